@@ -29,12 +29,11 @@ struct cola_settings {
     /* LMPoutputRange, 1/10000 deg: angles of beams. Without `narrowed` all beams are sent. */
     int32_t start_e4, stop_e4;
     uint8_t narrowed;
-    uint8_t filter; /* FREchoFilter: enum cola_filter */
+    uint8_t filter; /* FREchoFilter: enum cola_echoes */
     uint32_t scale; /* LMDscandatascalefactor; 0: the geometry's */
     char location[COLA_MAX_NAME];
     uint8_t framing; /* EIHstCola, as it was written or stored */
 };
-enum cola_filter { COLA_FILTER_FIRST = 0, COLA_FILTER_ALL = 1, COLA_FILTER_LAST = 2 };
 
 struct cola {
     struct protocol_host host;
@@ -164,9 +163,9 @@ cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
 
 /* 12 of "field012"; UINT32_MAX: another name. */
 uint32_t cola_field_number(const char *name);
-/* A field is answered as a record; beyond the model's records the answer is a single 0 (n_records). */
-enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out);
-enum cola_error cola_write_field(struct cola *self, uint32_t field, struct cola_args *args);
+/* The field whose number is in `field` is answered as a record; beyond the model's records the answer is a single 0
+ * (n_records). */
+cola_handler cola_read_field, cola_write_field;
 cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_set_method, cola_write_set_method,
     cola_read_set, cola_write_set, cola_set_results_event, cola_set_outputs_event, cola_set_inputs_event;
 /* The event LIDoutputstate. */
@@ -209,7 +208,7 @@ enum cola_head_state {
     COLA_HEAD_FAULT
 };
 enum cola_head_state cola_ask_state(struct cola *self);
-/* Lets the head scan if it rests. */
+/* Lets the head scan if it rests. 1: it does not; then polls that wait are refused. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
     cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination, cola_log_in,

@@ -75,17 +75,8 @@ static const struct command {
 };
 
 /* field000 and on */
-static enum cola_error read_field(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    return cola_read_field(self, self->field, args, out);
-}
-static enum cola_error write_field(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    (void)out;
-    return cola_write_field(self, self->field, args);
-}
-static const struct command any_field = {"field", 'R', COLA_RUN, read_field},
-                            set_field = {"field", 'W', COLA_CLIENT, write_field};
+static const struct command any_field = {"field", 'R', COLA_RUN, cola_read_field},
+                            set_field = {"field", 'W', COLA_CLIENT, cola_write_field};
 
 enum cola_error cola_read_switch(struct cola_args *args, int *on)
 {
@@ -107,13 +98,15 @@ static enum cola_error set_scan_event(struct cola *self, struct cola_args *args,
     return COLA_OK;
 }
 
+/* An answer may be under way in self->unit, where a poll of before is refused. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error)
 {
-    struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
+    uint8_t unit[32];
+    struct cola_out out = {.buf = unit, .cap = sizeof unit};
     cola_begin(&out, form, "sFA");
     cola_put_u(&out, 2, (uint32_t)error);
     self->host.count(self->host.ctx, PROTOCOL_WRONG, 1);
-    self->host.send(self->host.ctx, self->unit, cola_end(&out));
+    self->host.send(self->host.ctx, unit, cola_end(&out));
 }
 
 /* A request cut into its parts. */
@@ -184,10 +177,8 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
  * anew. */
 static void reboot(struct cola *self)
 {
-    char reply[512];
-    const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", reply, sizeof reply) != 0;
-    struct sh_err err; /* unused: what is stored was accepted before */
-    cola_power_up(self, &err);
+    const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", NULL, 0) != 0;
+    cola_power_up(self, NULL); /* what is stored was accepted before */
     if (refused) self->host.hang_up(self->host.ctx);
 }
 

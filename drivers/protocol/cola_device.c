@@ -6,7 +6,7 @@
 #include "drivers/protocol/cola.h"
 #include "drivers/protocol/cola_clock.h"
 
-enum { MAX_REPLY = 512, MOST_LOCATION = 16 };
+enum { MOST_LOCATION = 16 };
 
 /* ---- identity */
 
@@ -59,7 +59,7 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
 enum cola_head_state cola_ask_state(struct cola *self)
 {
     static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
-    char state[MAX_REPLY] = "";
+    char state[PROTOCOL_REPLY] = "";
     if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return COLA_HEAD_UNKNOWN;
     for (int i = COLA_HEAD_OFF; i <= COLA_HEAD_FAULT; i++)
         if (strcmp(names[i], state) == 0) return (enum cola_head_state)i;
@@ -169,24 +169,25 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 
 int cola_start_scan(struct cola *self)
 {
-    char reply[MAX_REPLY];
     const enum cola_head_state head = cola_ask_state(self);
-    if (head == COLA_HEAD_IDLE) {
-        const int refused = self->host.command(self->host.ctx, "SCAN:START", reply, sizeof reply) != 0;
-        self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before */
-        return refused;
-    }
-    self->wants_scan = head != COLA_HEAD_FAULT && head != COLA_HEAD_UNKNOWN; /* one that scans may be about to stop */
-    return !self->wants_scan;
+    int refused = head == COLA_HEAD_FAULT || head == COLA_HEAD_UNKNOWN;
+    if (head == COLA_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
+    self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before, or just now */
+    if (!refused) return 0;
+    for (uint32_t i = 0; i < self->n_waiting; i++)
+        cola_refuse(self, (enum cola_form)self->waiting_form[i], COLA_CONDITION);
+    self->n_waiting = 0;
+    return 1;
 }
 
-/* u8 0: measures */
+/* u8 0: measures; 1: not allowed, and all is as before */
 enum cola_error cola_start(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = self->started = 1;
-    cola_put_u(out, 1, (uint32_t)cola_start_scan(self));
+    const int refused = cola_start_scan(self);
+    if (!refused) self->measures = self->started = 1;
+    cola_put_u(out, 1, (uint32_t)refused);
     return COLA_OK;
 }
 
@@ -195,8 +196,9 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
 {
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    self->measures = self->started = self->wants_scan = 0;
-    cola_ports_select(self); /* results of before would hide that nothing is watched */
+    self->measures = self->started = 0;
+    self->wants_scan = self->n_waiting != 0; /* a poll is answered also where nothing is measured */
+    cola_ports_select(self);                 /* results of before would hide that nothing is watched */
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }

@@ -198,7 +198,7 @@ static void add_point(struct cola_record *r, uint32_t beam, int32_t near_um, int
     r->n++;
 }
 
-/* The direction of a beam or a corner, at the beam that is nearest to it; beside the head's beams there is none. */
+/* Adds the direction of a beam or a corner, at the beam that is nearest to it; none where the head has no such beam. */
 static void add_direction(struct cola_record *r, const struct cola_shape *shape, const struct planar_head *head,
                           double turns)
 {

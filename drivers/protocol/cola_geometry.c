@@ -7,7 +7,6 @@
 
 /* of mLMPsetscancfg */
 enum { OK, FREQUENCY_ERROR, RESOLUTION_ERROR, RESOLUTION_AND_AREA_ERROR, AREA_ERROR, OTHER_ERROR };
-enum { REPLY_LEN = 512 };
 
 /* ---- the head as it is set */
 
@@ -32,7 +31,7 @@ static void take_geometry(struct planar_head *h, int64_t lines_uhz, uint32_t ste
 
 static double ask(struct cola *self, const char *query)
 {
-    char reply[REPLY_LEN] = "";
+    char reply[PROTOCOL_REPLY];
     return self->host.command(self->host.ctx, query, reply, sizeof reply) == 0 ? strtod(reply, NULL) : 0.0;
 }
 
@@ -101,18 +100,18 @@ static uint32_t cola_geometry_find(const struct cola *self, const struct scan_cf
 
 static int set_lines(struct cola *self)
 {
-    char line[48], reply[REPLY_LEN];
+    char line[48];
     snprintf(line, sizeof line, "HEAD:LINes %.6f", (double)self->next.lines_uhz / 1e6);
-    return self->host.command(self->host.ctx, line, reply, sizeof reply);
+    return self->host.command(self->host.ctx, line, NULL, 0);
 }
 
 /* The order of the two commands depends on the geometry before: each step must lead to a geometry that the head has. */
 static enum cola_error set_head(struct cola *self)
 {
-    char line[48], reply[REPLY_LEN];
+    char line[48];
     const int lines = set_lines(self);
     snprintf(line, sizeof line, "SCAN:STEP %.9f", 360.0 / self->next.steps);
-    if (self->host.command(self->host.ctx, line, reply, sizeof reply) != 0) return COLA_CONDITION;
+    if (self->host.command(self->host.ctx, line, NULL, 0) != 0) return COLA_CONDITION;
     if (lines != 0 && set_lines(self) != 0) return COLA_CONDITION;
     cola_look_at_head(self);
     return COLA_OK;
@@ -133,7 +132,6 @@ static int is_measuring(const struct cola *self)
 enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     struct planar_head wanted = *cola_head(self);
-    char reply[REPLY_LEN];
     struct scan_cfg asked;
     asked.scan_chz = cola_arg_u(args, 4);
     asked.sectors = cola_arg_i(args, 2);
@@ -152,7 +150,7 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
         self->next.steps = wanted.steps;
         self->next.form = out->form;
         if (is_turning(self)) {
-            if (self->host.command(self->host.ctx, "SCAN:STOP", reply, sizeof reply) != 0) return COLA_CONDITION;
+            if (self->host.command(self->host.ctx, "SCAN:STOP", NULL, 0) != 0) return COLA_CONDITION;
             self->next.is_due = 1;
             return COLA_LATER;
         }

@@ -62,7 +62,7 @@ static const struct planar_echo *echo_of(const struct cola *self, unsigned k, ui
     const uint32_t n = self->scan.whole->n[beam];
     if (k == 1) return n > 1 ? &echo[1] : NULL;
     if (n == 0) return NULL;
-    return self->set.filter == COLA_FILTER_LAST ? &echo[n - 1] : &echo[0];
+    return self->set.filter == COLA_ECHOES_LAST ? &echo[n - 1] : &echo[0];
 }
 
 static void put_distances(const struct cola *self, unsigned k, struct cola_out *out)

@@ -81,22 +81,22 @@ uint32_t cola_field_number(const char *name)
 }
 
 /* The record of a field without a shape. */
-static void describe_empty(const struct cola *self, uint32_t field, struct cola_record *r)
+static void describe_empty(const struct cola *self, struct cola_record *r)
 {
     *r = (struct cola_record){.scale = 1.0f,
                               .step_e4 = cola_step_angle(cola_head(self)),
                               .first_e4 = cola_beam_angle(cola_head(self), 0),
                               .type = COLA_FIELD_SEGMENTED,
                               .is_segmented = self->model->named};
-    if (self->model->named) snprintf(r->name, sizeof r->name, "Field%03u", (unsigned)field + 1);
+    if (self->model->named) snprintf(r->name, sizeof r->name, "Field%03u", (unsigned)self->field + 1);
 }
 
 /* In a TiM the corner of a rectangle is counted from the first beam, in an LMS1xx from 0. */
-enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_field(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const struct cola_field *f = &self->fields.field[field];
+    const struct cola_field *f = &self->fields.field[self->field];
     struct cola_record record;
-    if (field >= self->model->n_records) {
+    if (self->field >= self->model->n_records) {
         cola_put_u(out, 1, 0);
         return cola_args_end(args);
     }
@@ -106,20 +106,21 @@ enum cola_error cola_read_field(struct cola *self, uint32_t field, struct cola_a
         return cola_args_end(args);
     }
     if (f->shape.kind == COLA_SHAPE_NONE)
-        describe_empty(self, field, &record);
+        describe_empty(self, &record);
     else
         cola_field_describe(f, cola_head(self), !cola_ports_is_lms(self), &record);
-    record.number = (uint8_t)(self->model->named || f->shape.kind != COLA_SHAPE_NONE ? field + 1 : 0);
+    record.number = (uint8_t)(self->model->named || f->shape.kind != COLA_SHAPE_NONE ? self->field + 1 : 0);
     cola_record_put(&record, out);
     return cola_args_end(args);
 }
 
 /* The field keeps the response time and the blanking size of the configuration: no telegram is known that has them. */
-enum cola_error cola_write_field(struct cola *self, uint32_t field, struct cola_args *args)
+enum cola_error cola_write_field(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    struct cola_field *f = &self->fields.field[field];
+    struct cola_field *f = &self->fields.field[self->field];
     struct cola_record record;
     struct cola_shape shape;
+    (void)out;
     enum cola_error error = cola_record_take(args, &record);
     if (error != COLA_OK) return error;
     if (!cola_head(self)->known) return COLA_CONDITION;
@@ -163,11 +164,16 @@ enum cola_error cola_read_field_results(struct cola *self, struct cola_args *arg
     return cola_args_end(args);
 }
 
-/* ---- which set of fields a TiM watches */
+/* ---- which set of fields a TiM watches. Other models don't have these variables. */
+
+static int has_sets(const struct cola *self)
+{
+    return !cola_ports_is_lms(self) && self->model->n_results != 0;
+}
 
 enum cola_error cola_read_set_method(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
     cola_put_u(out, 1, self->ports.by_telegram);
     return cola_args_end(args);
 }
@@ -183,7 +189,7 @@ enum cola_error cola_write_set_method(struct cola *self, struct cola_args *args,
 {
     int by_telegram;
     (void)out;
-    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
     const enum cola_error error = cola_read_switch(args, &by_telegram);
     if (error != COLA_OK) return error;
     self->ports.by_telegram = (uint8_t)by_telegram;
@@ -193,7 +199,7 @@ enum cola_error cola_write_set_method(struct cola *self, struct cola_args *args,
 
 enum cola_error cola_read_set(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
     cola_put_u(out, 2, self->ports.set);
     return cola_args_end(args);
 }
@@ -201,7 +207,7 @@ enum cola_error cola_read_set(struct cola *self, struct cola_args *args, struct 
 enum cola_error cola_write_set(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     (void)out;
-    if (cola_ports_is_lms(self) || self->model->n_results == 0) return COLA_VARIABLE_UNKNOWN;
+    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
     const uint32_t set = cola_arg_u(args, 2);
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;

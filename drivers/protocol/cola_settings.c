@@ -117,7 +117,7 @@ enum cola_error cola_read_filter(struct cola *self, struct cola_args *args, stru
 
 int cola_filter_fits(const struct cola *self, uint32_t filter)
 {
-    return filter <= COLA_FILTER_LAST && (filter != COLA_FILTER_ALL || self->model->echoes > 1);
+    return filter <= COLA_ECHOES_LAST && (filter != COLA_ECHOES_ALL || self->model->echoes > 1);
 }
 
 enum cola_error cola_write_filter(struct cola *self, struct cola_args *args, struct cola_out *out)

@@ -6,8 +6,6 @@
 
 #include "drivers/protocol/cola.h"
 
-enum { MAX_REPLY = 512 };
-
 static void put_lines(const struct cola *self, char *text, size_t cap)
 {
     struct cola_settings s = self->set;
@@ -26,13 +24,13 @@ static void put_lines(const struct cola *self, char *text, size_t cap)
 
 enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    char reply[MAX_REPLY], text[PROTOCOL_STORED];
+    char text[PROTOCOL_STORED];
     const enum cola_error error = cola_args_end(args);
     int kept = 1; /* a head without a file answers 1, too, but keeps nothing */
     if (error != COLA_OK) return error;
     if (self->keeps) {
         put_lines(self, text, sizeof text);
-        kept = self->host.command(self->host.ctx, "HEAD:STORe", reply, sizeof reply) == 0 &&
+        kept = self->host.command(self->host.ctx, "HEAD:STORe", NULL, 0) == 0 &&
                self->host.store(self->host.ctx, text) == 0;
         if (kept) strcpy(self->stored, text);
     }

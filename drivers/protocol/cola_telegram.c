@@ -111,7 +111,7 @@ enum cola_error cola_args_end(const struct cola_args *args)
 {
     const uint8_t *at = args->at;
     if (args->error != COLA_OK) return args->error;
-    while (at < args->end && *at == ' ')
+    while (args->form == COLA_A && at < args->end && *at == ' ')
         at++;
     return at < args->end ? COLA_TOO_LONG : COLA_OK;
 }

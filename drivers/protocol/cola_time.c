@@ -8,7 +8,7 @@
 #include "drivers/protocol/cola.h"
 #include "drivers/protocol/cola_clock.h"
 
-enum { MAX_REPLY = 512, N_ROLES = 3, N_INTERFACES = 2, ZONE_0 = 12, N_ZONES = 25 };
+enum { N_ROLES = 3, N_INTERFACES = 2, ZONE_0 = 12, N_ZONES = 25 };
 
 /* ---- the clock */
 
@@ -32,14 +32,14 @@ void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)
 /* 1: the clock shows that time now. */
 static int set_clock(struct cola *self, int64_t ns)
 {
-    char line[48], reply[MAX_REPLY];
+    char line[48], reply[PROTOCOL_REPLY];
     int64_t shift_ns;
     if (self->host.command(self->host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
         sscanf(reply, "%" SCNd64, &shift_ns) != 1)
         return 0;
     shift_ns += ns - cola_clock_ns(self, self->now_ns);
     snprintf(line, sizeof line, "TIME:SHIFt %" PRId64, shift_ns);
-    return self->host.command(self->host.ctx, line, reply, sizeof reply) == 0;
+    return self->host.command(self->host.ctx, line, NULL, 0) == 0;
 }
 
 /* ---- the time server */
@@ -62,7 +62,7 @@ static uint32_t cola_time_word_of(const char *const words[], uint32_t n, const c
 
 static enum cola_error get_server(struct cola *self, struct cola_server *s)
 {
-    char reply[MAX_REPLY], role[8], interface[4];
+    char reply[PROTOCOL_REPLY], role[8], interface[4];
     uint32_t *const a = s->address;
     int zone_h;
     if (self->host.command(self->host.ctx, "TIME:SERVer?", reply, sizeof reply) != 0 ||
@@ -77,81 +77,60 @@ static enum cola_error get_server(struct cola *self, struct cola_server *s)
 
 static enum cola_error put_server(struct cola *self, const struct cola_server *s)
 {
-    char line[96], reply[MAX_REPLY];
+    char line[96];
     const uint32_t *const a = s->address;
     if (s->role >= N_ROLES || s->interface >= N_INTERFACES || s->zone >= N_ZONES) return COLA_INVALID_DATA;
     snprintf(line, sizeof line, "TIME:SERVer %s,%u.%u.%u.%u,%u,%d,%s", roles[s->role], a[0], a[1], a[2], a[3],
              s->update_s, (int)s->zone - ZONE_0, interfaces[s->interface]);
-    const int error = self->host.command(self->host.ctx, line, reply, sizeof reply);
+    const int error = self->host.command(self->host.ctx, line, NULL, 0);
     return error == 0 ? COLA_OK : error == -221 ? COLA_CONDITION : COLA_INVALID_DATA;
 }
 
-/* The variables that have one number: a member of struct cola_server, and its bytes. */
-static enum cola_error read_number(struct cola *self, size_t member, unsigned bytes, struct cola_args *args,
-                                   struct cola_out *out)
+/* The variables of one number, or of four: a member of struct cola_server, how many it has, and the bytes of each. */
+static enum cola_error read_numbers(struct cola *self, size_t member, int n, unsigned bytes, struct cola_args *args,
+                                    struct cola_out *out)
 {
     struct cola_server s;
     enum cola_error error = cola_args_end(args);
     if (error == COLA_OK) error = get_server(self, &s);
-    if (error == COLA_OK) cola_put_u(out, bytes, *(const uint32_t *)((const char *)&s + member));
+    for (int i = 0; i < n && error == COLA_OK; i++)
+        cola_put_u(out, bytes, ((const uint32_t *)((const char *)&s + member))[i]);
     return error;
 }
 
-static enum cola_error write_number(struct cola *self, size_t member, unsigned bytes, struct cola_args *args)
+static enum cola_error write_numbers(struct cola *self, size_t member, int n, unsigned bytes, struct cola_args *args)
 {
     struct cola_server s;
-    const uint32_t value = cola_arg_u(args, bytes);
+    uint32_t value[4];
+    for (int i = 0; i < n; i++)
+        value[i] = cola_arg_u(args, bytes);
     enum cola_error error = cola_args_end(args);
     if (error == COLA_OK) error = get_server(self, &s);
     if (error != COLA_OK) return error;
-    *(uint32_t *)((char *)&s + member) = value;
+    memcpy((char *)&s + member, value, (size_t)n * sizeof value[0]);
     return put_server(self, &s);
 }
 
-#define NUMBER(name, member, bytes)                                                                    \
+#define NUMBERS(name, member, n, bytes)                                                                \
     enum cola_error cola_read_##name(struct cola *self, struct cola_args *args, struct cola_out *out)  \
     {                                                                                                  \
-        return read_number(self, offsetof(struct cola_server, member), bytes, args, out);              \
+        return read_numbers(self, offsetof(struct cola_server, member), n, bytes, args, out);          \
     }                                                                                                  \
     enum cola_error cola_write_##name(struct cola *self, struct cola_args *args, struct cola_out *out) \
     {                                                                                                  \
         (void)out;                                                                                     \
-        return write_number(self, offsetof(struct cola_server, member), bytes, args);                  \
+        return write_numbers(self, offsetof(struct cola_server, member), n, bytes, args);              \
     }
-NUMBER(time_role, role, 1)
-NUMBER(time_interface, interface, 1)
-NUMBER(time_zone, zone, 1)
-NUMBER(time_update, update_s, 4)
-
-/* 4 x u8 */
-enum cola_error cola_read_time_address(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    struct cola_server s;
-    enum cola_error error = cola_args_end(args);
-    if (error == COLA_OK) error = get_server(self, &s);
-    for (int i = 0; i < 4 && error == COLA_OK; i++)
-        cola_put_u(out, 1, s.address[i]);
-    return error;
-}
-
-enum cola_error cola_write_time_address(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    struct cola_server s;
-    uint32_t address[4];
-    (void)out;
-    for (int i = 0; i < 4; i++)
-        address[i] = cola_arg_u(args, 1);
-    enum cola_error error = cola_args_end(args);
-    if (error == COLA_OK) error = get_server(self, &s);
-    if (error != COLA_OK) return error;
-    memcpy(s.address, address, sizeof s.address);
-    return put_server(self, &s);
-}
+NUMBERS(time_role, role, 1, 1)
+NUMBERS(time_interface, interface, 1, 1)
+NUMBERS(time_zone, zone, 1, 1)
+NUMBERS(time_update, update_s, 1, 4)
+NUMBERS(time_address, address, 4, 1)
 
 /* One of the times, in ns, of TIME:SERVer? STATe: 0 the limit, 1 the offset, 2 the delay. float, s */
 static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
 {
-    char reply[MAX_REPLY];
+    char reply[PROTOCOL_REPLY];
     int64_t ns[3];
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;

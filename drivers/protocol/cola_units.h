@@ -9,7 +9,7 @@
 
 /* Rounded to 1/10000 deg. */
 int32_t cola_beam_angle(const struct planar_head *head, uint32_t beam);
-/* The beam that is nearest to an angle; below 0, or n and more: beside the beams of the head. */
+/* The beam that is nearest to an angle; below 0, or n and more: the head has no such beam. */
 int64_t cola_beam_at(const struct planar_head *head, int32_t angle_e4);
 /* The exact direction of a beam, in quarters of a step. */
 int64_t cola_beam_quarters(const struct planar_head *head, uint32_t beam);

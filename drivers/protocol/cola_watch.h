@@ -2,8 +2,8 @@
 /* Watches fields: whole turns of a planar head go in, results of fields and states of outputs come out.
  *
  * An object is an echo that lies in a field's shape (cola_shape.h). A shot without echo is none, and neither is an echo
- * nearer than the head's least range or farther than COLA_SHAPE_REACH_UM. The echo filter
- * chooses which echoes of a beam count: the first, the last, or each of them.
+ * nearer than the head's least range or farther than COLA_SHAPE_REACH_UM. The echo filter chooses which echoes of a
+ * beam count: the first, the last, or each of them.
  *
  * Response time: a beam counts once it has seen an object in so many scans in a row, the number of scans that is
  * nearest to the time, at least one. It no longer counts with the first scan in which it sees none.
@@ -19,7 +19,7 @@
 
 enum { COLA_WATCH_SLOTS = 10, COLA_WATCH_OUTPUTS = 4 };
 enum cola_result { COLA_RESULT_INVALID, COLA_RESULT_FREE, COLA_RESULT_INFRINGED };
-enum cola_echoes { COLA_ECHOES_FIRST, COLA_ECHOES_ALL, COLA_ECHOES_LAST };
+enum cola_echoes { COLA_ECHOES_FIRST, COLA_ECHOES_ALL, COLA_ECHOES_LAST }; /* as FREchoFilter numbers them */
 /* Bits of news. */
 enum { COLA_NEW_RESULT = 1, COLA_NEW_OUTPUT = 2 };
 

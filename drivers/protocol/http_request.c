@@ -36,7 +36,7 @@ void http_reader_drop(struct http_reader *r)
 /* The parts that the fields of a head are cut into. */
 struct head {
     struct http_text host, origin, target_place; /* without one, s is NULL */
-    int n_host, n_length, n_coding, expects, expects_other, close, keep_alive;
+    int n_host, n_origin, n_length, n_coding, expects, expects_other, close, keep_alive;
     size_t length;
 };
 
@@ -71,6 +71,7 @@ static int read_field(struct head *h, struct http_text line)
         h->n_host++;
         h->host = f.value;
     } else if (http_text_is(f.name, "origin")) {
+        h->n_origin++;
         h->origin = f.value;
     } else if (http_text_is(f.name, "transfer-encoding")) {
         h->n_coding++;
@@ -79,7 +80,7 @@ static int read_field(struct head *h, struct http_text line)
         h->keep_alive |= http_list_has(f.value, "keep-alive");
     } else if (http_text_is(f.name, "expect")) {
         h->expects = http_text_is(f.value, "100-continue");
-        h->expects_other = !h->expects;
+        h->expects_other |= !h->expects;
     } else if (http_text_is(f.name, "content-length")) {
         if (h->n_length++ != 0) return 400;
         return http_read_length(f.value, &h->length);
@@ -109,7 +110,7 @@ static int read_head(struct http_reader *r, struct head *h)
     while (status == 0 && (line = http_next_line(r->bytes, r->head_len, &at)).len != 0)
         status = read_field(h, line);
     if (status != 0) return status;
-    if (h->n_host > 1 || (h->n_host == 0 && q->minor > 0)) return 400;
+    if (h->n_host > 1 || h->n_origin > 1 || (h->n_host == 0 && q->minor > 0)) return 400;
     if (h->target_place.s != NULL) h->host = h->target_place;
     if (http_read_place(h->host, &place) != 0) return 400;
     if (h->n_coding != 0 || (h->n_length == 0 && strcmp(q->method, "POST") == 0)) return 411;
@@ -130,7 +131,8 @@ static int find_head(struct http_reader *r)
     if (empty != 0) forget(r, empty);
     const int result = http_scan_head(&r->scan, r->bytes, r->len < HTTP_MAX_HEAD ? r->len : HTTP_MAX_HEAD);
     const char *line_end = memchr(r->bytes, '\n', r->len);
-    const size_t line_len = line_end != NULL ? (size_t)(line_end - r->bytes) : r->len;
+    size_t line_len = line_end != NULL ? (size_t)(line_end - r->bytes) : r->len;
+    if (line_len != 0 && r->bytes[line_len - 1] == '\r') line_len--;
     if (line_len > HTTP_MAX_LINE) return 414;
     if (result == HTTP_SCAN_MORE) return r->len > HTTP_MAX_HEAD ? 431 : 0;
     if (result != HTTP_SCAN_WHOLE) return result;

@@ -14,8 +14,8 @@
 #include "drivers/protocol/http_head.h"
 
 enum {
-    HTTP_MAX_LINE = 512,  /* request line: 414 */
-    HTTP_MAX_HEAD = 4096, /* request line and fields: 431 */
+    HTTP_MAX_LINE = 512,  /* request line without its end: 414 */
+    HTTP_MAX_HEAD = 4096, /* request line and fields, with the empty line: 431 */
     HTTP_MAX_BODY = 1024, /* 413 */
 };
 

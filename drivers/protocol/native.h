@@ -321,7 +321,6 @@ void native_decode_beam(const uint8_t *payload, uint32_t i, struct native_beam *
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out);
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out);
 int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out);
-void native_decode_colour(const uint8_t *payload, uint32_t i, uint8_t rgb[3]); /* i < n_points */
 int native_decode_line_end(const uint8_t *payload, size_t len, struct line_end *out);
 int native_decode_telemetry(const uint8_t *payload, size_t len, struct native_telemetry *out);
 int native_decode_event(const uint8_t *payload, size_t len, struct native_event *out);

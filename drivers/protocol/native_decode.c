@@ -50,9 +50,8 @@ void native_decode_beam(const uint8_t *payload, uint32_t i, struct native_beam *
 
 int native_decode_points(const uint8_t *payload, size_t len, struct native_points *out)
 {
-    int rc = fields_decode(&fields_points, payload, len, out);
-    if (rc == 0 && out->n_points > (len - NATIVE_POINTS_HEAD_LEN) / NATIVE_POINT_LEN) rc = SH_EFORMAT;
-    return rc;
+    const int rc = fields_decode(&fields_points, payload, len, out);
+    return rc == 0 && out->n_points > (len - NATIVE_POINTS_HEAD_LEN) / NATIVE_POINT_LEN ? SH_EFORMAT : rc;
 }
 
 /* It has no branches, and one load per point: some readers decode nothing else. */
@@ -70,24 +69,21 @@ void native_count_points(const uint8_t *payload, uint32_t n, uint32_t *n_empty, 
     *n_reflectances = n - without;
 }
 
+/* Attributes and colours begin alike. each: the bytes of a record. */
+static int decode_beside(const uint8_t *payload, size_t len, size_t each, struct native_attributes *out)
+{
+    const int rc = fields_decode(&fields_attributes, payload, len, out);
+    return rc == 0 && out->n_points > (len - NATIVE_ATTRIBUTES_HEAD_LEN) / each ? SH_EFORMAT : rc;
+}
+
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out)
 {
-    int rc = fields_decode(&fields_attributes, payload, len, out);
-    if (rc == 0 && out->n_points > (len - NATIVE_ATTRIBUTES_HEAD_LEN) / NATIVE_ATTRIBUTE_LEN) rc = SH_EFORMAT;
-    return rc;
+    return decode_beside(payload, len, NATIVE_ATTRIBUTE_LEN, out);
 }
 
-/* A colours payload begins as an attributes payload does. */
 int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out)
 {
-    int rc = fields_decode(&fields_attributes, payload, len, out);
-    if (rc == 0 && out->n_points > (len - NATIVE_COLOURS_HEAD_LEN) / NATIVE_COLOUR_LEN) rc = SH_EFORMAT;
-    return rc;
-}
-
-void native_decode_colour(const uint8_t *payload, uint32_t i, uint8_t rgb[3])
-{
-    memcpy(rgb, payload + NATIVE_COLOURS_HEAD_LEN + (size_t)i * NATIVE_COLOUR_LEN, NATIVE_COLOUR_LEN);
+    return decode_beside(payload, len, NATIVE_COLOUR_LEN, out);
 }
 
 int native_check_deviations(size_t len, uint32_t n_points)

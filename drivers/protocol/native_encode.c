@@ -171,17 +171,23 @@ struct encode_cut {
     int64_t t_ns; /* in the headers */
 };
 
+/* Attributes and colours begin alike. */
+static void put_beside_head(uint8_t *dst, const struct encode_cut *cut)
+{
+    const struct native_attributes head = {cut->head.pulse0, cut->head.line, cut->head.n_points};
+    fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
+}
+
 /* Writes attributes. Here and below, 0 means that there is no room. */
 static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *cut)
 {
     const struct line_block *block = cut->block;
     const uint32_t n = cut->head.n_points, end = cut->first + n;
-    const struct native_attributes head = {.pulse0 = cut->head.pulse0, .line = cut->head.line, .n_points = n};
     const size_t each = NATIVE_ATTRIBUTE_LEN + (block->deviation != NULL ? (size_t)NATIVE_DEVIATION_LEN : 0);
     const size_t payload_len = NATIVE_ATTRIBUTES_HEAD_LEN + n * each;
     uint8_t *at = dst + NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
-    fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
+    put_beside_head(dst, cut);
     for (uint32_t i = cut->first; i < end; i++, at += NATIVE_ATTRIBUTE_LEN)
         le_put32(at, (uint16_t)block->amplitude_cdb[i] | (uint32_t)block->width_cns[i] << 16);
     for (uint32_t i = cut->first; block->deviation != NULL && i < end; i++, at += NATIVE_DEVIATION_LEN)
@@ -192,11 +198,9 @@ static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *
 /* Colours likewise. */
 static size_t put_colours(uint8_t *dst, size_t cap, const struct encode_cut *cut)
 {
-    const struct native_attributes head = {
-        .pulse0 = cut->head.pulse0, .line = cut->head.line, .n_points = cut->head.n_points};
-    const size_t len = (size_t)head.n_points * NATIVE_COLOUR_LEN, payload_len = NATIVE_COLOURS_HEAD_LEN + len;
+    const size_t len = (size_t)cut->head.n_points * NATIVE_COLOUR_LEN, payload_len = NATIVE_COLOURS_HEAD_LEN + len;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
-    fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
+    put_beside_head(dst, cut);
     memcpy(dst + NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN, cut->block->rgb + cut->first, len);
     return put_header(dst, NATIVE_COLOURS, 0, payload_len, cut->t_ns);
 }

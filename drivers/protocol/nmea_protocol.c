@@ -52,13 +52,6 @@ static int64_t next(const void *protocol)
     return self->next_ns;
 }
 
-static void skip(void *protocol, const uint8_t *bytes, size_t len)
-{
-    struct receiver *self = protocol;
-    (void)bytes;
-    self->host.count(self->host.ctx, PROTOCOL_INPUT_LOST, len);
-}
-
 const struct protocol_ops protocol_nmea = {
     .name = "nmea",
     .needs = PROTOCOL_NEEDS_TIME | PROTOCOL_NEEDS_PLACE,
@@ -69,6 +62,6 @@ const struct protocol_ops protocol_nmea = {
     .destroy = free,
     .open = open_at,
     .time = pass,
-    .input = skip,
+    .input = protocol_lose_input,
     .next_ns = next,
 };

@@ -37,14 +37,12 @@ int planar_scan_check(const struct native_descriptor *d, const struct native_emi
 static void take_head(struct planar_scan *s)
 {
     const struct native_emitter *e = &s->emitter;
+    const struct native_descriptor d = {.pan_counts_per_turn = s->pan_counts};
     struct planar_head *h = &s->head;
-    const int64_t n = (int64_t)e->last_step - e->first_step + 1;
-    h->known = e->kind == NATIVE_EMIT_PLANAR && e->steps <= PLANAR_MAX_TURN && e->first_step >= 0 && n > 0 &&
-               n <= PLANAR_MAX_STEPS && (uint32_t)e->last_step < e->steps && e->front_step >= 0 &&
-               (uint32_t)e->front_step < e->steps && s->pan_counts >= 1;
+    h->known = e->kind == NATIVE_EMIT_PLANAR && planar_scan_check(&d, e, PLANAR_MAX_TURN, NULL) == SH_OK;
     if (!h->known) return;
     h->steps = e->steps;
-    h->n = (uint32_t)n;
+    h->n = (uint32_t)(e->last_step - e->first_step) + 1;
     h->first = e->first_step;
     h->last = e->last_step;
     h->front = e->turn < 0 ? e->front_step : e->first_step + e->last_step - e->front_step;

@@ -23,6 +23,13 @@ static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_CAPTURE] = &protocol_capture,
 };
 
+void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len)
+{
+    const struct protocol_host *host = protocol;
+    (void)bytes;
+    host->count(host->ctx, PROTOCOL_INPUT_LOST, len);
+}
+
 const struct protocol_ops *protocol_ops_get(enum protocol_id id)
 {
     return (unsigned)id < PROTOCOL_N ? protocols[id] : NULL;

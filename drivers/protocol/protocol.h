@@ -74,8 +74,8 @@ struct protocol_host {
      * counts that. */
     int (*send)(void *ctx, const void *unit, size_t len);
     /* Carries out one line of the native command set (COMMANDS.md), "HEAD:LINES 20" for example, as this
-     * session, which then releases control. reply (cap 500 and more) gets the reply line without its end.
-     * Returns 0, or the SCPI error number. */
+     * session, which then releases control. reply (cap PROTOCOL_REPLY; or NULL and 0: not looked at) gets the reply
+     * line without its end. Returns 0, or the SCPI error number. */
     int (*command)(void *ctx, const char *line, char *reply, size_t cap);
     /* The last fix of the GNSS receiver at or before a device time. Returns 1, or 0: there is none (no time, or no fix
      * since power-up). Quality 0 where the head is nowhere on the Earth. */
@@ -105,7 +105,7 @@ struct protocol_host {
     void (*tell_once)(void *ctx, const char *text);
 };
 
-enum { PROTOCOL_STORED = 2048 };
+enum { PROTOCOL_REPLY = 512, PROTOCOL_STORED = 2048 };
 
 enum { PROTOCOL_MAX_GEOMETRIES = 8 };
 struct cola_fields;
@@ -201,7 +201,11 @@ struct protocol_ops {
     int64_t (*next_ns)(const void *protocol);
 };
 
-/* From the one list, in protocol.c. NULL for an unknown id, or one that is not built in. */
+/* protocol_ops.input of a protocol that takes no bytes: counts them as lost. Its session begins with its struct
+ * protocol_host. */
+void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len);
+
+/* From the one list, in protocol.c. NULL for an unknown id. */
 const struct protocol_ops *protocol_ops_get(enum protocol_id id);
 
 #endif

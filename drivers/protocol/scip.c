@@ -69,7 +69,7 @@ static void scip_take_line(struct scip *s)
     if (!s->foul && s->is_over)
         scip_answer(s, s->line, s->n_line, "0B");
     else if (!s->foul && s->n_line != 0)
-        scip_command(s, s->line, s->n_line);
+        scip_command(s);
     s->n_line = 0;
     s->is_over = s->foul = 0;
 }
@@ -107,8 +107,7 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
  * recording, only this session begins anew. */
 static void reboot(struct scip *s)
 {
-    char reply[512];
-    const int refused = s->host.command(s->host.ctx, "HEAD:REBOOT", reply, sizeof reply) != 0;
+    const int refused = s->host.command(s->host.ctx, "HEAD:REBOOT", NULL, 0) != 0;
     scip_power_up(s);
     if (refused) s->host.hang_up(s->host.ctx);
 }

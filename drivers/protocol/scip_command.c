@@ -16,52 +16,45 @@ int32_t scip_number(const char *text, size_t len)
     return value;
 }
 
-static void laser(struct scip *s, const char *line, size_t len)
+static const char *laser(struct scip *s)
 {
-    const char *refused;
-    if (s->simulation.broken)
-        refused = "01";
-    else if (s->laser)
-        refused = "02";
-    else if (s->time_mode)
-        refused = "10";
-    else
-        refused = scip_laser_on(s);
-    if (refused != NULL && strcmp(refused, "50") == 0) refused = "01";
-    scip_answer(s, line, len, refused == NULL ? "00" : refused);
+    if (s->simulation.broken) return "01";
+    if (s->laser) return "02";
+    if (s->time_mode) return "10";
+    const char *refused = scip_laser_on(s);
+    if (refused == NULL) return "00";
+    return strcmp(refused, "50") == 0 ? "01" : refused;
 }
 
-static void quit(struct scip *s, const char *line, size_t len)
+static const char *quit(struct scip *s)
 {
     scip_laser_off(s);
     s->time_mode = s->asleep = 0;
-    scip_answer(s, line, len, "00");
+    return "00";
 }
 
 /* The speed is the sensor's: another session, which is over by now, may have changed it. */
 static void reset_speed(struct scip *s)
 {
-    char reply[512];
     if ((s->features & SCIP_MOTOR_SPEED) != 0 &&
         scip_lines_uhz(s, "HEAD:LINES?") != scip_lines_uhz(s, "HEAD:LINES? DEF"))
-        s->host.command(s->host.ctx, "HEAD:LINES DEF", reply, sizeof reply);
+        s->host.command(s->host.ctx, "HEAD:LINES DEF", NULL, 0);
 }
 
 /* RT: RS without the timer and the bit rate. */
-static void reset(struct scip *s, const char *line, size_t len)
+static const char *reset(struct scip *s)
 {
-    scip_laser_off(s);
-    s->time_mode = s->asleep = 0;
+    quit(s);
     s->simulation = (struct scip_simulation){0};
     reset_speed(s);
-    if (line[1] == 'S') {
+    if (s->line[1] == 'S') {
         s->epoch_ns = s->epoch_us_ns = s->now_ns;
         s->bit_rate = s->model->bit_rate;
     }
-    scip_answer(s, line, len, "00");
+    return "00";
 }
 
-static void reboot(struct scip *s, const char *line, size_t len)
+static const char *reboot(struct scip *s)
 {
     enum { SECOND_NS = 1000000000 };
     const int again = s->rb_ns != INT64_MIN && s->now_ns - s->rb_ns <= SECOND_NS;
@@ -69,9 +62,11 @@ static void reboot(struct scip *s, const char *line, size_t len)
     if (again) {
         scip_laser_off(s);
         s->reboot_ns = s->now_ns + SECOND_NS;
+        return "00";
     }
-    scip_reply_begin(&s->reply, line, len, again ? "00" : "01"); /* 01 to the first of two is no error */
+    scip_reply_begin(&s->reply, s->line, s->n_line, "01"); /* to the first of two it is no error */
     scip_send(s);
+    return NULL;
 }
 
 static const char *time_mode(struct scip *s, char code)
@@ -81,52 +76,53 @@ static const char *time_mode(struct scip *s, char code)
     if (code == '0' && (s->stream.active || s->single.active)) return "10";
     if (code == '2' && !s->time_mode) return "03";
     if (code == '1' && !s->time_mode && (s->features & SCIP_TIME_ALONE) != 0) return "04";
-    return code < '0' || code > '2' ? "01" : NULL;
+    return code < '0' || code > '2' ? "01" : "00";
 }
 
-static void adjust_time(struct scip *s, const char *line, size_t len)
+static const char *adjust_time(struct scip *s)
 {
-    const char *refused = time_mode(s, line[2]);
-    if (refused != NULL) {
-        scip_answer(s, line, len, refused);
-        return;
-    }
-    if (line[2] == '0') scip_laser_off(s);
-    if (line[2] != '1') s->time_mode = line[2] == '0';
-    scip_reply_begin(&s->reply, line, len, "00");
-    if (line[2] == '1') scip_reply_time(&s->reply, scip_time_ms(s, s->now_ns));
+    const char code = s->line[2];
+    const char *status = time_mode(s, code);
+    if (strcmp(status, "00") != 0) return status;
+    if (code == '0') scip_laser_off(s);
+    if (code != '1') s->time_mode = code == '0';
+    if (code != '1') return status;
+    scip_reply_begin(&s->reply, s->line, s->n_line, status);
+    scip_reply_time(&s->reply, scip_time_ms(s, s->now_ns));
     scip_send(s);
+    return NULL;
 }
 
 /* The % goes with TM1 alone. TM0 and TM2, without it, switch the time mode. */
-static void tell_time_us(struct scip *s, const char *line, size_t len)
+static const char *tell_time_us(struct scip *s)
 {
-    if (line[3] != '1') {
-        scip_answer(s, line, len, "01");
-        return;
-    }
-    scip_reply_begin(&s->reply, line, len, "00");
+    if (s->line[3] != '1') return "01";
+    scip_reply_begin(&s->reply, s->line, s->n_line, "00");
     scip_reply_time_us(&s->reply, scip_time_us(s, s->now_ns));
     scip_send(s);
+    return NULL;
 }
 
-static void bit_rate(struct scip *s, const char *line, size_t len)
+static const char *bit_rate(struct scip *s)
 {
     static const int32_t rates[] = {19200, 38400, 57600, 115200, 250000, 500000, 750000};
-    const int32_t rate = scip_number(line + 2, 6);
-    const char *status = "02";
-    for (size_t i = 0; i < sizeof rates / sizeof *rates; i++)
-        if (rate == rates[i]) status = (uint32_t)rate == s->bit_rate ? "03" : "00";
-    if (rate < 0) status = "01";
-    if ((s->features & SCIP_BIT_RATE) == 0) status = "0F";
-    if (strcmp(status, "00") == 0) s->bit_rate = (uint32_t)rate;
-    scip_answer(s, line, len, status);
+    const int32_t rate = scip_number(s->line + 2, 6);
+    size_t i = 0;
+    if ((s->features & SCIP_BIT_RATE) == 0) return "0F";
+    if (rate < 0) return "01";
+    while (i < sizeof rates / sizeof *rates && rate != rates[i])
+        i++;
+    if (i == sizeof rates / sizeof *rates) return "02";
+    if ((uint32_t)rate == s->bit_rate) return "03";
+    s->bit_rate = (uint32_t)rate;
+    return "00";
 }
 
 /* Level 1 to 10: 1 to 10 percent slower. 0 and 99: the default. */
-static const char *motor_speed(struct scip *s, int32_t level)
+static const char *motor_speed(struct scip *s)
 {
-    char command[48], reply[512];
+    char command[48];
+    const int32_t level = scip_number(s->line + 2, 2);
     if ((s->features & SCIP_MOTOR_SPEED) == 0) return "04";
     if (level < 0) return "01";
     if (level > 10 && level != 99) return "02";
@@ -135,33 +131,28 @@ static const char *motor_speed(struct scip *s, int32_t level)
     if (wanted_uhz == now_uhz) return "03";
     snprintf(command, sizeof command, "HEAD:LINES %llu.%06llu", (unsigned long long)(wanted_uhz / 1000000),
              (unsigned long long)(wanted_uhz % 1000000));
-    const int error = s->host.command(s->host.ctx, command, reply, sizeof reply);
+    const int error = s->host.command(s->host.ctx, command, NULL, 0);
     if (error != 0) return error == -222 || error == -221 ? "04" : "10";
     return "00";
 }
 
-static void change_speed(struct scip *s, const char *line, size_t len)
+static const char *sensitivity(struct scip *s)
 {
-    scip_answer(s, line, len, motor_speed(s, scip_number(line + 2, 2)));
+    return s->line[2] == '0' || s->line[2] == '1' ? "03" : "01";
 }
 
-static void sensitivity(struct scip *s, const char *line, size_t len)
-{
-    scip_answer(s, line, len, line[2] == '0' || line[2] == '1' ? "03" : "01");
-}
-
-static void fall_asleep(struct scip *s, const char *line, size_t len)
+static const char *fall_asleep(struct scip *s)
 {
     scip_laser_off(s);
     s->asleep = 1;
-    scip_answer(s, line, len, "00");
+    return "00";
 }
 
 static const struct command {
     char name[4];
     uint8_t n_params;  /* characters after the name */
     uint32_t features; /* all of them, or the command is not there */
-    void (*run)(struct scip *s, const char *line, size_t len);
+    scip_handler *run;
 } commands[] = {
     {"VV", 0, 0, scip_info_version},
     {"PP", 0, 0, scip_info_parameters},
@@ -173,7 +164,7 @@ static const struct command {
     {"RB", 0, SCIP_REBOOT, reboot},
     {"TM", 1, 0, adjust_time},
     {"SS", 6, 0, bit_rate},
-    {"CR", 2, 0, change_speed},
+    {"CR", 2, 0, motor_speed},
     {"HS", 1, 0, sensitivity},
     {"DB", 2, 0, scip_simulate},
     {"%SL", 0, SCIP_SLEEP, fall_asleep},
@@ -193,12 +184,12 @@ static const struct command {
     {"NE", 13, SCIP_MULTI_ECHO | SCIP_INTENSITY, scip_measure},
 };
 
-static const struct command *scip_command_find(const struct scip *s, const char *line, size_t len)
+static const struct command *scip_command_find(const struct scip *s, size_t len)
 {
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         const struct command *c = &commands[i];
         const size_t n = strlen(c->name);
-        if (len >= n && memcmp(line, c->name, n) == 0 && (s->features & c->features) == c->features) return c;
+        if (len >= n && memcmp(s->line, c->name, n) == 0 && (s->features & c->features) == c->features) return c;
     }
     return NULL;
 }
@@ -216,25 +207,23 @@ static const char *check_tag(const char *tag, size_t len)
 }
 
 /* NULL, or what is wrong with the line as such; n: its length without the tag and the ';' before it. */
-static const char *check_line(const struct scip *s, const struct command *c, const char *line, size_t len, size_t n)
+static const char *check_line(const struct scip *s, const struct command *c, size_t n)
 {
     const int time_alone = s->time_mode && (s->features & SCIP_TIME_ALONE) != 0;
     if (c == NULL || (time_alone && c->run != adjust_time)) return "0E";
-    const char *wrong = n < len ? check_tag(line + n + 1, len - n - 1) : NULL;
+    const char *wrong = n < s->n_line ? check_tag(s->line + n + 1, s->n_line - n - 1) : NULL;
     if (wrong != NULL) return wrong;
     const size_t wanted = strlen(c->name) + c->n_params;
     if (n == wanted) return NULL;
     return n < wanted ? "0C" : "0D";
 }
 
-void scip_command(struct scip *s, const char *line, size_t len)
+void scip_command(struct scip *s)
 {
-    const char *tag = memchr(line, ';', len);
-    const size_t n = tag == NULL ? len : (size_t)(tag - line);
-    const struct command *c = scip_command_find(s, line, n);
-    const char *wrong = check_line(s, c, line, len, n);
-    if (wrong != NULL)
-        scip_answer(s, line, len, wrong);
-    else
-        c->run(s, line, len);
+    const char *tag = memchr(s->line, ';', s->n_line);
+    const size_t n = tag == NULL ? s->n_line : (size_t)(tag - s->line);
+    const struct command *c = scip_command_find(s, n);
+    const char *status = check_line(s, c, n);
+    if (status == NULL) status = c->run(s);
+    if (status != NULL) scip_answer(s, s->line, s->n_line, status);
 }

@@ -9,7 +9,7 @@
 
 uint64_t scip_lines_uhz(struct scip *s, const char *query)
 {
-    char reply[512], *end;
+    char reply[PROTOCOL_REPLY], *end;
     if (s->host.command(s->host.ctx, query, reply, sizeof reply) != 0) return s->scan.head.lines_uhz;
     const double hz = strtod(reply, &end);
     return end == reply || !(hz > 0 && hz < 1e6) ? s->scan.head.lines_uhz : (uint64_t)llround(hz * 1e6);
@@ -30,28 +30,26 @@ static const char *or_else(const char *text, const char *other)
     return text != NULL ? text : other;
 }
 
-void scip_info_version(struct scip *s, const char *line, size_t len)
+const char *scip_info_version(struct scip *s)
 {
     struct scip_reply *r = &s->reply;
-    scip_reply_begin(r, line, len, "00");
+    scip_reply_begin(r, s->line, s->n_line, "00");
     scip_reply_key(r, "VEND", "%s", or_else(s->model->vendor, s->identity->maker));
     scip_reply_key(r, "PROD", "%s", or_else(s->model->product, s->identity->model));
     scip_reply_key(r, "FIRM", "%s", s->identity->firmware);
     scip_reply_key(r, "PROT", "%s", s->model->protocol);
     scip_reply_key(r, "SERI", "%s", s->identity->serial);
     scip_send(s);
+    return NULL;
 }
 
-void scip_info_parameters(struct scip *s, const char *line, size_t len)
+const char *scip_info_parameters(struct scip *s)
 {
     struct scip_reply *r = &s->reply;
     const struct planar_head *head = &s->scan.head;
-    if (!scip_has_head(s)) {
-        scip_answer(s, line, len, "0A");
-        return;
-    }
+    if (!scip_has_head(s)) return "0A";
     const unsigned normal_rpm = rpm(scip_lines_uhz(s, "HEAD:LINES? DEF"));
-    scip_reply_begin(r, line, len, "00");
+    scip_reply_begin(r, s->line, s->n_line, "00");
     scip_reply_key(r, "MODL", "%s", or_else(s->model->model, s->identity->model));
     scip_reply_key(r, "DMIN", "%u", (unsigned)scip_millimetres(head->range_min_m));
     scip_reply_key(r, "DMAX", "%u", (unsigned)scip_millimetres(head->range_max_m));
@@ -61,11 +59,12 @@ void scip_info_parameters(struct scip *s, const char *line, size_t len)
     scip_reply_key(r, "AFRT", "%d", (int)head->front);
     scip_reply_key(r, "SCAN", "%u", normal_rpm);
     scip_send(s);
+    return NULL;
 }
 
 enum scip_head scip_head_state(struct scip *s)
 {
-    char reply[512];
+    char reply[PROTOCOL_REPLY];
     if (s->host.command(s->host.ctx, "HEAD:STATE?", reply, sizeof reply) != 0) return SCIP_HEAD_WORKS;
     if (strcmp(reply, "fault") == 0) return SCIP_HEAD_HAS_FAILED;
     if (strcmp(reply, "boot") == 0 || strcmp(reply, "off") == 0) return SCIP_HEAD_BOOTS;
@@ -107,12 +106,12 @@ static void put_time(struct scip *s)
         scip_reply_key(&s->reply, "TIME", "%.4s", time);
 }
 
-void scip_info_state(struct scip *s, const char *line, size_t len)
+const char *scip_info_state(struct scip *s)
 {
     struct scip_reply *r = &s->reply;
     const struct scip_model *m = s->model;
     const enum scip_head head = scip_head_state(s);
-    scip_reply_begin(r, line, len, "00");
+    scip_reply_begin(r, s->line, s->n_line, "00");
     scip_reply_key(r, "MODL", "%s", or_else(m->model, s->identity->model));
     scip_reply_key(r, "LASR", "%s", s->laser ? "ON" : "OFF");
     put_speed(s);
@@ -124,10 +123,11 @@ void scip_info_state(struct scip *s, const char *line, size_t len)
     put_time(s);
     scip_reply_key(r, "STAT", "%s", status(s, head));
     scip_send(s);
+    return NULL;
 }
 
 /* Numbers as in MESM of a UTM-30LX-EW. */
-void scip_info_state_number(struct scip *s, const char *line, size_t len)
+const char *scip_info_state_number(struct scip *s)
 {
     const enum scip_head head = scip_head_state(s);
     const char *number = "000";
@@ -143,7 +143,8 @@ void scip_info_state_number(struct scip *s, const char *line, size_t len)
         number = "003";
     else if (s->asleep)
         number = "005";
-    scip_reply_begin(&s->reply, line, len, "00");
+    scip_reply_begin(&s->reply, s->line, s->n_line, "00");
     scip_reply_line(&s->reply, number, strlen(number));
     scip_send(s);
+    return NULL;
 }

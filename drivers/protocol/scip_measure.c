@@ -17,12 +17,11 @@ int scip_has_head(const struct scip *s)
 const char *scip_laser_on(struct scip *s)
 {
     enum { LATELY_NS = 500000000 };
-    char reply[512];
     const int scans = s->scan.t0_ns != INT64_MIN && native_since_ns(s->now_ns, s->scan.t0_ns) < LATELY_NS;
     const enum scip_head head = scans ? SCIP_HEAD_WORKS : scip_head_state(s);
     if (head == SCIP_HEAD_HAS_FAILED) return "50";
     if (head == SCIP_HEAD_BOOTS) return "10";
-    if (head == SCIP_HEAD_IS_IDLE && s->host.command(s->host.ctx, "SCAN:START", reply, sizeof reply) != 0) return "10";
+    if (head == SCIP_HEAD_IS_IDLE && s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
     if (!s->laser) s->laser_ns = s->now_ns;
     s->laser = 1;
     s->asleep = 0;
@@ -58,18 +57,11 @@ static const char *read_request(struct scip_request *q, const char *line, int st
     return NULL;
 }
 
-static int is_time_us(const char *line)
+static const char *scip_measure_begin(struct scip *s, struct scip_request *q, int streams)
 {
-    return line[0] == '%';
-}
-
-static const char *scip_measure_begin(struct scip *s, struct scip_request *q, const char *line, size_t len, int streams)
-{
-    memset(q, 0, sizeof *q);
-    memcpy(q->echo, line, len);
-    q->echo_len = len;
-    q->time_us = is_time_us(line);
-    line += q->time_us;
+    *q = (struct scip_request){.echo_len = s->n_line, .time_us = s->line[0] == '%'};
+    memcpy(q->echo, s->line, s->n_line);
+    const char *line = s->line + q->time_us;
     q->n_chars = line[1] == 'S' ? 2 : 3;
     q->intensity = line[1] == 'E';
     q->multi_echo = line[0] == 'H' || line[0] == 'N';
@@ -84,28 +76,25 @@ static const char *scip_measure_begin(struct scip *s, struct scip_request *q, co
 
 /* A second M or N replaces the first, unless it is refused. A second G or H before the first is answered
  * repeats the request that is being processed. */
-void scip_measure(struct scip *s, const char *line, size_t len)
+const char *scip_measure(struct scip *s)
 {
     enum { WAIT_NS = 2000000000 };
     struct scip_request request;
-    const int streams = is_time_us(line) || line[0] == 'M' || line[0] == 'N';
-    const char *refused = scip_has_head(s) ? scip_measure_begin(s, &request, line, len, streams) : "0A";
-    if (refused == NULL && !streams && s->single.active) refused = "0B";
-    if (refused != NULL) {
-        scip_answer(s, line, len, refused);
-        return;
-    }
+    const int streams = strchr("%MN", s->line[0]) != NULL;
+    const char *refused = scip_has_head(s) ? scip_measure_begin(s, &request, streams) : "0A";
+    if (refused != NULL) return refused;
+    if (!streams && s->single.active) return "0B";
     request.active = 1;
     request.after_ns = streams ? s->now_ns : s->laser_ns;
     request.until_ns = s->now_ns + WAIT_NS;
     s->try_ns = s->now_ns + TRY_NS;
     if (!streams) {
         s->single = request;
-        return;
+        return NULL;
     }
     s->stream = request;
     s->simulation.n_waiting = 0; /* a new stream has all phases of DB, from the first on */
-    scip_answer(s, line, len, "00");
+    return "00";
 }
 
 /* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. After the

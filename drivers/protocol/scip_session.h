@@ -63,8 +63,10 @@ void scip_send(struct scip *s);
 /* A whole reply without data. Counts what is an error. */
 void scip_answer(struct scip *s, const char *echo, size_t len, const char *status);
 
-/* scip_command.c: one line without its end. */
-void scip_command(struct scip *s, const char *line, size_t len);
+/* scip_command.c: carries out the line at hand. */
+void scip_command(struct scip *s);
+/* A command of the line at hand. Returns the status of the reply to it; NULL: it has replied by itself. */
+typedef const char *scip_handler(struct scip *s);
 /* len decimal digits; -1: others are among them. */
 int32_t scip_number(const char *text, size_t len);
 
@@ -72,10 +74,7 @@ int32_t scip_number(const char *text, size_t len);
 enum scip_head { SCIP_HEAD_WORKS, SCIP_HEAD_IS_IDLE, SCIP_HEAD_BOOTS, SCIP_HEAD_HAS_FAILED };
 /* The head is asked for its state. */
 enum scip_head scip_head_state(struct scip *s);
-void scip_info_version(struct scip *s, const char *line, size_t len);
-void scip_info_parameters(struct scip *s, const char *line, size_t len);
-void scip_info_state(struct scip *s, const char *line, size_t len);
-void scip_info_state_number(struct scip *s, const char *line, size_t len);
+scip_handler scip_info_version, scip_info_parameters, scip_info_state, scip_info_state_number;
 /* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
 uint64_t scip_lines_uhz(struct scip *s, const char *query);
 /* Rounded; 0 where there is no such range. */
@@ -89,7 +88,7 @@ int scip_has_head(const struct scip *s);
 const char *scip_laser_on(struct scip *s);
 /* Ends stream and laser; a G or H that waits is answered with status 10. */
 void scip_laser_off(struct scip *s);
-void scip_measure(struct scip *s, const char *line, size_t len);
+scip_handler scip_measure;
 /* Answers requests with the scans at hand. */
 void scip_scans_came(struct scip *s, struct planar_news news);
 /* Serves a request that waits: starts the head again if it has stopped meanwhile, and ends a G or H that waited too
@@ -97,7 +96,7 @@ void scip_scans_came(struct scip *s, struct planar_news news);
 void scip_measure_time(struct scip *s);
 
 /* scip_simulate.c */
-void scip_simulate(struct scip *s, const char *line, size_t len);
+scip_handler scip_simulate;
 /* To be called before a scan of the stream. NULL: it is sent; "": it is not; else the status that is sent in its
  * place, of which 50 ends the stream. */
 const char *scip_simulated(struct scip *s);

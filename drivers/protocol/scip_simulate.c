@@ -24,14 +24,11 @@ static const char *order(struct scip *s, int32_t mode)
     return "00";
 }
 
-void scip_simulate(struct scip *s, const char *line, size_t len)
+const char *scip_simulate(struct scip *s)
 {
-    const int32_t mode = scip_number(line + 2, 2);
+    const int32_t mode = scip_number(s->line + 2, 2);
     const char *status = order(s, mode);
-    if (strcmp(status, "00") != 0) {
-        scip_answer(s, line, len, status);
-        return;
-    }
+    if (strcmp(status, "00") != 0) return status;
     s->simulation = (struct scip_simulation){.mode = mode == 10 ? 0 : mode, .broken = mode == 2};
     if (mode == 2 && s->single.active) {
         s->single.active = 0;
@@ -39,7 +36,7 @@ void scip_simulate(struct scip *s, const char *line, size_t len)
     }
     if (mode == 2 && s->stream.active) scip_answer(s, s->stream.echo, s->stream.echo_len, "50");
     if (mode == 2) scip_laser_off(s);
-    scip_answer(s, line, len, "00");
+    return status;
 }
 
 const char *scip_simulated(struct scip *s)

@@ -228,14 +228,14 @@ static const struct talk_kind talk_scip = {.name = "SCIP",
 /* Two letters are no proof: what follows a name is its first digit, or the end of a command without digits. */
 static int is_scip(const uint8_t *bytes, size_t len)
 {
-    static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "SCIP2.0"};
-    static const char *const counted[] = {"TM", "SS", "CR", "HS", "GD", "GS", "GE",
+    static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "%SL", "%ST", "SCIP2.0"};
+    static const char *const counted[] = {"TM", "SS", "CR", "HS", "DB", "GD", "GS", "GE",
                                           "MD", "MS", "ME", "HD", "HE", "ND", "NE"};
-    if (len != 0 && bytes[0] == '%') bytes++, len--;
     for (size_t i = 0; i < sizeof bare / sizeof *bare; i++) {
         const size_t n = strlen(bare[i]);
         if (len > n && memcmp(bytes, bare[i], n) == 0 && memchr("\n\r;", bytes[n], 3) != NULL) return 1;
     }
+    if (len != 0 && bytes[0] == '%') bytes++, len--;
     for (size_t i = 0; i < sizeof counted / sizeof *counted; i++)
         if (len > 2 && memcmp(bytes, counted[i], 2) == 0 && bytes[2] >= '0' && bytes[2] <= '9') return 1;
     return 0;
@@ -267,10 +267,9 @@ void talk_name(const struct talk_kind *kind, const uint8_t *request, size_t len,
     struct telegram t = {(const char *)request, len};
     if (kind == &talk_cola) t = cola_inside(request, len);
     size_t n = kind == &talk_scip ? 2 + (size_t)(len != 0 && request[0] == '%') : words_len(&t, kind->n_words);
-    if (kind->n_words != 0)
-        n = n < scip_line((const uint8_t *)t.text, t.len) ? n : scip_line((const uint8_t *)t.text, t.len);
+    const size_t line = scip_line((const uint8_t *)t.text, t.len);
     if (kind->n_words != 0) {
-        snprintf(name, TALK_NAME_LEN, "%.*s", n < TALK_NAME_LEN ? (int)n : TALK_NAME_LEN - 1, t.text);
+        snprintf(name, TALK_NAME_LEN, "%.*s", (int)(n < line ? n : line), t.text);
         return;
     }
     name[0] = '\0';

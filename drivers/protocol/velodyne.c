@@ -138,18 +138,18 @@ static void take_emitter(struct velodyne *v, const uint8_t *payload, size_t len)
     v->model = model;
 }
 
-static void put_entry(struct velodyne *v, uint8_t *at, const struct native_point *p)
+/* Returns whether it is an echo whose range has no number. */
+static uint32_t put_entry(const struct velodyne *v, uint8_t *at, const struct native_point *p)
 {
     double units = p->echo == 0 ? 0.0 : p->a * v->range_units_per_count + 0.5;
+    const int is_lost = units >= 65536.0 || (p->echo != 0 && units < 1.0);
     uint8_t refl = 0;
-    if (units >= 65536.0 || (p->echo != 0 && units < 1.0)) {
-        v->host.count(v->host.ctx, PROTOCOL_POINTS_LOST, 1);
-        units = 0.0;
-    }
+    if (is_lost) units = 0.0;
     if (units >= 1.0 && p->refl_cdb >= REFL_LEAST_CDB)
         refl = p->refl_cdb < REFL_MOST_CDB ? v->reflectivity[p->refl_cdb - REFL_LEAST_CDB] : 255;
     le_put16(at, (uint16_t)units);
     at[2] = refl;
+    return (uint32_t)is_lost;
 }
 
 /* Received power in 0.01 dB, up to a constant of the head: from the reflectance and the square of the range.
@@ -208,12 +208,14 @@ static void add_firing(struct velodyne *v, const uint8_t *payload, uint32_t firs
     native_decode_point(payload, first + n - 1, &p); /* the last; of a single return the only one */
     if (v->n_firings == 0) v->t0_ns = native_after_ns(frame_t_ns, p.dt_ns);
     if (entry == 0) put_azimuth(v, block, p.c);
-    put_entry(v, at, &p);
+    uint32_t n_lost = put_entry(v, at, &p);
     if (dual) {
         if (entry == 0) put_azimuth(v, block + VELODYNE_BLOCK_LEN, p.c);
         if (n > 1) find_other(payload, first, n, &p);
-        put_entry(v, at + VELODYNE_BLOCK_LEN, &p);
+        const uint32_t other_lost = put_entry(v, at + VELODYNE_BLOCK_LEN, &p);
+        if (n > 1) n_lost += other_lost; /* a single return is in both blocks, and counts once */
     }
+    if (n_lost != 0) v->host.count(v->host.ctx, PROTOCOL_POINTS_LOST, n_lost);
     v->n_firings++;
     if (v->n_firings == (dual ? VELODYNE_PACKET_FIRINGS / 2 : VELODYNE_PACKET_FIRINGS)) send_packet(v);
 }
@@ -310,14 +312,6 @@ static void nothing_at(void *protocol, int64_t t_ns)
     (void)t_ns;
 }
 
-/* A UDP link has no input. On another link, bytes that come are no part of this protocol. */
-static void input(void *protocol, const uint8_t *bytes, size_t len)
-{
-    const struct velodyne *v = protocol;
-    (void)bytes;
-    v->host.count(v->host.ctx, PROTOCOL_INPUT_LOST, len);
-}
-
 static int64_t never(const void *protocol)
 {
     (void)protocol;
@@ -346,6 +340,6 @@ const struct protocol_ops protocol_velodyne = {
     .frame = frame,
     .gap = gap,
     .time = nothing_at,
-    .input = input,
+    .input = protocol_lose_input,
     .next_ns = never,
 };

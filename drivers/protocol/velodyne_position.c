@@ -94,13 +94,6 @@ static void at_time(void *protocol, int64_t t_ns)
         send_packet(p, p->next_ns);
 }
 
-static void input(void *protocol, const uint8_t *bytes, size_t len)
-{
-    const struct position *p = protocol;
-    (void)bytes;
-    p->host.count(p->host.ctx, PROTOCOL_INPUT_LOST, len);
-}
-
 static int64_t next_ns(const void *protocol)
 {
     return ((const struct position *)protocol)->next_ns + 1;
@@ -117,6 +110,6 @@ const struct protocol_ops protocol_velodyne_position = {
     .destroy = free,
     .open = open_at,
     .time = at_time,
-    .input = input,
+    .input = protocol_lose_input,
     .next_ns = next_ns,
 };

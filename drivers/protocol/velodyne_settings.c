@@ -6,10 +6,8 @@
 #include <string.h>
 #include <strings.h>
 
-#include "drivers/protocol/http_head.h"
+#include "drivers/protocol/http_request.h"
 #include "drivers/protocol/velodyne.h"
-
-enum { MAX_PAIRS = 8, MAX_REPLY = 512 };
 
 struct posted {
     const struct protocol_spec *spec;
@@ -25,7 +23,7 @@ static int refuse(const struct posted *p, int status, const char *why)
 /* 200, or the status for what the head refuses: another session has control, out of range, not now. */
 static int command(const struct posted *p, const char *line)
 {
-    char reply[MAX_REPLY];
+    char reply[PROTOCOL_REPLY];
     const struct protocol_host *host = &p->spec->host;
     const int error = host->command(host->ctx, line, reply, sizeof reply);
     if (error == 0) return 200;
@@ -35,7 +33,7 @@ static int command(const struct posted *p, const char *line)
 
 static void ask(const struct protocol_spec *spec, const char *line, char *reply, size_t cap)
 {
-    char whole[MAX_REPLY];
+    char whole[PROTOCOL_REPLY];
     if (spec->host.command(spec->host.ctx, line, whole, sizeof whole) != 0) whole[0] = '\0';
     snprintf(reply, cap, "%.*s", (int)cap - 1, whole);
 }
@@ -128,22 +126,25 @@ static int set_address(const struct posted *p, const char *value, int apply)
     return refuse(p, 409, "addr: can't be changed here; the head's configuration sets it (links)");
 }
 
-static int set_data_port(const struct posted *p, const char *value, int apply)
+static int set_port(const struct posted *p, const char *value, int present)
 {
     long port;
+    if (!read_number(value, &port) || port < 1 || port > 65535)
+        return refuse(p, 400, "dport, tport: allowed are 1 to 65535");
+    if (port == present) return 200;
+    return refuse(p, 409, "dport, tport: can't be changed here; the head's configuration sets them (links)");
+}
+
+static int set_data_port(const struct posted *p, const char *value, int apply)
+{
     (void)apply;
-    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "dport: allowed are 1 to 65535");
-    if (port == velodyne_host_port(p->spec)) return 200;
-    return refuse(p, 409, "dport: can't be changed here; the head's configuration sets it (links)");
+    return set_port(p, value, velodyne_host_port(p->spec));
 }
 
 static int set_position_port(const struct posted *p, const char *value, int apply)
 {
-    long port;
     (void)apply;
-    if (!read_number(value, &port) || port < 1 || port > 65535) return refuse(p, 400, "tport: allowed are 1 to 65535");
-    if (port == VELODYNE_POSITION_PORT) return 200;
-    return refuse(p, 409, "tport: can't be changed here; the head's configuration sets it (links)");
+    return set_port(p, value, VELODYNE_POSITION_PORT);
 }
 
 static int set_network(const struct posted *p, const char *value, int apply)
@@ -192,14 +193,14 @@ static int check_phase_input(const struct posted *p, const char *value, int appl
 /* A head without a place for settings takes it, too: clients expect that a device does. */
 static int save(const struct posted *p, const char *value, int apply)
 {
-    if (strcmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");
+    if (strcasecmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");
     return apply && p->spec->keeps ? command(p, "HEAD:STORE") : 200;
 }
 
 /* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */
 static int reset(const struct posted *p, const char *value, int apply)
 {
-    if (strcmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
+    if (strcasecmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
     if (!apply) return 200;
     int status = command(p, "HEAD:LINES DEF");
     if (status == 200) status = command(p, "SCAN:ECHOES DEF");
@@ -282,14 +283,13 @@ static int read_pair(const struct posted *p, const char *path, char *s, size_t l
     return out->setting != NULL ? 200 : refuse(p, 400, "this path has no such key");
 }
 
-/* The number of pairs, or an error as a status below 0. */
+/* The number of pairs, or an error as a status below 0. pairs has a place more than there are settings. */
 static int read_form(const struct posted *p, const char *path, char *form, size_t len, struct pair *pairs)
 {
     int n = 0;
     for (size_t at = 0, end; at < len; at = end + 1) {
         const char *ampersand = memchr(form + at, '&', len - at);
         end = ampersand != NULL ? (size_t)(ampersand - form) : len;
-        if (n == MAX_PAIRS) return -refuse(p, 400, "too many keys: at most 8");
         int status = read_pair(p, path, form + at, end - at, &pairs[n]);
         if (status != 200) return -status;
         for (int i = 0; i < n; i++)
@@ -301,10 +301,9 @@ static int read_form(const struct posted *p, const char *path, char *form, size_
 
 int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text)
 {
-    struct pair pairs[MAX_PAIRS];
+    struct pair pairs[N_SETTINGS + 1];
     const struct posted posted = {spec, text};
-    char copy[VELODYNE_MAX_FORM + 1];
-    if (len > VELODYNE_MAX_FORM) return refuse(&posted, 413, "the body is too long");
+    char copy[HTTP_MAX_BODY + 1];
     memcpy(copy, form, len);
     if (len == 0 && strcmp(path, "/cgi/save") == 0) /* a published client posts no body to it */
         len = (size_t)snprintf(copy, sizeof copy, "data=submit");

@@ -12,11 +12,12 @@
 
 #include "drivers/protocol/protocol.h"
 
-enum { VELODYNE_TEXT = 600, VELODYNE_MAX_FORM = 1024 }; /* for an error's line; bytes */
+enum { VELODYNE_TEXT = 600 }; /* bytes for an error's line */
 
 /* Whether a path takes forms. */
 int velodyne_takes_forms(const char *path);
-/* Carries out a form. Returns 200; or 400, 409, 413 or 503 with a line of text (cap VELODYNE_TEXT). */
+/* Carries out a form of at most HTTP_MAX_BODY bytes. Returns 200; or 400, 409 or 503 with a line of text (cap
+ * VELODYNE_TEXT). */
 int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text);
 
 struct velodyne_state {

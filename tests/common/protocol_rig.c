@@ -34,7 +34,7 @@ static int keep_unit(void *ctx, const void *unit, size_t len)
 static int answer(void *ctx, const char *line, char *reply, size_t cap)
 {
     struct protocol_rig *rig = ctx;
-    assert_true(rig->n_lines < RIG_LINES && cap >= 480);
+    assert_true(rig->n_lines < RIG_LINES && (reply == NULL ? cap == 0 : cap >= PROTOCOL_REPLY));
     snprintf(rig->line[rig->n_lines++], sizeof rig->line[0], "%s", line);
     if (sscanf(line, "TIME:SHIFt %" SCNd64, &rig->shift_ns) == 1) return snprintf(reply, cap, "OK"), 0;
     if (strcmp(line, "TIME:SHIFt?") == 0) return snprintf(reply, cap, "%" PRId64, rig->shift_ns), 0;
@@ -93,6 +93,24 @@ static int store(void *ctx, const char *lines)
     snprintf(rig->stored, sizeof rig->stored, "%s", lines);
     return !rig->spec.keeps;
 }
+
+const struct nmea_fix protocol_rig_fix = {.talker = {'G', 'N'},
+                                          .year = 2026,
+                                          .month = 1,
+                                          .day = 2,
+                                          .hour = 3,
+                                          .minute = 4,
+                                          .second = 5,
+                                          .lat_deg = -33.8567844,
+                                          .lon_deg = 151.2152967,
+                                          .altitude_m = 87.6543,
+                                          .geoid_separation_m = 22.4321,
+                                          .quality = 4,
+                                          .satellites = 12,
+                                          .hdop = 0.9,
+                                          .speed_m_s = 1.0,
+                                          .course_deg = 90.0,
+                                          .sigma_m = {0.01, 0.01, 0.02}};
 
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
@@ -257,37 +275,49 @@ static int64_t firing_ns(const struct native_emitter *e, uint64_t pulse)
     return (int64_t)(pulse * e->sequence_ns_num / e->sequence_ns_den);
 }
 
-void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part)
+void protocol_rig_part(struct protocol_rig *rig, uint32_t line, uint32_t from, uint32_t n,
+                       const struct protocol_rig_shot *shot)
 {
     enum { MOST = 4096 };
     static const double level[MOST];
     double pan_turn[MOST];
     int64_t dt_ns[MOST];
     const struct native_emitter *e = &rig->emitter;
-    const uint32_t n = (uint32_t)(e->last_step - e->first_step) + 1;
-    const uint64_t pulse0 = (uint64_t)line * e->steps;
-    const int64_t line_ns = firing_ns(e, pulse0);
-    assert_true(part != 0 && part <= MOST);
-    for (uint32_t at = 0; at < n; at += part) {
-        const int64_t t0_ns = firing_ns(e, pulse0 + (uint32_t)e->first_step + at);
-        struct protocol_rig_run run = {
-            line, line, pulse0 + (uint32_t)e->first_step + at, 0, t0_ns, line_ns, dt_ns, level, pan_turn, shot + at};
-        run.n = n - at < part ? n - at : part;
-        for (uint32_t i = 0; i < run.n; i++) {
-            const int step = e->first_step + (int)(at + i);
-            dt_ns[i] = firing_ns(e, pulse0 + (uint32_t)step) - t0_ns;
-            pan_turn[i] = (double)(e->turn * (step - e->front_step)) / e->steps;
-        }
-        protocol_rig_points(rig, &run);
+    const int first = e->first_step + (int)from;
+    const uint64_t line0 = (uint64_t)line * e->steps, pulse0 = line0 + (uint32_t)first;
+    const int64_t t0_ns = firing_ns(e, pulse0);
+    assert_true(n <= MOST);
+    for (uint32_t i = 0; i < n; i++) {
+        dt_ns[i] = firing_ns(e, pulse0 + i) - t0_ns;
+        pan_turn[i] = (double)(e->turn * (first + (int)i - e->front_step)) / e->steps;
     }
+    const struct protocol_rig_run run = {line,  line,  pulse0,   n,   t0_ns, firing_ns(e, line0),
+                                         dt_ns, level, pan_turn, shot};
+    protocol_rig_points(rig, &run);
+}
+
+int64_t protocol_rig_turn_end(struct protocol_rig *rig, uint32_t line, uint32_t status)
+{
+    const struct native_emitter *e = &rig->emitter;
+    const uint64_t pulse0 = (uint64_t)line * e->steps;
     const struct line_end end = {.frame = line,
                                  .line = line,
                                  .pulse0 = pulse0,
                                  .n_fired = e->steps,
-                                 .n_cast = n,
-                                 .t0_ns = line_ns,
+                                 .n_cast = (uint32_t)(e->last_step - e->first_step) + 1,
+                                 .t0_ns = firing_ns(e, pulse0),
                                  .t1_ns = firing_ns(e, pulse0 + e->steps),
-                                 .status = LINE_LAST_OF_FRAME};
+                                 .status = status};
     protocol_rig_line_end(rig, &end);
-    if (rig->ops->time != NULL) rig->ops->time(rig->protocol, rig->scan_t0_ns + end.t1_ns);
+    return rig->scan_t0_ns + end.t1_ns;
+}
+
+void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part)
+{
+    const uint32_t n = (uint32_t)(rig->emitter.last_step - rig->emitter.first_step) + 1;
+    assert_true(part != 0);
+    for (uint32_t at = 0; at < n; at += part)
+        protocol_rig_part(rig, line, at, n - at < part ? n - at : part, shot + at);
+    const int64_t end_ns = protocol_rig_turn_end(rig, line, LINE_LAST_OF_FRAME);
+    if (rig->ops->time != NULL) rig->ops->time(rig->protocol, end_ns);
 }

@@ -46,6 +46,9 @@ struct protocol_rig {
     uint32_t seq;
 };
 
+/* RTK fixed at 2026-01-02 03:04:05, 33.8567844 degrees south and 151.2152967 east; all else has a value, too. */
+extern const struct nmea_fix protocol_rig_fix;
+
 /* `model` is the profile's. The rig is large: allocate it, or make it static. It asserts that the protocol opens. */
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model);
 void protocol_rig_close(struct protocol_rig *rig);
@@ -80,8 +83,15 @@ struct protocol_rig_run {
 };
 void protocol_rig_points(struct protocol_rig *rig, const struct protocol_rig_run *run);
 void protocol_rig_line_end(struct protocol_rig *rig, const struct line_end *end);
-/* Feeds a whole turn of a planar head: shots of the steps first..last, in frames of `part` pulses, and the line end.
- * Then it calls time() with the turn's end. `line` counts from 0. */
+
+/* Feeds one frame of points of a planar head, whose turns `line` counts from 0: n shots, the first of which is of the
+ * step first_step + from. */
+void protocol_rig_part(struct protocol_rig *rig, uint32_t line, uint32_t from, uint32_t n,
+                       const struct protocol_rig_shot *shot);
+/* Feeds a turn's line end. Returns the device time of the turn's end. */
+int64_t protocol_rig_turn_end(struct protocol_rig *rig, uint32_t line, uint32_t status);
+/* Feeds a whole turn: shots of the steps first..last, in frames of `part` pulses, and the line end. Then it calls
+ * time() with the turn's end. */
 void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part);
 
 #endif

@@ -84,7 +84,7 @@ static uint64_t decode(const uint8_t *payload, size_t len)
     if (native_decode_attributes(payload, len, &u.attributes) == SH_OK && (n = u.attributes.n_points) > 0)
         native_decode_attribute(payload, n - 1, &u.attribute);
     if (native_decode_colours(payload, len, &u.attributes) == SH_OK && (n = u.attributes.n_points) > 0)
-        native_decode_colour(payload, n - 1, u.rgb);
+        memcpy(u.rgb, payload + NATIVE_COLOURS_HEAD_LEN + (size_t)NATIVE_COLOUR_LEN * (n - 1), NATIVE_COLOUR_LEN);
     if (native_decode_attributes(payload, len, &u.attributes) == SH_OK && (n = u.attributes.n_points) > 0 &&
         native_check_deviations(len, n) == SH_OK)
         sum += native_decode_deviation(payload, n, n - 1);

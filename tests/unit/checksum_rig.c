@@ -48,30 +48,6 @@ static int is_same(const struct said *a, const struct said *b)
     return a->size == b->size && memcmp(a->bytes, b->bytes, a->size) == 0;
 }
 
-void seal_check(const struct protocol_ops *ops, const uint8_t *unit, size_t len, seal_reader *read)
-{
-    static struct said clean, other;
-    uint8_t *mask = mask_of(ops, unit, len), *bits = calloc(len, 1);
-    assert_non_null(bits);
-    change(ops, unit, bits, len, read, &clean); /* a unit that is right stays as it is */
-    for (size_t i = 0; i < len; i++)
-        for (int b = 0; b < 8; b++) {
-            if ((mask[i] >> b & 1) == 0) continue;
-            bits[i] = (uint8_t)(1U << b);
-            change(ops, unit, bits, len, read, &other);
-            bits[i] = 0;
-            if (is_same(&clean, &other)) fail_msg("bit %d of byte %zu changes nothing", b, i);
-        }
-    for (uint32_t k = 0; k < RANDOM_SETS; k++) {
-        for (size_t i = 0; i < len; i++)
-            bits[i] = mask[i] & (uint8_t)rng_u64(1, rng_echo(i, k));
-        change(ops, unit, bits, len, read, &other);
-        assert_false(is_same(&clean, &other));
-    }
-    free(bits);
-    free(mask);
-}
-
 static void try_one(const struct protocol_ops *ops, const uint8_t *unit, size_t len)
 {
     uint8_t *copy = malloc(len), *mask;
@@ -96,4 +72,29 @@ void seal_check_broken(const struct protocol_ops *ops, const uint8_t *unit, size
         damaged[i] = unit[i];
     }
     free(damaged);
+}
+
+void seal_check(const struct protocol_ops *ops, const uint8_t *unit, size_t len, seal_reader *read)
+{
+    static struct said clean, other;
+    uint8_t *mask = mask_of(ops, unit, len), *bits = calloc(len, 1);
+    assert_non_null(bits);
+    change(ops, unit, bits, len, read, &clean); /* a unit that is right stays as it is */
+    for (size_t i = 0; i < len; i++)
+        for (int b = 0; b < 8; b++) {
+            if ((mask[i] >> b & 1) == 0) continue;
+            bits[i] = (uint8_t)(1U << b);
+            change(ops, unit, bits, len, read, &other);
+            bits[i] = 0;
+            if (is_same(&clean, &other)) fail_msg("bit %d of byte %zu changes nothing", b, i);
+        }
+    for (uint32_t k = 0; k < RANDOM_SETS; k++) {
+        for (size_t i = 0; i < len; i++)
+            bits[i] = mask[i] & (uint8_t)rng_u64(1, rng_echo(i, k));
+        change(ops, unit, bits, len, read, &other);
+        assert_false(is_same(&clean, &other));
+    }
+    free(bits);
+    free(mask);
+    seal_check_broken(ops, unit, len);
 }

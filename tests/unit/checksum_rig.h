@@ -20,11 +20,12 @@ typedef const void *seal_reader(const uint8_t *unit, size_t len, size_t *size);
 /* Returns how many bits of a unit may be changed. */
 uint64_t seal_count(const struct protocol_ops *ops, const uint8_t *unit, size_t len);
 
-/* Changes each of these bits alone, and random sets of them. The reader must accept the unit, with other contents. */
-void seal_check(const struct protocol_ops *ops, const uint8_t *unit, size_t len, seal_reader *read);
-
 /* Tries the unit's beginnings, each in memory of just its length, and the unit with random single bytes. Nothing
  * outside is read or written (sanitizers see that), and the changeable bits lie within it. */
 void seal_check_broken(const struct protocol_ops *ops, const uint8_t *unit, size_t len);
+
+/* Does that, and changes each of the changeable bits alone, and random sets of them. The reader must accept the unit,
+ * with other contents. */
+void seal_check(const struct protocol_ops *ops, const uint8_t *unit, size_t len, seal_reader *read);
 
 #endif

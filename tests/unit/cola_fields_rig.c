@@ -60,10 +60,3 @@ void fields_expect(const char *results)
     for (int k = 0; k < 3; k++)
         assert_int_equal('0' + fields_result(cola.bytes + 8, k), results[k]);
 }
-
-int fields_close(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}

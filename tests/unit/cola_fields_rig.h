@@ -23,6 +23,5 @@ void fields_open(const struct cola_fields *fields);
 int fields_result(const uint8_t *payload, int k);
 /* Reads LFErec, as "012" for the results invalid, free and infringed. */
 void fields_expect(const char *results);
-int fields_close(void **state);
 
 #endif

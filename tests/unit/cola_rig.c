@@ -10,9 +10,22 @@ void cola_head_state(const char *state)
     replies[0].reply = state;
 }
 
+int cola_teardown(void **state)
+{
+    (void)state;
+    if (cola.protocol != NULL) protocol_rig_close(&cola);
+    return 0;
+}
+
+void cola_open(const char *model)
+{
+    cola_teardown(NULL);
+    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", model);
+}
+
 static void open_model(const char *model, uint32_t steps, int first, int last, int front, uint32_t hz)
 {
-    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", model);
+    cola_open(model);
     cola_head_state("scanning");
     cola.replies = replies;
     protocol_rig_planar(&cola, steps, first, last, front, -1, hz);
@@ -27,11 +40,6 @@ void cola_open_tim(const char *model)
 void cola_open_lms(void)
 {
     open_model("LMS111", 1440, 0, 1080, 540, 25);
-}
-
-void cola_close(void)
-{
-    protocol_rig_close(&cola);
 }
 
 void cola_input(const void *bytes, size_t len)
@@ -214,4 +222,11 @@ void cola_turn(uint32_t line, double base_m)
         shot[i] = (struct protocol_rig_shot){
             .n = 1, .range_m = {base_m + 0.01 * i}, .refl_cdb = {0}, .amplitude_cdb = {2000}};
     protocol_rig_turn(&cola, line, shot, 100);
+}
+
+void cola_scan(uint32_t line, double base_m, struct cola_lmd *out)
+{
+    protocol_rig_clear(&cola);
+    cola_turn(line, base_m);
+    cola_read_lmd(0, out);
 }

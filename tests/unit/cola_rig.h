@@ -17,11 +17,14 @@
 
 extern struct protocol_rig cola;
 
-/* Opens a session with a scanner that scans; its geometry is known. TiM: 1080 steps a turn, 0 to 810 cast, 15 Hz.
+/* Opens a session, and closes the one before. The head has not described itself. */
+void cola_open(const char *model);
+/* Does the same with a scanner that scans; its geometry is known. TiM: 1080 steps a turn, 0 to 810 cast, 15 Hz.
  * LMS111: 1440, 0 to 1080 cast, 25 Hz. */
 void cola_open_tim(const char *model);
 void cola_open_lms(void);
-void cola_close(void);
+/* Closes the session that a test has left open. */
+int cola_teardown(void **state);
 /* Sets the head's answers to SCPI lines: state is that of HEAD:STATE?. */
 void cola_head_state(const char *state);
 
@@ -63,5 +66,7 @@ void cola_read_lmd(uint32_t unit, struct cola_lmd *out);
 
 /* Feeds a turn whose ranges are `base_m` and 1 cm more with each step, with an amplitude of 20 dB. */
 void cola_turn(uint32_t line, double base_m);
+/* Does the same, and reads the first telegram that comes then. */
+void cola_scan(uint32_t line, double base_m, struct cola_lmd *out);
 
 #endif

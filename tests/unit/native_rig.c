@@ -122,3 +122,18 @@ struct line_block make_block(uint32_t n_points)
                                .label = block_label};
     return block;
 }
+
+struct line_block make_pulses(uint32_t n_points, uint32_t echoes)
+{
+    struct line_block block = make_block(n_points);
+    for (uint32_t i = 0; i < n_points; i++) {
+        block_a[i] = i;
+        block_dt[i] = i / echoes * 500;
+        block_echo[i] = (uint8_t)((i % echoes + 1) | echoes << 4);
+    }
+    block.line = 77;
+    block.pulse0 = UINT64_C(0x123456789a);
+    block.n_pulses = (n_points + echoes - 1) / echoes;
+    block.t0_ns = 1000;
+    return block;
+}

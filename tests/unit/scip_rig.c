@@ -4,8 +4,16 @@
 struct protocol_rig rig;
 struct protocol_rig_shot shot[SCIP_STEPS];
 
+int scip_teardown(void **state)
+{
+    (void)state;
+    if (rig.protocol != NULL) protocol_rig_close(&rig);
+    return 0;
+}
+
 void scip_open_head(const char *model, uint32_t steps, int first, int last, int front, int turn, uint32_t lines_hz)
 {
+    scip_teardown(NULL);
     protocol_rig_open(&rig, PROTOCOL_SCIP, "Hokuyo", model);
     protocol_rig_planar(&rig, steps, first, last, front, turn, lines_hz);
     scip_flat(1.0);
@@ -23,11 +31,6 @@ void scip_open(const char *model)
     protocol_rig_describe(&rig, 0);
 }
 
-void scip_close(void)
-{
-    protocol_rig_close(&rig);
-}
-
 void scip_expect(const char *answer)
 {
     rig.bytes[rig.len] = 0;
@@ -42,6 +45,16 @@ void scip_ask(const char *lines, const char *answer)
     scip_expect(answer);
 }
 
+void scip_expect_in(const char *line, const char *const *pieces)
+{
+    protocol_rig_clear(&rig);
+    protocol_rig_input(&rig, line);
+    rig.bytes[rig.len] = 0;
+    for (; *pieces != NULL; pieces++)
+        if (strstr((char *)rig.bytes, *pieces) == NULL) fail_msg("%s: no %s in %s", line, *pieces, (char *)rig.bytes);
+    protocol_rig_clear(&rig);
+}
+
 void scip_flat(double range_m)
 {
     for (int i = 0; i < SCIP_STEPS; i++)
@@ -53,57 +66,16 @@ void scip_turn(uint32_t line)
     protocol_rig_turn(&rig, line, shot, 100);
 }
 
-static int64_t line_ns(uint32_t line)
-{
-    return (int64_t)line * (1000000000 / (int64_t)(rig.descriptor.lines_uhz / 1000000));
-}
-
-static void part(uint32_t line, int from, int to)
-{
-    static double level[SCIP_STEPS], pan[SCIP_STEPS];
-    static int64_t dt_ns[SCIP_STEPS];
-    const struct native_emitter *e = &rig.emitter;
-    const int64_t step_ns = (line_ns(1) - line_ns(0)) / e->steps;
-    const int first = e->first_step + from;
-    for (int i = 0; i <= to - from; i++) {
-        dt_ns[i] = i * step_ns;
-        pan[i] = (double)(e->turn * (first + i - e->front_step)) / e->steps;
-    }
-    const struct protocol_rig_run run = {.frame = line,
-                                         .line = line,
-                                         .pulse0 = (uint64_t)line * e->steps + (uint64_t)first,
-                                         .n = (uint32_t)(to - from) + 1,
-                                         .t0_ns = line_ns(line) + first * step_ns,
-                                         .line_t0_ns = line_ns(line),
-                                         .dt_ns = dt_ns,
-                                         .mirror_turn = level,
-                                         .pan_turn = pan,
-                                         .shot = shot + from};
-    protocol_rig_points(&rig, &run);
-}
-
 /* Frames have at most 150 points, so firing times within a frame are below 2^24 ns. */
 void scip_part(uint32_t line, int from, int to)
 {
     for (; from <= to; from += 150)
-        part(line, from, to - from < 150 ? to : from + 149);
+        protocol_rig_part(&rig, line, (uint32_t)from, to - from < 150 ? (uint32_t)(to - from) + 1 : 150, shot + from);
 }
 
 void scip_line_end(uint32_t line, uint32_t status)
 {
-    const struct line_end end = {.frame = line,
-                                 .line = line,
-                                 .pulse0 = (uint64_t)line * rig.emitter.steps,
-                                 .n_fired = rig.emitter.steps,
-                                 .t0_ns = line_ns(line),
-                                 .t1_ns = line_ns(line + 1),
-                                 .status = status};
-    protocol_rig_line_end(&rig, &end);
-}
-
-void scip_line_time(uint32_t line)
-{
-    rig.ops->time(rig.protocol, rig.scan_t0_ns + line_ns(line + 1));
+    rig.ops->time(rig.protocol, protocol_rig_turn_end(&rig, line, status));
 }
 
 /* Reads one line, whose last character is the sum of those before it. Returns how many those are. */

@@ -90,17 +90,20 @@ static void client_tell_once(void *ctx, const char *text)
     snprintf(((struct client *)ctx)->told, 120, "%s", text);
 }
 
-void client_open(struct client *c, const struct talk *talk, const struct talk_options *options)
+void client_open(struct client *c, const struct made *m, uint32_t i, const struct talk_options *options)
 {
+    static const struct talk_options none = {0};
+    struct replay_capture *capture = made_load(m);
     const struct protocol_spec spec = {.host = {.ctx = c,
                                                 .send = client_send,
                                                 .count = client_count,
                                                 .hang_up = client_hang_up,
                                                 .tell_once = client_tell_once},
-                                       .talk = talk,
-                                       .talk_options = options};
+                                       .talk = &capture_place(capture, i)->talk,
+                                       .talk_options = options != NULL ? options : &none};
     struct sh_err err;
     memset(c, 0, sizeof *c);
+    c->capture = capture;
     c->ops = protocol_ops_get(PROTOCOL_CAPTURE);
     assert_int_equal(c->ops->create(&spec, &c->protocol, &err), SH_OK);
     c->ops->open(c->protocol, 0);
@@ -121,4 +124,5 @@ const char *client_ask(struct client *c, const char *text, int ms)
 void client_close(struct client *c)
 {
     c->ops->destroy(c->protocol);
+    capture_free(c->capture);
 }

@@ -36,6 +36,7 @@ const char *made_write(const struct made *m, size_t len);
 struct replay_capture *made_load(const struct made *m);
 
 struct client {
+    struct replay_capture *capture;
     const struct protocol_ops *ops;
     void *protocol;
     char got[4096]; /* "at 5: text|" for each unit */
@@ -45,7 +46,8 @@ struct client {
     char told[120];
 };
 
-void client_open(struct client *c, const struct talk *talk, const struct talk_options *options);
+/* Loads the capture, and connects to its place i. options NULL: none. */
+void client_open(struct client *c, const struct made *m, uint32_t i, const struct talk_options *options);
 /* Sends the text in pieces of a byte, and then lets time pass, a millisecond a tick. Returns what came meanwhile. */
 const char *client_ask(struct client *c, const char *text, int ms);
 void client_close(struct client *c);

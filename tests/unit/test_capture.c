@@ -6,41 +6,40 @@
 
 #include "tests/unit/talk_rig.h"
 
+static struct made m;
+static struct client c;
+
 /* A CoLa connection: an answer after 3 ms and another to the same request, a stream of 10 ms, an event that nobody
  * asked for, and an answer within the stream. */
-static void make_cola(struct made *m)
+static void make_cola(void)
 {
-    made_begin(m);
-    made_connect(m, 1000);
-    made_say(m, 1010, 0, "\x02sRN A\x03");
-    made_say(m, 1013, 1, "\x02sRA A 1\x03");
-    made_say(m, 1015, 1, "\x02sSN Odd 7\x03");
-    made_say(m, 1020, 0, "\x02sRN A\x03");
-    made_say(m, 1021, 1, "\x02sRA A 2\x03");
-    made_say(m, 1030, 0, "\x02sEN S 1\x03");
-    made_say(m, 1032, 1, "\x02sEA S 1\x03");
-    made_say(m, 1040, 1, "\x02sSN S 1\x03");
-    made_say(m, 1050, 1, "\x02sSN S 2\x03");
-    made_say(m, 1052, 0, "\x02sRN B\x03");
-    made_say(m, 1060, 1, "\x02sSN S 3\x03");
-    made_say(m, 1061, 1, "\x02sFA 3\x03");
+    made_begin(&m);
+    made_connect(&m, 1000);
+    made_say(&m, 1010, 0, "\x02sRN A\x03");
+    made_say(&m, 1013, 1, "\x02sRA A 1\x03");
+    made_say(&m, 1015, 1, "\x02sSN Odd 7\x03");
+    made_say(&m, 1020, 0, "\x02sRN A\x03");
+    made_say(&m, 1021, 1, "\x02sRA A 2\x03");
+    made_say(&m, 1030, 0, "\x02sEN S 1\x03");
+    made_say(&m, 1032, 1, "\x02sEA S 1\x03");
+    made_say(&m, 1040, 1, "\x02sSN S 1\x03");
+    made_say(&m, 1050, 1, "\x02sSN S 2\x03");
+    made_say(&m, 1052, 0, "\x02sRN B\x03");
+    made_say(&m, 1060, 1, "\x02sSN S 3\x03");
+    made_say(&m, 1061, 1, "\x02sFA 3\x03");
 }
 
 static void test_answers_and_streams(void **state)
 {
     (void)state;
-    static struct made m;
-    const struct talk_options options = {0};
-    struct client c;
-    make_cola(&m);
-    struct replay_capture *capture = made_load(&m);
-    assert_int_equal(capture_n(capture), 1);
-    const struct capture_place *place = capture_place(capture, 0);
+    make_cola();
+    client_open(&c, &m, 0, NULL);
+    assert_int_equal(capture_n(c.capture), 1);
+    const struct capture_place *place = capture_place(c.capture, 0);
     assert_int_equal(place->port, 2112);
     assert_string_equal(place->device, "10.0.0.1");
     assert_string_equal(place->talk.kind->name, "CoLa");
     assert_int_equal(place->talk.n_requests, 3);
-    client_open(&c, &place->talk, &options);
     /* At 15 ms of the connection comes what nobody asked for. */
     assert_string_equal(client_ask(&c, "", 14), "");
     assert_string_equal(client_ask(&c, "", 2), "15:\x02sSN Odd 7\x03|");
@@ -58,18 +57,14 @@ static void test_answers_and_streams(void **state)
     assert_string_equal(c.told, "the capture has no such request: sEN S");
     assert_int_equal(c.ops->next_ns(c.protocol), INT64_MAX);
     client_close(&c);
-    capture_free(capture);
 }
 
 static void test_loop_and_unknown(void **state)
 {
     (void)state;
-    static struct made m;
     const struct talk_options again = {.unknown = TALK_ERROR, .loop = 1}, close = {.unknown = TALK_CLOSE};
-    struct client c;
-    make_cola(&m);
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &again);
+    make_cola();
+    client_open(&c, &m, 0, &again);
     /* Its mean period is 10 ms: after 3 at 30 ms, 1 comes at 40 ms. The one odd event has no period, and is not
      * repeated. */
     assert_string_equal(client_ask(&c, "\x02sEN S 1\x03", 52),
@@ -79,22 +74,18 @@ static void test_loop_and_unknown(void **state)
     assert_string_equal(client_ask(&c, "\x02sRN Z\x03", 2), "52:\x02sFA 3\x03|");
     assert_string_equal(client_ask(&c, "\x02sMN Z\x03", 2), "54:\x02sFA 2\x03|");
     client_close(&c);
-    client_open(&c, &capture_place(capture, 0)->talk, &close);
+    client_open(&c, &m, 0, &close);
     assert_string_equal(client_ask(&c, "\x02sRN Z\x03", 20), "");
     assert_int_equal(c.ended, 1);
     client_close(&c);
-    capture_free(capture);
 }
 
 /* Segments of an answer come in the wrong order, one twice and one with bytes that came before. */
 static void test_segments_in_order(void **state)
 {
     (void)state;
-    static struct made m;
     static uint8_t frame[3][ETHERNET_MAX_FRAME];
     size_t len[3];
-    const struct talk_options options = {0};
-    struct client c;
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 10, 0, "GD0000000000\n");
@@ -109,23 +100,18 @@ static void test_segments_in_order(void **state)
     made_add(&m, 14, frame[0], len[0]);
     made_add(&m, 15, over, over_len);
     made_add(&m, 17, frame[1], len[1]);
-    struct replay_capture *capture = made_load(&m);
+    client_open(&c, &m, 0, NULL);
     struct capture_counts counts;
-    capture_get_counts(capture, &counts);
+    capture_get_counts(c.capture, &counts);
     assert_int_equal(counts.missing_bytes, 0);
-    client_open(&c, &capture_place(capture, 0)->talk, &options);
     assert_string_equal(client_ask(&c, "GD0000000000\n", 5), "2:GD0000000000\n00P\n1234\n\n|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* SCIP: the stream's messages have a status 99 and count down; a scan that is asked for alone is an answer. */
 static void test_scip(void **state)
 {
     (void)state;
-    static struct made m;
-    const struct talk_options options = {0};
-    struct client c;
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 0, 0, "BM\n");
@@ -133,25 +119,20 @@ static void test_scip(void **state)
     made_say(&m, 5, 0, "MD0000001000002\n");
     made_say(&m, 6, 1, "MD0000001000002\n00P\n\nMD0000001000001\n99b\nx\n\n");
     made_say(&m, 30, 1, "MD0000001000000\n99b\ny\n\n");
-    struct replay_capture *capture = made_load(&m);
-    assert_string_equal(capture_place(capture, 0)->talk.kind->name, "SCIP");
-    assert_int_equal(capture_place(capture, 0)->talk.n_requests, 2);
-    client_open(&c, &capture_place(capture, 0)->talk, &options);
+    client_open(&c, &m, 0, NULL);
+    assert_string_equal(capture_place(c.capture, 0)->talk.kind->name, "SCIP");
+    assert_int_equal(capture_place(c.capture, 0)->talk.n_requests, 2);
     assert_string_equal(client_ask(&c, "BM\n", 5), "1:BM\n00P\n\n|");
     assert_string_equal(client_ask(&c, "MD0000001000002\n", 10),
                         "6:MD0000001000002\n00P\n\n|6:MD0000001000001\n99b\nx\n\n|");
     assert_string_equal(client_ask(&c, "QT\n", 30), ""); /* it ends the stream */
     client_close(&c);
-    capture_free(capture);
 }
 
 /* A protocol that is not known: what the device says until the next request belongs to the one before. */
 static void test_turns(void **state)
 {
     (void)state;
-    static struct made m;
-    const struct talk_options options = {0};
-    struct client c;
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 2, 1, "\xffhello");
@@ -160,75 +141,63 @@ static void test_turns(void **state)
     made_say(&m, 19, 1, "more");
     made_say(&m, 20, 0, "\x01\x02\x03");
     made_say(&m, 21, 1, "two");
-    struct replay_capture *capture = made_load(&m);
-    assert_string_equal(capture_place(capture, 0)->talk.kind->name, "bytes");
-    client_open(&c, &capture_place(capture, 0)->talk, &options);
+    client_open(&c, &m, 0, NULL);
+    assert_string_equal(capture_place(c.capture, 0)->talk.kind->name, "bytes");
     assert_string_equal(client_ask(&c, "", 10), "2:\xffhello|");
     assert_string_equal(client_ask(&c, "\x01\x02", 4), "12:one|");
     assert_string_equal(client_ask(&c, "\x01\x02\x03", 10), "15:two|"); /* and no "more", whose turn is over */
     client_close(&c);
-    capture_free(capture);
 }
 
 /* Datagrams of two ports keep their times to each other. */
 static void test_datagrams(void **state)
 {
     (void)state;
-    static struct made m;
     uint8_t frame[ETHERNET_MAX_FRAME];
     struct ethernet_end from = {.address = {192, 168, 1, 201}, .port = 2368}, to = {.address = {255, 255, 255, 255}};
-    const struct talk_options options = {0};
-    struct client c;
     made_begin(&m);
     to.port = 2368;
     made_add(&m, 100, frame, ethernet_put_udp(frame, &from, &to, "data1", 5));
     made_add(&m, 103, frame, ethernet_put_udp(frame, &from, &to, "data2", 5));
     from.port = to.port = 8308;
     made_add(&m, 107, frame, ethernet_put_udp(frame, &from, &to, "place", 5));
-    struct replay_capture *capture = made_load(&m);
-    assert_int_equal(capture_n(capture), 2);
-    assert_int_equal(capture_place(capture, 0)->port, 2368);
-    assert_int_equal(capture_place(capture, 1)->source_port, 8308);
-    client_open(&c, &capture_place(capture, 0)->talk, &options);
+    client_open(&c, &m, 0, NULL);
+    assert_int_equal(capture_n(c.capture), 2);
+    assert_int_equal(capture_place(c.capture, 0)->port, 2368);
+    assert_int_equal(capture_place(c.capture, 1)->source_port, 8308);
     assert_string_equal(client_ask(&c, "", 9), "0:data1|3:data2|");
     client_close(&c);
-    client_open(&c, &capture_place(capture, 1)->talk, &options);
+    client_open(&c, &m, 1, NULL);
     assert_string_equal(client_ask(&c, "", 9), "7:place|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* A device that is asked in datagrams, and answers each. */
 static void test_asked_datagrams(void **state)
 {
     (void)state;
-    static struct made m;
     uint8_t frame[ETHERNET_MAX_FRAME];
-    const struct talk_options options = {0};
-    struct client c;
     made_begin(&m);
     made_add(&m, 10, frame, ethernet_put_udp(frame, &DRIVER, &DEVICE, "ask", 3));
     made_add(&m, 14, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "one", 3));
     made_add(&m, 20, frame, ethernet_put_udp(frame, &DRIVER, &DEVICE, "ask", 3));
     made_add(&m, 21, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "two", 3));
-    struct replay_capture *capture = made_load(&m);
-    assert_int_equal(capture_n(capture), 1);
-    assert_int_equal(capture_place(capture, 0)->port, DRIVER.port);
-    client_open(&c, &capture_place(capture, 0)->talk, &options);
+    client_open(&c, &m, 0, NULL);
+    assert_int_equal(capture_n(c.capture), 1);
+    assert_int_equal(capture_place(c.capture, 0)->port, DRIVER.port);
     c.ops->input(c.protocol, (const uint8_t *)"ask", 3);
     assert_string_equal(client_ask(&c, "", 6), "4:one|");
     c.ops->input(c.protocol, (const uint8_t *)"ask", 3);
     assert_string_equal(client_ask(&c, "", 6), "7:two|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* Each beginning of a file, and files with a byte changed: they load, or are refused in one line. */
 static void test_hostile(void **state)
 {
     (void)state;
-    static struct made m, changed;
-    make_cola(&m);
+    static struct made changed;
+    make_cola();
     int refused = 0, loaded = 0;
     for (size_t i = 0; i < m.len; i += 3) {
         for (int how = 0; how < 2; how++) {

@@ -8,7 +8,8 @@
 #include "drivers/protocol/pcapng.h"
 #include "tests/unit/talk_rig.h"
 
-static const struct talk_options DEFAULTS = {0};
+static struct made m;
+static struct client c;
 
 /* ---- which protocol it is */
 
@@ -20,11 +21,15 @@ static const char *kind_of(const char *first)
 static void test_kinds(void **state)
 {
     (void)state;
-    static const char *const scip[] = {"BM\n",      "VV;abc\r\n", "MD0044072501000\n", "%MD0044072501000\n",
-                                       "SCIP2.0\n", "TM0\n",      "GE00000000\n",      "SS019200\n"};
-    static const char *const lines[] = {"MEAS:VOLT?\n", "HEAD:STORe\n", "SSH-2.0-x\r\n", "PPS\n", "RST\n", "GET x\n"};
+    static const char *const scip[] = {"BM\n",  "VV;abc\r\n", "MD0044072501000\n", "%MD0044072501000\n",
+                                       "TM0\n", "SCIP2.0\n",  "SS019200\n",        "GE00000000\n"},
+                             *const simulation[] = {"%ST\n", "%SL\r\n", "DB02\n"};
+    static const char *const lines[] = {"MEAS:VOLT?\n", "HEAD:STORe\n", "SSH-2.0-x\r\n", "PPS\n",
+                                        "RST\n",        "GET x\n",      "ST\n",          "%VV\n"};
     for (size_t i = 0; i < sizeof scip / sizeof *scip; i++)
         assert_string_equal(kind_of(scip[i]), "SCIP");
+    for (size_t i = 0; i < sizeof simulation / sizeof *simulation; i++)
+        assert_string_equal(kind_of(simulation[i]), "SCIP");
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
         assert_string_equal(kind_of(lines[i]), "lines");
     assert_string_equal(kind_of("GET / HTTP/1.1\r\nHost: x\r\n\r\n"), "bytes");
@@ -37,18 +42,14 @@ static void test_kinds(void **state)
 static void test_http(void **state)
 {
     (void)state;
-    static struct made m;
-    struct client c;
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 5, 0, "GET / HTTP/1.1\r\n\r\n");
     made_say(&m, 7, 1, "HTTP/1.1 200 OK\r\n\r\n");
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    client_open(&c, &m, 0, NULL);
     assert_string_equal(client_ask(&c, "", 20), "");
     assert_string_equal(client_ask(&c, "GET / HTTP/1.1\r\n\r\n", 5), "22:HTTP/1.1 200 OK\r\n\r\n|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* ---- times */
@@ -57,20 +58,16 @@ static void test_http(void **state)
 static void test_equal_times(void **state)
 {
     (void)state;
-    static struct made m;
-    struct client c;
     made_begin(&m);
     made_connect(&m, 9);
     made_say(&m, 9, 0, "a\n");
     made_say(&m, 9, 1, "one\n");
     made_say(&m, 9, 0, "b\n");
     made_say(&m, 9, 1, "two\n");
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    client_open(&c, &m, 0, NULL);
     assert_string_equal(client_ask(&c, "a\n", 2), "0:one\n|");
     assert_string_equal(client_ask(&c, "b\n", 2), "2:two\n|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* The clock is set back by an hour between two requests: delays stay as they were. A packet that comes 1 ms early in
@@ -78,8 +75,6 @@ static void test_equal_times(void **state)
 static void test_clock_steps(void **state)
 {
     (void)state;
-    static struct made m;
-    struct client c;
     const int64_t hour_ms = 3600000;
     struct capture_counts counts;
     made_begin(&m);
@@ -90,52 +85,46 @@ static void test_clock_steps(void **state)
     made_say(&m, 25, 1, "two\n");
     made_say(&m, 24, 1, "three\n");
     made_say(&m, 28, 1, "four\n");
-    struct replay_capture *capture = made_load(&m);
-    capture_get_counts(capture, &counts);
+    client_open(&c, &m, 0, NULL);
+    capture_get_counts(c.capture, &counts);
     assert_int_equal(counts.backward, 2);
     assert_int_equal(counts.untimed, 0);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
     assert_string_equal(client_ask(&c, "a\n", 5), "3:one\n|");
     assert_string_equal(client_ask(&c, "b\n", 10), "10:two\n|10:three\n|13:four\n|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* A Simple Packet Block has no time: type 3, length, the packet's length, its bytes, length. */
-static void made_add_simple(struct made *m, const uint8_t *frame, size_t len)
+static void made_add_simple(const uint8_t *frame, size_t len)
 {
     const uint32_t whole = (uint32_t)(16 + (len + 3) / 4 * 4), head[3] = {3, whole, (uint32_t)len};
-    assert_true(m->len + whole < sizeof m->bytes);
-    memset(m->bytes + m->len, 0, whole);
-    memcpy(m->bytes + m->len, head, sizeof head); /* little-endian, as this machine */
-    memcpy(m->bytes + m->len + sizeof head, frame, len);
-    memcpy(m->bytes + m->len + whole - 4, &whole, 4);
-    m->len += whole;
+    assert_true(m.len + whole < sizeof m.bytes);
+    memset(m.bytes + m.len, 0, whole);
+    memcpy(m.bytes + m.len, head, sizeof head); /* little-endian, as this machine */
+    memcpy(m.bytes + m.len + sizeof head, frame, len);
+    memcpy(m.bytes + m.len + whole - 4, &whole, 4);
+    m.len += whole;
 }
 
 static void test_without_times(void **state)
 {
     (void)state;
-    static struct made m;
     uint8_t frame[ETHERNET_MAX_FRAME];
     struct capture_counts counts;
-    struct client c;
     made_begin(&m);
-    made_add_simple(&m, frame, tcp_put_syn(&m.talk, 0, frame));
-    made_add_simple(&m, frame, tcp_put_syn(&m.talk, 1, frame));
-    made_add_simple(&m, frame, tcp_put_data(&m.talk, 0, "a\n", 2, frame));
-    made_add_simple(&m, frame, tcp_put_data(&m.talk, 1, "one\n", 4, frame));
+    made_add_simple(frame, tcp_put_syn(&m.talk, 0, frame));
+    made_add_simple(frame, tcp_put_syn(&m.talk, 1, frame));
+    made_add_simple(frame, tcp_put_data(&m.talk, 0, "a\n", 2, frame));
+    made_add_simple(frame, tcp_put_data(&m.talk, 1, "one\n", 4, frame));
     /* The date of the first time is no delay. */
     made_say(&m, INT64_C(1700000000000), 0, "b\n");
     made_say(&m, INT64_C(1700000000004), 1, "two\n");
-    struct replay_capture *capture = made_load(&m);
-    capture_get_counts(capture, &counts);
+    client_open(&c, &m, 0, NULL);
+    capture_get_counts(c.capture, &counts);
     assert_int_equal(counts.untimed, 4);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
     assert_string_equal(client_ask(&c, "a\n", 2), "0:one\n|");
     assert_string_equal(client_ask(&c, "b\n", 5), "6:two\n|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* ---- files */
@@ -145,7 +134,6 @@ static void test_without_times(void **state)
 static void test_long_front(void **state)
 {
     (void)state;
-    static struct made m;
     enum { COMMENT = 60000, WHOLE = 12 + 16 + 4 + COMMENT + 4 };
     const uint32_t head[7] = {0x0a0d0d0a, WHOLE, 0x1a2b3c4d, 1, 0xffffffff, 0xffffffff, 1 | (uint32_t)COMMENT << 16},
                    whole = WHOLE;
@@ -165,7 +153,6 @@ static void test_long_front(void **state)
 static void test_unknown_link(void **state)
 {
     (void)state;
-    static struct made m;
     struct capture_counts counts;
     struct replay_capture *capture;
     struct sh_err err = {0};
@@ -194,7 +181,6 @@ static int ask_to_stop(void *ctx)
 static void test_stopped(void **state)
 {
     (void)state;
-    static struct made m;
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 1, 0, "a\n");
@@ -220,32 +206,26 @@ static void test_stopped(void **state)
 static void test_swapped_beginning(void **state)
 {
     (void)state;
-    static struct made m;
     uint8_t first[ETHERNET_MAX_FRAME], second[ETHERNET_MAX_FRAME];
     struct capture_counts counts;
-    struct client c;
     made_begin(&m);
     made_say(&m, 0, 0, "GD0000000000\n");
     const size_t first_len = tcp_put_data(&m.talk, 1, "GD0000000000\n00P\n", 17, first);
     const size_t second_len = tcp_put_data(&m.talk, 1, "1234\n\n", 6, second);
     made_add(&m, 1, second, second_len);
     made_add(&m, 2, first, first_len);
-    struct replay_capture *capture = made_load(&m);
-    capture_get_counts(capture, &counts);
+    client_open(&c, &m, 0, NULL);
+    capture_get_counts(c.capture, &counts);
     assert_int_equal(counts.missing_bytes, 0);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
     assert_string_equal(client_ask(&c, "GD0000000000\n", 5), "2:GD0000000000\n00P\n1234\n\n|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* LMCstopmeas ends scans, and no other event; LMCstartmeas begins them again. mSCreboot ends all. */
 static void test_scans_stop(void **state)
 {
     (void)state;
-    static struct made m;
     const struct talk_options again = {.loop = 1};
-    struct client c;
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 0, 0, "\x02sEN Odd 1\x03");
@@ -257,8 +237,7 @@ static void test_scans_stop(void **state)
     made_say(&m, 14, 0, "\x02sMN LMCstopmeas\x03");
     made_say(&m, 15, 0, "\x02sMN LMCstartmeas\x03");
     made_say(&m, 20, 1, "\x02sSN LMDscandata 3\x03");
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &again);
+    client_open(&c, &m, 0, &again);
     client_ask(&c, "\x02sEN Odd 1\x03\x02sEN LMDscandata 1\x03", 4);
     assert_non_null(strstr(c.got, "1:\x02sSN LMDscandata 1\x03|3:\x02sSN LMDscandata 2\x03|"));
     client_ask(&c, "\x02sMN LMCstopmeas\x03", 20);
@@ -268,7 +247,6 @@ static void test_scans_stop(void **state)
     assert_non_null(strstr(c.got, "29:\x02sSN LMDscandata 3\x03|"));
     assert_string_equal(client_ask(&c, "\x02sMN mSCreboot\x03", 20), "");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* ---- clients */
@@ -277,36 +255,29 @@ static void test_scans_stop(void **state)
 static void test_pipelined_turns(void **state)
 {
     (void)state;
-    static struct made m;
-    struct client c;
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 10, 0, "a\n");
     made_say(&m, 13, 1, "one\n");
     made_say(&m, 20, 0, "b\n");
     made_say(&m, 22, 1, "two\n");
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    client_open(&c, &m, 0, NULL);
     /* a is taken at 0 and answered at 3; b is taken with the tick after that, and answered 2 ms later. */
     assert_string_equal(client_ask(&c, "a\nb\n", 10), "3:one\n|6:two\n|");
     client_close(&c);
-    capture_free(capture);
 }
 
 /* Many more requests than can be answered at a time: none is lost, also where the client sends more than fits. */
 static void test_pipelined_flood(void **state)
 {
     (void)state;
-    static struct made m;
-    struct client c;
     static const char request[] = "\x02sRN A\x03";
     enum { LEN = sizeof request - 1, N = 20000 };
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 10, 0, request);
     made_say(&m, 15, 1, "\x02sRA A 1\x03");
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    client_open(&c, &m, 0, NULL);
     int sent = 0, answers = 0;
     size_t at = 0; /* in the request that is being sent */
     for (int tick = 0; answers < N && tick < 100 * N; tick++) {
@@ -321,22 +292,18 @@ static void test_pipelined_flood(void **state)
     assert_int_equal(answers, N);
     assert_int_equal(c.lost + (uint64_t)c.wrong, 0);
     client_close(&c);
-    capture_free(capture);
 }
 
 /* Bytes that never become a request are left out, counted and said, and the next request is answered. */
 static void test_endless_request(void **state)
 {
     (void)state;
-    static struct made m;
-    struct client c;
     static uint8_t many[TALK_MAX_REQUEST];
     made_begin(&m);
     made_connect(&m, 0);
     made_say(&m, 10, 0, "a\n");
     made_say(&m, 10, 1, "one\n");
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    client_open(&c, &m, 0, NULL);
     memset(many, 'x', sizeof many);
     c.ops->input(c.protocol, many, sizeof many);
     assert_int_equal(c.ops->takes(c.protocol), 0);
@@ -348,21 +315,17 @@ static void test_endless_request(void **state)
     client_ask(&c, "", 1);
     assert_int_equal(c.ops->owes(c.protocol), 0); /* no more comes for half a request */
     client_close(&c);
-    capture_free(capture);
 }
 
 /* Two datagrams are two requests, whatever their bytes are together. */
 static void test_datagrams_stay_apart(void **state)
 {
     (void)state;
-    static struct made m;
     uint8_t frame[ETHERNET_MAX_FRAME];
-    struct client c;
     made_begin(&m);
     made_add(&m, 10, frame, ethernet_put_udp(frame, &DRIVER, &DEVICE, "PING", 4));
     made_add(&m, 10, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "pong", 4));
-    struct replay_capture *capture = made_load(&m);
-    client_open(&c, &capture_place(capture, 0)->talk, &DEFAULTS);
+    client_open(&c, &m, 0, NULL);
     c.ops->input(c.protocol, (const uint8_t *)"PI", 2);
     c.ops->input(c.protocol, (const uint8_t *)"NG", 2);
     assert_string_equal(client_ask(&c, "", 3), "");
@@ -371,7 +334,6 @@ static void test_datagrams_stay_apart(void **state)
     c.ops->input(c.protocol, (const uint8_t *)"PING", 4);
     assert_string_equal(client_ask(&c, "", 3), "3:pong|4:pong|");
     client_close(&c);
-    capture_free(capture);
 }
 
 int main(void)

@@ -2,13 +2,6 @@
 /* CoLa's commands: the sequences of real clients, both forms, log-in, errors, and bytes that are no telegram. */
 #include "tests/unit/cola_rig.h"
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 /* ---- start-up sequences of real clients, with the answers that they accept */
 
 static void sick_tim_starts(void **state)
@@ -69,7 +62,6 @@ static void no_ident_is_an_old_tim(void **state)
         char part[3];
         cola_open_tim(models[i]);
         assert_int_not_equal(sscanf(cola_ask("sRI0"), "sRA 0 6 TiM3%1s%1s", part, part + 1), 2);
-        cola_close();
     }
     cola_open_tim("Scanner of my own");
     cola.identity.firmware[0] = 0;
@@ -196,7 +188,9 @@ static void a_resting_head_is_started(void **state)
     assert_int_equal(cola.n_lines, 0);
     cola_head_state("fault");
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
-    cola_head_state("spin-down"); /* it stops as soon as it can */
+    cola_head_state("scanning");
+    assert_int_equal(cola_ask("sRN STlms")[10], '6'); /* the session is stopped, as before */
+    cola_head_state("spin-down");                     /* it stops as soon as it can */
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
     cola_head_state("idle");
     cola.ops->time(cola.protocol, 200000000);
@@ -301,6 +295,7 @@ static void errors_have_their_numbers(void **state)
     assert_int_equal(cola.count[PROTOCOL_WRONG], sizeof cases / sizeof cases[0]);
     cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 9C4 FFF92230 225510"); /* nothing has changed */
     EXPECT_B("sRN NoSuchVariable", "sFA\0\3");
+    EXPECT_B("sWN FREchoFilter \2 ", "sFA\0\7"); /* a blank is a byte, too */
 }
 
 static void a_geometry_that_the_head_has_not_is_refused(void **state)
@@ -371,7 +366,7 @@ static void the_clock_can_be_set(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(sick_tim_starts),
         CASE(a_reboot_that_is_refused_ends_the_session),

@@ -156,16 +156,15 @@ static void results_follow_the_scan(void **state)
     static const struct {
         int beam;
         double range_m;
-        char result;
-    } cases[] = {{299, 1.0, '1'}, {300, 1.0, '2'},    {500, 1.0, '2'}, {501, 1.0, '1'},
-                 {300, 0.5, '2'}, {300, 0.4999, '1'}, {500, 2.0, '2'}, {500, 2.001, '1'},
-                 {400, 0.0, '1'}, {400, 0.3, '1'},    {400, 1.0, '2'}, {400, 0.02, '1'}};
+        const char *results;
+    } cases[] = {{299, 1.0, "100"}, {300, 1.0, "200"},    {500, 1.0, "200"}, {501, 1.0, "100"},
+                 {300, 0.5, "200"}, {300, 0.4999, "100"}, {500, 2.0, "200"}, {500, 2.001, "100"},
+                 {400, 0.0, "100"}, {400, 0.3, "100"},    {400, 1.0, "200"}, {400, 0.02, "100"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         fields_object(cases[i].beam, 1, cases[i].range_m);
         fields_shot[cases[i].beam].n = cases[i].range_m > 0.0;
         fields_turn();
-        const char results[] = {cases[i].result, '0', '0', 0};
-        fields_expect(results);
+        fields_expect(cases[i].results);
     }
 }
 
@@ -178,13 +177,12 @@ static void chords(void **state)
     write_field_1();
     static const struct {
         double range_m;
-        char result;
-    } cases[] = {{1.67097, '2'}, {1.67098, '1'}, {0.41774, '1'}, {0.41775, '2'}};
+        const char *results;
+    } cases[] = {{1.67097, "200"}, {1.67098, "100"}, {0.41774, "100"}, {0.41775, "200"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         fields_object(400, 1, cases[i].range_m);
         fields_turn();
-        const char results[] = {cases[i].result, '0', '0', 0};
-        fields_expect(results);
+        fields_expect(cases[i].results);
     }
 }
 
@@ -335,7 +333,7 @@ static void another_set_is_news(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, fields_close)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(a_record_is_read_back_as_it_was_written),
         CASE(records_that_say_nothing_are_refused),

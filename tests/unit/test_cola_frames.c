@@ -2,13 +2,6 @@
 /* CoLa's frames: both forms on one connection, bytes that are no telegram, and telegrams that are broken at random. */
 #include "tests/unit/cola_rig.h"
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 /* ---- frames */
 
 static void answers_have_the_form_of_the_request(void **state)
@@ -162,7 +155,7 @@ static void broken_telegrams_do_no_harm(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(answers_have_the_form_of_the_request), CASE(garbage_is_skipped_and_counted),
         CASE(an_overlong_telegram_is_refused_once), CASE(long_requests_are_answered),

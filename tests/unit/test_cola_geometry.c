@@ -32,13 +32,6 @@ static void open_lms(void)
     cola_authorise();
 }
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 #define FAST   " 1388 1 1388 FFF92230 225510" /* 50 Hz, 0.5 deg */
 #define FINE   " 9C4 1 9C4 FFF92230 225510"   /* 25 Hz, 0.25 deg */
 #define SPARSE " 9C4 1 1388 FFF92230 225510"  /* 25 Hz, 0.5 deg */
@@ -153,7 +146,7 @@ static void the_range_stays_on_the_new_grid(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(a_resting_head_says_how_it_is_set), CASE(other_pairs_are_refused),         CASE(a_resting_head_is_set),
         CASE(a_scan_is_stopped_first),           CASE(the_range_stays_on_the_new_grid),

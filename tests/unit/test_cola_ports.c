@@ -2,13 +2,6 @@
 /* CoLa: fields, inputs and outputs, in the forms of real scanners (an LMS111 V1.80.2 and a TiM781S V3.13). */
 #include "tests/unit/cola_rig.h"
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 /* "sRN field012" is answered by "sRA field012 " and these bytes. */
 static void expect_field(int number, const void *values, size_t len)
 {
@@ -59,7 +52,7 @@ static void a_tim7_has_48_named_fields(void **state)
 static void fields_wait_for_the_head(void **state)
 {
     (void)state;
-    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "TiM781");
+    cola_open("TiM781");
     cola_expect("sRN field000", "sFA 4");
     cola_expect("sRN LFErec", "sFA 4");
 }
@@ -117,7 +110,7 @@ static void an_lms_says_what_is_not_used(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(an_lms_has_ten_empty_fields), CASE(a_tim7_has_48_named_fields), CASE(fields_wait_for_the_head),
         CASE(a_tim7_has_three_results),    CASE(a_tim7_has_five_outputs),    CASE(an_lms_says_what_is_not_used),

@@ -4,13 +4,6 @@
 
 static struct cola_lmd lmd;
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 static void a_narrowed_range_is_narrower(void **state)
 {
     (void)state;
@@ -19,9 +12,7 @@ static void a_narrowed_range_is_narrower(void **state)
     cola_expect("sWN LMPoutputRange 1 D05 +0 +1800000", "sWA LMPoutputRange");
     cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 D05 0 1B7740");
     cola_stream(0);
-    protocol_rig_clear(&cola);
-    cola_turn(0, 1.0);
-    cola_read_lmd(0, &lmd);
+    cola_scan(0, 1.0, &lmd);
     for (int k = 0; k < 2; k++) {
         assert_int_equal(lmd.channel[k].start_e4, 0);
         assert_int_equal(lmd.channel[k].n, 541);
@@ -29,9 +20,7 @@ static void a_narrowed_range_is_narrower(void **state)
     for (uint32_t i = 0; i < 541; i++)
         assert_int_equal(lmd.channel[0].value[i], 1000 + 10 * (135 + i));
     cola_expect("sWN LMPoutputRange 1 D05 +900000 +900000", "sWA LMPoutputRange");
-    protocol_rig_clear(&cola);
-    cola_turn(1, 1.0);
-    cola_read_lmd(0, &lmd);
+    cola_scan(1, 1.0, &lmd);
     assert_int_equal(lmd.channel[0].n, 1);
     assert_int_equal(lmd.channel[0].value[0], 1000 + 10 * 405);
 }
@@ -46,9 +35,7 @@ static void expect_range(uint32_t line, const char *step, int32_t start_e4, int3
     cola_expect(request, "sWA LMPoutputRange");
     snprintf(answer, sizeof answer, "%s", cola_ask("sRN LMPoutputRange"));
     assert_int_equal(sscanf(answer, "sRA LMPoutputRange 1 %X %X %X", &read_step, &start, &stop), 3);
-    protocol_rig_clear(&cola);
-    cola_turn(line, 1.0);
-    cola_read_lmd(0, &lmd);
+    cola_scan(line, 1.0, &lmd);
     const struct cola_channel *dist = &lmd.channel[0];
     assert_int_equal(dist->n, n);
     for (uint32_t i = 0; i < n; i++)
@@ -73,7 +60,6 @@ static void a_range_off_the_grid_goes_to_the_nearest_beams(void **state)
     expect_range(3, "9C4", -448749, 2248749, 1, 1079);
     expect_range(4, "9C4", 10, 20, 180, 1);
     expect_range(5, "9C4", 1240, 1260, 180, 2);
-    cola_close();
     cola_open_tim("TiM571");
     cola_authorise();
     cola_stream(0);
@@ -87,7 +73,7 @@ static void a_range_off_the_grid_goes_to_the_nearest_beams(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(a_narrowed_range_is_narrower),
         CASE(a_range_off_the_grid_goes_to_the_nearest_beams),

@@ -9,18 +9,11 @@
 static struct cola_lmd lmd;
 static struct protocol_rig_shot shots[3001];
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 /* ---- the telegram as a whole, by hand: 4 beams of a head with 8 steps a turn, 10 Hz */
 
 static void open_small(void)
 {
-    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "TiM571");
+    cola_open("TiM571");
     protocol_rig_planar(&cola, 8, 2, 5, 4, -1, 10);
     cola.scan_t0_ns = INT64_C(1000000000);
     protocol_rig_describe(&cola, 0);
@@ -37,9 +30,9 @@ static void a_telegram_in_a_is_this_text(void **state)
     cola_stream(0);
     protocol_rig_clear(&cola);
     protocol_rig_turn(&cola, 0, shots, 1);
-    /* Serial number 17210001 = 0x1069A91. Scan start 1 s = F4240 us, sent at the turn's end, 1.1 s = 10C8E0. 10 Hz = 3E8,
-     * 80 pulses a second: 1 (100 Hz). Step 45 deg = 6DDD0, and that is more than 16 bits: DDD0. First beam 90 - 2 x 45
-     * deg = 0. White is FF, -32 dB 80, -63.99 dB 1. */
+    /* Serial number 17210001 = 0x1069A91. Scan start 1 s = F4240 us, sent at the turn's end, 1.1 s = 10C8E0. 10 Hz =
+     * 3E8, 80 pulses a second: 1 (100 Hz). Step 45 deg = 6DDD0, and that is more than 16 bits: DDD0. First beam 90 - 2
+     * x 45 deg = 0. White is FF, -32 dB 80, -63.99 dB 1. */
     static const char expected[] = "\2sSN LMDscandata 1 1 1069A91 0 0 0 0 F4240 10C8E0 0 0 0 0 0 3E8 1 0 1 "
                                    "DIST1 3F800000 00000000 0 DDD0 4 3E8 9C4 0 1230 "
                                    "1 RSSI1 3F800000 00000000 0 DDD0 4 FF 80 0 1 0 0 0 0 0\3";
@@ -83,9 +76,7 @@ static void ranges_stand_at_their_angles(void **state)
     for (int b = 0; b < 2; b++) {
         cola_open_tim("TiM571");
         cola_stream(b);
-        protocol_rig_clear(&cola);
-        cola_turn(0, 1.0);
-        cola_read_lmd(0, &lmd);
+        cola_scan(0, 1.0, &lmd);
         assert_string_equal(lmd.verb, "sSN");
         assert_int_equal(lmd.serial, 17210001);
         assert_int_equal(lmd.scan_chz, 1500);
@@ -101,7 +92,6 @@ static void ranges_stand_at_their_angles(void **state)
         assert_int_equal(rssi->n, 811);
         for (uint32_t i = 0; i < 811; i++)
             assert_int_equal(dist->value[i], 1000 + 10 * i); /* counter-clockwise: with the steps */
-        if (b == 0) cola_close();
     }
 }
 
@@ -115,13 +105,10 @@ static void rates_agree_as_sick_tim_asks(void **state)
         else
             cola_open_tim("TiM571");
         cola_stream(0);
-        protocol_rig_clear(&cola);
-        cola_turn(0, 1.0);
-        cola_read_lmd(0, &lmd);
+        cola_scan(0, 1.0, &lmd);
         const double scan_s = 100.0 / lmd.scan_chz, step_deg = lmd.channel[0].step_e4 / 1e4;
         assert_true(fabs(scan_s * step_deg / 360.0 - 1.0 / (100.0 * lmd.meas_100hz)) < 1e-5);
         assert_int_equal(lmd.meas_100hz, lms ? 360 : 162);
-        if (!lms) cola_close();
     }
 }
 
@@ -131,7 +118,7 @@ static void a_mark_on_the_left_is_on_the_left(void **state)
 {
     (void)state;
     for (int turn = -1; turn <= 1; turn += 2) {
-        protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "mine");
+        cola_open("mine");
         protocol_rig_planar(&cola, 720, 100, 500, 300, turn, 10);
         protocol_rig_describe(&cola, 0);
         cola_stream(0);
@@ -147,7 +134,6 @@ static void a_mark_on_the_left_is_on_the_left(void **state)
             const int32_t angle_e4 = lmd.channel[0].start_e4 + (int32_t)(i * lmd.channel[0].step_e4);
             assert_int_equal(lmd.channel[0].value[i], angle_e4 == (90 + 30) * 10000 ? 3000 : 5000);
         }
-        if (turn < 0) cola_close();
     }
 }
 
@@ -158,17 +144,13 @@ static void far_heads_count_in_two_millimetres(void **state)
     cola.descriptor.range_max_m = 80.0;
     protocol_rig_describe(&cola, 0);
     cola_stream(0);
-    protocol_rig_clear(&cola);
-    cola_turn(0, 60.0); /* to 68.1 m */
-    cola_read_lmd(0, &lmd);
+    cola_scan(0, 60.0, &lmd); /* to 68.1 m */
     assert_true(lmd.channel[0].scale == 2.0);
     for (uint32_t i = 0; i < 811; i++)
         assert_int_equal(lmd.channel[0].value[i], 30000 + 5 * i);
     cola_authorise();
     cola_expect("sWN LMDscandatascalefactor 3F800000", "sFA 5"); /* it would cut off */
-    protocol_rig_clear(&cola);
-    cola_turn(1, 130.0); /* 131.07 m is the end of 16 bits */
-    cola_read_lmd(0, &lmd);
+    cola_scan(1, 130.0, &lmd);                                   /* 131.07 m is the end of 16 bits */
     assert_int_equal(lmd.channel[0].value[107], 65535);
     assert_int_equal(lmd.channel[0].value[108], 0);
     assert_int_equal(cola.count[PROTOCOL_POINTS_LOST], 811 - 108);
@@ -257,14 +239,11 @@ static void name_and_time_where_asked_for(void **state)
             cola_expect("sWN LMDscandatacfg 1 0 0 0 0 0 0 1 1 1 1 1", "sWA LMDscandatacfg");
             cola_stream(b);
             cola_turn(0, 1.0);
-            protocol_rig_clear(&cola);
-            cola_turn(1, 1.0);
-            cola_read_lmd(0, &lmd);
+            cola_scan(1, 1.0, &lmd);
             assert_string_equal(lmd.name, "left bumper.");
             assert_int_equal(lmd.has_time, 1);
             /* step 0 of scan 1: 1.0666 s after power-up */
             assert_memory_equal(lmd.date, utc ? known : unknown, sizeof known);
-            if (b != 1 || utc != 1) cola_close();
         }
 }
 
@@ -284,9 +263,7 @@ static void the_encoder_counts_the_way(void **state)
     cola_authorise();
     cola_expect("sWN LMDscandatacfg 1 0 0 0 0 1 0 0 0 0 0 1", "sWA LMDscandatacfg");
     cola_stream(1);
-    protocol_rig_clear(&cola);
-    cola_turn(0, 1.0); /* a head that stands */
-    cola_read_lmd(0, &lmd);
+    cola_scan(0, 1.0, &lmd); /* a head that stands */
     assert_int_equal(lmd.n_encoders, 1);
     assert_int_equal(lmd.position, 0);
     assert_int_equal(lmd.speed, 0);
@@ -306,7 +283,7 @@ static void the_encoder_counts_the_way(void **state)
 static void the_longest_telegram_has_room(void **state)
 {
     (void)state;
-    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "LMS111");
+    cola_open("LMS111");
     protocol_rig_planar(&cola, 3600, 0, 2999, 1500, -1, 10);
     cola.descriptor.range_max_m = 60.0;
     protocol_rig_describe(&cola, 0);
@@ -331,7 +308,7 @@ static void the_longest_telegram_has_room(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(a_telegram_in_a_is_this_text),       CASE(a_telegram_in_b_is_these_bytes),
         CASE(a_tim571_telegram_has_its_length),   CASE(ranges_stand_at_their_angles),

@@ -4,13 +4,6 @@
 
 #include "tests/unit/cola_rig.h"
 
-static int close_rig(void **state)
-{
-    (void)state;
-    if (cola.protocol != NULL) cola_close();
-    return 0;
-}
-
 /* Another session of the same head, after what the rig's spec says now. Returns what create does. */
 static int open_again(struct sh_err *err)
 {
@@ -188,7 +181,6 @@ static void one_dialect_at_a_time(void **state)
     cola.spec.stored = "EIHstCola 1\n"; /* with it, it is the one of power-up */
     assert_int_equal(open_again(&err), 0);
     EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
-    cola_close();
     open_strict(PROTOCOL_COLA_B);
     expect_silence("\2sRN SCdevicestate\3", 19);
     EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
@@ -245,7 +237,7 @@ static void garbage_of_the_other_dialect(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(settings_are_kept),
         CASE(without_a_file_nothing_is_kept),

@@ -16,13 +16,6 @@ static void open_with_replies(void)
     cola.replies = replies;
 }
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 /* 468CA000 is 18000 s, as a real scanner has answered (sick_scan_xd's examples of telegrams); 3F000000 is 0.5. */
 static void variables_are_read(void **state)
 {
@@ -110,7 +103,7 @@ static void the_servers_clock_is_not_set_by_hand(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(variables_are_read),
         CASE(frames_are_those_of_the_manuals),

@@ -8,13 +8,6 @@
 static struct cola_lmd lmd;
 static struct protocol_rig_shot shots[3001];
 
-static int close_rig(void **state)
-{
-    (void)state;
-    cola_close();
-    return 0;
-}
-
 /* ---- times and counters */
 
 static void ticks_count_modulo_32_bits(void **state)
@@ -48,9 +41,7 @@ static void ticks_are_on_a_line_with_time(void **state)
     uint32_t before_us = 0;
     int64_t wraps = 0;
     for (uint32_t line = 0; line < 27000; line += line % 2 == 0 ? 1 : 899) {
-        protocol_rig_clear(&cola);
-        cola_turn(line, 1.0);
-        cola_read_lmd(0, &lmd);
+        cola_scan(line, 1.0, &lmd);
         if (lmd.scan_us < before_us) wraps++;
         before_us = lmd.scan_us;
         const double tick_us = (double)lmd.scan_us + 4294967296.0 * (double)wraps;
@@ -64,7 +55,7 @@ static void ticks_are_on_a_line_with_time(void **state)
 static void counters_count_modulo_16_bits(void **state)
 {
     (void)state;
-    protocol_rig_open(&cola, PROTOCOL_COLA, "SICK", "TiM571");
+    cola_open("TiM571");
     protocol_rig_planar(&cola, 8, 2, 5, 4, -1, 10);
     protocol_rig_describe(&cola, 0);
     cola_stream(1);
@@ -91,19 +82,9 @@ static void counters_count_modulo_16_bits(void **state)
 /* Feeds n steps of a turn, from `from` on. */
 static void part_of_turn(uint32_t line, uint32_t from, uint32_t n)
 {
-    static const double level[1100];
-    double pan_turn[1100];
-    int64_t dt_ns[1100];
-    const int64_t line_ns = (int64_t)line * 66666667;
-    for (uint32_t i = 0; i < n; i++) {
-        dt_ns[i] = (int64_t)i * 61728;
-        pan_turn[i] = -((double)(from + i) - 405.0) / 1080.0;
+    for (uint32_t i = 0; i < n; i++)
         shots[i] = (struct protocol_rig_shot){1, {5.0}, {0}, {0}};
-    }
-    const struct protocol_rig_run run = {
-        line,     line, (uint64_t)line * 1080 + from, n, line_ns + from * INT64_C(61728), line_ns, dt_ns, level,
-        pan_turn, shots};
-    protocol_rig_points(&cola, &run);
+    protocol_rig_part(&cola, line, from, n, shots);
 }
 
 static void a_scan_with_a_hole_is_not_sent(void **state)
@@ -190,25 +171,6 @@ static void two_scans_in_a_tick_are_both_sent(void **state)
     }
 }
 
-/* The same with all attributes of a turn missing. */
-static void a_scan_without_its_attributes_is_not_sent(void **state)
-{
-    (void)state;
-    cola_open_tim("TiM571");
-    cola.attributes = 1;
-    protocol_rig_describe(&cola, 0);
-    cola_stream(0);
-    protocol_rig_clear(&cola);
-    cola_turn(0, 1.0);
-    assert_int_equal(cola.n_units, 1);
-    cola.attributes = 0; /* the head sends some; here they are lost */
-    cola_turn(1, 1.0);
-    cola.attributes = 1;
-    cola_turn(2, 1.0);
-    assert_int_equal(cola.n_units, 2);
-    assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 1);
-}
-
 static void what_nobody_asked_for_is_not_lost(void **state)
 {
     (void)state;
@@ -225,8 +187,7 @@ static void what_nobody_asked_for_is_not_lost(void **state)
     cola_stream(0);
     protocol_rig_clear(&cola);
     part_of_turn(12, 0, 100); /* the scan is stopped */
-    const struct line_end end = {.frame = 12, .line = 12, .n_fired = 100, .n_cast = 100, .status = LINE_PARTIAL};
-    protocol_rig_line_end(&cola, &end);
+    protocol_rig_turn_end(&cola, 12, LINE_PARTIAL);
     assert_int_equal(cola.n_units, 0);
     assert_int_equal(cola.count[PROTOCOL_UNITS_LOST], 0);
 }
@@ -249,6 +210,13 @@ static void a_client_that_does_not_read_loses_whole_scans(void **state)
 }
 
 /* ---- polled, every second one, stopped */
+
+static void expect_bytes(const char *bytes)
+{
+    assert_int_equal(cola.len, strlen(bytes));
+    assert_memory_equal(cola.bytes, bytes, cola.len);
+    protocol_rig_clear(&cola);
+}
 
 static void a_poll_gets_the_last_scan(void **state)
 {
@@ -277,22 +245,25 @@ static void a_poll_gets_the_last_scan(void **state)
         assert_int_equal(lmd.channel[0].value[1080], 12800);
     }
     cola_head_state("idle"); /* a resting head is woken */
-    cola_close();
     cola_open_lms();
     cola_head_state("idle");
     protocol_rig_input(&cola, "\2sRN LMDscandata\3");
     assert_string_equal(cola.line[1], "SCAN:START");
     cola_head_state("fault");
-    cola_expect("sRN LMDscandata", "sFA 4");
+    protocol_rig_clear(&cola);
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    expect_bytes("\2sFA 4\3\2sFA 4\3"); /* the one that has waited is refused, too */
 }
+
+/* Another session controls the head. */
+static const struct protocol_rig_reply refused[] = {
+    {"HEAD:STATE?", "idle", 0}, {"SCAN:START", "ERR", -203}, {NULL, NULL, 0}};
 
 /* Somebody stops the head before the first scan has come: it is started again, since a poll waits. After that scan a
  * stop is meant. Where the start is refused, it is tried once. */
 static void a_waiting_poll_starts_the_head_again(void **state)
 {
     (void)state;
-    static const struct protocol_rig_reply refused[] = {
-        {"HEAD:STATE?", "idle", 0}, {"SCAN:START", "ERR", -203}, {NULL, NULL, 0}};
     cola_open_lms();
     cola_head_state("idle");
     protocol_rig_input(&cola, "\2sRN LMDscandata\3");
@@ -309,13 +280,44 @@ static void a_waiting_poll_starts_the_head_again(void **state)
     protocol_rig_clear(&cola);
     cola.ops->time(cola.protocol, 9000000000);
     assert_int_equal(cola.n_lines, 0);
-    cola_close();
+    cola_open_lms(); /* the poll waits, too, of a session that has stopped its measurement meanwhile */
+    cola_head_state("boot");
+    cola_authorise();
+    protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0");
+    cola_head_state("idle");
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 1000000000);
+    assert_int_equal(cola.n_lines, 2);
+    assert_string_equal(cola.line[1], "SCAN:START");
     cola_open_lms();
     cola.replies = refused;
     cola_expect("sRN LMDscandata", "sFA 4");
     protocol_rig_clear(&cola);
     cola.ops->time(cola.protocol, 1000000000);
     assert_int_equal(cola.n_lines, 0);
+}
+
+/* The head fails while a poll waits, or may not be started any more: the poll is refused, once. The answer to the
+ * request in which this shows comes after it. */
+static void a_waiting_poll_is_refused(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        cola_open_lms();
+        cola_head_state("boot");
+        cola_authorise();
+        protocol_rig_clear(&cola);
+        protocol_rig_input(&cola, "\2sRN LMDscandata\3");
+        cola_head_state("fault");
+        if (i == 1) cola.replies = refused;
+        if (i == 2) protocol_rig_input(&cola, "\2sMN LMCstartmeas\3");
+        cola.ops->time(cola.protocol, 1000000000);
+        cola.ops->time(cola.protocol, 2000000000);
+        expect_bytes(i == 2 ? "\2sFA 4\3\2sAN LMCstartmeas 1\3" : "\2sFA 4\3");
+        cola_turn(41, 1.0);
+        assert_int_equal(cola.n_units, 0);
+    }
 }
 
 /* Two polls wait for the first scan: each answer has the form of its request. */
@@ -384,19 +386,19 @@ static void the_stream_has_the_chosen_form(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, close_rig)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(ticks_count_modulo_32_bits),
         CASE(ticks_are_on_a_line_with_time),
         CASE(counters_count_modulo_16_bits),
         CASE(a_scan_with_a_hole_is_not_sent),
-        CASE(a_scan_without_its_attributes_is_not_sent),
         CASE(attributes_are_those_of_their_points),
         CASE(two_scans_in_a_tick_are_both_sent),
         CASE(what_nobody_asked_for_is_not_lost),
         CASE(a_client_that_does_not_read_loses_whole_scans),
         CASE(a_poll_gets_the_last_scan),
         CASE(a_waiting_poll_starts_the_head_again),
+        CASE(a_waiting_poll_is_refused),
         CASE(waiting_polls_keep_their_forms),
         CASE(every_nth_scan_on_request),
         CASE(the_stream_has_the_chosen_form),

@@ -160,7 +160,6 @@ static void a_rectangle_has_a_record(void **state)
     fields_open(&fields);
     cola_expect("sRN field000",
                 "sRA field000 3F800000 00000000 D05 FFF92230 1 1 0 1 1B7740 586 0 7D0 3E8 0 0 1 4 gate 0");
-    cola_close();
     cola_open_lms();
     fields_open(&fields);
     cola_expect("sRN field000",
@@ -194,7 +193,7 @@ static void a_polygon_has_a_record(void **state)
 
 int main(void)
 {
-#define CASE(f) cmocka_unit_test_teardown(f, fields_close)
+#define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(inputs_choose_the_set),
         CASE(a_soiled_window_shows),

@@ -58,6 +58,8 @@ static void test_broken_requests(void **state)
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\n folded\r\n\r\n", 400, 1},
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\x01\r\n\r\n", 400, 1},
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nExpect: tea\r\n\r\n", 417, 1},
+        {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nExpect: tea\r\nExpect: 100-continue\r\n\r\n", 417, 1},
+        {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nOrigin: http://y\r\nOrigin: http://x\r\n\r\n", 400, 1},
         {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\nrpm=600", 411, 1},
         {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n7\r\nrpm=600\r\n0\r\n\r\n", 411,
          1},
@@ -95,6 +97,25 @@ static void test_broken_requests(void **state)
         http_get("/cgi/info.json"); /* after the last answer nothing more is answered */
         assert_int_equal(http_rig.len, 0);
         assert_true(len > 0);
+    }
+}
+
+/* A line of 512 bytes without its end, and a head of 4096 bytes with its end, are the longest. */
+static void test_longest(void **state)
+{
+    (void)state;
+    static char text[8192];
+    for (int more = 0; more < 2; more++) {
+        http_renew();
+        snprintf(text, sizeof text, "GET /cgi/info.json?%0*d HTTP/1.1\r\nHost: x\r\n\r\n", 512 - 19 - 9 + more, 0);
+        http_send(text);
+        assert_int_equal(http_status(), more ? 414 : 200);
+        http_renew();
+        snprintf(text, sizeof text, "GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nX: %0*d\r\n\r\n",
+                 4096 - 29 - 9 - 3 - 4 + more, 0);
+        assert_int_equal(strlen(text), 4096 + more);
+        http_send(text);
+        assert_int_equal(http_status(), more ? 431 : 200);
     }
 }
 
@@ -195,8 +216,13 @@ static void test_garbage(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_pieces),          TEST(test_broken_requests),      TEST(test_head_method),
-        TEST(test_expect_continue), TEST(test_pages_from_elsewhere), TEST(test_nothing_is_reflected),
+        TEST(test_pieces),
+        TEST(test_broken_requests),
+        TEST(test_head_method),
+        TEST(test_longest),
+        TEST(test_expect_continue),
+        TEST(test_pages_from_elsewhere),
+        TEST(test_nothing_is_reflected),
         TEST(test_garbage),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -89,13 +89,7 @@ static void test_empty_block(void **state)
  * numbers are right. */
 static void check_cut(uint32_t n_points, uint32_t echoes)
 {
-    struct line_block block = make_block(n_points);
-    for (uint32_t i = 0; i < n_points; i++) {
-        block_a[i] = i;
-        block_echo[i] = (uint8_t)((i % echoes + 1) | echoes << 4);
-        block_dt[i] = i / echoes * 500;
-    }
-    block.n_pulses = (n_points + echoes - 1) / echoes;
+    const struct line_block block = make_pulses(n_points, echoes);
     size_t len = native_encode_points(out, native_points_bound(n_points), &block, 0), at = 0;
     assert_true(len > 0 && len <= native_points_bound(n_points));
     uint32_t seen = 0, pulses = 0;

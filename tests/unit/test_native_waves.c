@@ -1,44 +1,24 @@
 /* SPDX-License-Identifier: MIT */
 /* These tests compare frames of waveforms byte by byte. They are sent after their points, attributes and colours,
  * cut with them, and refused where they are wrong. Deviations are behind the attributes. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-#include <cmocka.h>
-
-#include "core/err.h"
-#include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/native_waves.h"
+#include "tests/unit/native_rig.h"
 
 enum { MOST = 2 * NATIVE_MAX_POINTS + 100, MOST_SAMPLES = 1 << 19 };
 
 static uint8_t out[1 << 21];
-static uint32_t dt[MOST], a[MOST];
-static int16_t refl[MOST], amplitude[MOST];
-static uint16_t label[MOST], width[MOST], deviation[MOST], sample[MOST_SAMPLES];
-static uint8_t echo[MOST], rgb[MOST][3];
+static int16_t amplitude[MOST];
+static uint16_t width[MOST], deviation[MOST], sample[MOST_SAMPLES];
+static uint8_t rgb[MOST][3];
 static struct line_wave wave[MOST];
 static struct line_waves waves;
 
-static uint64_t wire(const uint8_t *p, int bytes)
-{
-    uint64_t v = 0;
-    for (int i = bytes - 1; i >= 0; i--)
-        v = v << 8 | p[i];
-    return v;
-}
-
 /* One point a pulse, 500 ns apart, and no window yet. */
-static struct line_block make_block(uint32_t n_points)
+static struct line_block with_waves(uint32_t n_points)
 {
-    for (uint32_t i = 0; i < n_points; i++) {
-        dt[i] = i * 500;
-        echo[i] = 0x11;
+    struct line_block block = make_pulses(n_points, 1);
+    for (uint32_t i = 0; i < n_points; i++)
         deviation[i] = (uint16_t)(i * 3);
-    }
     waves = (struct line_waves){.wave = wave,
                                 .sample = sample,
                                 .capacity = MOST,
@@ -47,19 +27,8 @@ static struct line_block make_block(uint32_t n_points)
                                 .baseline_16 = 3205,
                                 .bits = 12,
                                 .count_signal = 0.25F};
-    return (struct line_block){.line = 77,
-                               .pulse0 = UINT64_C(0x123456789a),
-                               .n_pulses = n_points,
-                               .t0_ns = 1000,
-                               .n_points = n_points,
-                               .dt_ns = dt,
-                               .a = a,
-                               .b = a,
-                               .c = a,
-                               .refl_cdb = refl,
-                               .echo = echo,
-                               .label = label,
-                               .waves = &waves};
+    block.waves = &waves;
+    return block;
 }
 
 /* Adds a window of n samples, which count up over all windows. */
@@ -90,7 +59,7 @@ static void test_bytes(void **state)
 {
     (void)state;
     for (int beside = 0; beside < 2; beside++) {
-        struct line_block block = make_block(3);
+        struct line_block block = with_waves(3);
         add_window(1, 20, 3);
         add_window(2, 0x10000, 2);
         waves.n_left_out = 9;
@@ -102,27 +71,27 @@ static void test_bytes(void **state)
         assert_int_equal(f[0], 0xd5);
         assert_int_equal(f[1], 12);
         assert_int_equal(f[3], 0);
-        assert_int_equal(wire(f + 4, 4), 32 + 28 + 8 + 28 + 4);
-        assert_int_equal(wire(f + 16, 8), wire(out + 16, 8)); /* the device time of its points */
-        assert_int_equal(wire(p, 8), 0x123456789a);
-        assert_int_equal(wire(p + 8, 4), 77);
-        assert_int_equal(wire(p + 12, 4), 2);
-        assert_int_equal(wire(p + 16, 4), 1500);
-        assert_int_equal(wire(p + 20, 2), 3205);
+        assert_int_equal(wire(f, 4, 4), 32 + 28 + 8 + 28 + 4);
+        assert_int_equal(wire(f, 16, 8), wire(out, 16, 8)); /* the device time of its points */
+        assert_int_equal(wire(p, 0, 8), 0x123456789a);
+        assert_int_equal(wire(p, 8, 4), 77);
+        assert_int_equal(wire(p, 12, 4), 2);
+        assert_int_equal(wire(p, 16, 4), 1500);
+        assert_int_equal(wire(p, 20, 2), 3205);
         assert_int_equal(p[22], 12);
         assert_int_equal(p[23], 0);
-        assert_int_equal(wire(p + 24, 4), 0x3e800000); /* 0.25 by IEEE 754 */
-        assert_int_equal(wire(p + 28, 4), 9);
-        assert_int_equal(wire(w, 4), 1);
-        assert_int_equal(wire(w + 4, 4), 500);
-        assert_int_equal(wire(w + 8, 4), 20);
-        assert_int_equal(wire(w + 12, 4), 3); /* and the zero behind it */
-        assert_int_equal(wire(w + 16, 4), 0xa0000001);
-        assert_int_equal(wire(w + 20, 4), 0xb0000001);
-        assert_int_equal(wire(w + 24, 4), 0xc0000001);
+        assert_int_equal(wire(p, 24, 4), 0x3e800000); /* 0.25 by IEEE 754 */
+        assert_int_equal(wire(p, 28, 4), 9);
+        assert_int_equal(wire(w, 0, 4), 1);
+        assert_int_equal(wire(w, 4, 4), 500);
+        assert_int_equal(wire(w, 8, 4), 20);
+        assert_int_equal(wire(w, 12, 4), 3); /* and the zero behind it */
+        assert_int_equal(wire(w, 16, 4), 0xa0000001);
+        assert_int_equal(wire(w, 20, 4), 0xb0000001);
+        assert_int_equal(wire(w, 24, 4), 0xc0000001);
         assert_memory_equal(w + 28, "\0\0\1\0\2\0\0\0", 8);
-        assert_int_equal(wire(w + 36, 4), 2);
-        assert_int_equal(wire(w + 44, 4), 0x10000);
+        assert_int_equal(wire(w, 36, 4), 2);
+        assert_int_equal(wire(w, 44, 4), 0x10000);
         assert_memory_equal(w + 64, "\3\0\4\0", 4);
     }
 }
@@ -131,7 +100,7 @@ static void test_bytes(void **state)
 static void test_deviations(void **state)
 {
     (void)state;
-    struct line_block block = make_block(3);
+    struct line_block block = with_waves(3);
     struct native_attributes head;
     add_attributes(&block);
     deviation[1] = 65535;
@@ -154,7 +123,7 @@ static void test_deviations(void **state)
 static void test_refused(void **state)
 {
     (void)state;
-    struct line_block block = make_block(3);
+    struct line_block block = with_waves(3);
     struct native_waves head;
     static const struct {
         size_t at;
@@ -241,7 +210,7 @@ static void test_cut_with_their_points(void **state)
 {
     (void)state;
     const uint32_t n = 2 * NATIVE_MAX_POINTS + 2;
-    struct line_block block = make_block(n);
+    struct line_block block = with_waves(n);
     for (uint32_t i = 0; i < n; i++)
         if (i % 7 != 3) add_window(i, 3 * i, 1 + i % 90);
     add_attributes(&block);
@@ -260,7 +229,7 @@ static void test_cut_with_their_points(void **state)
 static void test_longest(void **state)
 {
     (void)state;
-    struct line_block block = make_block(3);
+    struct line_block block = with_waves(3);
     for (uint32_t i = 0; i < 24; i++)
         add_window(i / 8, i * 5000, NATIVE_MAX_SAMPLES);
     const size_t room = native_points_bound(3) + native_waves_bound(3, waves.n, waves.n_samples);
@@ -273,7 +242,7 @@ static void test_longest(void **state)
 static void test_none(void **state)
 {
     (void)state;
-    struct line_block block = make_block(NATIVE_MAX_POINTS + 5);
+    struct line_block block = with_waves(NATIVE_MAX_POINTS + 5);
     assert_int_equal(see_all(native_encode_points(out, sizeof out, &block, 0)).waves_frames, 0);
     waves.n_left_out = 77;
     const size_t room = native_points_bound(block.n_points) + native_waves_bound(block.n_points, 0, 0);

@@ -41,7 +41,6 @@ static void cola_counts_telegrams_and_scans(void **state)
     cola_turn(8, 1.0);
     cola_read_lmd(0, &lmd);
     assert_int_equal(lmd.telegram, 65533);
-    cola_close();
 }
 
 /* Times are us in 32 bits, 2 s below the wrap, so that they wrap 2 s after power-up. Turns begin at 1.8 s, 15 a
@@ -66,7 +65,6 @@ static void cola_times_pass_the_wrap(void **state)
     char now[64]; /* 2.2 s: 200,000 us, which are 30D40 */
     snprintf(now, sizeof now, "sRA LIDoutputstate 0 30D40 ");
     assert_int_equal(strncmp(cola_ask("sRN LIDoutputstate"), now, strlen(now)), 0);
-    cola_close();
 }
 
 /* The time stamp is ms in 24 bits, 75 ms below the wrap. The fourth of the turns of 25 ms begins at it. */
@@ -92,15 +90,14 @@ static void scip_times_pass_the_wrap(void **state)
     open_again(&rig, 75);
     rig.ops->time(rig.protocol, rig.spec.power_ns);
     scip_ask("TM0\nTM1\n", "TM0\n00P\n\nTM1\n00P\noonea\n\n"); /* 2^24 - 75: 63, 63, 62, 53 */
-    scip_close();
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cola_counts_telegrams_and_scans),
-        cmocka_unit_test(cola_times_pass_the_wrap),
+        cmocka_unit_test_teardown(cola_counts_telegrams_and_scans, cola_teardown),
+        cmocka_unit_test_teardown(cola_times_pass_the_wrap, cola_teardown),
         cmocka_unit_test(scip_times_pass_the_wrap),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, scip_teardown);
 }

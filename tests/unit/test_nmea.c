@@ -13,25 +13,37 @@
 #include "drivers/protocol/nmea.h"
 #include "tests/common/nmea_reader.h"
 
-static struct nmea_fix munich(void)
+static struct nmea_fix fix;
+static struct nmea_line line; /* the last one that was read */
+
+static int setup(void **state)
 {
-    return (struct nmea_fix){.talker = {'G', 'P'},
-                             .year = 1994,
-                             .month = 3,
-                             .day = 23,
-                             .hour = 12,
-                             .minute = 35,
-                             .second = 19,
-                             .lat_deg = 48 + 7.038 / 60,
-                             .lon_deg = 11 + 31.0 / 60,
-                             .altitude_m = 545.4,
-                             .geoid_separation_m = 46.9,
-                             .quality = 1,
-                             .satellites = 8,
-                             .hdop = 0.9,
-                             .speed_m_s = 22.4 * 1852.0 / 3600.0,
-                             .course_deg = 84.4,
-                             .sigma_m = {0.01, 0.02, 0.03}};
+    (void)state;
+    fix = (struct nmea_fix){.talker = {'G', 'P'},
+                            .year = 1994,
+                            .month = 3,
+                            .day = 23,
+                            .hour = 12,
+                            .minute = 35,
+                            .second = 19,
+                            .lat_deg = 48 + 7.038 / 60,
+                            .lon_deg = 11 + 31.0 / 60,
+                            .altitude_m = 545.4,
+                            .geoid_separation_m = 46.9,
+                            .quality = 1,
+                            .satellites = 8,
+                            .hdop = 0.9,
+                            .speed_m_s = 22.4 * 1852.0 / 3600.0,
+                            .course_deg = 84.4,
+                            .sigma_m = {0.01, 0.02, 0.03}};
+    return 0;
+}
+
+/* Encodes the fix, and reads its fields. */
+static void encode(size_t (*how)(char *, size_t, const struct nmea_fix *), const char *type, int n_fields)
+{
+    char text[NMEA_MAX_SENTENCE];
+    read_line(text, how(text, sizeof text, &fix), type, n_fields, &line);
 }
 
 /* The sentences are those of many manuals and tutorials (the first two are the "Munich" ones). */
@@ -54,29 +66,26 @@ static void published_checksums(void **state)
 static void the_example_comes_out(void **state)
 {
     (void)state;
-    struct nmea_fix fix = munich();
-    struct nmea_line line;
-    char text[NMEA_MAX_ALL];
-    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    encode(nmea_encode_gga, "GPGGA", 15);
     static const char *const gga[] = {"123519.00", "4807.0380000", "N", "01131.0000000", "E", "1", "08",
                                       "0.9",       "545.4000",     "M", "46.9000",       "M", "",  ""};
     for (int i = 0; i < 14; i++)
         assert_string_equal(line.field[i + 1], gga[i]);
-    read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+    encode(nmea_encode_rmc, "GPRMC", 13);
     static const char *const rmc[] = {
         "123519.00", "A", "4807.0380000", "N", "01131.0000000", "E", "22.400", "84.40", "230394", "", "", "A"};
     for (int i = 0; i < 12; i++)
         assert_string_equal(line.field[i + 1], rmc[i]);
-    read_line(text, nmea_encode_zda(text, sizeof text, &fix), "GPZDA", 7, &line);
+    encode(nmea_encode_zda, "GPZDA", 7);
     assert_string_equal(line.field[2], "23");
     assert_string_equal(line.field[3], "03");
     assert_string_equal(line.field[4], "1994");
-    read_line(text, nmea_encode_gsa(text, sizeof text, &fix), "GPGSA", 18, &line);
+    encode(nmea_encode_gsa, "GPGSA", 18);
     assert_string_equal(line.field[2], "3");
     assert_string_equal(line.field[10], "08"); /* eight satellites, then none */
     assert_string_equal(line.field[11], "");
     assert_string_equal(line.field[16], "0.9");
-    read_line(text, nmea_encode_gst(text, sizeof text, &fix), "GPGST", 9, &line);
+    encode(nmea_encode_gst, "GPGST", 9);
     assert_string_equal(line.field[6], "0.0100");
     assert_string_equal(line.field[7], "0.0200");
     assert_string_equal(line.field[8], "0.0300");
@@ -87,12 +96,9 @@ static void the_example_comes_out(void **state)
 
 static void check_place(double lat_deg, double lon_deg)
 {
-    struct nmea_fix fix = munich();
-    struct nmea_line line;
-    char text[NMEA_MAX_SENTENCE];
     fix.lat_deg = lat_deg;
     fix.lon_deg = lon_deg;
-    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    encode(nmea_encode_gga, "GPGGA", 15);
     double lat = read_angle(line.field[2], line.field[3], 2, "NS"),
            lon = read_angle(line.field[4], line.field[5], 3, "EW");
     if (fabs(lat - lat_deg) > HALF_STEP_DEG || fabs(lon - lon_deg) > HALF_STEP_DEG)
@@ -117,20 +123,17 @@ static void places_come_back(void **state)
 static void minutes_round_up_to_degrees(void **state)
 {
     (void)state;
-    struct nmea_fix fix = munich();
-    struct nmea_line line;
-    char text[NMEA_MAX_SENTENCE];
     fix.lat_deg = 48 - 0.4e-7 / 60;
     fix.lon_deg = -(10 - 0.4e-7 / 60);
-    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    encode(nmea_encode_gga, "GPGGA", 15);
     assert_string_equal(line.field[2], "4800.0000000");
     assert_string_equal(line.field[4], "01000.0000000");
     assert_string_equal(line.field[5], "W");
     fix.lat_deg = 48 - 0.6e-7 / 60;
-    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    encode(nmea_encode_gga, "GPGGA", 15);
     assert_string_equal(line.field[2], "4759.9999999");
     fix.lat_deg = -1e-12; /* no minus zero */
-    read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+    encode(nmea_encode_gga, "GPGGA", 15);
     assert_string_equal(line.field[2], "0000.0000000");
     assert_string_equal(line.field[3], "N");
 }
@@ -138,31 +141,25 @@ static void minutes_round_up_to_degrees(void **state)
 static void leap_second_and_hundredths(void **state)
 {
     (void)state;
-    struct nmea_fix fix = munich();
-    struct nmea_line line;
-    char text[NMEA_MAX_SENTENCE];
     fix.hour = 23;
     fix.minute = 59;
     fix.second = 60;
     fix.hundredth = 95;
-    read_line(text, nmea_encode_zda(text, sizeof text, &fix), "GPZDA", 7, &line);
+    encode(nmea_encode_zda, "GPZDA", 7);
     assert_string_equal(line.field[1], "235960.95");
 }
 
 static void speed_and_course(void **state)
 {
     (void)state;
-    struct nmea_fix fix = munich();
-    struct nmea_line line;
-    char text[NMEA_MAX_SENTENCE];
     fix.speed_m_s = 1852.0 / 3600.0;
     fix.course_deg = 359.999;
-    read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+    encode(nmea_encode_rmc, "GPRMC", 13);
     assert_string_equal(line.field[7], "1.000");
     assert_string_equal(line.field[8], "359.99"); /* never 360.00 */
     fix.speed_m_s = 0;
     fix.course_deg = NAN;
-    read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+    encode(nmea_encode_rmc, "GPRMC", 13);
     assert_string_equal(line.field[7], "0.000");
     assert_string_equal(line.field[8], "000.0"); /* not empty: the head stands, and sscanf's %[^,] needs a character */
 }
@@ -176,20 +173,18 @@ static void qualities(void **state)
         const char *mode;
     } of[] = {{0, "N"}, {1, "A"}, {2, "D"}, {4, "R"}, {5, "F"}};
     for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
-        struct nmea_fix fix = munich();
-        struct nmea_line line;
-        char text[NMEA_MAX_SENTENCE], digit[2] = {(char)('0' + of[i].quality)};
+        const char digit[2] = {(char)('0' + of[i].quality)};
         fix.quality = of[i].quality;
-        read_line(text, nmea_encode_gga(text, sizeof text, &fix), "GPGGA", 15, &line);
+        encode(nmea_encode_gga, "GPGGA", 15);
         assert_string_equal(line.field[6], digit);
         for (int k = 2; k < 6 && fix.quality == 0; k++)
             assert_string_equal(line.field[k], "");
-        read_line(text, nmea_encode_rmc(text, sizeof text, &fix), "GPRMC", 13, &line);
+        encode(nmea_encode_rmc, "GPRMC", 13);
         assert_string_equal(line.field[12], of[i].mode);
         assert_string_equal(line.field[2], fix.quality == 0 ? "V" : "A");
-        read_line(text, nmea_encode_gsa(text, sizeof text, &fix), "GPGSA", 18, &line);
+        encode(nmea_encode_gsa, "GPGSA", 18);
         assert_string_equal(line.field[2], fix.quality == 0 ? "1" : "3");
-        read_line(text, nmea_encode_gst(text, sizeof text, &fix), "GPGST", 9, &line);
+        encode(nmea_encode_gst, "GPGST", 9);
     }
 }
 
@@ -197,7 +192,6 @@ static void qualities(void **state)
 static void room_is_kept(void **state)
 {
     (void)state;
-    struct nmea_fix fix = munich();
     char text[NMEA_MAX_ALL + 1], small[NMEA_MAX_ALL + 1];
     fix.satellites = 99;
     fix.hdop = 99.9;
@@ -227,13 +221,13 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(published_checksums),
-        cmocka_unit_test(the_example_comes_out),
-        cmocka_unit_test(places_come_back),
-        cmocka_unit_test(minutes_round_up_to_degrees),
-        cmocka_unit_test(leap_second_and_hundredths),
-        cmocka_unit_test(speed_and_course),
-        cmocka_unit_test(qualities),
-        cmocka_unit_test(room_is_kept),
+        cmocka_unit_test_setup(the_example_comes_out, setup),
+        cmocka_unit_test_setup(places_come_back, setup),
+        cmocka_unit_test_setup(minutes_round_up_to_degrees, setup),
+        cmocka_unit_test_setup(leap_second_and_hundredths, setup),
+        cmocka_unit_test_setup(speed_and_course, setup),
+        cmocka_unit_test_setup(qualities, setup),
+        cmocka_unit_test_setup(room_is_kept, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

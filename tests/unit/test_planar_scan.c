@@ -12,7 +12,7 @@
 #include "drivers/protocol/planar_scan.h"
 #include "tests/common/protocol_rig.h"
 
-enum { STEPS = 16, FIRST = 3, LAST = 14, N = LAST - FIRST + 1, FRONT = 6, TURN_NS = 10000000 };
+enum { STEPS = 16, FIRST = 3, LAST = 14, N = LAST - FIRST + 1, FRONT = 6 };
 
 static struct protocol_rig rig;
 static struct planar_scan scan;
@@ -58,31 +58,7 @@ static void expect(int begun, int whole, uint32_t broken)
 /* Feeds shots from..to of a turn, in the order of firing, as one frame of points. */
 static void part(uint32_t line, int from, int to)
 {
-    static const double level[N];
-    double pan[N];
-    int64_t dt_ns[N];
-    for (int i = 0; i <= to - from; i++) {
-        dt_ns[i] = i * (TURN_NS / STEPS);
-        pan[i] = (double)(rig.emitter.turn * (FIRST + from + i - FRONT)) / STEPS;
-    }
-    const int64_t line_ns = (int64_t)line * TURN_NS;
-    const struct protocol_rig_run run = {.line = line,
-                                         .pulse0 = (uint64_t)line * STEPS + (uint64_t)(FIRST + from),
-                                         .n = (uint32_t)(to - from) + 1,
-                                         .t0_ns = line_ns + (FIRST + from) * (TURN_NS / STEPS),
-                                         .line_t0_ns = line_ns,
-                                         .dt_ns = dt_ns,
-                                         .mirror_turn = level,
-                                         .pan_turn = pan,
-                                         .shot = shot + from};
-    protocol_rig_points(&rig, &run);
-}
-
-static void line_end(uint32_t line, uint32_t status)
-{
-    const struct line_end end = {
-        .line = line, .t0_ns = (int64_t)line * TURN_NS, .t1_ns = (int64_t)(line + 1) * TURN_NS, .status = status};
-    protocol_rig_line_end(&rig, &end);
+    protocol_rig_part(&rig, line, (uint32_t)from, (uint32_t)(to - from) + 1, shot + from);
 }
 
 /* Feeds three frames and the end. */
@@ -91,7 +67,7 @@ static void turn(uint32_t line)
     part(line, 0, 3);
     part(line, 4, 7);
     part(line, 8, N - 1);
-    line_end(line, 0);
+    protocol_rig_turn_end(&rig, line, 0);
 }
 
 /* The rig looks to the right by turn * (step - 6) / 16 of a turn. To the left of the head, counter-clockwise, numbers
@@ -263,8 +239,8 @@ static void turns_are_missing(void **state)
     (void)state;
     open_head(-1, 0);
     turn(0);
-    line_end(1, 0); /* all its points */
-    turn(5);        /* 2, 3, 4 */
+    protocol_rig_turn_end(&rig, 1, 0); /* all its points */
+    turn(5);                           /* 2, 3, 4 */
     expect(3, 2, 4);
     part(6, 0, 3);
     turn(9); /* the rest of 6; 7, 8 */
@@ -281,18 +257,18 @@ static void what_is_no_loss(void **state)
     open_head(-1, 0);
     part(3, 4, 7); /* the client came within it */
     part(3, 8, N - 1);
-    line_end(3, 0);
+    protocol_rig_turn_end(&rig, 3, 0);
     expect(1, 0, 0);
     part(4, 0, 3);
-    line_end(4, LINE_PARTIAL); /* the scan was stopped within it */
+    protocol_rig_turn_end(&rig, 4, LINE_PARTIAL); /* the scan was stopped within it */
     expect(1, 0, 0);
     open_head(-1, 0);
-    line_end(8, 0);
+    protocol_rig_turn_end(&rig, 8, 0);
     turn(9);
     expect(2, 1, 0);
     open_head(-1, 0);
     part(0, 0, 3); /* from its first step on, so it is the client's */
-    line_end(0, 0);
+    protocol_rig_turn_end(&rig, 0, 0);
     expect(1, 0, 1);
 }
 
@@ -305,12 +281,12 @@ static void parts_of_two_turns_make_none(void **state)
     part(1, 4, 7);
     rig.scan_t0_ns += 60000000000; /* a turn of that number in another scan */
     part(1, 8, N - 1);
-    line_end(1, 0);
+    protocol_rig_turn_end(&rig, 1, 0);
     expect(3, 1, 3); /* both, and turn 0 of that scan */
     part(2, 0, 3);
     part(2, 0, 3); /* twice the same */
     part(2, 4, 7);
-    line_end(2, 0);
+    protocol_rig_turn_end(&rig, 2, 0);
     expect(1, 0, 1);
     for (int i = 0; i < N; i++)
         shot[i].n = 2;
@@ -373,6 +349,7 @@ static void heads_that_it_can_t_read(void **state)
     struct sh_err err;
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         open_head(-1, 0);
+        const struct native_emitter good = rig.emitter;
         protocol_rig_planar(&rig, rows[i].steps, rows[i].first, rows[i].last, rows[i].front, -1, 10);
         rig.emitter.sequence_ns_den = 160;
         rig.descriptor.pan_counts_per_turn = rows[i].pan_counts;
@@ -380,8 +357,9 @@ static void heads_that_it_can_t_read(void **state)
         assert_int_equal(scan.head.known, rows[i].known);
         if (protocol_ops_get(PROTOCOL_COLA)->check_head(&rig.descriptor, &rig.emitter, NULL, &err) == SH_OK)
             assert_int_equal(rows[i].known, 1);
+        rig.emitter = good; /* whose points come all the same */
         part(0, 0, 3);
-        line_end(0, 0);
+        protocol_rig_turn_end(&rig, 0, 0);
         if (!rows[i].known) expect(0, 0, 0);
         news = (struct planar_news){0, 0, 0};
     }

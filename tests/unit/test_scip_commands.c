@@ -29,7 +29,6 @@ static void urg_library_opens(void **state)
     scip_ask("PP\n", PP_URG);
     scip_ask("VV\n", VV_URG);
     scip_ask("QT\n", "QT\n00P\n\n");
-    scip_close();
 }
 
 /* rawlog-grabber sends these to a UTM-30LX on a serial line, up to the first scan's command. */
@@ -45,7 +44,6 @@ static void rawlog_grabber_opens(void **state)
     scip_ask("PP\n", "PP\n00P\nMODL:UTM-30LX(Hokuyo Automatic Co.,Ltd.);U\nDMIN:100;c\nDMAX:30000;G\nARES:1440;^\n"
                      "AMIN:0;?\nAMAX:1080;Z\nAFRT:540;0\nSCAN:2400;U\n\n");
     scip_ask("MD0000108001000\n", "MD0000108001000\n00P\n\n");
-    scip_close();
 }
 
 static void state_of_the_sensor(void **state)
@@ -56,24 +54,11 @@ static void state_of_the_sensor(void **state)
     scip_ask("II\n", "II\n00P\nMODL:URG-04LX(Hokuyo Automatic Co.,Ltd.);N\nLASR:OFF;7\n"
                      "SCSP:Initial(600[rpm])<-Default setting by user;A\nMESM:IDLE;:\n"
                      "SBPS:19200[bps]<-Default setting by user;A\nTIME:081615;N\nSTAT:Sensor works well.;8\n\n");
-    protocol_rig_input(&rig, "BM\nII\n");
-    rig.bytes[rig.len] = 0;
-    assert_non_null(strstr((char *)rig.bytes, "\nLASR:ON;9\n"));
-    assert_null(strstr((char *)rig.bytes, "MESM:IDLE"));
-    scip_close();
+    EXPECT_IN("BM\nII\n", "\nLASR:ON;9\n", "\nMESM:CLASSIC;^\n");
     /* A UST sends the time as four characters: 16000000 is "m2@0" (C-42-03320B, encoding). */
     scip_open("UST-20LX");
     rig.ops->time(rig.protocol, 16000000000000);
-    protocol_rig_input(&rig, "II\n");
-    rig.bytes[rig.len] = 0;
-    assert_non_null(strstr((char *)rig.bytes, "\nTIME:m2@0;"));
-    assert_non_null(strstr((char *)rig.bytes, "\nSTAT:sensor is working normally;"));
-    scip_close();
-    scip_open("UTM-30LX");
-    protocol_rig_input(&rig, "II\n");
-    rig.bytes[rig.len] = 0;
-    assert_non_null(strstr((char *)rig.bytes, "\nSTAT:Sensor works well.;8"));
-    scip_close();
+    EXPECT_IN("II\n", "\nTIME:m2@0;");
 }
 
 static void a_model_of_ones_own(void **state)
@@ -81,7 +66,6 @@ static void a_model_of_ones_own(void **state)
     (void)state;
     scip_open("Mine 7");
     scip_ask("VV\n", "VV\n00P\nVEND:Hokuyo;V\nPROD:Mine 7;?\nFIRM:1.2.3;J\nPROT:SCIP 2.2;P\nSERI:17210001;i\n\n");
-    scip_close();
 }
 
 static void ends_of_lines_and_tags(void **state)
@@ -98,7 +82,6 @@ static void ends_of_lines_and_tags(void **state)
     scip_ask("Q", "");
     scip_ask("T;in piec", "");
     scip_ask("es\n", "QT;in pieces\n00P\n\n");
-    scip_close();
 }
 
 static void what_is_no_command(void **state)
@@ -144,7 +127,6 @@ static void what_is_no_command(void **state)
         snprintf(answer, sizeof answer, "%s\n%s\n\n", rows[i].line, rows[i].status);
         scip_ask(line, answer);
         assert_int_equal(rig.count[PROTOCOL_WRONG], 1);
-        scip_close();
     }
 }
 
@@ -159,7 +141,6 @@ static void laser(void **state)
     scip_ask("BM\n", "BM\n00P\n\n");
     scip_ask("%SL\n", "%SL\n00P\n\n");
     scip_ask("GD0000108001\n", "GD0000108001\n10Q\n\n");
-    scip_close();
 }
 
 /* The head is started from rest, and is not asked while its scans come. */
@@ -193,14 +174,12 @@ static void the_head_is_started(void **state)
         scip_expect(answer);
         snprintf(answer, sizeof answer, "MD0000108001000\n%s\n\n", rows[i].stream);
         scip_ask("MD0000108001000\n", answer);
-        scip_close();
     }
     scip_open("UTM-30LX");
     rig.replies = idle;
     scip_turn(0);
     scip_ask("BM\nQT\nMD0000108001000\n", "BM\n00P\n\nQT\n00P\n\nMD0000108001000\n00P\n\n");
     assert_int_equal(rig.n_lines, 0);
-    scip_close();
 }
 
 /* 16000000 ms are "m2@0" in C-42-03320B; the sum is 109 + 50 + 64 + 48 = 271, 271 - 4 * 64 + 48 = '?'. */
@@ -219,7 +198,6 @@ static void time_adjustment(void **state)
     scip_ask("BM\n", "BM\n0Ee\n\n");
     scip_ask("TM2\n", "TM2\n00P\n\n");
     scip_ask("GD0044072501\n", "GD0044072501\n10Q\n\n"); /* the laser went off */
-    scip_close();
 
     scip_open("UTM-30LX");
     rig.ops->time(rig.protocol, 16000000 * 1000000LL);
@@ -231,7 +209,6 @@ static void time_adjustment(void **state)
     scip_ask("TM2\n", "TM2\n03S\n\n");
     scip_ask("MD0000108001000\n", "MD0000108001000\n00P\n\n");
     scip_ask("TM0\n", "TM0\n10Q\n\n");
-    scip_close();
 }
 
 static void bit_rate(void **state)
@@ -245,17 +222,17 @@ static void bit_rate(void **state)
     scip_ask("SS11520x\n", "SS11520x\n01Q\n\n");
     scip_ask("RS\n", "RS\n00P\n\n");
     scip_ask("SS019200\n", "SS019200\n03S\n\n");
-    scip_close();
 }
+
+/* A head at its own rate, and one that CR has slowed down. */
+static const struct protocol_rig_reply at10[] = {{"HEAD:LINES?", "10", 0}, {NULL, NULL, 0}},
+                                       at9[] = {
+                                           {"HEAD:LINES? DEF", "10", 0}, {"HEAD:LINES?", "9.1", 0}, {NULL, NULL, 0}};
 
 static void motor_speed(void **state)
 {
     (void)state;
-    static const struct protocol_rig_reply at10[] = {{"HEAD:LINES?", "10", 0}, {NULL, NULL, 0}},
-                                           at9[] = {{"HEAD:LINES? DEF", "10", 0},
-                                                    {"HEAD:LINES?", "9.1", 0},
-                                                    {NULL, NULL, 0}},
-                                           thirds[] = {{"HEAD:LINES?", "33.333333", 0}, {NULL, NULL, 0}},
+    static const struct protocol_rig_reply thirds[] = {{"HEAD:LINES?", "33.333333", 0}, {NULL, NULL, 0}},
                                            narrow[] = {
                                                {"HEAD:LINES?", "10", 0}, {"HEAD:LINES ", "ERR", -222}, {NULL, NULL, 0}};
     scip_open("URG-04LX");
@@ -270,14 +247,8 @@ static void motor_speed(void **state)
     scip_expect("CR09\n00P\n\n");
     rig.replies = at9;
     scip_ask("CR09\n", "CR09\n03S\n\n");
-    protocol_rig_input(&rig, "PP\n"); /* the standard speed, whatever it is now */
-    rig.bytes[rig.len] = 0;
-    assert_non_null(strstr((char *)rig.bytes, "\nSCAN:600;e\n"));
-    protocol_rig_clear(&rig);
-    protocol_rig_input(&rig, "II\n");
-    rig.bytes[rig.len] = 0;
-    assert_non_null(strstr((char *)rig.bytes, "\nSCSP:Initial(546[rpm]);"));
-    protocol_rig_clear(&rig);
+    EXPECT_IN("PP\n", "\nSCAN:600;e\n"); /* the standard speed, whatever it is now */
+    EXPECT_IN("II\n", "\nSCSP:Initial(546[rpm]);");
     rig.replies = thirds; /* a rate that 100 does not divide */
     scip_ask("CR00\n", "CR00\n03S\n\n");
     protocol_rig_input(&rig, "CR01\n");
@@ -285,17 +256,12 @@ static void motor_speed(void **state)
     scip_expect("CR01\n00P\n\n");
     rig.replies = narrow;
     scip_ask("CR10\n", "CR10\n04T\n\n");
-    scip_close();
 }
 
 /* RS and RT bring the speed back, also one that an earlier session has set. */
 static void speed_is_reset(void **state)
 {
     (void)state;
-    static const struct protocol_rig_reply at10[] = {{"HEAD:LINES?", "10", 0}, {NULL, NULL, 0}},
-                                           at9[] = {{"HEAD:LINES? DEF", "10", 0},
-                                                    {"HEAD:LINES?", "9.1", 0},
-                                                    {NULL, NULL, 0}};
     scip_open("URG-04LX");
     rig.replies = at9;
     protocol_rig_input(&rig, "RS\n");
@@ -305,12 +271,10 @@ static void speed_is_reset(void **state)
     protocol_rig_input(&rig, "RS\n");
     for (uint32_t i = 0; i < rig.n_lines; i++)
         assert_string_not_equal(rig.line[i], "HEAD:LINES DEF");
-    scip_close();
     scip_open("UTM-30LX"); /* it has no CR, and so another speed is not this client's affair */
     rig.replies = at9;
     scip_ask("RS\n", "RS\n00P\n\n");
     assert_int_equal(rig.n_lines, 0);
-    scip_close();
 }
 
 static void reset_and_reboot(void **state)
@@ -332,7 +296,6 @@ static void reset_and_reboot(void **state)
     rig.ops->time(rig.protocol, 16000000 * 1000000LL + 3000000001);
     assert_string_equal(rig.line[rig.n_lines - 1], "HEAD:REBOOT");
     assert_false(rig.hung_up); /* the power cycle ends it */
-    scip_close();
 
     /* There is no head to reboot. Only the session begins anew, and the device's time goes on. */
     static const struct protocol_rig_reply recorded[] = {{"HEAD:REBOOT", "ERR", -221}, {NULL, NULL, 0}};
@@ -342,30 +305,27 @@ static void reset_and_reboot(void **state)
     rig.ops->time(rig.protocol, 16000000 * 1000000LL);
     assert_true(rig.hung_up);
     scip_ask("GD0000108001\nTM1\n", "GD0000108001\n10Q\n\nTM1\n00P\nm2@0?\n\n");
-    scip_close();
 }
 
 /* A head that is not planar, or has more steps than a unit has room for, gives no scans. */
 static void heads_that_dont_fit(void **state)
 {
     (void)state;
+    scip_teardown(NULL);
     protocol_rig_open(&rig, PROTOCOL_SCIP, "Hokuyo", "UTM-30LX");
     protocol_rig_input(&rig, "PP\nMD0000108001000\nVV\n"); /* before the head has described itself */
     assert_memory_equal(rig.bytes, "PP\n0Aa\n\nMD0000108001000\n0Aa\n\nVV\n00P\n", 36);
-    scip_close();
     scip_open_head("UTM-30LX", 5760, 0, 2879, 1440, -1, 40);
     protocol_rig_describe(&rig, 0);
     scip_ask("BM\nMD0000287901000\n", "BM\n00P\n\nMD0000287901000\n00P\n\n");
-    scip_close();
     scip_open_head("UTM-30LX", 5760, 0, 2880, 1440, -1, 40);
     protocol_rig_describe(&rig, 0);
     scip_ask("PP\nMD0000108001000\n", "PP\n0Aa\n\nMD0000108001000\n0Aa\n\n");
-    scip_close();
+    scip_teardown(NULL);
     protocol_rig_open(&rig, PROTOCOL_SCIP, "Hokuyo", "UTM-30LX");
     protocol_rig_beams(&rig, 10);
     protocol_rig_describe(&rig, 0);
     scip_ask("PP\nGD0000108001\n", "PP\n0Aa\n\nGD0000108001\n0Aa\n\n");
-    scip_close();
 }
 
 int main(void)
@@ -386,5 +346,5 @@ int main(void)
         cmocka_unit_test(reset_and_reboot),
         cmocka_unit_test(heads_that_dont_fit),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, scip_teardown);
 }

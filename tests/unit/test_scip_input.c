@@ -19,7 +19,6 @@ static void noise(void **state)
     scip_expect("QT\n00P\n\n");
     assert_int_equal(rig.count[PROTOCOL_INPUT_LOST], 3 + 3 + 3 + 3);
     assert_int_equal(rig.count[PROTOCOL_WRONG], 0);
-    scip_close();
 }
 
 /* A line that is too long gets an echo of the part that fits, and 0B. A client's line of 72 bytes has room for it. */
@@ -46,7 +45,6 @@ static void overlong_lines(void **state)
     assert_int_equal(rig.count[PROTOCOL_INPUT_LOST], 100000 - 64);
     assert_int_equal(rig.count[PROTOCOL_WRONG], 2);
     scip_ask("QT\n", "QT\n00P\n\n");
-    scip_close();
 }
 
 /* Each of many lines that come at once has its answer, in order. The owner counts those without room. */
@@ -76,7 +74,6 @@ static void ten_thousand_at_once(void **state)
     scip_expect("");
     rig.room = SIZE_MAX;
     scip_ask("QT\n", "QT\n00P\n\n");
-    scip_close();
 }
 
 /* A scan without room is lost. The next one comes, and the count goes on as from a sensor on a bad line. */
@@ -91,7 +88,6 @@ static void scans_without_room(void **state)
     rig.room = SIZE_MAX;
     scip_turn(1);
     assert_memory_equal(rig.bytes, "MD0000108000001\n99b\n", 20);
-    scip_close();
 }
 
 /* The same bytes, cut anywhere, get the same answers. */
@@ -105,14 +101,12 @@ static void in_pieces(void **state)
     bytes_in(talk, sizeof talk - 1);
     const size_t len = rig.len;
     memcpy(whole, rig.bytes, len);
-    scip_close();
     for (size_t size = 1; size < 20; size++) {
         scip_open("UTM-30LX");
         for (size_t at = 0; at < sizeof talk - 1; at += size)
             bytes_in(talk + at, sizeof talk - 1 - at < size ? sizeof talk - 1 - at : size);
         assert_int_equal(rig.len, len);
         assert_memory_equal(rig.bytes, whole, len);
-        scip_close();
     }
 }
 
@@ -198,7 +192,6 @@ static void nonsense(void **state)
         bytes_in("\nDB10\nTM2\nQT\n", 13);
         protocol_rig_clear(&rig);
         scip_ask("QT;end\n", "QT;end\n00P\n\n");
-        scip_close();
     }
 }
 
@@ -212,5 +205,5 @@ int main(void)
         cmocka_unit_test(in_pieces),
         cmocka_unit_test(nonsense),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, scip_teardown);
 }

@@ -30,17 +30,6 @@ static void time_is_ms(int64_t ms)
     rig.ops->time(rig.protocol, ms * 1000000);
 }
 
-/* A reply to `line` has these pieces. */
-static void expect_in(const char *line, const char *const *pieces)
-{
-    protocol_rig_input(&rig, line);
-    rig.bytes[rig.len] = 0;
-    for (; *pieces != NULL; pieces++)
-        if (strstr((char *)rig.bytes, *pieces) == NULL) fail_msg("%s: no %s in %s", line, *pieces, (char *)rig.bytes);
-    protocol_rig_clear(&rig);
-}
-#define EXPECT_IN(line, ...) expect_in(line, (const char *const[]){__VA_ARGS__, NULL})
-
 static void a_utm_with_usb(void **state)
 {
     (void)state;
@@ -57,7 +46,6 @@ static void a_utm_with_usb(void **state)
                      "TIME:4991D0;d\nSTAT:Sensor works well.;8\n\n");
     scip_ask("CR00\n", "CR00\n04T\n\n");
     scip_ask("HD0000108001\nND0000108001000\n", "HD0000108001\n0Ee\n\nND0000108001000\n0Ee\n\n");
-    scip_close();
 }
 
 static void a_urg(void **state)
@@ -73,7 +61,6 @@ static void a_urg(void **state)
                      "SCSP:Initial(600[rpm])<-Default setting by user;A\nMESM:CLASSIC;^\n"
                      "SBPS:19200[bps]<-Default setting by user;A\nTIME:6A5404;]\nSTAT:Sensor works well.;8\n\n");
     scip_ask("CR00\n", "CR00\n03S\n\n");
-    scip_close();
 }
 
 /* Clients look for UTM and UST at the beginning of PROD, and for three numbers in FIRM. */
@@ -91,7 +78,6 @@ static void a_utm_with_ethernet(void **state)
     scip_ask("%TM1\n", "%TM1\n0Ee\n\n"); /* its firmware counts milliseconds */
     scip_ask("ND0000108001000\n", "ND0000108001000\n00P\n\n");
     EXPECT_IN("II\n", "\nMESM:004 Multi_scan;");
-    scip_close();
 }
 
 static void usts(void **state)
@@ -109,7 +95,6 @@ static void usts(void **state)
         EXPECT_IN("II\n", "\nSCSP:2400;", "\nMESM:Measuring by Sensitive Mode;", "\nSBPS:Ethernet 100 [Mbps];",
                   "\nSTAT:sensor is working normally;");
         scip_ask("%TM1\n", "%TM1\n0Ee\n\n");
-        scip_close();
     }
 }
 
@@ -128,10 +113,8 @@ static void numbers_of_states(void **state)
     scip_ask("%ST\n", "%ST\n00P\n001A\n\n");
     rig.replies = FAILED;
     scip_ask("%ST\n", "%ST\n00P\n900I\n\n");
-    scip_close();
     scip_open("UTM-30LX");
     scip_ask("%ST\n", "%ST\n0Ee\n\n");
-    scip_close();
 }
 
 /* No model then sends the text that clients take for a working sensor. */
@@ -153,7 +136,6 @@ static void boots_and_fails(void **state)
             protocol_rig_clear(&rig);
             scip_ask("QT\nBM\n", fails ? "QT\n00P\n\nBM\n01Q\n\n" : "QT\n00P\n\nBM\n10Q\n\n");
             if (!fails) scip_ask("TM0\nTM2\n", "TM0\n10Q\n\nTM2\n03S\n\n");
-            scip_close();
         }
 }
 
@@ -169,7 +151,6 @@ static void time_since_power_up(void **state)
     rig.ops->open(rig.protocol, rig.spec.power_ns);
     time_is_ms(5000 + 16000000);
     scip_ask("TM1\n", "TM1\n00P\nm2@0?\n\n");
-    scip_close();
 }
 
 static uint64_t us_of(const char *text)
@@ -190,7 +171,6 @@ static void times_in_microseconds(void **state)
     scip_ask("%TM0\n%TM2\n", "%TM0\n01Q\n\n%TM2\n01Q\n\n");
     scip_ask("TM0\nTM1\nTM2\n", "TM0\n00P\n\nTM1\n00P\n00000\n\nTM2\n00P\n\n");
     scip_ask("RS\n%TM1\n", "RS\n00P\n\n%TM1\n00P\n00000000000@\n\n");
-    scip_close();
 
     open_with("UST-20LX", "4.1.0b-A", "H1614934", 0.02, 60);
     scip_ask("%MD0000000201002;t\n", "%MD0000000201002;t\n00P\n\n");
@@ -206,13 +186,11 @@ static void times_in_microseconds(void **state)
     }
     scip_ask("%ME0000000201001\n", "%ME0000000201001\n00P\n\n");
     scip_ask("%MS0000000201001\n%GD0000000201\n", "%MS0000000201001\n0Ee\n\n%GD0000000201\n0Ee\n\n");
-    scip_close();
 
     static const char *const without[] = {"4.0.2-A", "1.0.1", "2.23.0000", "P.1.05(17/Apr./2009)", ""};
     for (size_t i = 0; i < sizeof without / sizeof *without; i++) {
         open_with("UST-20LX", without[i], "H1614934", 0.02, 60);
         scip_ask("%TM1\n%MD0000000201001\n", "%TM1\n0Ee\n\n%MD0000000201001\n0Ee\n\n");
-        scip_close();
     }
 }
 
@@ -224,5 +202,5 @@ int main(void)
         cmocka_unit_test(numbers_of_states),   cmocka_unit_test(boots_and_fails),
         cmocka_unit_test(time_since_power_up), cmocka_unit_test(times_in_microseconds),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, scip_teardown);
 }

@@ -34,7 +34,6 @@ static void bytes_by_hand(void **state)
     scip_ask("BM\nGD0001000101;1\n", "BM\n00P\n\n");
     scip_turn(2); /* 16000200: 61, 2, 19, 8 */
     scip_expect("GD0001000101;1\n00P\nm2C8J\n1DhM\n\n");
-    scip_close();
 }
 
 /* Draws ranges of 0.1 to 30 m in steps of 1 um, which the description rounds to mm. */
@@ -67,7 +66,6 @@ static void ranges_to_the_millimetre(void **state)
     scip_turn(3);
     scip_expect("");
     scip_ask("GD0000108001\n", "GD0000108001\n10Q\n\n"); /* the laser went off after the last */
-    scip_close();
 }
 
 /* In an endless stream the two digits stay 00. A scan is as long as the description makes it: 6717 bytes of 1081 steps
@@ -86,7 +84,6 @@ static void without_end(void **state)
         assert_int_equal(got.time_ms, 25 * k);
     }
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 0);
-    scip_close();
 }
 
 /* Steps count counter-clockwise seen from above. A target to the left, 90 degrees from the front, is a quarter of a
@@ -102,24 +99,17 @@ static void left_is_left(void **state)
     scip_decode_only(&got, 3, 0);
     for (int i = 0; i < 1081; i++)
         assert_int_equal(got.range_mm[i][0], i == 540 + 1440 / 4 ? 2000 : 5000);
-    scip_close();
 
     scip_open_head("UTM-30LX", 1440, 100, 1000, 500, 1, 40); /* a head that turns clockwise */
     protocol_rig_describe(&rig, 0);
     scip_flat(5.0);
-    shot[500 - 360 - 100].range_m[0] = 2.0; /* pan (140 - 500) / 1440: left */
-    protocol_rig_input(&rig, "PP\n");
-    rig.bytes[rig.len] = 0;
-    assert_non_null(strstr((char *)rig.bytes, "\nAMIN:100;"));
-    assert_non_null(strstr((char *)rig.bytes, "\nAMAX:1000;"));
-    assert_non_null(strstr((char *)rig.bytes, "\nAFRT:600;")); /* 400 steps to the left of it, 500 to the right */
-    protocol_rig_clear(&rig);
+    shot[500 - 360 - 100].range_m[0] = 2.0;                          /* pan (140 - 500) / 1440: left */
+    EXPECT_IN("PP\n", "\nAMIN:100;", "\nAMAX:1000;", "\nAFRT:600;"); /* 400 steps to the left of it, 500 to the right */
     scip_ask("MD0100100000001\n", "MD0100100000001\n00P\n\n");
     scip_turn(0);
     scip_decode_only(&got, 3, 0);
     for (int i = 100; i <= 1000; i++)
         assert_int_equal(got.range_mm[i - 100][0], i == 600 + 1440 / 4 ? 2000 : 5000);
-    scip_close();
 }
 
 /* A cluster has its least range, without errors. It has an error where there is nothing else. */
@@ -152,7 +142,6 @@ static void clusters(void **state)
     scip_turn(9);
     rig.bytes[rig.len] = 0;
     assert_string_equal((char *)rig.bytes + 22, "\n0CBe\n\n");
-    scip_close();
 }
 
 static void several_echoes(void)
@@ -192,7 +181,6 @@ static void echoes_and_intensity(void **state)
         scip_turn(0);
         rig.bytes[rig.len] = 0;
         assert_string_equal((char *)rig.bytes + 22, tail);
-        scip_close();
     }
 }
 
@@ -213,7 +201,6 @@ static void marks_anywhere(void **state)
         assert_int_equal(got.range_mm[i][1], i % 3 >= 1 ? 10000 : 0);
         assert_int_equal(got.range_mm[i][2], i % 3 == 2 ? 20000 : 0);
     }
-    scip_close();
 }
 
 /* These codes take a range's place. 44 is the URG-04LX's first step; 40 to 43 can't be measured. */
@@ -230,7 +217,6 @@ static void codes_of_a_urg(void **state)
     assert_int_equal(got.n_steps, 7);
     for (int i = 0; i < 7; i++)
         assert_int_equal(got.range_mm[i][0], want[i]);
-    scip_close();
 }
 
 static void parameters(void **state)
@@ -251,7 +237,6 @@ static void parameters(void **state)
         snprintf(answer, sizeof answer, "%s\n%s\n\n", rows[i].line, rows[i].status);
         scip_ask(line, answer);
     }
-    scip_close();
 }
 
 int main(void)
@@ -263,5 +248,5 @@ int main(void)
         cmocka_unit_test(marks_anywhere), cmocka_unit_test(codes_of_a_urg),
         cmocka_unit_test(parameters),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, scip_teardown);
 }

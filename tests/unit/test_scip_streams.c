@@ -19,7 +19,6 @@ static void check_turns(const char *command, const char *want)
         snprintf(times + strlen(times), sizeof times - strlen(times), "%u:%.2s ", got.time_ms / 25, got.echo + 13);
     }
     assert_string_equal(times, want);
-    scip_close();
 }
 
 static void skipped_scans(void **state)
@@ -56,7 +55,6 @@ static void asked_while_it_stops(void **state)
     protocol_rig_clear(&rig);
     rig.ops->time(rig.protocol, 9000000000);
     assert_int_equal(rig.n_lines, 0);
-    scip_close();
 }
 
 /* A turn that is left out may as well be broken. */
@@ -67,21 +65,17 @@ static void skipped_and_broken(void **state)
     scip_ask("MD0000108000100\n", "MD0000108000100\n00P\n\n");
     scip_part(0, 0, 500);
     scip_line_end(0, 0);
-    scip_line_time(0);
     scip_turn(1);
     scip_decode_only(&got, 3, 0);
     assert_int_equal(got.time_ms, 25);
-    scip_close();
     scip_open("UTM-30LX-EW"); /* one that is broken is one of three, and no more */
     scip_ask("MD0000108000300\n", "MD0000108000300\n00P\n\n");
     scip_part(0, 0, 500);
     scip_line_end(0, 0);
-    scip_line_time(0);
     for (uint32_t line = 1; line < 4; line++)
         scip_turn(line);
     scip_decode_only(&got, 3, 0);
     assert_int_equal(got.time_ms, 75);
-    scip_close();
 }
 
 /* A recording of a UTM-30LX has the first scan 27 ms after the answer to ME0000108001101 (SCIP.md, D). */
@@ -99,7 +93,6 @@ static void the_first_comes_at_once(void **state)
     scip_turn(3);
     scip_decode_only(&got, 3, 0);
     assert_int_equal(got.time_ms, 75);
-    scip_close();
 }
 
 /* A scan is sent once its last step has come, before the turn is over. */
@@ -114,10 +107,8 @@ static void sent_after_the_last_step(void **state)
     scip_part(0, 1080, 1080);
     scip_decode_only(&got, 3, 0);
     scip_line_end(0, 0);
-    scip_line_time(0);
     scip_expect("");
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 0);
-    scip_close();
 }
 
 /* QT ends a stream within a turn. A second M replaces the first one, and a refused one doesn't. */
@@ -130,7 +121,6 @@ static void streams_end(void **state)
     scip_ask("QT\n", "QT\n00P\n\n");
     scip_part(0, 701, 1080);
     scip_line_end(0, 0);
-    scip_line_time(0);
     scip_turn(1);
     scip_expect("");
     scip_ask("MD0000108000000\nMD0000000301002\n", "MD0000108000000\n00P\n\nMD0000000301002\n00P\n\n");
@@ -142,7 +132,6 @@ static void streams_end(void **state)
     scip_turn(3);
     scip_decode_only(&got, 3, 0);
     assert_string_equal(got.echo, "MD0000000301000");
-    scip_close();
 }
 
 /* M gives scans that were measured after it was asked for. G gives the next scan that is whole and was measured with
@@ -156,7 +145,6 @@ static void measured_when(void **state)
     scip_ask("BM\nMD0000108000000\nGD0000000001\n", "BM\n00P\n\nMD0000108000000\n00P\n\n");
     scip_part(0, 701, 1080);
     scip_line_end(0, 0);
-    scip_line_time(0);
     scip_expect("");
     scip_turn(1);
     const char *at = (const char *)rig.bytes;
@@ -171,7 +159,6 @@ static void measured_when(void **state)
     scip_part(2, 0, 700);
     rig.ops->time(rig.protocol, 62000000);
     scip_ask("QT\nBM\nQT\n", "QT\n00P\n\nBM\n00P\n\nQT\n00P\n\n");
-    scip_close();
 }
 
 static void handshakes(void **state)
@@ -195,7 +182,6 @@ static void handshakes(void **state)
     scip_expect("GD0000108001;c\n0Aa\n\n");
     rig.ops->time(rig.protocol, 125000000 + 5000000000);
     scip_expect("");
-    scip_close();
 }
 
 /* A turn with missing frames is not sent, but counted. All requested ones come. */
@@ -207,7 +193,6 @@ static void lost_frames(void **state)
     scip_part(0, 0, 500);
     scip_part(0, 502, 1080);
     scip_line_end(0, 0);
-    scip_line_time(0);
     scip_expect("");
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 1);
     scip_turn(1);
@@ -224,90 +209,6 @@ static void lost_frames(void **state)
     scip_decode_only(&got, 3, 0);
     assert_string_equal(got.echo + 13, "01");
     assert_int_equal(got.time_ms, 175);
-    scip_close();
-}
-
-/* Points whose attributes are missing have no intensity. The rig's frames alternate: points, attributes. */
-static void (*real_frame)(void *, const uint8_t *, size_t);
-static int n_attributes;
-static void leave_out_one(void *protocol, const uint8_t *frame, size_t len)
-{
-    if (frame[1] == NATIVE_ATTRIBUTES && n_attributes++ == 3) return;
-    real_frame(protocol, frame, len);
-}
-
-static void lost_attributes(void **state)
-{
-    (void)state;
-    struct protocol_ops ops;
-    scip_open("UTM-30LX");
-    rig.attributes = 1;
-    protocol_rig_describe(&rig, 0);
-    scip_ask("ME0000108000000\n", "ME0000108000000\n00P\n\n");
-    ops = *rig.ops;
-    real_frame = ops.frame;
-    ops.frame = leave_out_one;
-    rig.ops = &ops;
-    n_attributes = 0;
-    scip_turn(0);
-    scip_expect("");
-    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 1);
-    scip_turn(1);
-    scip_decode_only(&got, 3, 1);
-    assert_int_equal(got.time_ms, 25);
-    n_attributes = 3 - 10; /* the last of the turn's eleven frames */
-    scip_turn(2);
-    scip_expect("");
-    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 2);
-    scip_close();
-}
-
-/* A turn that never was is not lost: the turn within which the scan was stopped, or the client joined. */
-static void turns_that_are_not_lost(void **state)
-{
-    (void)state;
-    scip_open("UTM-30LX");
-    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
-    scip_part(0, 300, 1080);
-    scip_line_end(0, 0);
-    scip_turn(1);
-    scip_part(2, 0, 600);
-    scip_line_end(2, LINE_PARTIAL);
-    rig.descriptor.scan = 2;
-    rig.scan_t0_ns = 10000000000;
-    protocol_rig_describe(&rig, rig.scan_t0_ns);
-    protocol_rig_clear(&rig);
-    scip_turn(0);
-    scip_decode_only(&got, 3, 0);
-    assert_int_equal(got.time_ms, 10000);
-    assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 0);
-    scip_close();
-}
-
-/* Parts of two turns never make one. They may be of two scans, each with a turn of that number, or the same part sent
- * twice. */
-static void turns_are_not_mixed(void **state)
-{
-    (void)state;
-    scip_open("UTM-30LX");
-    scip_turn(0);
-    scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
-    scip_turn(1);
-    protocol_rig_clear(&rig);
-    scip_part(2, 0, 600);
-    rig.scan_t0_ns = 10000000000; /* without the rest of this scan, and the begin of the next one */
-    scip_part(2, 601, 1080);
-    scip_line_end(2, 0);
-    scip_expect("");
-    scip_part(3, 0, 539);
-    scip_part(3, 0, 539);
-    scip_part(3, 0, 0);
-    scip_line_end(3, 0);
-    scip_expect("");
-    scip_turn(4);
-    scip_decode_only(&got, 3, 0);
-    assert_int_equal(got.time_ms, 10100);
-    scip_close();
 }
 
 /* A change of speed within a turn sends descriptor and emitter again, and does not change the turn. Another number of
@@ -332,7 +233,6 @@ static void speed_changes_within_a_turn(void **state)
     scip_line_end(1, 0);
     scip_expect("");
     scip_ask("MD0000060100000\n", "MD0000060100000\n04T\n\n");
-    scip_close();
 }
 
 /* 2^24 ms are 4 h 39 min 37.216 s. The stamp is that of step 0, wherever the scan begins. */
@@ -357,7 +257,6 @@ static void the_clock_wraps(void **state)
     assert_int_equal(got.time_ms, 0);
     scip_decode(&got, &at, 3, 0);
     assert_int_equal(got.time_ms, 100);
-    scip_close();
 }
 
 /* Writes all replies since, a line each: the two digits of an echo and its status, or only the status. */
@@ -414,7 +313,6 @@ static void played_malfunctions(void **state)
     scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
     turns_of_a_stream(&line, 21);
     check_played("00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:99 00:21 00:98 ");
-    scip_close();
 }
 
 int main(void)
@@ -426,15 +324,12 @@ int main(void)
         cmocka_unit_test(measured_when),
         cmocka_unit_test(handshakes),
         cmocka_unit_test(lost_frames),
-        cmocka_unit_test(lost_attributes),
         cmocka_unit_test(the_clock_wraps),
-        cmocka_unit_test(turns_that_are_not_lost),
-        cmocka_unit_test(turns_are_not_mixed),
         cmocka_unit_test(speed_changes_within_a_turn),
         cmocka_unit_test(asked_while_it_stops),
         cmocka_unit_test(skipped_and_broken),
         cmocka_unit_test(the_first_comes_at_once),
         cmocka_unit_test(played_malfunctions),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, NULL, scip_teardown);
 }

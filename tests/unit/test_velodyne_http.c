@@ -107,6 +107,7 @@ static void test_settings(void **state)
         {"/cgi/setting/phaselock", "offset=36000", 400, NULL},
         {"/cgi/setting/phaselock", "offset=nan", 400, NULL},
         {"/cgi/save", "data=submit", 200, NULL},
+        {"/cgi/save", "data=SUBMIT", 200, NULL},
         {"/cgi/save", "data=x", 400, NULL},
         {"/cgi/reset", "data=x", 400, NULL},
     };
@@ -196,7 +197,7 @@ static void test_reset(void **state)
     assert_string_equal(http_rig.line[4], "HEAD:STATE?");
     assert_int_equal(http_rig.n_lines, 5);
     http_replies[0].reply = "idle";
-    http_post("/cgi/reset", "data=reset_system");
+    http_post("/cgi/reset", "data=Reset_System");
     assert_string_equal(http_rig.line[5], "SCAN:START");
 }
 

@@ -6,6 +6,7 @@
 
 #include <cmocka.h>
 
+#include "core/bytes.h"
 #include "tests/common/protocol_rig.h"
 
 static struct protocol_rig rig;
@@ -16,20 +17,7 @@ static int setup(void **state)
 {
     (void)state;
     protocol_rig_open(&rig, PROTOCOL_VELODYNE_POSITION, "Velodyne", "VLP-16");
-    rig.fix = (struct nmea_fix){.talker = "GN",
-                                .year = 2026,
-                                .month = 1,
-                                .day = 2,
-                                .hour = 3,
-                                .minute = 4,
-                                .second = 5,
-                                .lat_deg = 48.1,
-                                .lon_deg = -11.5,
-                                .quality = 4,
-                                .satellites = 12,
-                                .hdop = 0.9,
-                                .speed_m_s = 1.0,
-                                .course_deg = 90.0};
+    rig.fix = protocol_rig_fix;
     n_asked = 0;
     return 0;
 }
@@ -39,11 +27,6 @@ static int teardown(void **state)
     (void)state;
     protocol_rig_close(&rig);
     return 0;
-}
-
-static uint32_t u32(const uint8_t *p)
-{
-    return (uint32_t)(p[0] | p[1] << 8 | p[2] << 16) | (uint32_t)p[3] << 24;
 }
 
 static const uint8_t *packet(uint32_t i)
@@ -76,7 +59,7 @@ static void open_again(int64_t t_ns)
 static void test_fields(void **state)
 {
     (void)state;
-    static const char rmc[] = "$GPRMC,030405.00,A,4806.0000000,N,01130.0000000,W,1.944,90.00,020126,,,R*";
+    static const char rmc[] = "$GPRMC,030405.00,A,3351.4070640,S,15112.9178020,E,1.944,90.00,020126,,,R*";
     uint8_t want[512] = {0};
     rig.utc0_ns = INT64_C(1767323040000000000); /* 2026-01-02 03:04:00 */
     rig.ops->time(rig.protocol, 1);             /* the packet of device time 0 */
@@ -92,7 +75,7 @@ static void test_fields(void **state)
     want[0xc0] = 9;
     want[0xc4] = 1;
     const uint32_t us = (uint32_t)((4 * 60000000000 + t_ns) / 1000);
-    memcpy(want + 0xc6, (uint8_t[]){(uint8_t)us, (uint8_t)(us >> 8), (uint8_t)(us >> 16), (uint8_t)(us >> 24)}, 4);
+    le_put32(want + 0xc6, us);
     want[0xca] = 2;
     want[0xcd] = 25;
     memcpy(want + 0xce, p + 0xce, 128); /* below */
@@ -119,8 +102,7 @@ static void test_pulses_per_second(void **state)
         rig.ops->time(rig.protocol, 1);
         const uint8_t *p = packet(rig.n_units - 1);
         assert_int_equal(p[0xca], k);
-        const uint32_t us = p[0xc6] | (uint32_t)p[0xc7] << 8 | (uint32_t)p[0xc8] << 16 | (uint32_t)p[0xc9] << 24;
-        assert_int_equal(us, k == 0 ? 0 : 4 * 60000000);
+        assert_int_equal(le_get32(p + 0xc6), k == 0 ? 0 : 4 * 60000000);
     }
 }
 
@@ -134,12 +116,12 @@ static void test_rate(void **state)
     assert_int_equal(rig.ops->next_ns(rig.protocol), 108 * 18579456ll + 1);
     assert_int_equal(rig.n_units, 108); /* 2 s / 18.579456 ms = 107.6, and the one of 0 */
     for (uint32_t i = 0; i < rig.n_units; i++)
-        assert_int_equal(u32(packet(i) + 198), i * 18579456ull / 1000);
+        assert_int_equal(le_get32(packet(i) + 198), i * 18579456ull / 1000);
     protocol_rig_clear(&rig);
     open_again(1000000000);
     rig.ops->time(rig.protocol, 1003303624); /* 54 x 18.579456 ms = 1.003290624 s is the next */
     assert_int_equal(rig.n_units, 1);
-    assert_int_equal(u32(packet(0) + 198), 1003290);
+    assert_int_equal(le_get32(packet(0) + 198), 1003290);
 }
 
 /* Without UTC the time counts from power-up, PPS is absent, and there is no sentence. The time wraps with the hour. */
@@ -148,13 +130,12 @@ static void test_without_utc(void **state)
     (void)state;
     rig.fix.quality = 0; /* the rig has none then */
     const int64_t hour_ns = INT64_C(3600000000000), first_ns = (hour_ns / 18579456 + 1) * 18579456;
-    protocol_rig_clear(&rig);
     rig.ops->destroy(rig.protocol);
     assert_int_equal(rig.ops->create(&rig.spec, &rig.protocol, NULL), 0);
     rig.ops->open(rig.protocol, hour_ns);
     rig.ops->time(rig.protocol, first_ns + 1);
     assert_int_equal(rig.n_units, 1);
-    assert_int_equal(u32(packet(0) + 198), (first_ns - hour_ns) / 1000);
+    assert_int_equal(le_get32(packet(0) + 198), (first_ns - hour_ns) / 1000);
     assert_int_equal(packet(0)[202], 0);
     for (int i = 206; i < 512; i++)
         assert_int_equal(packet(0)[i], 0);
@@ -168,7 +149,7 @@ static void test_after_power_cycle(void **state)
     open_again(rig.spec.power_ns);
     rig.ops->time(rig.protocol, INT64_C(7500000000)); /* the last packet before it is at 7.487521 s */
     assert_int_equal(packet(rig.n_units - 1)[0xc4], 1);
-    assert_int_equal(u32(packet(rig.n_units - 1) + 0xc0), 2);
+    assert_int_equal(le_get32(packet(rig.n_units - 1) + 0xc0), 2);
 }
 
 /* UTC is known, but the receiver gives no position: locked, without a sentence. */
@@ -217,7 +198,7 @@ static void test_after_a_long_silence(void **state)
     rig.ops->time(rig.protocol, t_ns); /* due: 0 .. 999 */
     assert_int_equal(rig.n_units, 64);
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST], 1000 - 64);
-    assert_int_equal(u32(packet(63) + 198), 999 * 18579456ull / 1000);
+    assert_int_equal(le_get32(packet(63) + 198), 999 * 18579456ull / 1000);
     rig.ops->time(rig.protocol, t_ns + 1);
     assert_int_equal(rig.n_units, 65);
 }

@@ -8,8 +8,13 @@
 
 enum { SEQUENCE_NS = 55296, FIRING_NS = 2304 };
 
-/* Opens the protocol for a VLP-16 at 10 turns a second that sends the strongest echo. */
-void velodyne_head_open(struct protocol_rig *rig);
+/* The session of a VLP-16 at 10 turns a second that sends the strongest echo; from setup to teardown. */
+extern struct protocol_rig rig;
+int velodyne_head_setup(void **state);
+int velodyne_head_teardown(void **state);
+
+/* Returns data packet i, of 1206 bytes. */
+const uint8_t *velodyne_head_packet(uint32_t i);
 
 /* Returns the time of pulse k since the scan's start: 55.296 us a sequence, 2.304 us a firing. */
 int64_t velodyne_head_ns(uint64_t pulse);
@@ -19,10 +24,9 @@ double velodyne_head_turns(uint64_t pulse, double rpm);
 int velodyne_head_elevation_deg(uint32_t beam);
 
 /* Fires one points frame of n pulses from pulse0 on, n <= 4096. turn0: the azimuth of pulse 0 of the scan. */
-void velodyne_head_fire(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, const struct protocol_rig_shot *shot,
-                        double rpm, double turn0);
+void velodyne_head_fire(uint64_t pulse0, uint32_t n, const struct protocol_rig_shot *shot, double rpm, double turn0);
 /* Does the same with one range for all. */
-void velodyne_head_fire_alike(struct protocol_rig *rig, uint64_t pulse0, uint32_t n, double range_m);
-void velodyne_head_event(struct protocol_rig *rig, uint32_t code);
+void velodyne_head_fire_alike(uint64_t pulse0, uint32_t n, double range_m);
+void velodyne_head_event(uint32_t code);
 
 #endif

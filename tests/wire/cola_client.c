@@ -20,12 +20,16 @@ const char *cola_client_next(struct cola_client *c)
     }
 }
 
-const char *cola_client_ask(struct cola_client *c, const char *request)
+void cola_client_send(struct cola_client *c, const char *request)
 {
     char line[64];
+    raw_send(c->fd, line, (size_t)snprintf(line, sizeof line, "\2%s\3", request));
+}
+
+const char *cola_client_ask(struct cola_client *c, const char *request)
+{
     const char *answer;
-    const int n = snprintf(line, sizeof line, "\2%s\3", request);
-    if (send(c->fd, line, (size_t)n, MSG_NOSIGNAL) != n) return NULL;
+    cola_client_send(c, request);
     while ((answer = cola_client_next(c)) != NULL && strncmp(answer, "sSN ", 4) == 0)
         continue;
     return answer;
@@ -36,4 +40,13 @@ void cola_client_expect(struct cola_client *c, const char *request, const char *
     const char *said = cola_client_ask(c, request);
     assert_non_null(said);
     assert_string_equal(said, answer);
+}
+
+void cola_client_reboot(struct cola_client *c, const struct head *head)
+{
+    cola_client_expect(c, "sMN mSCreboot", "sAN mSCreboot");
+    assert_null(cola_client_next(c));
+    close(c->fd);
+    *c = (struct cola_client){.fd = raw_connect_again(head_endpoint(head, "tcp"), "\2sRN ODpwrc\3")};
+    assert_string_equal(cola_client_next(c), "sRA ODpwrc 2");
 }

@@ -37,10 +37,8 @@ static void split(char *all)
         for (int i = 0; i < n_columns; i++) {
             char *cell = strsep(&line, "\t");
             assert_non_null(cell);
-            while (*cell != 0 && cell != NULL) {
+            while (cell != NULL && *cell != 0)
                 add_value(&column[i], strsep(&cell, "|"));
-                if (cell == NULL) break;
-            }
         }
 }
 

@@ -24,7 +24,9 @@ static void expect_header(const uint8_t *frame)
 }
 
 #define UINT(prefix, member) expect_uint(S prefix "." #member, v.member)
+#define INT(prefix, member)  expect_int(S prefix "." #member, v.member)
 #define REAL(prefix, member) expect_real(S prefix "." #member, v.member, 0)
+#define DEG(member)          expect_real(S "descriptor." #member "_deg", (double)v.member##_udeg / 1e6, 0)
 static void expect_descriptor(const struct scanhead_frame *f)
 {
     struct native_descriptor v;
@@ -35,12 +37,7 @@ static void expect_descriptor(const struct scanhead_frame *f)
     expect_real(S "descriptor.prr_hz", (double)v.prr_uhz / 1e6, 0);
     expect_real(S "descriptor.lines_hz", (double)v.lines_uhz / 1e6, 0);
     expect_real(S "descriptor.pan_deg_s", (double)v.pan_udeg_s / 1e6, 0);
-    expect_real(S "descriptor.fov_min_deg", (double)v.fov_min_udeg / 1e6, 0);
-    expect_real(S "descriptor.sweep_deg", (double)v.sweep_udeg / 1e6, 0);
-    expect_real(S "descriptor.line_start_deg", (double)v.line_start_udeg / 1e6, 0);
-    expect_real(S "descriptor.line_stop_deg", (double)v.line_stop_udeg / 1e6, 0);
-    expect_real(S "descriptor.pan_start_deg", (double)v.pan_start_udeg / 1e6, 0);
-    expect_real(S "descriptor.pan_stop_deg", (double)v.pan_stop_udeg / 1e6, 0);
+    DEG(fov_min), DEG(sweep), DEG(line_start), DEG(line_stop), DEG(pan_start), DEG(pan_stop);
     REAL("descriptor", mirror_counts_per_turn), REAL("descriptor", pan_counts_per_turn);
     REAL("descriptor", range_scale_m), REAL("descriptor", range_min_m), REAL("descriptor", range_max_m);
     UINT("descriptor", max_echoes), UINT("descriptor", n_surfaces), UINT("descriptor", frames);
@@ -147,8 +144,7 @@ static void expect_telemetry(const struct scanhead_frame *f)
     if (v.ptp_port != NATIVE_PTP_NONE) {
         UINT("telemetry", ptp_port), UINT("telemetry", ptp_servo), UINT("telemetry", ptp_grandmaster);
         UINT("telemetry", ptp_class), UINT("telemetry", ptp_accuracy), UINT("telemetry", ptp_flags);
-        UINT("telemetry", ptp_reserved), expect_int(S "telemetry.ptp_offset_ns", v.ptp_offset_ns);
-        expect_int(S "telemetry.ptp_delay_ns", v.ptp_delay_ns);
+        UINT("telemetry", ptp_reserved), INT("telemetry", ptp_offset_ns), INT("telemetry", ptp_delay_ns);
     }
     const char *text = take_text(S "telemetry.utc"), *rest = strptime(text, "%b %d, %Y %H:%M:%S", &utc);
     if (rest == NULL) rest = strptime(text, "%Y-%m-%dT%H:%M:%S", &utc); /* as later versions write it */
@@ -234,10 +230,7 @@ static void expect_emitter(struct scanhead *sh, const struct scanhead_frame *f)
     assert_int_equal(scanhead_get_emitter(sh, &e), 0);
     UINT("emitter", kind), UINT("emitter", n_beams), UINT("emitter", steps), UINT("emitter", rings);
     UINT("emitter", echoes), UINT("emitter", gaps);
-    expect_int(S "emitter.first_step", v.first_step);
-    expect_int(S "emitter.last_step", v.last_step);
-    expect_int(S "emitter.front_step", v.front_step);
-    expect_int(S "emitter.turn", v.turn);
+    INT("emitter", first_step), INT("emitter", last_step), INT("emitter", front_step), INT("emitter", turn);
     expect_uint(S "emitter.sequence_num", v.sequence_ns_num);
     expect_uint(S "emitter.sequence_den", v.sequence_ns_den);
     expect_real(S "emitter.first_ring_deg", (double)v.first_ring_udeg / 1e6, 0);

@@ -14,6 +14,7 @@ static void expect_beam(const struct scanhead_wave *w, int is_geo)
     const double rad = 3.14159265358979323846 / 180;
     const double line = rad * atof(take_text(S "wave.line_deg")), pan = rad * atof(take_text(S "wave.pan_deg"));
     const double d[] = {sin(pan) * cos(line), cos(pan) * cos(line), sin(line)};
+    assert_true(line >= -180 * rad && line <= 180 * rad); /* as of points: the middle of these lines is 0 */
     for (int i = 0; i < 3; i++)
         assert_true(fabs(d[i] - w->direction[i]) < 1e-14);
 }

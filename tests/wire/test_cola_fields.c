@@ -5,13 +5,6 @@
 #include "tests/wire/room.h"
 #include "tests/wire/wire.h"
 
-static void send_request(struct cola_client *c, const char *request)
-{
-    char line[64];
-    const int n = snprintf(line, sizeof line, "\2%s\3", request);
-    assert_int_equal(send(c->fd, line, (size_t)n, MSG_NOSIGNAL), n);
-}
-
 /* Waits for a telegram that begins so. */
 static const char *wait_for(struct cola_client *c, const char *begin)
 {
@@ -38,7 +31,7 @@ static void read_results(const char *telegram, char results[4])
 static void poll_until(struct cola_client *c, const char *request, const char *answer)
 {
     do
-        send_request(c, request);
+        cola_client_send(c, request);
     while (strcmp(wait_for(c, "sRA "), answer) != 0);
 }
 
@@ -67,17 +60,17 @@ static void fields_and_the_window(void **state)
     struct head head = start(wire);
     struct scanhead *native = client_open(head_endpoint(&head, "pty"));
     c.fd = raw_connect(head_endpoint(&head, "tcp"));
-    send_request(&c, "sEN LFErec 1");
-    send_request(&c, "sEN LIDoutputstate 1");
-    send_request(&c, "sMN SetAccessMode 03 F4724744");
+    cola_client_send(&c, "sEN LFErec 1");
+    cola_client_send(&c, "sEN LIDoutputstate 1");
+    cola_client_send(&c, "sMN SetAccessMode 03 F4724744");
     wait_for(&c, "sAN SetAccessMode 1");
-    send_request(&c, "sMN LMCstartmeas");
+    cola_client_send(&c, "sMN LMCstartmeas");
     read_results(wait_for(&c, "sSN LFErec 3 "), results);
     assert_string_equal(results, "210");
     assert_non_null(strstr(wait_for(&c, "sSN LIDoutputstate 0 "), " 1 1 0 0 0 0 0 0 0 0 0"));
     static struct cola_client late; /* the first answer has what was seen before it came */
     late.fd = raw_connect(head_endpoint(&head, "tcp"));
-    send_request(&late, "sRN LFErec");
+    cola_client_send(&late, "sRN LFErec");
     read_results(wait_for(&late, "sRA LFErec 3 "), results);
     assert_string_equal(results, "210");
     close(late.fd);
@@ -114,7 +107,7 @@ static void received_is_from_the_first_moment_on(void **state)
         before += frame.n_pulses;
     }
     c.fd = raw_connect(head_endpoint(&head, "tcp"));
-    send_request(&c, "sRN LFErec");
+    cola_client_send(&c, "sRN LFErec");
     wait_for(&c, "sRA LFErec 3 ");
     close(c.fd);
     scanhead_close(native);

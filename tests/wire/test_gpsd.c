@@ -14,19 +14,6 @@ static int in_path(const char *program)
     return 0;
 }
 
-/* Returns a port that is free now. */
-static int free_port(void)
-{
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    close(fd);
-    return ntohs(at.sin_port);
-}
-
 /* Starts a program of the system with its standard output on out_fd (-1: nowhere). */
 static pid_t spawn(struct wire *wire, const char *const *args, int out_fd)
 {
@@ -90,7 +77,8 @@ struct gpsd {
 static void gpsd_start(struct gpsd *g, struct wire *wire)
 {
     char port[16], server[32], device[352];
-    int number = free_port(), out[2];
+    int number, out[2];
+    close(wire_bind(SOCK_STREAM, &number)); /* a port that is free now */
     snprintf(port, sizeof port, "%d", number);
     snprintf(server, sizeof server, "127.0.0.1:%d", number);
     snprintf(device, sizeof device, "%s", wire_path(wire, "gnss"));

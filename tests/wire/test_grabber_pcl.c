@@ -41,13 +41,9 @@ static const char *build_or_skip(struct wire *wire)
 
 static int free_port(void)
 {
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
-    socklen_t len = sizeof at;
-    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    close(fd);
-    return ntohs(at.sin_port);
+    int port;
+    close(wire_bind(SOCK_DGRAM, &port));
+    return port;
 }
 
 /* Returns 1 when the point is on the house. */

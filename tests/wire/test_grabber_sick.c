@@ -11,20 +11,6 @@ static const double STEP_DEG = 0.25, FIRST_DEG = -45.0; /* 90 is forward, counte
 static const double MIN_M = 0.5, MAX_M = 20.0;
 static const uint32_t PERIOD_US = 40000; /* 25 Hz */
 
-/* Returns a listening socket of this machine. */
-static int listen_anywhere(int *port)
-{
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(listen(fd, 1), 0);
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    *port = ntohs(at.sin_port);
-    return fd;
-}
-
 static int pass_on(int from, int to, FILE *keep)
 {
     char bytes[16384];
@@ -112,7 +98,8 @@ static int poll_scans(struct wire *wire, const char *endpoint, int number, struc
 {
     static struct grabber grabber;
     char sensor[256], name[16];
-    int port, listener = listen_anywhere(&port), is_whole = 1;
+    int port, listener = wire_bind(SOCK_STREAM, &port), is_whole = 1;
+    assert_int_equal(listen(listener, 1), 0);
     pid_t relay = relay_start(wire, listener, endpoint);
     grabber_hurry(relay); /* else the client, which polls all the time, would go before it */
     close(listener);

@@ -2,6 +2,7 @@
 /* rawlog-grabber reads the ready configuration of a VLP-16, which needs no other key. Each packet of some turns comes,
  * at its time and azimuth, with the ranges of the house, and the receiver's time dates the turns. Then a head loses
  * packets on request. The grabber takes two fixed ports of this machine. */
+#include "core/bytes.h"
 #include "tests/wire/grabber.h"
 #include "tests/wire/house.h"
 #include "tests/wire/room.h"
@@ -13,16 +14,6 @@ enum { TURNS = 25, BLOCKS = 12, SHOTS = 32, PACKET = RAWLOG_PACKET_LEN };
 static const double ELEVATION_DEG[16] = {-15, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15};
 static const double LASER_US = 2.304, SEQUENCE_US = 55.296, PACKET_US = 24 * 55.296, DEG_PER_US = 3600e-6; /* 600 rpm */
 static const double MIN_M = 0.1, MAX_M = 100.0; /* the room has nothing outside of that */
-
-static uint32_t get16(const uint8_t *at)
-{
-    return at[0] | (uint32_t)at[1] << 8;
-}
-
-static uint32_t get32(const uint8_t *at)
-{
-    return get16(at) | get16(at + 2) << 16;
-}
 
 static const int64_t HOUR_US = 3600000000;
 
@@ -41,7 +32,7 @@ struct packets {
 /* Returns the microseconds from one packet to another, by their own time, which begins anew with each hour. */
 static int64_t later_us(const uint8_t *packet, const uint8_t *first)
 {
-    const int64_t us = (int64_t)get32(packet + 1200) - get32(first + 1200);
+    const int64_t us = (int64_t)le_get32(packet + 1200) - le_get32(first + 1200);
     return us > HOUR_US / 2 ? us - HOUR_US : us < -HOUR_US / 2 ? us + HOUR_US : us;
 }
 
@@ -97,15 +88,15 @@ static double turned_deg(uint32_t n, int sequence, int laser)
  * azimuth. */
 static void check_azimuths(struct packets *all)
 {
-    const double begin_deg = 0.01 * get16(all->packet[0].bytes + 2);
+    const double begin_deg = 0.01 * le_get16(all->packet[0].bytes + 2);
     double sum = 0.0, least = INFINITY, most = -INFINITY;
     for (uint32_t n = 0; n < all->n; n++)
         for (int b = 0; b < BLOCKS; b++) {
             const uint8_t *block = all->packet[n].bytes + 100 * b;
-            assert_int_equal(get16(block), 0xeeff);
-            assert_true(get16(block + 2) < 36000);
+            assert_int_equal(le_get16(block), 0xeeff);
+            assert_true(le_get16(block + 2) < 36000);
             double off =
-                remainder(0.01 * get16(block + 2) - begin_deg - turned_deg(all->packet[n].number, 2 * b, 0), 360.0);
+                remainder(0.01 * le_get16(block + 2) - begin_deg - turned_deg(all->packet[n].number, 2 * b, 0), 360.0);
             sum += off;
             least = fmin(least, off);
             most = fmax(most, off);
@@ -122,7 +113,7 @@ static void check_ranges(const struct house *house, const struct packets *all, u
             const uint8_t *at = all->packet[n].bytes + 100 * b + 4 + 3 * shot;
             const double azimuth =
                 (all->azimuth0_deg + turned_deg(all->packet[n].number, 2 * b + shot / 16, shot % 16)) * M_PI / 180.0;
-            const double elevation = ELEVATION_DEG[shot % 16] * M_PI / 180.0, range_m = 0.002 * get16(at);
+            const double elevation = ELEVATION_DEG[shot % 16] * M_PI / 180.0, range_m = 0.002 * le_get16(at);
             /* The bound is half of 2 mm. The mean of azimuths that are rounded in a regular pattern is good to a tenth
              * of 0.01 degrees: 2e-5 rad. */
             if (!house_agrees(house, azimuth, elevation, 2e-5, range_m, 0.00101, MIN_M, MAX_M))
@@ -139,7 +130,7 @@ static void check_dates(const struct rawlog *log, const struct packets *all)
         fixes += log->item[i].kind == RAWLOG_GPS;
     for (uint32_t i = 0; i < all->n_turns; i++) {
         const struct rawlog_item *turn = all->turn[i];
-        const int64_t us = turn->t_100ns / 10 % HOUR_US, is = get32(turn->packets + 1200);
+        const int64_t us = turn->t_100ns / 10 % HOUR_US, is = le_get32(turn->packets + 1200);
         /* 1: rounding of seconds in double. The first turns may have begun before the first fix. */
         if (llabs(us - is) <= 1)
             dated++;
@@ -167,6 +158,17 @@ static void ports_or_skip(void)
     skip();
 }
 
+/* Reads so many turns, and ends head and client. Returns how many packets the kernel threw away meanwhile. */
+static uint32_t read_turns(struct grabber *grabber, int n, struct head *head, struct rawlog *log)
+{
+    if (!grabber_wait(grabber, n)) fail_msg("rawlog-grabber complains:\n%s", grabber->said);
+    head_end(head, SIGTERM);
+    const uint32_t dropped = grabber_dropped_at(2368);
+    grabber_end(grabber);
+    rawlog_read(grabber, log);
+    return dropped;
+}
+
 static void test_turns(void **state)
 {
     struct wire *wire = *state;
@@ -180,11 +182,7 @@ static void test_turns(void **state)
     struct head head = head_start(wire, "config/velodyne.yaml", house_options(wire, "4", NULL));
     struct house *house = house_load(wire);
     assert_true(house_is_mark(house, mark, 0.0) && !house_is_mark(house, -mark, 0.0));
-    if (!grabber_wait(&grabber, TURNS + 2)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
-    head_end(&head, SIGTERM);
-    const uint32_t dropped = grabber_dropped_at(2368);
-    grabber_end(&grabber);
-    rawlog_read(&grabber, &log);
+    const uint32_t dropped = read_turns(&grabber, TURNS + 2, &head, &log);
     collect(&log, by_device_time, &all);
     check_times(&all, dropped);
     check_azimuths(&all);
@@ -297,7 +295,7 @@ static void check_cuts(const struct rawlog *log)
     for (uint32_t i = 0; i < log->n_items; i++) {
         const struct rawlog_item *turn = &log->item[i];
         for (uint32_t k = 0; turn->kind == RAWLOG_TURN && k < turn->n; k++) {
-            const int azimuth = (int)get16(turn->packets + (size_t)PACKET * k + 2);
+            const int azimuth = (int)le_get16(turn->packets + (size_t)PACKET * k + 2);
             if (before >= 0 && (azimuth < before) != (k == 0))
                 fail_msg("turn %u, packet %u: azimuth %d after %d", i, k, azimuth, before);
             before = azimuth;
@@ -316,11 +314,7 @@ static void test_lossy(void **state)
     ports_or_skip();
     grabber_start(wire, "LOSSY", "driver = CVelodyneScanner\nmodel = VLP16\n", &grabber);
     struct head head = start_lossy(wire);
-    if (!grabber_wait(&grabber, TURNS)) fail_msg("rawlog-grabber complains:\n%s", grabber.said);
-    head_end(&head, SIGTERM);
-    const uint32_t dropped = grabber_dropped_at(2368);
-    grabber_end(&grabber);
-    rawlog_read(&grabber, &log);
+    const uint32_t dropped = read_turns(&grabber, TURNS, &head, &log);
     collect(&log, NULL, &all);
     read_truth(wire, &sent);
     check_lossy(&all, &sent, dropped);

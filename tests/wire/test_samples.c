@@ -95,7 +95,7 @@ static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *o
         block.echo[i] = (uint8_t)(p.echo | p.echo_count << 4);
         block.amplitude_cdb[i] = a.amplitude_cdb;
         block.width_cns[i] = a.width_cns;
-        native_decode_colour(colours + 28, i, block.rgb[i]);
+        memcpy(block.rgb[i], colours + 28 + 16 + 3 * (size_t)i, 3);
         block.deviation[i] = native_decode_deviation(next + 28, points.n_points, i);
     }
     size_t len = native_encode_points(out, room, &block, header.t_ns - points.t0_ns);

@@ -256,18 +256,6 @@ static void test_nmea(void **state)
 
 /* ---- Velodyne over UDP: two turns are 150 packets, which a socket that nobody reads has room for */
 
-static int bind_udp(int *port)
-{
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
-    socklen_t len = sizeof at;
-    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), room = 1 << 22;
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    *port = ntohs(at.sin_port);
-    return fd;
-}
-
 static size_t packet_whole(const uint8_t *bytes, size_t len)
 {
     (void)bytes;
@@ -282,7 +270,8 @@ static void test_velodyne(void **state)
     struct unit_list got = {0}, clean = {0};
     char links[256];
     int port;
-    const int fd = bind_udp(&port);
+    const int fd = wire_bind(SOCK_DGRAM, &port), room = 1 << 22;
+    setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
     snprintf(links, sizeof links,
              "links: [{type: udp, protocol: velodyne, port: %d}, {type: file, protocol: velodyne, path: clean}]\n"
              "beam: {echoes: strongest}\n",

@@ -4,6 +4,7 @@
  * packet i is of device time i * 18.579456 ms. */
 #include <math.h>
 
+#include "core/bytes.h"
 #include "tests/wire/room.h"
 
 enum { DATA = 1206, POSITION = 512, BLOCKS = 12 };
@@ -49,11 +50,6 @@ static const struct {
     {13.503, 14.5, WRONG, 11.003, "$GPRMC,010011.00,A,4806.0000000,N,01130.0000000,E,0.000,000.0,010126,,,A", 0},
 };
 
-static uint32_t u32(const uint8_t *p)
-{
-    return (uint32_t)(p[0] | p[1] << 8 | p[2] << 16) | (uint32_t)p[3] << 24;
-}
-
 static unsigned xor_of(const char *text, size_t len)
 {
     unsigned sum = 0;
@@ -80,9 +76,9 @@ static void check_positions(const uint8_t *bytes, size_t len)
         for (size_t k = 0; k < sizeof WANT / sizeof *WANT; k++) {
             if (t_s < WANT[k].from_s || t_s >= WANT[k].until_s) continue;
             const double hour_s = WANT[k].hour_s + t_s - WANT[k].from_s;
-            if (packet[202] != WANT[k].pps || fabs(u32(packet + 198) - 1e6 * hour_s) > 1.0) /* rounded down */
-                fail_msg("at %.6f s: PPS %d, %u us; not %d, %.6f s", t_s, packet[202], u32(packet + 198), WANT[k].pps,
-                         hour_s);
+            if (packet[202] != WANT[k].pps || fabs(le_get32(packet + 198) - 1e6 * hour_s) > 1.0) /* rounded down */
+                fail_msg("at %.6f s: PPS %d, %u us; not %d, %.6f s", t_s, packet[202], le_get32(packet + 198),
+                         WANT[k].pps, hour_s);
             check_sentence((const char *)packet + 206, WANT[k].sentence, WANT[k].is_spoilt);
             seen |= 1u << k;
         }
@@ -95,8 +91,7 @@ static double azimuth_deg(const uint8_t *packet, double us)
 {
     double blocks = us / BLOCK_US;
     int b = blocks < BLOCKS - 2 ? (int)blocks : BLOCKS - 2;
-    const double here = 0.01 * (packet[100 * b + 2] | packet[100 * b + 3] << 8),
-                 next = 0.01 * (packet[100 * b + 102] | packet[100 * b + 103] << 8);
+    const double here = 0.01 * le_get16(packet + 100 * b + 2), next = 0.01 * le_get16(packet + 100 * b + 102);
     return here + (blocks - b) * fmod(next - here + 360.0, 360.0);
 }
 
@@ -113,7 +108,7 @@ static void check_azimuths(const uint8_t *bytes, size_t len)
     double free_deg = 0.0;
     for (size_t i = 0; (i + 1) * DATA <= len; i++) {
         const uint8_t *packet = bytes + i * DATA;
-        const uint32_t us = u32(packet + 1200), second = us / 1000000 + 1;
+        const uint32_t us = le_get32(packet + 1200), second = us / 1000000 + 1;
         const double left_us = second * SECOND_US - us;
         if (left_us >= BLOCKS * BLOCK_US) continue;
         const double beyond_deg = remainder(azimuth_deg(packet, left_us) - 123.45, 360.0);

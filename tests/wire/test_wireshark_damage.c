@@ -202,7 +202,8 @@ static const struct {
     {1, 128, 4, 2, 0, "layout 2, allowed 0 to 1"},
     {1, 252, 4, 65536, 0, "n_surfaces 65536, allowed 0 to 65535"},
     {1, 0, 0, 0, -200, "80 bytes, allowed 272 and more"},
-    {1, 272, 4, 24, 0, "Reserved bits are set"}, /* attributes have deviations from here on */
+    {1, 272, 4, 24, 0, "Reserved bits are set"}, /* attributes have deviations then */
+    {9, 12, 4, 5, 0, "5 deviations, and room for 4"},
     {2, 0, 4, 4, 0, "crs 4, allowed 0 to 3"},
     {2, 20, 4, 0x7ff80000, 0, "x: not a finite number"},
     {3, 36, 4, 5, 0, "5 points, and room for 4"},
@@ -215,7 +216,6 @@ static const struct {
     {7, 27, 1, 4, 0, "shorter than its names"}, /* the last one, of 3 bytes */
     {8, 0, 4, 1, 0, "1 poses, allowed 2 to 2"},
     {8, 44, 4, 0x40000000, 0, "a quaternion that is not of length one"},
-    {9, 12, 4, 5, 0, "5 deviations, and room for 4"},
     {10, 24, 4, 0, 0, "turn 0, allowed 1 and -1"},
     {10, 4, 4, 4, 0, "4 beams, and room for 3"},
     {11, 12, 4, 5, 0, "5 points, and room for 4"},
@@ -296,8 +296,36 @@ static void test_damage(void **state)
     expect_damaged("damaged.shs");
 }
 
+/* Another head's points, or those after a power cut, are not placed by the descriptor and the anchor of before. */
+static void test_restart(void **state)
+{
+    (void)state;
+    static const char *const fields[] = {"_ws.expert.message", NULL};
+    struct capture c = {0};
+    size_t len;
+    uint8_t *bytes = (uint8_t *)wire_read(wire_path(wire, "polar.shs"), &len), *points = NULL;
+    capture_begin(&c);
+    const uint32_t interface = capture_interface(&c, CAPTURE_USER0);
+    for (uint8_t *at = bytes; at < bytes + len; at += native_frame_len(at)) {
+        capture_packet(&c, interface, at, native_frame_len(at));
+        if (at[1] == NATIVE_POINTS) points = at;
+    }
+    assert_non_null(points);
+    le_put32(points + 8, le_get32(points + 8) - 100000); /* no frame of this recording has that number */
+    seal_frame(points);
+    capture_packet(&c, interface, points, native_frame_len(points));
+    wire_write(wire, "restart.pcapng", c.bytes, c.len);
+    free(c.bytes);
+    free(bytes);
+    dissect("restart.pcapng", 1, fields);
+    const char *last = strstr(dissected_text(), "The sequence begins anew");
+    assert_non_null(last);
+    assert_non_null(strstr(last, "Points that nobody can place yet"));
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_hurt), cmocka_unit_test(test_damage)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_hurt), cmocka_unit_test(test_damage),
+                                       cmocka_unit_test(test_restart)};
     return cmocka_run_group_tests(tests, wireshark_setup, wire_teardown);
 }

@@ -163,6 +163,10 @@ local function rows_of(prefix, rows)
   return rows
 end
 
+local function rows_beside_points(prefix)
+  return rows_of(prefix, {{"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}})
+end
+
 local YES_NO = {"yes", "no"}
 local PTP_PORTS = {[0] = "none", "INITIALIZING", "FAULTY", [4] = "LISTENING", [8] = "UNCALIBRATED", [9] = "SLAVE"}
 local PTP_SERVOS = {[0] = "s0, unlocked", "s1, jump", "s2, locked"}
@@ -236,8 +240,7 @@ local ROWS = {
     {"qw", "f64", "Quaternion w"}, {"qx", "f64", "Quaternion x"}, {"qy", "f64", "Quaternion y"},
     {"qz", "f64", "Quaternion z"}, {"frame", "f64", "Frame scalar"}, {"flags", "hex", "Flags", 8},
     {"reserved", "zero", "Reserved"}}),
-  [ATTRIBUTES] = rows_of("attributes.", {
-    {"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}}),
+  [ATTRIBUTES] = rows_beside_points("attributes."),
   [EMITTER] = rows_of("emitter.", {
     {"kind", "u32", "Kind", {[0] = "line", "planar", "beams", "sphere", "directions"}}, {"n_beams", "u32", "Beams"},
     {"steps", "u32", "Steps of a line"}, {"first_step", "i32", "First step that is cast"},
@@ -250,8 +253,7 @@ local ROWS = {
     {"gaps", "u32", "Gaps from pole to pole"}}),
   beam = rows_of("beam.", {{"elevation_deg", "deg32", "Elevation"}, {"azimuth_deg", "deg32", "Azimuth"},
                            {"offset_ns", "u32", "Fires after the sequence's first", "ns"}}),
-  [COLOURS] = rows_of("colours.", {
-    {"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_points", "u32", "Points"}}),
+  [COLOURS] = rows_beside_points("colours."),
   [WAVES] = rows_of("waves.", {
     {"pulse0", "u64", "First pulse"}, {"line", "u32", "Line"}, {"n_windows", "u32", "Windows"},
     {"sample_ps", "u32", "Time between samples", "ps"}, {"baseline", "counts16", "Baseline"},
@@ -475,13 +477,16 @@ local function wrong_row(rows, bytes, at)
   end
 end
 
-local function records_fit(what, n, head_len, record_len)
-  return function(bytes, at, len)
-    local count = number_at(bytes, at + n)
-    if count > floor((len - head_len) / record_len) then
-      return string.format("%d %s, and room for %d", count, what, floor((len - head_len) / record_len))
-    end
-  end
+-- Payloads that end with records of one length: where their number is, where they begin, their length.
+local LISTS = {[POINTS] = {"points", 36, 40, 20}, [ATTRIBUTES] = {"points", 12, 16, 4},
+               [COLOURS] = {"points", 12, 16, 3}, [POSES] = {"poses", 0, 8, 80}, [EMITTER] = {"beams", 4, 64, 12}}
+local DEVIATIONS = {"deviations", 12, 16, 6} -- of attributes that have them
+
+local function list_of(h, m) return h.type == ATTRIBUTES and m.has_deviations and DEVIATIONS or LISTS[h.type] end
+
+local function wrong_list(list, bytes, at, len)
+  local count, most = number_at(bytes, at + list[2]), floor((len - list[3]) / list[4])
+  if count > most then return string.format("%d %s, and room for %d", count, list[1], most) end
 end
 
 local function wrong_names(bytes, at, len)
@@ -543,32 +548,26 @@ local WRONG = {
     return problem
   end,
   [ANCHOR] = function(bytes, at) return one_of("crs", 0, 3)(bytes, at) or one_of("heights", 192, 1)(bytes, at) end,
-  [POINTS] = records_fit("points", 36, 40, 20),
   [SURFACES] = wrong_names,
   [POSES] = wrong_poses,
-  [ATTRIBUTES] = records_fit("points", 12, 16, 4),
-  [COLOURS] = records_fit("points", 12, 16, 3),
   [WAVES] = wrong_waves,
-  [EMITTER] = function(bytes, at, len)
+  [EMITTER] = function(bytes, at)
     local turn = number_at(bytes, at + 24, "<i4")
     if number64(bytes, at + 40) == 0 then return "sequence_den 0" end
     if turn ~= 1 and turn ~= -1 then return string.format("turn %d, allowed 1 and -1", turn) end
-    return one_of("kind", 0, 4)(bytes, at) or one_of("n_beams", 4, 128)(bytes, at) or
-      records_fit("beams", 4, 64, 12)(bytes, at, len)
+    return one_of("kind", 0, 4)(bytes, at) or one_of("n_beams", 4, 128)(bytes, at)
   end,
 }
 
-local function wrong_payload(h, bytes, at, has_deviations)
+local function wrong_payload(h, bytes, at, m)
   local rows = ROWS[h.type]
   if not rows then return nil end
   if h.length < rows.len and not (h.type == TELEMETRY and h.length >= 72) then
     return string.format("%d bytes, allowed %d and more", h.length, rows.len)
   end
-  local problem = h.length >= rows.len and wrong_row(rows, bytes, at)
-  if not problem and h.type == ATTRIBUTES and has_deviations then
-    problem = records_fit("deviations", 12, 16, 6)(bytes, at, h.length)
-  end
-  return problem or WRONG[h.type] and WRONG[h.type](bytes, at, h.length)
+  local list = list_of(h, m)
+  return h.length >= rows.len and wrong_row(rows, bytes, at) or WRONG[h.type] and WRONG[h.type](bytes, at, h.length) or
+    list and wrong_list(list, bytes, at, h.length)
 end
 
 -- ---- the state that the stream describes, as drivers/host/state.c follows it
@@ -678,19 +677,20 @@ local function absorb(flow, h, bytes, at, m)
     flow.lost = flow.lost + m.lost
     flow.line.whole = false
   end
-  if m.notice == RESTARTED then flow.scan, flow.line = nil, {pulses = 0, whole = false} end
+  if m.notice == RESTARTED then
+    forget(flow)
+    flow.scan, flow.final, flow.last_pulse0, flow.line = nil, nil, nil, {pulses = 0, whole = false}
+  end
   if m.notice then m.lost_so_far = flow.lost end
   if h.version ~= 1 then return end
   m.has_deviations = flow.descriptor and floor(flow.descriptor.content / 8) % 2 == 1
-  m.wrong = wrong_payload(h, bytes, at, m.has_deviations) or false
+  m.wrong = wrong_payload(h, bytes, at, m) or false
   if m.wrong or m.notice == REPEATED or m.notice == LATE then return end
   if ABSORB[h.type] then ABSORB[h.type](flow, h, bytes, at, m) end
-  if h.type == POINTS then
-    m.descriptor, m.anchor, m.emitter = flow.descriptor, flow.anchor, flow.emitter
-  elseif h.type == ATTRIBUTES or h.type == COLOURS then
+  m.descriptor, m.anchor, m.emitter = flow.descriptor, flow.anchor, flow.emitter
+  if h.type == ATTRIBUTES or h.type == COLOURS then
     m.points_in = is_of_points(flow, h, bytes, at) and flow.points.packet
   elseif h.type == WAVES then
-    m.descriptor = flow.descriptor
     m.points_in = is_wave_of_points(flow, h, bytes, at) and flow.points.packet
   end
 end
@@ -814,11 +814,15 @@ local function put_geo(item, wanted, m, tvb, at, a, b, c)
 end
 
 -- The line angle is that of the turn around the middle of the line; of other heads it is an elevation.
+local function angles_of(m, b, c)
+  local d = m.descriptor
+  local mirror, pan = b / d.mirror_counts, c / d.pan_counts
+  return 360 * (mirror - floor(mirror - (m.emitter and 0 or d.middle) + 0.5)), 360 * (pan - floor(pan))
+end
+
 local function put_polar(item, wanted, m, tvb, at, a, b, c, has_echo)
   local d, words = m.descriptor, "no echo"
-  local mirror, pan = b / d.mirror_counts, c / d.pan_counts
-  local line_deg = 360 * (mirror - floor(mirror - (m.emitter and 0 or d.middle) + 0.5))
-  local pan_deg = 360 * (pan - floor(pan))
+  local line_deg, pan_deg = angles_of(m, b, c)
   if has_echo then
     local range, pan_rad, line_rad = d.range_scale * a, math.rad(pan_deg), math.rad(line_deg)
     local flat = range * math.cos(line_rad)
@@ -910,8 +914,9 @@ local function put_beam(item, m, tvb, from)
     end
   elseif d then
     local line, pan = tvb(from + 20, 4), tvb(from + 24, 4)
-    put_real(item, F["wave.line_deg"], line, 360 * line:le_uint() / d.mirror_counts)
-    put_real(item, F["wave.pan_deg"], pan, 360 * pan:le_uint() / d.pan_counts)
+    local line_deg, pan_deg = angles_of(m, line:le_uint(), pan:le_uint())
+    put_real(item, F["wave.line_deg"], line, line_deg)
+    put_real(item, F["wave.pan_deg"], pan, pan_deg)
   end
 end
 
@@ -992,20 +997,16 @@ end
 
 -- Length of a payload with its records; bytes after that may belong to a later version.
 local function known_len(h, bytes, at, m)
-  if h.type == POINTS then return 40 + 20 * number_at(bytes, at + 36) end
-  if h.type == ATTRIBUTES then return 16 + (m.has_deviations and 6 or 4) * number_at(bytes, at + 12) end
+  local list = list_of(h, m)
+  if list then return list[3] + list[4] * number_at(bytes, at + list[2]) end
   if h.type == WAVES then return waves_len(bytes, at) end
-  if h.type == COLOURS then return 16 + 3 * number_at(bytes, at + 12) end
-  if h.type == POSES then return 8 + 80 * number_at(bytes, at) end
-  if h.type == EMITTER then return 64 + 12 * number_at(bytes, at + 4) end
   if h.type == SURFACES then return h.length end
   if h.type == DESCRIPTOR and h.length >= 280 then return 280 end
   if h.type == TELEMETRY and h.length >= 104 then return h.length >= 152 and 152 or 104 end
   return math.min(ROWS[h.type].len, h.length)
 end
 
--- Names of an event's a, b and c; {name, "s"} is nanoseconds, {name, STATES} a state.
-local SECONDS = "s"
+-- Names of an event's a, b and c.
 local EVENTS = {
   {"new state", "state before"}, {"scan", "device time of pulse 0", "its GPS time"},
   {"scan", "pulses fired", "pulses lost by the head"},
@@ -1015,6 +1016,7 @@ local EVENTS = {
   {nil, "device time", "its GPS time"}, {"station", "warnings of its place"},
   {"port + 256 * servo", "device time", "grandmaster"},
 }
+-- These of them are in nanoseconds, and shown in seconds.
 local IN_SECONDS = {[2] = {false, true, true}, [9] = {false, false, true}, [10] = {false, true, false},
                     [11] = {false, true, true}, [13] = {false, true, false}}
 local TROUBLE = {[4] = "event_warning", [5] = "event_warning", [9] = "event_warning", [7] = "event_note",
@@ -1050,7 +1052,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
     return
   end
   -- At the first look it was not there.
-  if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at, m.has_deviations) end
+  if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at, m) end
   put_rows(tree, rows, tvb, at, h.length)
   if h.type == DESCRIPTOR and h.length >= 280 then put_rows(tree, ROWS.content, tvb, at + 272, 8) end
   if h.type == TELEMETRY and h.length >= 104 then put_rows(tree, ROWS.lost_lines, tvb, at + 96, 8) end
@@ -1381,6 +1383,8 @@ function Search:run()
   if waits then return self.at, more, is_old end
 end
 
+local function run_search(...) return new_search(...):run() end
+
 -- Commands of the host: lines, ended by LF, CR or CR LF. Gives the same as Search:run.
 local function run_commands(tvb, pinfo, tree, conn, can_wait)
   local bytes, at = tvb:raw(0, tvb:len()), 0
@@ -1439,8 +1443,9 @@ end
 
 -- Frames that go on in the next packet are joined here, unless `ask` has TCP do it: ask(at, more). They are joined here
 -- also where TCP would give bytes again that were taken already, or cut them otherwise at the next look.
-local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
-  local key, packet, first_time = side .. tvb:offset(), memo_of(pinfo), not pinfo.visited
+local function dissect_joined(tvb, pinfo, tree, conn, is_down, can_wait, ask)
+  local side, packet, first_time = is_down and "in" or "out", memo_of(pinfo), not pinfo.visited
+  local key = side .. tvb:offset()
   local kept = packet[key]
   if not kept then
     kept = {}
@@ -1456,7 +1461,7 @@ local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
   local at, more, is_old = 0, nil, nil
   local all = kept.joined and ByteArray.new(kept.joined, true):tvb("Frames over several packets") or tvb
   if not kept.is_part then
-    at, more, is_old = run(all)
+    at, more, is_old = (is_down and run_search or run_commands)(all, pinfo, tree, conn, can_wait)
     if not at then return end
     if first_time then kept.asks = ask and not kept.joined and not is_old end
     if kept.asks then return ask(at, more) end
@@ -1465,11 +1470,6 @@ local function dissect_joined(tvb, pinfo, tree, conn, side, run, ask)
   end
   tree:add(scanhead, all(at, all:len() - at), "Scan head, part of a frame"):add(F["fragment"], all(at, all:len() - at))
   note_info(pinfo, "[part of a frame]")
-end
-
-local function dissect_either(tvb, pinfo, tree, conn, is_down, can_wait)
-  if is_down then return new_search(tvb, pinfo, tree, conn, can_wait):run() end
-  return run_commands(tvb, pinfo, tree, conn, can_wait)
 end
 
 local function first_header(tvb)
@@ -1502,11 +1502,8 @@ end
 
 local function dissect_tcp(tvb, pinfo, tree)
   local conn = conn_of("tcp " .. tcp_key(pinfo), true)
-  local is_down = side_of(tvb, pinfo, conn)
   begin_packet(pinfo)
-  dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
-    return dissect_either(all, pinfo, tree, conn, is_down, true)
-  end, pinfo.can_desegment > 0 and function(at, more)
+  dissect_joined(tvb, pinfo, tree, conn, side_of(tvb, pinfo, conn), true, pinfo.can_desegment > 0 and function(at, more)
     pinfo.desegment_offset, pinfo.desegment_len = at, more or DESEGMENT_ONE_MORE_SEGMENT
   end)
   pinfo.cols.info:fence()
@@ -1515,38 +1512,26 @@ end
 
 local function dissect_usb(tvb, pinfo, tree)
   local key, is_down = usb_end(pinfo)
-  local conn = conn_of(key, true)
   begin_packet(pinfo)
-  dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
-    return dissect_either(all, pinfo, tree, conn, is_down, true)
-  end)
-  return tvb:len()
-end
-
-local function dissect_web(tvb, pinfo, tree)
-  local conn = conn_of("ws " .. tcp_key(pinfo), true)
-  local is_down = side_of(tvb, pinfo, conn)
-  begin_packet(pinfo)
-  dissect_joined(tvb, pinfo, tree, conn, is_down and "in" or "out", function(all)
-    return dissect_either(all, pinfo, tree, conn, is_down, is_down)
-  end)
-  pinfo.cols.info:fence()
-  return tvb:len()
-end
-
-local function dissect_user0(tvb, pinfo, tree)
-  begin_packet(pinfo)
-  dissect_either(tvb, pinfo, tree, conn_of("user0", false), true, false)
-  return tvb:len()
+  dissect_joined(tvb, pinfo, tree, conn_of(key, true), is_down, true)
 end
 
 function scanhead.dissector(tvb, pinfo, tree)
   if pinfo.port_type == PORT_TYPE_TCP then return dissect_tcp(tvb, pinfo, tree) end
-  return dissect_user0(tvb, pinfo, tree)
+  begin_packet(pinfo)
+  run_search(tvb, pinfo, tree, conn_of("user0", false), false)
+  return tvb:len()
 end
 
 local web = Proto("scanhead.ws", "Scan head on WebSocket")
-web.dissector = dissect_web
+function web.dissector(tvb, pinfo, tree)
+  local conn = conn_of("ws " .. tcp_key(pinfo), true)
+  local is_down = side_of(tvb, pinfo, conn)
+  begin_packet(pinfo)
+  dissect_joined(tvb, pinfo, tree, conn, is_down, is_down)
+  pinfo.cols.info:fence()
+  return tvb:len()
+end
 
 -- Any port: a correct header, or what *IDN? answers, is enough.
 scanhead:register_heuristic("tcp", function(tvb, pinfo, tree)
