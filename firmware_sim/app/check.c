@@ -12,24 +12,25 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/device/head_clock.h"
-#include "firmware_sim/loop/pose_feed.h"
+#include "firmware_sim/loop/loop.h"
 #include "firmware_sim/site/waves.h"
 
-/* Opens and closes each link, and the socket of a live platform: a taken port or a wrong path shows now. */
-static int check_links(const struct config *cfg, struct sh_err *err)
+/* Makes the head with its links as `run` does, starts nothing, and closes all. So what `run` would refuse shows now: a
+ * taken port, two links at one port, a link that can't carry the stream. cfg: that of the site. */
+static int check_head(struct config *cfg, const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    for (uint32_t i = 0; i < cfg->n_links; i++) {
-        const struct link_ops *ops = link_ops_get(cfg->link[i].type);
-        if (cfg->link[i].type == LINK_FILE) continue; /* opening it would empty it */
-        void *link = NULL;
-        int rc = ops->open(&cfg->link[i], &link, err);
-        if (rc != SH_OK) return rc;
-        ops->close(link);
-    }
-    struct pose_feed *feed = NULL;
-    if (cfg->platform.kind != PLATFORM_LIVE || cfg->loop.pace == PACE_STEP) return SH_OK;
-    int rc = pose_feed_open(NULL, cfg, &feed, err);
-    pose_feed_close(feed);
+    struct link_spec kept[CONFIG_MAX_LINKS];
+    struct device *device = NULL;
+    struct loop *loop = NULL;
+    memcpy(kept, cfg->link, sizeof kept);
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].type == LINK_FILE)
+            cfg->link[i] = (struct link_spec){.type = LINK_NULL}; /* else it is emptied */
+    int rc = device_create(site, &(struct device_options){.report = report}, &device, err);
+    if (rc == SH_OK) rc = loop_create(site, device, &(struct loop_options){.report = report}, &loop, err);
+    loop_free(loop);
+    device_free(device);
+    memcpy(cfg->link, kept, sizeof kept);
     return rc;
 }
 
@@ -187,7 +188,7 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
     int rc = sites_load(cfg, &report, &sites, err);
-    if (rc == SH_OK) rc = check_links(cfg, err);
+    if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);
     if (rc == SH_OK) rc = print_summary(cfg, &sites, out, err);
     if (rc == SH_OK && (run->scene || run->csv != NULL))
         rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? out : NULL, err);
@@ -242,8 +243,8 @@ const struct app_command app_check = {
     .opens_links = 1,
     .notes =
         "Prints the scanners, the memory that the scene takes, and the places of the scene and of each station in\n"
-        "every known coordinate frame. Opens and closes each link except files, so a taken port or a wrong path "
-        "shows.\n"
+        "every known coordinate frame. Opens and closes the links except files, all at once, so a taken port, a wrong\n"
+        "path or a link that can't carry the stream shows.\n"
         "If the configuration is wrong, it shows all errors, up to 20, each with its line.\n"
         "\n"
         "--scene: an edge is open where only one triangle of the object has it, with corners at the same place, bit\n"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* These are tests of the output of `scanhead check`: all errors of a configuration, the keys of a section, an example
- * that passes. And short options in getopt's forms. */
+ * that passes, links that a head would refuse. And short options in getopt's forms. */
 #include "tests/wire/room.h"
 
 /* A value may follow its letter at once: -oFILE. */
@@ -228,6 +228,57 @@ static void test_help_of_a_section(void **state)
     }
 }
 
+/* Links that can be opened, but not together, or that can't carry 500,000 points of 20 bytes a second. `run` refuses
+ * them, and `check` says the same. */
+static void test_links_as_run(void **state)
+{
+    static const char *const says[] = {": cannot listen: Address already in use", ": the stream has 10.00 MB/s"};
+    struct wire *wire = *state;
+    int port;
+    close(wire_bind(SOCK_STREAM, &port)); /* it is free now */
+    room_write(wire);
+    for (int i = 0; i < 2; i++) {
+        char config[352], links[120] = "links: [{type: usb, port: 0, speed: full}]\n", *said[2], *from[2];
+        if (i == 0)
+            snprintf(links, sizeof links, "links: [{type: tcp, port: %d}, {type: tcp, port: %d}]\n", port, port);
+        const struct room_config c = {
+            .prr_hz = 500000, .lines_hz = 50, .pan_deg_s = 360, .pan_stop_deg = 36, .links = links};
+        snprintf(config, sizeof config, "%s", room_config_write(wire, &c));
+        for (int k = 0; k < 2; k++) {
+            const char *const args[] = {k == 0 ? "check" : "run", config, NULL};
+            assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+            said[k] = wire_read(wire_path(wire, "err"), NULL);
+            from[k] = strstr(said[k], says[i]);
+            if (from[k] == NULL) fail_msg("%s", said[k]);
+        }
+        assert_string_equal(from[0], from[1]);
+        free(said[0]);
+        free(said[1]);
+    }
+}
+
+/* A file of a link is shown, and stays as it is. */
+static void test_file_stays(void **state)
+{
+    struct wire *wire = *state;
+    const struct room_config c = {.prr_hz = 20000,
+                                  .lines_hz = 50,
+                                  .pan_deg_s = 360,
+                                  .pan_stop_deg = 36,
+                                  .links = "links: [{type: file, path: kept}]\n"};
+    char config[352];
+    room_write(wire);
+    wire_write_text(wire, "kept", "keep me\n");
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &c));
+    const char *const args[] = {"check", config, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *kept = wire_read(wire_path(wire, "kept"), NULL);
+    if (strstr(out, "\nlink      file:") == NULL) fail_msg("%s", out);
+    assert_string_equal(kept, "keep me\n");
+    free(out);
+    free(kept);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -239,6 +290,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_transparent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_colours_in_part, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_links_as_run, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_file_stays, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -377,6 +377,17 @@ void client_wait_state(struct scanhead *sh, const char *state)
     }
 }
 
+int wire_bind(int type, int *port)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+    socklen_t len = sizeof at;
+    const int fd = socket(AF_INET, type | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
+    *port = ntohs(at.sin_port);
+    return fd;
+}
+
 int raw_try_connect(const char *endpoint)
 {
     const char *port = strrchr(endpoint, ':');

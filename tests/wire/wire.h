@@ -149,6 +149,8 @@ void client_wait_state(struct scanhead *sh, const char *state);
 /* Only Assimp reads IFC, for tests with another subject: the other readers take 3 s of processor time a start. */
 #define IFC_BY_ASSIMP "scene.ifc_reader=assimp"
 
+/* Returns a socket of a type, SOCK_STREAM or SOCK_DGRAM, that has a free port of this machine and does not listen. */
+int wire_bind(int type, int *port);
 /* Opens a plain socket to the "tcp:127.0.0.1:PORT" of the head. */
 int raw_connect(const char *endpoint);
 /* The same; -1: nobody listens there now. */
