@@ -123,7 +123,7 @@ help_command() {
     "$program" help >"$work/all" && "$program" --help | cmp - "$work/all" &&
         "$program" help run >"$work/run" && "$program" run --help | cmp - "$work/run" || return
     "$program" help -- | cmp - "$work/all" || return
-    for wrong in "help rnu:did you mean run" "help --man run.1:--man list" "help --completion zsh:allowed is bash" \
+    for wrong in "help rnu:did you mean run" "help run check:one COMMAND is allowed; check is one too many" "help --man run.1:--man list" "help --completion zsh:allowed is bash" \
         "help --man list --completion bash:one of them" "help --men list:did you mean --man"; do
         said=$("$program" ${wrong%%:*} 2>&1 >/dev/null)
         [ $? = 2 ] && [[ $said == *"${wrong#*:}"* ]] || { echo "${wrong%%:*}: $said"; return 1; }

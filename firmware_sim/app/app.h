@@ -34,17 +34,22 @@ struct config_faults;
 #define APP_DECLARE(name) extern const struct app_command app_##name;
 APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 
-/* Prints "PROGRAM: TEXT" and gives the exit status for the error. */
+/* Prints a line to standard error, with the program's name before it. Control characters become question marks. */
+void app_say(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
+/* Prints an error as such a line, and returns the exit status for it. */
 int app_fail(const struct sh_err *err);
 /* The same for each error of a configuration. */
 int app_fail_config(const struct config_faults *faults);
+/* Adds the result `more`, with its reason, to rc, that of earlier work. The first failure is returned, and err has its
+ * text; a second one is printed as a warning. */
+int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
 /* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
  * change it; it is freed afterwards. Returns the exit status. The reason of a failure is printed: each error of a
  * configuration is a line. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
-/* The same for links in YAML, of --link, which have no configuration; NULL: as app_with_config. */
+/* The same for `links`, YAML that --link gives in place of a configuration. NULL: as app_with_config. */
 int app_with_links(const struct app_input *in, const char *links,
                    int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
 
@@ -96,10 +101,12 @@ int app_is_recording(const char *path);
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 
-/* The file that a user names for output, new; "-": standard output, which is not to be closed. */
+/* Opens the file that a user names for output, empty; "-": standard output. */
 int app_open_new(const char *path, FILE **out, struct sh_err *err);
+/* Closes it, but not standard output. Returns the first error in writing it; its text begins with the path. */
+int app_close_new(const char *path, FILE *out, struct sh_err *err);
 
-/* One JSON value, written by `put`, to a file; path "-" is standard output. */
+/* Writes one JSON value, by `put`, to a file; path "-" is standard output. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
 

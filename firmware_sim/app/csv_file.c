@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/csv_file.h"
 
-#include <errno.h>
 #include <math.h>
 #include <string.h>
 
@@ -9,16 +8,11 @@
 
 int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
 {
-    const int to_stdout = strcmp(path, "-") == 0;
     FILE *out;
     const int rc = app_open_new(path, &out, err);
     if (rc != SH_OK) return rc;
     put(out, ctx);
-    int failed = fflush(out) != 0 || ferror(out);
-    const int why = errno;
-    if (!to_stdout) failed |= fclose(out) != 0;
-    if (!failed) return SH_OK;
-    return sh_fail(err, SH_EIO, "%s: %s", to_stdout ? "standard output" : path, strerror(why));
+    return app_close_new(path, out, err);
 }
 
 void csv_file_put_text(FILE *out, const char *text)

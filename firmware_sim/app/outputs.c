@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks that a command writes no file twice, and none that it reads, so that none is destroyed. */
+/* Checks of the files that a command names. It writes none twice, and none that it reads, so that none is destroyed.
+ * There is a place for each that it writes. */
+#include <errno.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,7 +26,7 @@ struct files {
     struct named *file;
     size_t n, room;
     const char *prefix; /* before the names of keys */
-    int keeps_written;  /* paths of keys that are written count */
+    int keeps_written;  /* 1: files that the configuration names for writing are written */
     struct sh_err *err;
 };
 
@@ -178,6 +180,20 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 
 /* ---- the check */
 
+/* Some files are made at the end of long work. That there is no place for one shows now. */
+static int check_place(const struct app_file *file, struct sh_err *err)
+{
+    struct stat st;
+    char folder[PATH_MAX];
+    if (stat(file->path, &st) == 0) {
+        if (!S_ISDIR(st.st_mode)) return SH_OK;
+        return sh_fail(err, SH_EINPUT, "--%s %s: is a directory; allowed is a file", file->option, file->path);
+    }
+    snprintf(folder, sizeof folder, "%.*s.", (int)(basename(file->path) - file->path), file->path);
+    if (file->path[0] != '\0' && (stat(folder, &st) == 0 || (errno != ENOENT && errno != ENOTDIR))) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "--%s %s: %s", file->option, file->path, strerror(errno));
+}
+
 /* A scenario that comes with the program has a bare name, which is no file here: only what is there is read. */
 static int is_there(const struct named *file)
 {
@@ -205,7 +221,10 @@ static int check(const struct files *f, struct sh_err *err)
 int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err)
 {
     struct files f = {.err = err};
-    int rc = add_all(&f, in, cfg);
+    int rc = SH_OK;
+    for (int i = 0; i < in->n_files && rc == SH_OK; i++)
+        if (in->file[i].is_given && in->file[i].use == APP_WRITES) rc = check_place(&in->file[i], err);
+    if (rc == SH_OK) rc = add_all(&f, in, cfg);
     if (rc == SH_OK) rc = check(&f, err);
     for (size_t i = 0; i < f.n; i++) {
         free(f.file[i].who);

@@ -23,18 +23,16 @@ static const char *page_name(const char *command, char *name)
     return name;
 }
 
-static void bold(const char *text)
+static void in_font(char font, const char *text)
 {
-    fputs("\\fB", stdout);
+    printf("\\f%c", font);
     roff_put(text, strlen(text));
     fputs("\\fR", stdout);
 }
 
-static void italic(const char *text)
+static void bold(const char *text)
 {
-    fputs("\\fI", stdout);
-    roff_put(text, strlen(text));
-    fputs("\\fR", stdout);
+    in_font('B', text);
 }
 
 static void put_option(char letter, const char *name, const char *argument, const char *help)
@@ -45,7 +43,7 @@ static void put_option(char letter, const char *name, const char *argument, cons
     puts(".TP");
     if (letter != '\0') bold(dash), fputs(", ", stdout);
     bold(word);
-    if (argument != NULL) putchar(' '), italic(argument);
+    if (argument != NULL) putchar(' '), in_font('I', argument);
     putchar('\n');
     roff_text(help);
 }
