@@ -18,6 +18,7 @@
 struct named {
     char *who, *path;
     int is_written;
+    int needs_place; /* its folder must be there already */
     int is_beside;   /* it is written with another: meshes of one scan share their image */
     size_t n_ending; /* of files of each scan: bytes of the path's ending; 0: it is one file */
 };
@@ -100,15 +101,19 @@ static int add_option(struct files *f, const struct app_file *file)
     char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : strdup(file->path);
     const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending;
     const int rc = outputs_add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
-    if (rc == SH_OK) f->file[f->n - 1].is_beside = file->ending != NULL;
-    return rc;
+    if (rc != SH_OK) return rc;
+    f->file[f->n - 1].is_beside = file->ending != NULL;
+    f->file[f->n - 1].needs_place = file->is_given && file->use == APP_WRITES;
+    return SH_OK;
 }
 
 static int add_key(void *ctx, const char *key, const char *path, int is_written)
 {
     struct files *f = ctx;
     if (is_written && !f->keeps_written) return SH_OK;
-    return outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
+    const int rc = outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
+    if (rc == SH_OK) f->file[f->n - 1].needs_place = is_written;
+    return rc;
 }
 
 static int add_of_mesh(void *ctx, const char *name, const char *path)
@@ -181,17 +186,17 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 /* ---- the check */
 
 /* Some files are made at the end of long work. That there is no place for one shows now. */
-static int check_place(const struct app_file *file, struct sh_err *err)
+static int check_place(const struct named *file, struct sh_err *err)
 {
     struct stat st;
     char folder[PATH_MAX];
     if (stat(file->path, &st) == 0) {
         if (!S_ISDIR(st.st_mode)) return SH_OK;
-        return sh_fail(err, SH_EINPUT, "--%s %s: is a directory; allowed is a file", file->option, file->path);
+        return sh_fail(err, SH_EINPUT, "%s %s: is a directory; allowed is a file", file->who, file->path);
     }
     snprintf(folder, sizeof folder, "%.*s.", (int)(basename(file->path) - file->path), file->path);
     if (file->path[0] != '\0' && (stat(folder, &st) == 0 || (errno != ENOENT && errno != ENOTDIR))) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "--%s %s: %s", file->option, file->path, strerror(errno));
+    return sh_fail(err, SH_EINPUT, "%s %s: %s", file->who, file->path, strerror(errno));
 }
 
 /* A scenario that comes with the program has a bare name, which is no file here: only what is there is read. */
@@ -221,10 +226,9 @@ static int check(const struct files *f, struct sh_err *err)
 int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err)
 {
     struct files f = {.err = err};
-    int rc = SH_OK;
-    for (int i = 0; i < in->n_files && rc == SH_OK; i++)
-        if (in->file[i].is_given && in->file[i].use == APP_WRITES) rc = check_place(&in->file[i], err);
-    if (rc == SH_OK) rc = add_all(&f, in, cfg);
+    int rc = add_all(&f, in, cfg);
+    for (size_t i = 0; i < f.n && rc == SH_OK; i++)
+        if (f.file[i].needs_place) rc = check_place(&f.file[i], err);
     if (rc == SH_OK) rc = check(&f, err);
     for (size_t i = 0; i < f.n; i++) {
         free(f.file[i].who);

@@ -257,7 +257,7 @@ static void test_links_as_run(void **state)
     }
 }
 
-/* A file of a link is shown, and stays as it is. */
+/* A file of a link is shown, and stays as it is. It needs a folder. */
 static void test_file_stays(void **state)
 {
     struct wire *wire = *state;
@@ -277,6 +277,8 @@ static void test_file_stays(void **state)
     assert_string_equal(kept, "keep me\n");
     free(out);
     free(kept);
+    const char *const none[] = {"check", config, "--set", "links[0].path=none/x", NULL};
+    wire_expect_usage(wire, none, "links[0].path none/x: No such file or directory");
 }
 
 int main(void)
