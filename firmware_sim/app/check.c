@@ -6,9 +6,9 @@
 
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/app/check_heads.h"
 #include "firmware_sim/app/check_places.h"
 #include "firmware_sim/app/check_scene.h"
+#include "firmware_sim/app/sites.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/device/head_clock.h"
@@ -32,6 +32,44 @@ static int check_head(struct config *cfg, const struct site *site, const struct 
     device_free(device);
     memcpy(cfg->link, kept, sizeof kept);
     return rc;
+}
+
+static void print_stations(const struct config *cfg, FILE *out)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        n += config_serves(cfg, i) != 0;
+    fprintf(out, "station%s ", n > 1 ? "s" : "");
+    for (uint32_t i = 0, k = 0; i < cfg->n_stations; i++)
+        if (config_serves(cfg, i)) fprintf(out, "%s%u", k++ > 0 ? ", " : "", i + 1);
+    fputs(": ", out);
+}
+
+/* Where there are several scanners, the line begins with the stations that this one scans from. */
+static void print_scanner(const struct config *cfg, FILE *out)
+{
+    const struct head_settings *s = &cfg->head.settings;
+    char emitter[160];
+    fputs("head      ", out);
+    if (!config_is_alone(cfg)) print_stations(cfg, out);
+    fprintf(out, "%s %s (%s), %g Hz pulses, %g lines/s, pan %g deg/s\n", cfg->profile.maker, cfg->profile.model,
+            cfg->profile.name, (double)s->prr_uhz * 1e-6, (double)s->lines_uhz * 1e-6, (double)s->pan_udeg_s * 1e-6);
+    if (config_limits_range(cfg))
+        fprintf(out, "range     %g to %g m only (head.range_min_m, range_max_m); the head profile has %g to %g\n",
+                cfg->head.range_min_m, cfg->head.range_max_m, cfg->head.profile_min_m, cfg->head.profile_max_m);
+    emitter_describe(&cfg->profile.emitter, emitter, sizeof emitter);
+    if (emitter[0] != '\0') fprintf(out, "emitter   %s\n", emitter);
+}
+
+static void print_scanners(const struct sites *sites, FILE *out)
+{
+    print_scanner(sites->first->cfg, out);
+    for (uint32_t i = 0; i < sites->n; i++) {
+        const struct site *site = sites->other[i].site;
+        print_scanner(site->cfg, out);
+        if (site->scale_m != sites->first->scale_m)
+            fprintf(out, "output    of this head %g m per count\n", site->scale_m);
+    }
 }
 
 static void print_platform(const struct site *site, FILE *out)
@@ -133,7 +171,7 @@ static int print_summary(const struct config *cfg, const struct sites *sites, FI
     char copies[96];
     int rc = SH_OK;
     fprintf(out, "%s: ok\n", cfg->file);
-    check_print_heads(sites, out);
+    print_scanners(sites, out);
     fprintf(out, "scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
             scene->n_surfaces, copies_text(scene, copies, sizeof copies), scene->min_m[0], scene->max_m[0],
             scene->min_m[1], scene->max_m[1], scene->min_m[2], scene->max_m[2]);

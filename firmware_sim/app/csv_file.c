@@ -29,11 +29,12 @@ void csv_file_put_text(FILE *out, const char *text)
     putc('"', out);
 }
 
-void csv_file_put_colour(FILE *out, const struct scene_surface *s)
+const char *csv_file_colour(const struct scene_surface *s, char text[CSV_FILE_COLOUR_LEN])
 {
     unsigned rgb[3];
-    if (!s->has_colour) return;
+    if (!s->has_colour) return "";
     for (int k = 0; k < 3; k++)
         rgb[k] = (unsigned)lround(255.0 * (double)s->colour[k]);
-    fprintf(out, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+    snprintf(text, CSV_FILE_COLOUR_LEN, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+    return text;
 }

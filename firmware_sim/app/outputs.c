@@ -189,13 +189,12 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 static int check_place(const struct named *file, struct sh_err *err)
 {
     struct stat st;
-    char folder[PATH_MAX];
+    const char *name;
     if (stat(file->path, &st) == 0) {
         if (!S_ISDIR(st.st_mode)) return SH_OK;
         return sh_fail(err, SH_EINPUT, "%s %s: is a directory; allowed is a file", file->who, file->path);
     }
-    snprintf(folder, sizeof folder, "%.*s.", (int)(basename(file->path) - file->path), file->path);
-    if (file->path[0] != '\0' && (stat(folder, &st) == 0 || (errno != ENOENT && errno != ENOTDIR))) return SH_OK;
+    if (file->path[0] != '\0' && (split(file->path, &st, &name) || (errno != ENOENT && errno != ENOTDIR))) return SH_OK;
     return sh_fail(err, SH_EINPUT, "%s %s: %s", file->who, file->path, strerror(errno));
 }
 

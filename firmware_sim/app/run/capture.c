@@ -152,7 +152,6 @@ static int serve(struct config *cfg, void *ctx, struct sh_err *err)
     struct run_options *o = run->o;
     struct replay *replay = NULL;
     struct loop *loop = NULL;
-    struct loop_stats stats;
     const struct loop_options options = {.report = &app_report_stderr};
     int rc = join_links(run, cfg, err);
     if (rc == SH_OK && cfg->loop.pace != PACE_REALTIME)
@@ -175,10 +174,8 @@ static int serve(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) {
         if (!o->quiet) say_what_runs(run, loop);
         warn_of_capture(run);
-        rc = run_serve(o, loop, &stats, err);
-        run_warn_losses(&stats.counters);
+        rc = run_serve(o, loop, err);
     }
-    if (rc == SH_OK) rc = loop_check_links(loop, err);
     loop_free(loop);
     replay_free(replay);
     return rc;

@@ -85,13 +85,11 @@ static void say_what_ran(const struct run_options *o, struct replay *replay)
 
 static int serve(const struct run_options *o, struct replay *replay, struct loop *loop, struct sh_err *err)
 {
-    struct loop_stats stats;
+    struct sh_err why;
     if (!o->quiet) say_what_runs(o, replay, loop);
-    int rc = run_serve(o, loop, &stats, err);
+    const int rc = run_serve(o, loop, err);
     say_what_ran(o, replay);
-    run_warn_losses(&stats.counters);
-    if (rc == SH_OK) rc = replay_check(replay, err);
-    return rc == SH_OK ? loop_check_links(loop, err) : rc;
+    return app_and_also(rc, replay_check(replay, &why), &why, err);
 }
 
 /* With fewer places than --clients names the recording would never begin. A USB link has a console, too. */

@@ -66,16 +66,6 @@ static void say_short_scan(const struct run_options *o, struct device *device)
             o->frames_given ? "all its frames were scanned" : "its path ended, or it was stopped");
 }
 
-static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
-{
-    struct loop_stats stats;
-    int rc = run_serve(o, loop, &stats, err);
-    if (rc == SH_OK) rc = loop_check_links(loop, err);
-    say_short_scan(o, device);
-    run_warn_losses(&stats.counters);
-    return rc;
-}
-
 static void warn_of_replay(const struct run_options *o, const struct device *device)
 {
     if (o->device.replay == NULL || device_replay_ends(device) || o->device.duration_s > 0.0) return;
@@ -162,7 +152,8 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
         if (!o->quiet) say_what_runs(cfg, site, loop);
         if (!o->quiet) say_stored(cfg, o->device.settings);
         warn_of_replay(o, device);
-        rc = serve(o, loop, device, err);
+        rc = run_serve(o, loop, err);
+        say_short_scan(o, device);
     }
     loop_free(loop);
     if (watch != NULL) page->close(watch);

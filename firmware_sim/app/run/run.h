@@ -24,12 +24,11 @@ struct run_options {
     long device_port;    /* 0: not given */
 };
 
-/* serve.c: runs the loop from its start to its end, and writes the statistics. stats is filled in any case. */
-int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err);
+/* serve.c: runs the loop from its start to its end, writes the statistics, and warns of losses. */
+int run_serve(const struct run_options *o, struct loop *loop, struct sh_err *err);
 /* Adds a web link for --view, where there is none. SH_EINPUT: there is no link at all. */
 int run_complete_links(const struct run_options *o, struct config *cfg, struct sh_err *err);
 void run_say_links(const struct loop *loop);
-void run_warn_losses(const struct device_counters *c);
 
 /* replay.c */
 /* --link: adds one to the options. */

@@ -164,7 +164,7 @@ static void put_stats(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-void run_warn_losses(const struct device_counters *c)
+static void warn_losses(const struct device_counters *c)
 {
     if (c->lost_pulses != 0)
         sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
@@ -192,9 +192,10 @@ static int close_files(struct loop *loop, struct loop_stats *stats, struct sh_er
     return SH_OK;
 }
 
-int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err)
+int run_serve(const struct run_options *o, struct loop *loop, struct sh_err *err)
 {
     struct run_stats run = {.loop = loop};
+    struct loop_stats *stats = &run.stats;
     int rc = app_begin_messages(err);
     if (rc == SH_OK) rc = loop_start(loop, err);
     if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
@@ -208,7 +209,8 @@ int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats 
     app_end_messages();
     struct sh_err why = {0};
     const int files_rc = close_files(loop, stats, &why);
-    run.stats = *stats;
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
-    return app_and_also(rc, files_rc, &why, err);
+    warn_losses(&stats->counters);
+    rc = app_and_also(rc, files_rc, &why, err);
+    return rc == SH_OK ? loop_check_links(loop, err) : rc;
 }
