@@ -99,18 +99,23 @@ static double bytes_of(const struct scene *scene, const struct bvh *bvh)
     return bytes;
 }
 
-/* The peak counts all that the program had at once, also while it was loading. */
-static void print_memory(const struct site *site, FILE *out)
+/* Returns the most that the program had at once, also while it was loading. */
+static double peak_mb(void)
 {
     struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return 1024e-6 * (double)usage.ru_maxrss;
+}
+
+static void print_memory(const struct site *site, double all_mb, FILE *out)
+{
     double bytes = bytes_of(site->scene, site->bvh), triangles = (double)scene_n_kept(site->scene);
     for (uint32_t i = 0; i < site->n_movers; i++) {
         bytes += bytes_of(site->mover[i].scene, site->mover[i].bvh);
         triangles += (double)scene_n_kept(site->mover[i].scene);
     }
-    getrusage(RUSAGE_SELF, &usage);
     fprintf(out, "memory    %.4g MB for meshes and BVH, %.0f bytes a triangle; %.4g MB at the peak\n", 1e-6 * bytes,
-            bytes / triangles, 1024e-6 * (double)usage.ru_maxrss);
+            bytes / triangles, all_mb);
 }
 
 static void print_output(const struct config *cfg, const struct site *site, FILE *out)
@@ -164,7 +169,8 @@ static const char *copies_text(const struct scene *scene, char *text, size_t len
     return text;
 }
 
-static int print_summary(const struct config *cfg, const struct sites *sites, FILE *out, struct sh_err *err)
+static int print_summary(const struct config *cfg, const struct sites *sites, double all_mb, FILE *out,
+                         struct sh_err *err)
 {
     const struct site *site = sites->first;
     const struct scene *scene = site->scene;
@@ -175,7 +181,7 @@ static int print_summary(const struct config *cfg, const struct sites *sites, FI
     fprintf(out, "scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
             scene->n_surfaces, copies_text(scene, copies, sizeof copies), scene->min_m[0], scene->max_m[0],
             scene->min_m[1], scene->max_m[1], scene->min_m[2], scene->max_m[2]);
-    print_memory(site, out);
+    print_memory(site, all_mb, out);
     print_target(site, out);
     check_print_anchor(site, out);
     if (site->stop != NULL) check_print_stops(site, out);
@@ -226,8 +232,9 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
     int rc = sites_load(cfg, &report, &sites, err);
+    const double all_mb = peak_mb(); /* of the scene, without the head's queues */
     if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);
-    if (rc == SH_OK) rc = print_summary(cfg, &sites, out, err);
+    if (rc == SH_OK) rc = print_summary(cfg, &sites, all_mb, out, err);
     if (rc == SH_OK && (run->scene || run->csv != NULL))
         rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? out : NULL, err);
     if (rc == SH_OK) rc = print_time(cfg, out, err);
