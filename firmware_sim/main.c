@@ -107,9 +107,12 @@ int main(int argc, char **argv)
     if (status == APP_OK) status = main_run(argc, argv);
     errno = 0;
     const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
-    if (!failed || status != APP_OK) return status;
-    /* A write that failed earlier has emptied the buffer, so that the last one had no reason to fail. */
-    if (errno == 0 && write(STDOUT_FILENO, "\n", 1) == 1) errno = 0;
-    app_say("standard output: writing failed%s%s", errno != 0 ? ": " : "", errno != 0 ? strerror(errno) : "");
-    return APP_FAILED;
+    if (failed && status == APP_OK) {
+        /* A write that failed earlier has emptied the buffer, so that the last one had no reason to fail. */
+        if (errno == 0 && write(STDOUT_FILENO, "\n", 1) == 1) errno = 0;
+        app_say("standard output: writing failed%s%s", errno != 0 ? ": " : "", errno != 0 ? strerror(errno) : "");
+        status = APP_FAILED;
+    }
+    app_end_messages();
+    return status;
 }

@@ -63,9 +63,9 @@ int app_check_files(const struct app_input *in, const struct config *cfg, struct
 /* Whether `name` is STEM-N.ENDING of a file of scans, whose ending has n_ending bytes. */
 int app_is_name_of_scan(const char *file, size_t n_ending, const char *name);
 
-/* From here to app_end_messages, a thread writes the messages of the reports below to standard error. So no thread of a
- * head waits for its reader. Messages that find no room in 64 KiB are dropped, and their number is printed.
- * app_end_messages waits at most 2 s for a reader that has stopped. */
+/* From here on a thread writes all lines of app_say to standard error. So no thread of a head waits for its reader, and
+ * the end of the run does not, either. Messages that find no room in 64 KiB are dropped, and their number is printed.
+ * app_end_messages, which main calls last, waits at most 2 s for a reader that has stopped. */
 int app_begin_messages(struct sh_err *err);
 void app_end_messages(void);
 

@@ -206,7 +206,6 @@ int run_serve(const struct run_options *o, struct loop *loop, struct sh_err *err
     else
         loop_end(loop);
     loop_join(loop, stats);
-    app_end_messages();
     struct sh_err why = {0};
     const int files_rc = close_files(loop, stats, &why);
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
