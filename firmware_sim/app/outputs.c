@@ -112,7 +112,8 @@ static int add_key(void *ctx, const char *key, const char *path, int is_written)
     struct files *f = ctx;
     if (is_written && !f->keeps_written) return SH_OK;
     const int rc = outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
-    if (rc == SH_OK) f->file[f->n - 1].needs_place = is_written;
+    /* Not every run uses another one: where a journal is replayed, no settings are stored. */
+    if (rc == SH_OK) f->file[f->n - 1].needs_place = is_written && strncmp(key, "links", 5) == 0;
     return rc;
 }
 
