@@ -85,13 +85,9 @@ int app_read_numbers(const char *text, char between, double *out, int n)
     return 1;
 }
 
-static int pass(const struct app_command *command, const struct app_option *row, const char *text,
-                struct app_words *words)
+static int pass(const struct app_option *row, const char *text, struct app_words *words)
 {
     char *name = words->name[words->n_names];
-    for (int i = 0; i < words->n_names; i++)
-        if (strcmp(words->name[i] + 2, row->name) == 0)
-            return app_usage(command, "--%s: given twice; one is allowed", row->name);
     snprintf(name, sizeof words->name[0], "--%s", row->name);
     words->n_names++;
     words->word[words->n++] = name;
@@ -144,7 +140,6 @@ static int apply(const struct app_command *command, const struct app_option *row
         *(int *)at = 1;
         return APP_OK;
     case APP_TEXT:
-        if (*(const char **)at != NULL) return app_usage(command, "--%s: given twice; one is allowed", row->name);
         *(const char **)at = text;
         return APP_OK;
     case APP_NUMBER:
@@ -163,7 +158,7 @@ static int apply(const struct app_command *command, const struct app_option *row
     case APP_SET:
         return app_add_set(&in->sets, text);
     case APP_PASS:
-        return pass(command, row, text, at);
+        return pass(row, text, at);
     default:
         return row->apply(values, text);
     }
@@ -397,7 +392,10 @@ static int take_option(const struct app_command *command, int opt, const char *w
     *done = row->kind == APP_PRINT;
     in->alone |= row->kind == APP_ALONE;
     in->n_options++;
-    in->given |= UINT64_C(1) << (row - command->options);
+    const uint64_t bit = UINT64_C(1) << (row - command->options);
+    if ((row->kind == APP_TEXT || row->kind == APP_PASS) && (in->given & bit) != 0)
+        return app_usage(command, "--%s: given twice; one is allowed", row->name);
+    in->given |= bit;
     const struct app_file file = {.option = row->name, .path = optarg, .use = row->file, .is_given = 1};
     if (row->file != APP_NO_FILE && app_add_file(in, &file) != APP_OK) return APP_USAGE;
     return apply(command, row, optarg, in, values);
