@@ -25,7 +25,7 @@ static int check_head(struct config *cfg, const struct site *site, const struct 
     memcpy(kept, cfg->link, sizeof kept);
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].type == LINK_FILE)
-            cfg->link[i] = (struct link_spec){.type = LINK_NULL}; /* else it is emptied */
+            cfg->link[i] = (struct link_spec){.type = LINK_NULL}; /* opening a file would empty it */
     int rc = device_create(site, &(struct device_options){.report = report}, &device, err);
     if (rc == SH_OK) rc = loop_create(site, device, &(struct loop_options){.report = report}, &loop, err);
     loop_free(loop);
