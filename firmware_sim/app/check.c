@@ -20,9 +20,11 @@
 static int check_head(struct config *cfg, const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     struct link_spec kept[CONFIG_MAX_LINKS];
+    const uint32_t threads = cfg->loop.threads;
     struct device *device = NULL;
     struct loop *loop = NULL;
     memcpy(kept, cfg->link, sizeof kept);
+    cfg->loop.threads = 1; /* each has memory of its own */
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].type == LINK_FILE)
             cfg->link[i] = (struct link_spec){.type = LINK_NULL}; /* opening a file would empty it */
@@ -31,6 +33,7 @@ static int check_head(struct config *cfg, const struct site *site, const struct 
     loop_free(loop);
     device_free(device);
     memcpy(cfg->link, kept, sizeof kept);
+    cfg->loop.threads = threads;
     return rc;
 }
 
