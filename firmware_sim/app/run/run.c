@@ -201,9 +201,10 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
-     .help = "end after S seconds of device time, counted from power-up, or with --start from the scan's start. With "
-             "--start the scan continues until then, frame after frame, and head.frames of the file is not used. "
-             "Without --duration and --frames the head runs until it is stopped"},
+     .help = "end after S seconds of device time, counted from power-up, or with --start from the scan's start, or "
+             "from a self-test that fails before one. With --start the scan continues until then, frame after frame, "
+             "and head.frames of the file is not used. Without --duration and --frames the head runs until it is "
+             "stopped"},
     {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
