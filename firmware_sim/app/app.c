@@ -70,15 +70,8 @@ int app_fail_config(const struct config_faults *faults)
     int status = APP_USAGE;
     for (uint32_t i = 0; i < faults->n && i < CONFIG_MAX_FAULTS; i++)
         status = app_fail(&faults->fault[i]);
-    if (faults->n > CONFIG_MAX_FAULTS) app_say("and %u more", faults->n - CONFIG_MAX_FAULTS);
+    if (faults->n > CONFIG_MAX_FAULTS) fprintf(stderr, "%s: and %u more\n", app_program, faults->n - CONFIG_MAX_FAULTS);
     return status;
-}
-
-int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err)
-{
-    if (rc == SH_OK && more != SH_OK) return sh_fail(err, more, "%s", why->text);
-    if (more != SH_OK) sh_warn(&app_report_stderr, "%s", why->text);
-    return rc;
 }
 
 int app_with_links(const struct app_input *in, const char *links,
@@ -240,6 +233,13 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples)
     if (lost_samples != 0)
         sh_warn(&app_report_stderr, "%llu samples of waveforms left out: their pulses had more than there is room for",
                 (unsigned long long)lost_samples);
+}
+
+int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err)
+{
+    if (rc == SH_OK && more != SH_OK) return sh_fail(err, more, "%s", why->text);
+    if (more != SH_OK) sh_warn(&app_report_stderr, "%s", why->text);
+    return rc;
 }
 
 int app_ends_in(const char *path, const char *ending)

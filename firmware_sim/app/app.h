@@ -40,9 +40,6 @@ void app_say(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 int app_fail(const struct sh_err *err);
 /* The same for each error of a configuration. */
 int app_fail_config(const struct config_faults *faults);
-/* Adds the result `more`, with its reason, to rc, that of earlier work. The first failure is returned, and err has its
- * text; a second one is printed as a warning. */
-int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
 /* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
  * change it; it is freed afterwards. Returns the exit status. The reason of a failure is printed: each error of a
@@ -52,6 +49,10 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
 /* The same for `links`, YAML that --link gives in place of a configuration. NULL: as app_with_config. */
 int app_with_links(const struct app_input *in, const char *links,
                    int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
+
+/* Adds the result `more`, with its reason, to rc, that of earlier work. The first failure is returned, and err has its
+ * text; a second one is printed as a warning. */
+int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
 /* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
 void app_warn_settings_file(const struct config *cfg, const char *why);
