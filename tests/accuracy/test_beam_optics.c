@@ -116,7 +116,7 @@ static struct scene *mirror_and_two_walls(void)
 
 /* All light of a footprint that lies on surfaces comes back. Pulse 0 of line 30 goes along an axis of the scene, to the
  * digit. Some of its sub-rays have a component of about -1e-22, which must not harm those that are packed with them
- * (core/bvh/refine.c). */
+ * (embree_direction in core/embree.h). */
 static void no_light_is_lost(void **state)
 {
     (void)state;
