@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/scene/build.h"
+#include "core/scene/build_load.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -231,11 +231,11 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     double *p = s->vertex_m[s->n_vertices];
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
-        if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
+        if (!(fabs(p[k]) <= SCENE_MAX_COORDINATE_M))
             return build_fail(
                 b, SH_EINPUT, err,
                 "vertex %llu is at %g m; allowed are coordinates up to %g m: check the scale of %g metres per unit",
-                number, p[k], BUILD_MAX_COORDINATE_M, spec->scale);
+                number, p[k], SCENE_MAX_COORDINATE_M, spec->scale);
     }
     s->n_vertices++;
     return SH_OK;
