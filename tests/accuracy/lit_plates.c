@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/accuracy/lit_plates.h"
 
+#include "tests/common/made.h"
+
 const double STATION[3] = {0.0, 0.0, 0.0};
 
 void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
@@ -32,18 +34,13 @@ struct scene *plates(double near_m, double far_m, int whole_back)
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
     static const uint16_t label[4] = {FRONT, FRONT, BACK, BACK};
     static const struct scene_surface surface[2] = {{.object = "front"}, {.object = "back"}};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 8; v++) {
         int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
         vertex[v][0] = right ? (back ? half : 0.0) : back && !whole_back ? 0.0 : -half;
         vertex[v][1] = back ? far_m : near_m;
         vertex[v][2] = v % 4 >= 2 ? half : -half;
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2});
 }
 
 void open_lit(struct lit *l, struct scene *scene, const struct beam_view *view, double least_at_1_m)

@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 
 static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
@@ -113,17 +114,12 @@ static struct scene *wall(double range_m, double incidence_rad)
     const double across[3] = {c, s, 0.0};
     double vertex[4][3];
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 4; v++) {
         double along = (v == 1 || v == 2 ? 1.0 : -1.0) * half, up = (v >= 2 ? 1.0 : -1.1) * half;
         for (int i = 0; i < 3; i++)
             vertex[v][i] = along * across[i] + (i == 1 ? range_m : i == 2 ? up : 0.0);
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0});
 }
 
 /* One ray and the closed term are within 0.05 mm of the mean. Without the term the error is 0.14 mm at 800 m and 80
@@ -174,12 +170,9 @@ static void test_end_of_range(void **state)
     static const double corner_m[8][3] = {{0.17452, 0, -1}, {0.17452, 20, -1}, {0.17452, 20, 1}, {0.17452, 0, 1},
                                           {-1, 50, -1},     {1, 50, -1},       {1, 50, 1},       {-1, 50, 1}};
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    struct scene *scene;
-    struct sh_err err;
     struct beam_rig rig;
     uint32_t cut = 0;
-    assert_int_equal(scene_from_arrays(&(struct scene_arrays){corner_m, 8, triangle, 4, NULL, NULL, 0}, &scene, &err),
-                     SH_OK);
+    struct scene *scene = made_scene(&(struct scene_arrays){corner_m, 8, triangle, 4, NULL, NULL, 0});
     open_rig(&rig, scene, &view);
     rig.setup.range_max_m = 10.0;
     for (uint32_t rings = 1; rings <= 4; rings++)
@@ -213,18 +206,13 @@ static struct scene *door(double step_m)
     static const uint16_t label[4] = {0, 0, 1, 1};
     static const struct scene_surface surface[2] = {{.object = "door", .material = "wood"},
                                                     {.object = "wall", .material = "plaster"}};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 8; v++) {
         int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
         vertex[v][0] = right ? (back ? 5.0 : 0.0) : -5.0;
         vertex[v][1] = 20.0 + back * step_m;
         vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2});
 }
 
 /* Steps go from less than a millimetre to more than the resolution. Up to it there is one echo at the energy-weighted

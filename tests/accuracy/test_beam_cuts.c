@@ -13,6 +13,7 @@
 #include "core/rng.h"
 #include "core/surface.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 
 static const double STATION[3] = {0.0, 0.0, 0.0};
 static const struct beam_view VIEW = {-20.0, 20.0, -45.0, 45.0, 6, 3000};
@@ -137,11 +138,9 @@ static void within_floats_of_an_edge(void **state)
                                  {-40, 128, -9}, {40, 128, -9}, {40, 128, 9}, {-40, 128, 9}};
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
     struct beam_rig rig;
-    struct scene *scene;
     struct sh_err err;
     uint64_t pulses = 0, sides[2] = {0};
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
+    struct scene *scene = made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0});
     if (beam_rig_open(&rig, scene, STATION, &view, &err) != 0) fail_msg("%s", err.text);
     for (uint32_t l = 0; l < view.lines; l++) {
         beam_rig_mode(&rig, BEAM_SINGLE, 0);
@@ -177,10 +176,8 @@ static void a_wire_in_the_sky_behind_an_edge(void **state)
                                      {x, 50, -0.05}, {x + w, 50, -0.05}, {to + w, 50, 0.05}, {to, 50, 0.05}};
         static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
         struct beam_rig rig;
-        struct scene *scene;
         struct sh_err err;
-        if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
-            fail_msg("%s", err.text);
+        struct scene *scene = made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0});
         if (beam_rig_open(&rig, scene, STATION, &view, &err) != 0) fail_msg("%s", err.text);
         beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
         for (uint32_t l = 0; l < view.lines; l++) {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Footprints on glass, on mirrors, and on surfaces that mix within one plane, against values worked out by hand. */
 #include "tests/accuracy/lit_plates.h"
+#include "tests/common/made.h"
 
 /* A pane with a free border is on the left, and a wall lies behind all of it. A part of the wall's echo has passed the
  * pane there and back. Without a signal there are the same echoes. */
@@ -96,8 +97,6 @@ static struct scene *mirror_and_two_walls(void)
     static const uint16_t label[6] = {FRONT, FRONT, BACK, BACK, BACK, BACK};
     static const struct scene_surface surface[2] = {{.object = "front"}, {.object = "back"}};
     static const double y[] = {20.0, 23.0, -12.0};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 12; v++) {
         int right = v % 4 == 1 || v % 4 == 2;
         vertex[v][0] = right ? (v < 4 ? 0.0 : 5.0) : -5.0;
@@ -107,11 +106,8 @@ static struct scene *mirror_and_two_walls(void)
     for (uint32_t t = 0; t < 6; t++)
         for (uint32_t v = 0; v < 3; v++)
             triangle[t][v] = t / 2 * 4 + (v == 0 ? 0 : v + t % 2);
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6,
-                                                 label, surface, 2},
-                          &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(
+        &(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6, label, surface, 2});
 }
 
 /* All light of a footprint that lies on surfaces comes back. Pulse 0 of line 30 goes along an axis of the scene, to the

@@ -18,6 +18,7 @@
 #include "firmware_sim/site/plan_rows.h"
 #include "tests/common/aimed.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
@@ -270,11 +271,7 @@ static struct scene *step_edge(double step_m)
     const double vertex[8][3] = {{-5, 20, -5}, {0, 20, -5}, {0, 20, 5}, {-5, 20, 5},
                                  {-5, y, -5},  {5, y, -5},  {5, y, 5},  {-5, y, 5}};
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0});
 }
 
 /* Returns where just 1 % of the energy is on the edge's far side, in radii from the centre. */

@@ -9,6 +9,7 @@
 
 #include "tests/common/beam_reference.h"
 #include "tests/common/hits.h"
+#include "tests/common/made.h"
 #include "tests/stability/table.h"
 
 enum { NAIVE_RINGS = 3, NAIVE_ROOM = 64 };
@@ -56,11 +57,7 @@ static struct scene *ground(double height_m)
     const double far_m = 3000.0, z = -height_m;
     const double vertex[4][3] = {{-far_m, -far_m, z}, {far_m, -far_m, z}, {far_m, far_m, z}, {-far_m, far_m, z}};
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0});
 }
 
 struct off {
@@ -124,18 +121,13 @@ static struct scene *door(double step_m)
 {
     double vertex[8][3];
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 8; v++) {
         int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
         vertex[v][0] = right ? (back ? 5.0 : 0.0) : -5.0;
         vertex[v][1] = DOOR_M + back * step_m;
         vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0});
 }
 
 /* Returns the energy of the Gaussian footprint beyond a line h from its centre (in radii), as a sum over small

@@ -4,6 +4,7 @@
 
 #include "core/colour.h"
 #include "core/surface.h"
+#include "tests/common/made.h"
 
 /* The wall ahead is a mirror. The room continues in it as its own image, and each ray as if there were no mirror. */
 static void a_mirror_shows_the_room_behind_it(void **state)
@@ -295,8 +296,6 @@ static void a_mirror_that_moves(void **state)
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     static const uint16_t label[2] = {6, 6};
     struct optics o;
-    struct scene *body;
-    struct bvh *bvh;
     struct sh_err err;
     struct schedule_line line;
     struct scene_surface named[7] = {{.object = ""}};
@@ -308,9 +307,8 @@ static void a_mirror_that_moves(void **state)
         o.table.surface[i].reflectance = 0.5;
     o.table.surface[6].mirror = 1.0;
     o.detect.ghost_label = 7;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, label, named, 7}, &body, &err) != 0 ||
-        bvh_create(body, 1, NULL, &bvh, &err) != 0)
-        fail_msg("%s", err.text);
+    struct scene *body = made_scene(&(struct scene_arrays){vertex, 4, triangle, 2, label, named, 7});
+    struct bvh *bvh = made_bvh(body);
     struct cast_mover *m = &o.rig->setup.mover[0];
     *m = (struct cast_mover){.bvh = bvh, .centre_m = {0, 2, 0}, .radius_m = 1.5};
     pose_heading(atan(1.0), m->rotation); /* clockwise: the mirror's plane is then y - 3 = -x */

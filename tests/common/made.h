@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/* Tests make scenes of arrays, and cast rays into them. One that can't be made is a failure of the test. */
+#ifndef TESTS_COMMON_MADE_H
+#define TESTS_COMMON_MADE_H
+
+#include "core/bvh.h"
+#include "core/scene.h"
+#include "tests/common/cases.h"
+
+static inline struct scene *made_scene(const struct scene_arrays *arrays)
+{
+    struct scene *scene = NULL;
+    struct sh_err err;
+    if (scene_from_arrays(arrays, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    return scene;
+}
+
+static inline struct bvh *made_bvh(const struct scene *scene)
+{
+    struct bvh *bvh = NULL;
+    struct sh_err err;
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    return bvh;
+}
+
+static inline struct bvh_work *made_bvh_work(void)
+{
+    struct bvh_work *work = NULL;
+    struct sh_err err;
+    if (bvh_work_create(&work, &err) != SH_OK) fail_msg("%s", err.text);
+    return work;
+}
+
+#endif
