@@ -7,7 +7,6 @@
 #include <png.h>
 
 #include "core/cast.h"
-#include "tests/common/cases.h"
 #include "tests/common/made.h"
 
 enum { SQUARES = 8, TEXELS = 4, RAYS = 20000, LAYERS = 40 };
@@ -339,7 +338,6 @@ static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
     scene_free(scene);
 }
 
-/* The path is one on the machine that the mesh comes from. */
 /* The image is scaled to twice a side, and shifted by three eighths: that equals a board with such coordinates. */
 static void scale_and_offset_of_obj_count(void **state)
 {
@@ -360,6 +358,7 @@ static void scale_and_offset_of_obj_count(void **state)
     scene_free(scene);
 }
 
+/* The path is one on the machine that the mesh comes from. */
 static void an_image_beside_the_mesh_is_found(void **state)
 {
     (void)state;
