@@ -1,15 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/accuracy/lit_plates.h"
 
-#include "tests/common/made.h"
-
 const double STATION[3] = {0.0, 0.0, 0.0};
-
-void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
-{
-    struct sh_err err;
-    if (beam_rig_open(rig, scene, STATION, view, &err) != 0) fail_msg("%s", err.text);
-}
 
 /* Returns the energy beyond a line at h of the unit disc. The Gaussian's strips across are each an error function long.
  * They are summed by Simpson's rule over x = -cos a, which has no corner at the disc's border. */
@@ -48,7 +40,7 @@ void open_lit(struct lit *l, struct scene *scene, const struct beam_view *view, 
     struct sh_err err;
     const struct detect_signal_spec spec = {
         .n_reaches = 1, .reach = {{0.9, sqrt(0.9 / fmax(least_at_1_m, 1e-12))}}, .threshold_snr = 8.0, .sharp = 1};
-    open_rig(&l->rig, scene, view);
+    made_beam_rig(&l->rig, scene, view);
     if (surface_table_alloc(2, &l->table, &err) != 0 || detect_signal_set_up(&spec, &l->signal, &err) != 0)
         fail_msg("%s", err.text);
     for (int i = 0; i < 2; i++)

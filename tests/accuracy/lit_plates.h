@@ -5,20 +5,14 @@
 #define TESTS_ACCURACY_LIT_PLATES_H
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/surface.h"
-#include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 
 extern const double STATION[3];
-
-void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view);
 
 /* ---- an edge between two plates */
 

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/accuracy/slanted.h"
 
-#include "tests/common/made.h"
-
 const struct beam_view AHEAD = {0.0, 0.001, -0.001, 0.001, 4, 4};
 
 double spread(const struct beam *beam, const double dir[3], const struct face *f, double *mean, double *variance)
@@ -63,7 +61,7 @@ struct scene *slanted(double range_m, double i, double about, const double u[2],
 void open_attributes(struct beam_rig *rig, struct scene *scene, const struct beam_view *view, double pulse_s)
 {
     struct sh_err err;
-    open_rig(rig, scene, view);
+    made_beam_rig(rig, scene, view);
     beam_init(&rig->beam.beam, 0.007, 0.35e-3, pulse_s);
     rig->setup.pulse_m = rig->beam.beam.resolution_m;
     rig->setup.range_max_m = 3000.0;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Amplitudes against the range equation. Amplitude and width stay with their echo, whatever happens to it. */
 #include "tests/accuracy/lit_plates.h"
-#include "tests/common/made.h"
 
 /* A = rho cos i / rho_min(R), and rho_min goes with R^2: 20 dB less at ten times the range. */
 static void amplitudes_follow_the_range_equation(void **state)

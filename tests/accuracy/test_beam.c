@@ -1,24 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* The beam against its definitions (core/footprint.h). */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "tests/common/beam_reference.h"
 #include "tests/common/made.h"
 #include "tests/common/thorough.h"
-
-static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
-{
-    static const double station_m[3] = {0.0, 0.0, 0.0};
-    struct sh_err err;
-    if (beam_rig_open(rig, scene, station_m, view, &err) != 0) fail_msg("%s", err.text);
-}
 
 /* Writes energy and moment beyond a line, summed over small cells of the disc in polar coordinates. */
 static void sum_half(double h, double *energy, double *moment)
@@ -136,7 +125,7 @@ static void test_wall(void **state)
             const double n[3] = {sin(i), -cos(i), 0.0};
             struct beam_rig rig;
             struct cast_counters counters;
-            open_rig(&rig, wall(range_m[r], i), &view);
+            made_beam_rig(&rig, wall(range_m[r], i), &view);
             beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
             for (uint32_t l = 0; l < view.lines; l++) {
                 beam_rig_directions(&rig, l, d[0], d[1], d[2]);
@@ -173,7 +162,7 @@ static void test_end_of_range(void **state)
     struct beam_rig rig;
     uint32_t cut = 0;
     struct scene *scene = made_scene(&(struct scene_arrays){corner_m, 8, triangle, 4, NULL, NULL, 0});
-    open_rig(&rig, scene, &view);
+    made_beam_rig(&rig, scene, &view);
     rig.setup.range_max_m = 10.0;
     for (uint32_t rings = 1; rings <= 4; rings++)
         for (uint32_t l = 0; l < view.lines; l++) {
@@ -227,7 +216,7 @@ static void test_door_edge(void **state)
     for (size_t k = 0; k < sizeof step_m / sizeof step_m[0]; k++) {
         struct beam_rig rig;
         uint32_t several = 0;
-        open_rig(&rig, door(step_m[k]), &view);
+        made_beam_rig(&rig, door(step_m[k]), &view);
         beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
         for (uint32_t l = 0; l < view.lines; l++) {
             beam_rig_directions(&rig, l, d[0], d[1], d[2]);
@@ -261,7 +250,7 @@ static void test_selection(void **state)
     const struct beam_view view = {0.0, 0.01, -0.03, 0.03, 60, 16};
     struct beam_rig rig;
     uint32_t several = 0;
-    open_rig(&rig, door(1.0), &view);
+    made_beam_rig(&rig, door(1.0), &view);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < view.lines; l++) {
         uint32_t range[4][32] = {{0}}, first[17] = {0};

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Footprints on glass, on mirrors, and on surfaces that mix within one plane, against values worked out by hand. */
 #include "tests/accuracy/lit_plates.h"
-#include "tests/common/made.h"
 
 /* A pane with a free border is on the left, and a wall lies behind all of it. A part of the wall's echo has passed the
  * pane there and back. Without a signal there are the same echoes. */

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Widths of echoes against the spread of many sub-rays, worked out from the definition in core/footprint.h. */
 #include "tests/accuracy/slanted.h"
-#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 
 /* The closed form has one ray for the footprint. The sub-rays of rings have spreads of their own, so few of them are

@@ -4,14 +4,10 @@
  * itself. All else is compared with a run with exact planes, the deepest way through glass, and georeferencing point by
  * point. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
@@ -293,13 +289,13 @@ static double threshold(const struct beam *beam)
 static void test_figures(void **state)
 {
     (void)state;
-    static const double station_m[3] = {0.0, 0.0, 0.0}, range_m = 20.0, pan_deg = 0.5;
+    static const double range_m = 20.0, pan_deg = 0.5;
     const struct beam_view view = {-1.0, 1.0, -0.5, 0.5, 1000, 1000};
     struct beam_rig rig;
     struct sh_err err;
     struct plan_sample *sample;
     struct plan_option single, adaptive, rings;
-    assert_int_equal(beam_rig_open(&rig, step_edge(1.0), station_m, &view, &err), SH_OK);
+    made_beam_rig(&rig, step_edge(1.0), &view);
     const struct beam *beam = &rig.beam.beam;
     double strip = threshold(beam) * beam_radius(beam, range_m) / range_m, share = strip / (pan_deg * M_PI / 180.0);
     struct plan_place place = {
@@ -330,7 +326,7 @@ static void test_figures(void **state)
 static void test_small_steps(void **state)
 {
     (void)state;
-    static const double station_m[3] = {0.0, 0.0, 0.0}, range_m = 20.0, pan_deg = 0.5, step_m = 0.004;
+    static const double range_m = 20.0, pan_deg = 0.5, step_m = 0.004;
     enum { PARTS = 1000, DRAWN = 32768 };
     const struct beam_view view = {-1.0, 1.0, -0.5, 0.5, 1000, 1000};
     struct beam_rig rig;
@@ -338,7 +334,7 @@ static void test_small_steps(void **state)
     struct plan_sample *sample;
     struct plan_option single;
     double sum2 = 0.0, sum4 = 0.0, energy, moment;
-    assert_int_equal(beam_rig_open(&rig, step_edge(step_m), station_m, &view, &err), SH_OK);
+    made_beam_rig(&rig, step_edge(step_m), &view);
     const struct beam *beam = &rig.beam.beam;
     for (int i = 0; i < PARTS; i++) {
         beam_half(beam, (i + 0.5) / PARTS, &energy, &moment);

@@ -4,13 +4,9 @@
  *
  * SIGHT_RAYS: rays of each kind in each scene (default 1000; 125000: a million in all). */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "tests/common/generate.h"
 #include "tests/common/made.h"

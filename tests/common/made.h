@@ -5,6 +5,7 @@
 
 #include "core/bvh.h"
 #include "core/scene.h"
+#include "tests/common/beam_reference.h"
 #include "tests/common/cases.h"
 
 static inline struct scene *made_scene(const struct scene_arrays *arrays)
@@ -29,6 +30,14 @@ static inline struct bvh_work *made_bvh_work(void)
     struct sh_err err;
     if (bvh_work_create(&work, &err) != SH_OK) fail_msg("%s", err.text);
     return work;
+}
+
+/* A head at the scene's zero, with a beam. */
+static inline void made_beam_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
+{
+    static const double station_m[3] = {0.0, 0.0, 0.0};
+    struct sh_err err;
+    if (beam_rig_open(rig, scene, station_m, view, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
 #endif

@@ -13,7 +13,6 @@
 #include "core/bvh.h"
 #include "core/rng.h"
 #include "core/vec3.h"
-#include "tests/common/cases.h"
 #include "tests/common/made.h"
 #include "tests/common/odd_judge.h"
 #include "tests/common/odd_rays.h"

@@ -15,12 +15,6 @@
 enum { NAIVE_RINGS = 3, NAIVE_ROOM = 64 };
 static const double STATION_M[3] = {0.0, 0.0, 0.0}, BIN_M = 0.5 * 299792458.0 * 0.25e-9;
 
-static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
-{
-    struct sh_err err;
-    if (beam_rig_open(rig, scene, STATION_M, view, &err) != 0) fail_msg("%s", err.text);
-}
-
 /* Sorts 37 sub-rays into bins of 0.25 ns. Returns the energy-weighted mean of the bins up to limit_m after the
  * first. */
 static double binned_mean(const struct beam_rig *rig, const struct beam_pattern *pattern, const double dir[3],
@@ -75,7 +69,7 @@ static struct off off_on_ground(double height_m, double incidence_deg)
     struct beam_rig rig;
     struct cast_counters counters;
     struct off off = {0};
-    open_rig(&rig, ground(height_m), &view);
+    made_beam_rig(&rig, ground(height_m), &view);
     beam_rings(NAIVE_RINGS, &pattern);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < view.lines; l++) {
@@ -160,7 +154,7 @@ static void look_at_edge(double step_m, struct edge *e)
     const struct beam_view view = {0.0, 0.001, -0.008, 0.008, EDGE_PULSES, 1};
     static struct beam_pattern pattern;
     struct beam_rig rig;
-    open_rig(&rig, door(step_m), &view);
+    made_beam_rig(&rig, door(step_m), &view);
     beam_rings(NAIVE_RINGS, &pattern);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < EDGE_PULSES; l++) {

@@ -9,7 +9,6 @@
 
 #include "core/bvh.h"
 #include "core/vec3.h"
-#include "tests/common/cases.h"
 #include "tests/common/made.h"
 #include "tests/stability/mesh.h"
 

@@ -7,7 +7,6 @@
 
 #include "core/bvh.h"
 #include "core/vec3.h"
-#include "tests/common/cases.h"
 #include "tests/common/made.h"
 #include "tests/common/thorough.h"
 

@@ -62,6 +62,18 @@ static void facing_mirrors_end_at_the_depth(void **state)
     close_optics(&o);
 }
 
+/* A pane before a wall, and a signal for it. */
+static void open_window(struct optics *o, struct detect_signal *signal)
+{
+    struct sh_err err;
+    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1};
+    assert_int_equal(detect_signal_set_up(&spec, signal, &err), SH_OK);
+    open_optics(o, window());
+    o->table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o->table.surface[1] = (struct surface){.reflectance = 0.6};
+    o->table.has_optics = 1;
+}
+
 /* There are three echoes: both sides of the pane, and the wall, whose light passes four sides. Only the middle of the
  * line has them. When fewer are asked for, the weakest is left out: the pane's far side, then its near one. */
 static void a_pane_and_what_is_behind_it(void **state)
@@ -70,13 +82,7 @@ static void a_pane_and_what_is_behind_it(void **state)
     struct optics o;
     struct schedule_line line;
     struct detect_signal signal;
-    struct sh_err err;
-    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1};
-    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
-    open_optics(&o, window());
-    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
-    o.table.surface[1] = (struct surface){.reflectance = 0.6};
-    o.table.has_optics = 1;
+    open_window(&o, &signal);
     for (int with_signal = 0; with_signal < 2; with_signal++)
         for (uint32_t most = 1; most <= 3; most++) {
             o.detect.signal = with_signal ? &signal : NULL;
@@ -113,13 +119,7 @@ static void what_is_too_near_is_one_echo(void **state)
     struct optics o;
     struct schedule_line line;
     struct detect_signal signal;
-    struct sh_err err;
-    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1};
-    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
-    open_optics(&o, window());
-    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
-    o.table.surface[1] = (struct surface){.reflectance = 0.6};
-    o.table.has_optics = 1;
+    open_window(&o, &signal);
     o.detect.signal = &signal;
     schedule_get_line(&o.rig->segment, 0, &line);
     o.detect.separation_m = 0.001;

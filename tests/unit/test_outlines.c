@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Pulses near outlines, by geometry alone. A pulse whose footprint reaches an edge is found, in any direction, and
  * among any other pulses. */
-#include "tests/common/cases.h"
 #include "tests/common/thorough.h"
 
 #include <math.h>

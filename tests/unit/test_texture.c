@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Reflectance from a mesh's texture: a board of dark and light squares, whose places are known. */
-#include "tests/common/cases.h"
 
 #include <math.h>
 #include <png.h>
