@@ -5,10 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/schedule.h"
-#include "tests/common/cases.h"
+#include "tests/unit/schedule_rig.h"
 
-#define DEG INT64_C(1000000)
 static const int64_t TURN = 360 * DEG;
 
 struct window {
