@@ -187,23 +187,6 @@ static void test_end_of_range(void **state)
 
 /* ---- a door edge */
 
-/* The left half of the view is at 20 m, the rest deeper by step_m. */
-static struct scene *door(double step_m)
-{
-    double vertex[8][3];
-    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    static const uint16_t label[4] = {0, 0, 1, 1};
-    static const struct scene_surface surface[2] = {{.object = "door", .material = "wood"},
-                                                    {.object = "wall", .material = "plaster"}};
-    for (int v = 0; v < 8; v++) {
-        int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
-        vertex[v][0] = right ? (back ? 5.0 : 0.0) : -5.0;
-        vertex[v][1] = 20.0 + back * step_m;
-        vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
-    }
-    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2});
-}
-
 /* Steps go from less than a millimetre to more than the resolution. Up to it there is one echo at the energy-weighted
  * mean of both surfaces, beyond it two, for each pulse across the edge. The outlines take up to half a millimetre for
  * no step, and the mean there is wrong by at most half of the step. */
@@ -216,7 +199,7 @@ static void test_door_edge(void **state)
     for (size_t k = 0; k < sizeof step_m / sizeof step_m[0]; k++) {
         struct beam_rig rig;
         uint32_t several = 0;
-        made_beam_rig(&rig, door(step_m[k]), &view);
+        made_beam_rig(&rig, made_door(step_m[k]), &view);
         beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
         for (uint32_t l = 0; l < view.lines; l++) {
             beam_rig_directions(&rig, l, d[0], d[1], d[2]);
@@ -250,7 +233,7 @@ static void test_selection(void **state)
     const struct beam_view view = {0.0, 0.01, -0.03, 0.03, 60, 16};
     struct beam_rig rig;
     uint32_t several = 0;
-    made_beam_rig(&rig, door(1.0), &view);
+    made_beam_rig(&rig, made_door(1.0), &view);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < view.lines; l++) {
         uint32_t range[4][32] = {{0}}, first[17] = {0};

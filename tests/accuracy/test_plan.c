@@ -260,16 +260,6 @@ static void test_glass(void **state)
     check_plan("config/glass.yaml", 0, 1);
 }
 
-/* Half of the view is at 20 m, the other half deeper by a step. */
-static struct scene *step_edge(double step_m)
-{
-    const double y = 20 + step_m;
-    const double vertex[8][3] = {{-5, 20, -5}, {0, 20, -5}, {0, 20, 5}, {-5, 20, 5},
-                                 {-5, y, -5},  {5, y, -5},  {5, y, 5},  {-5, y, 5}};
-    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    return made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0});
-}
-
 /* Returns where just 1 % of the energy is on the edge's far side, in radii from the centre. */
 static double threshold(const struct beam *beam)
 {
@@ -295,7 +285,7 @@ static void test_figures(void **state)
     struct sh_err err;
     struct plan_sample *sample;
     struct plan_option single, adaptive, rings;
-    made_beam_rig(&rig, step_edge(1.0), &view);
+    made_beam_rig(&rig, made_door(1.0), &view);
     const struct beam *beam = &rig.beam.beam;
     double strip = threshold(beam) * beam_radius(beam, range_m) / range_m, share = strip / (pan_deg * M_PI / 180.0);
     struct plan_place place = {
@@ -334,7 +324,7 @@ static void test_small_steps(void **state)
     struct plan_sample *sample;
     struct plan_option single;
     double sum2 = 0.0, sum4 = 0.0, energy, moment;
-    made_beam_rig(&rig, step_edge(step_m), &view);
+    made_beam_rig(&rig, made_door(step_m), &view);
     const struct beam *beam = &rig.beam.beam;
     for (int i = 0; i < PARTS; i++) {
         beam_half(beam, (i + 0.5) / PARTS, &energy, &moment);

@@ -32,6 +32,17 @@ static inline struct bvh_work *made_bvh_work(void)
     return work;
 }
 
+/* Makes a door 20 m away, on the left of x = 0, and behind all of it a wall that is deeper by a step. */
+static inline struct scene *made_door(double step_m)
+{
+    const double y = 20.0 + step_m, vertex[8][3] = {{-5, 20, -5}, {0, 20, -5}, {0, 20, 5}, {-5, 20, 5},
+                                                    {-5, y, -5},  {5, y, -5},  {5, y, 5},  {-5, y, 5}};
+    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+    static const uint16_t label[4] = {0, 0, 1, 1};
+    static const struct scene_surface surface[2] = {{.object = "door"}, {.object = "wall"}};
+    return made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, label, surface, 2});
+}
+
 /* A head at the scene's zero, with a beam. */
 static inline void made_beam_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
 {

@@ -110,20 +110,6 @@ static void one_ray_stands_for_the_ground(void **state)
 
 static const double DOOR_M = 20.0;
 
-/* The right half of the view is deeper by step_m. */
-static struct scene *door(double step_m)
-{
-    double vertex[8][3];
-    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    for (int v = 0; v < 8; v++) {
-        int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
-        vertex[v][0] = right ? (back ? 5.0 : 0.0) : -5.0;
-        vertex[v][1] = DOOR_M + back * step_m;
-        vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
-    }
-    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0});
-}
-
 /* Returns the energy of the Gaussian footprint beyond a line h from its centre (in radii), as a sum over small
  * cells. */
 static double energy_beyond(double h)
@@ -154,7 +140,7 @@ static void look_at_edge(double step_m, struct edge *e)
     const struct beam_view view = {0.0, 0.001, -0.008, 0.008, EDGE_PULSES, 1};
     static struct beam_pattern pattern;
     struct beam_rig rig;
-    made_beam_rig(&rig, door(step_m), &view);
+    made_beam_rig(&rig, made_door(step_m), &view);
     beam_rings(NAIVE_RINGS, &pattern);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < EDGE_PULSES; l++) {
