@@ -56,6 +56,13 @@ void close_lit(struct lit *l)
     beam_rig_close(&l->rig);
 }
 
+const struct line_block *lit_line(struct lit *l, uint32_t line)
+{
+    beam_rig_directions(&l->rig, line, l->d[0], l->d[1], l->d[2]);
+    beam_rig_line(&l->rig, line);
+    return &l->rig.block;
+}
+
 struct edge at_edge(const struct lit *l, double dx, double dy)
 {
     struct edge e;

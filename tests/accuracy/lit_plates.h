@@ -28,11 +28,15 @@ struct lit {
     struct detect_signal signal;
     struct cast_detect detect;
     double near_m, far_m, rho[2];
+    double d[3][16]; /* of the pulses of a line, by lit_line */
 };
 
 void open_lit(struct lit *l, struct scene *scene, const struct beam_view *view, double least_at_1_m);
 
 void close_lit(struct lit *l);
+
+/* Casts a line of up to 16 pulses. */
+const struct line_block *lit_line(struct lit *l, uint32_t line);
 
 /* The energy of a pulse along d on the front plate, and the light that comes back from both, slope included. */
 struct edge {
