@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/import/gltf/gltf_at.h"
+#include "core/scene/build.h"
 #include "core/text.h"
 
 enum { MAX_DEPTH = 12 };

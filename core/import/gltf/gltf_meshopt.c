@@ -7,6 +7,7 @@
 
 #include <meshoptimizer.h>
 
+#include "core/scene/build_say.h"
 #include "core/text.h"
 
 /* meshoptimizer asserts the sizes that it gets, so they are checked before. */
