@@ -131,33 +131,35 @@ void device_carry_out_line(struct device *device, const char *line)
     do_command(device, 0, line, device->next_tick, 0, &result);
 }
 
-void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,
-                    struct command_result *out)
+void device_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     do_command(device, session, line, released, 0, out);
     if (out->effect == COMMAND_MOVE) device_begin_move(device, session, line, -1, out);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_command_once(struct device *device, uint32_t session, const char *line, uint64_t released,
-                         struct command_result *out)
+void device_command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     do_command(device, session, line, released, 1, out);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_report(struct device *device, int number, const char *text)
+void device_report(void *self, int number, const char *text)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     command_queue_push(&device->cmd.queue, number, text);
     device_push_error(&device->events, 0, number, text);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_overlong(struct device *device, uint32_t session, struct command_result *out)
+void device_overlong(void *self, uint32_t session, struct command_result *out)
 {
+    struct device *device = self;
     char text[96];
     snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
     memset(out, 0, sizeof *out);
@@ -167,15 +169,17 @@ void device_overlong(struct device *device, uint32_t session, struct command_res
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_session_opened(struct device *device, uint32_t session, const char *who)
+void device_session_opened(void *self, uint32_t session, const char *who)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     command_set_peer(&device->cmd, session, who);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_session_closed(struct device *device, uint32_t session, const char *who, int partial)
+void device_session_closed(void *self, uint32_t session, const char *who, int partial)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     int in_control = device->cmd.control == session;
     if (in_control) {

@@ -173,8 +173,9 @@ int device_replays(const struct device *device)
     return device->options.replay != NULL;
 }
 
-int device_close_journal(struct device *device, struct sh_err *err)
+int device_close_journal(void *self, struct sh_err *err)
 {
+    struct device *device = self;
     const uint64_t tick = device->journal.end_tick;
     if (device->journal.out != NULL && device->over)
         journal_end(device->journal.out, tick, (int64_t)tick * device->tick_ns);
@@ -185,8 +186,9 @@ int device_close_journal(struct device *device, struct sh_err *err)
     return rc != SH_OK || truth_rc == SH_OK ? rc : sh_fail(err, truth_rc, "%s", why.text);
 }
 
-int device_files_fill(const struct device *device)
+int device_files_fill(const void *self)
 {
+    const struct device *device = self;
     return journal_is_filling(device->journal.out) || fault_board_is_filling(device->faults);
 }
 
@@ -335,17 +337,18 @@ int device_is_idle(struct device *device)
     return idle;
 }
 
-void device_end(struct device *device)
+void device_end(void *self)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     device->ending = 1;
     atomic_store(&device->moves.stops, 1);
     pthread_mutex_unlock(&device->lock);
 }
 
-struct device_counters *device_counters(struct device *device)
+struct device_counters *device_counters(void *self)
 {
-    return &device->counters;
+    return &((struct device *)self)->counters;
 }
 
 uint32_t device_last_scan(struct device *device, uint32_t *station)
@@ -366,12 +369,12 @@ int64_t device_scan_ns(struct device *device)
     return ticks * device->tick_ns;
 }
 
-int64_t device_tick_ns(const struct device *device)
+int64_t device_tick_ns(const void *self)
 {
-    return device->tick_ns;
+    return ((const struct device *)self)->tick_ns;
 }
 
-struct fault_board *device_faults(const struct device *device)
+struct fault_board *device_faults(const void *self)
 {
-    return device->faults;
+    return ((const struct device *)self)->faults;
 }
