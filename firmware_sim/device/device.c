@@ -20,7 +20,8 @@ static int check_live(const struct device *device, struct sh_err *err)
     double ticks = SCHEDULE_PACKET * 1e6 / (double)cfg->profile.prr_min_uhz * (double)device->tick_hz + 3.0;
     if (cfg->platform.kind != PLATFORM_LIVE || ticks <= DEVICE_MAX_POSES) return SH_OK;
     return sh_fail(err, SH_EINPUT, "%s: platform.kind: live needs prr_min_hz of head profile %s to be at least %.0f",
-                   cfg->file, cfg->profile.name, SCHEDULE_PACKET * (double)device->tick_hz / (DEVICE_MAX_POSES - 3.0));
+                   cfg->file, cfg->profile.name,
+                   ceil(SCHEDULE_PACKET * (double)device->tick_hz / (DEVICE_MAX_POSES - 3.0)));
 }
 
 static int set_up_commands(struct device *device, struct sh_err *err)
