@@ -65,7 +65,6 @@ static void turn_on(struct device *device, uint64_t tick)
     set_near_wrap(device, tick);
     device_start_date(device, time_of(device, tick));
     device->power.again++;
-    device->scan.variant = NULL;
     device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, tick);
 }

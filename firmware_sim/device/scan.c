@@ -169,15 +169,21 @@ int device_is_repeated(const struct device *device, uint64_t tick)
     return (since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost;
 }
 
+/* Stored settings may need a site of their own. Where that can't be planned, the scan's start says why. */
 void device_before_scans(struct device *device)
 {
+    const struct head_settings *settings = &device->cmd.settings;
+    struct device_scan *scan = &device->scan;
     struct schedule_spec spec;
+    struct sh_err err;
     device_end_beam(&device->beam, 0);
-    device_fill_spec(&device->beam, device->site, &spec);
-    schedule_start(&device->scan.segment, &spec);
-    device->scan.site = device->site;
-    device->scan.station = device->cmd.settings.station - 1;
-    device->scan.stretch = site_stretch_at(device->site, 0);
+    scan->station = settings->station - 1;
+    if (device_find_variant(&device->variants, settings, scan->station, &scan->variant, &err) != SH_OK)
+        scan->variant = NULL;
+    scan->site = scan->variant != NULL ? scan->variant->site : device->site;
+    device_fill_spec(&device->beam, scan->site, &spec);
+    schedule_start(&scan->segment, &spec);
+    scan->stretch = site_stretch_at(device->site, 0);
 }
 
 void device_describe(struct device *device, struct device_work *work)
