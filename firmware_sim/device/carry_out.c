@@ -194,6 +194,14 @@ void device_session_closed(void *self, uint32_t session, const char *who, int pa
     if (in_control || scanning) device_report(device, CMD_E_CLIENT_LOST, text);
 }
 
+void device_note_replayed(struct device *device, const struct command_result *result)
+{
+    struct device_journal *journal = &device->journal;
+    if (result->error == 0 || journal->n_refused++ != 0) return;
+    journal->refused = &journal->replay[journal->at - 1];
+    snprintf(journal->why, sizeof journal->why, "%.127s", result->reply);
+}
+
 int device_run_replay(struct device *device, uint64_t tick)
 {
     while (device->journal.at < device->journal.n_replay && device->journal.replay[device->journal.at].tick <= tick) {
@@ -204,6 +212,7 @@ int device_run_replay(struct device *device, uint64_t tick)
             device_begin_move(device, entry->session, entry->line, entry->t_ns, &result);
             return 1;
         }
+        device_note_replayed(device, &result);
     }
     return 0;
 }

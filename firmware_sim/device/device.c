@@ -174,9 +174,22 @@ int device_replays(const struct device *device)
     return device->options.replay != NULL;
 }
 
+/* A journal has only commands that had an effect. With other options, or after an edit, the head may refuse some. */
+static void warn_refused(const struct device *device)
+{
+    const struct device_journal *journal = &device->journal;
+    if (journal->n_refused == 0) return;
+    sh_warn(
+        device->options.report,
+        "journal: %.200s:%u: %.60s: %s; of %zu replayed commands the head refused %zu, so the session is another one",
+        device->options.replay, journal->refused->line_no, journal->refused->line, journal->why, journal->at,
+        journal->n_refused);
+}
+
 int device_close_journal(void *self, struct sh_err *err)
 {
     struct device *device = self;
+    warn_refused(device);
     const uint64_t tick = device->journal.end_tick;
     if (device->journal.out != NULL && device->over)
         journal_end(device->journal.out, tick, (int64_t)tick * device->tick_ns);
@@ -253,6 +266,7 @@ static void replay(struct device *device, uint64_t tick)
         device_plan_move(device);
         pthread_mutex_lock(&device->lock);
         device_take_move(device, device->moves.plan.t_ns, &result);
+        device_note_replayed(device, &result);
         pthread_mutex_unlock(&device->lock);
         device_end_move(device);
         pthread_mutex_lock(&device->lock);

@@ -109,7 +109,9 @@ struct device_options {
     const char *replay;             /* NULL: none */
     struct settings_file *settings; /* what clients have stored; the caller's; NULL: nothing is stored */
     const char *truth;              /* file for the faults that are injected; NULL: none */
-    const struct sh_report *report; /* warnings of a station's new place, from the thread that plans it; NULL: none */
+    /* Warnings of a station's new place, from the thread that plans it; and of a replayed journal, at the end. NULL:
+     * none. */
+    const struct sh_report *report;
 };
 
 /* site must outlive the device. Sites that the device makes from it when stations move are freed with the device. */
@@ -120,8 +122,9 @@ void device_free(struct device *device);
 int device_replay_ends(const struct device *device);
 /* 1: a journal is replayed. */
 int device_replays(const struct device *device);
-/* Ends and closes the journal and the file of the truth, if there are any. Returns the first error in writing them; the
- * lines that they lack are counted. A file that takes nothing for 2 s is given up. After the loop is joined. */
+/* Ends and closes the journal and the file of the truth, if there are any; warns where the head refused commands of the
+ * journal that was replayed. Returns the first error in writing them; the lines that they lack are counted. A file that
+ * takes nothing for 2 s is given up. After the loop is joined. */
 int device_close_journal(void *self, struct sh_err *err);
 /* 1: one of these files is behind; callers that can wait should. Any thread; takes no lock. */
 int device_files_fill(const void *self);

@@ -66,6 +66,9 @@ struct device_journal {
     size_t n_replay, at; /* next entry to carry out */
     int ends;            /* the replayed one has an end */
     uint64_t end_tick;   /* where the run at hand ended, once it is over */
+    size_t n_refused;    /* commands of the replayed one; the first of them, and its reply: */
+    const struct journal_entry *refused;
+    char why[128];
 };
 
 struct device {
@@ -139,6 +142,8 @@ void device_describe(struct device *device, struct device_work *work);
 /* Carries out commands of the replayed journal that are due at the tick. Returns 1 when one of them moves a station:
  * that has to be planned and finished before the others. */
 int device_run_replay(struct device *device, uint64_t tick);
+/* Notes the result of the command that was carried out of it last. */
+void device_note_replayed(struct device *device, const struct command_result *result);
 
 void device_carry_out_line(struct device *device, const char *line);
 
