@@ -121,6 +121,11 @@ static void loses_power(void **state)
     assert_true(result.reply[0] == '\0' && result.error == 0 && result.effect == COMMAND_NONE);
     device_command(rig->device, 1, "FAULt:ADD {kind: laser_off}", 1001, &result);
     assert_true(result.error != 0 && strcmp(rig_state(rig, 1001), "off") == 0);
+    assert_non_null(strstr(result.reply, "the head has no power"));
+    device_command(rig->device, 1, "FAULt:CLEar 1", 1001, &result);
+    assert_non_null(strstr(result.reply, "the head has no power"));
+    assert_string_equal(rig_tell(rig, "FAULt:LIST?", 1001), "1 power_cycle"); /* a query is answered */
+    assert_string_equal(rig_tell(rig, "FAULt:INJected? 1", 1001), "1");
     while (rig->next < 1500) {
         assert_true(rig_claim(rig));
         assert_silent(rig);
