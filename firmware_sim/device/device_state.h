@@ -129,6 +129,9 @@ enum head_state device_visible_state(const struct device *device, uint64_t relea
 uint64_t device_ticks_of(const struct device *device, double s);
 
 /* scan.c */
+/* With options.start, options.duration_s counts from the first scan's tick; before that, from the first tick at which a
+ * self-test failed. */
+void device_count_duration(struct device *device, uint64_t tick);
 void device_begin_scan(struct device *device, uint64_t tick);
 /* Claims the tick's part of the scan that is on: descriptor, names, pulses; and the scan's end. */
 void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work);

@@ -104,6 +104,7 @@ int device_end_boot(struct device *device, uint64_t tick)
     device_transition(device, HEAD_EV_FAIL, tick);
     device->cmd.why_fault = "the self-test failed; *RST goes on without it";
     if (device->options.start && device->options.one_scan) device->over = 1; /* there will be no scan to wait for */
+    if (device->scan.number == 0) device_count_duration(device, tick);
     return 1;
 }
 

@@ -88,6 +88,32 @@ static void ends_a_run_that_cannot_scan(void **state)
     rig_close(rig);
 }
 
+/* Without a scan its duration counts from the first self-test that failed, also in the paces that wait. A scan that
+ * begins all the same has its whole duration. */
+static void ends_a_run_after_its_duration(void **state)
+{
+    (void)state;
+    static const struct device_options options = {.start = 1, .duration_s = 0.4};
+    struct rig *rig =
+        open_with("  - {kind: self_test}\n  - {kind: power_cycle, for_ms: 1, from_s: 0.3}\n", &options, NULL, 0);
+    rig_go_to(rig, BOOT_TICKS + 1);
+    assert_false(device_is_idle(rig->device));
+    for (int i = 0; i < 1000 && rig_claim(rig); i++)
+        continue;
+    assert_in_range(rig->next, BOOT_TICKS + 400, BOOT_TICKS + 402); /* the end, and what is still to be said */
+    rig_close(rig);
+
+    rig = open_with("  - {kind: self_test}\n", &options, NULL, 0);
+    rig_go_to(rig, 500);
+    rig_tell(rig, "*RST", 500);
+    rig_tell(rig, "SCAN:START", 500);
+    const uint64_t start = rig_wait(rig, NATIVE_EV_SCAN_START, 100)->b / TICK_NS;
+    while (rig_claim(rig))
+        continue;
+    assert_in_range(rig->next, start + 400, start + 402);
+    rig_close(rig);
+}
+
 /* In this tick the head sends nothing. */
 static void assert_silent(struct rig *rig)
 {
@@ -391,6 +417,7 @@ int main(void)
         cmocka_unit_test(boots_slowly),
         cmocka_unit_test(fails_the_self_test),
         cmocka_unit_test(ends_a_run_that_cannot_scan),
+        cmocka_unit_test(ends_a_run_after_its_duration),
         cmocka_unit_test(loses_power),
         cmocka_unit_test(ends_without_power),
         cmocka_unit_test(loses_power_as_it_comes),
