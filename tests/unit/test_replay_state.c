@@ -435,8 +435,8 @@ int main(void)
         cmocka_unit_test(points_go_out_with_what_follows), cmocka_unit_test(it_begins_anew_as_it_began),
         cmocka_unit_test(frames_go_out_in_their_ticks),    cmocka_unit_test(each_time_has_its_numbers),
         cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(its_name_is_a_line),
-        cmocka_unit_test(a_command_seeks_paces_and_loops),
-        cmocka_unit_test(what_a_replay_refuses),           cmocka_unit_test(a_state_holds_from_its_tick_on),
+        cmocka_unit_test(a_command_seeks_paces_and_loops), cmocka_unit_test(what_a_replay_refuses),
+        cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }

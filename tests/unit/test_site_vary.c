@@ -11,8 +11,8 @@ static int is(double scale, double want)
     return fabs(scale / want - 1) < 1e-9; /* a power of ten, to a few roundings */
 }
 
-/* Coordinates up to 2500 m need counts of 10 um, those up to 1000 m only of 1 um (31 bits). Each station has a scale for
- * each leg of the path. */
+/* Coordinates up to 2500 m need counts of 10 um, those up to 1000 m only of 1 um (31 bits). Each station has a scale
+ * for each leg of the path. */
 static void the_legs_of_other_stations_keep_their_scale(void **state)
 {
     (void)state;
