@@ -37,8 +37,8 @@ enum ply_column {
     PLY_DEVIATION = 1 << 11, /* no word for it: it comes with the attributes, where the head sends it */
 };
 extern const char *const ply_column_words[]; /* by bit; NULL at the end */
-/* Reads such words with commas between them; "xyz" stands for none. Returns 0 if a word is not known, or comes twice.
- * */
+/* Reads such words with commas between them. "xyz" stands for none. Returns 0 if a word is not known, or comes
+ * twice. */
 int ply_columns_read(const char *text, unsigned *columns);
 
 struct recorder_options {
