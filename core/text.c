@@ -168,10 +168,10 @@ bool text_is_word(struct text_span span, const char *word)
     return span.n == strlen(word) && strncasecmp(span.p, word, span.n) == 0;
 }
 
-bool text_is_one_of(const char *text, const char *const *list)
+bool text_is_one_of(struct text_span span, const char *const *list)
 {
     for (; *list != NULL; list++)
-        if (strcmp(text, *list) == 0) return true;
+        if (text_is(span, *list)) return true;
     return false;
 }
 
