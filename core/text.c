@@ -218,6 +218,7 @@ static const char *scan_decimal(const char *p, struct decimal *d)
         if (fraction && d->exponent > -1000) d->exponent--;
     }
     if (n_digits == 0) return NULL;
+    d->simple &= d->exponent > -1000; /* there may be more decimals than were counted */
     if (*p != 'e' && *p != 'E') return p;
     p++;
     bool down = *p == '-';

@@ -159,6 +159,17 @@ static void obj_random_numbers_are_exact(void **state)
     free(text);
 }
 
+/* More decimals than any writer makes, and a power that takes them back: this is 1. */
+static void obj_long_numbers_are_exact(void **state)
+{
+    (void)state;
+    char text[1200];
+    sprintf(text, "v 0.%01000d1e1001 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", 0);
+    struct scene *s = load_text("long.obj", text);
+    assert_true(s->vertex_m[0][0] == 1.0);
+    scene_free(s);
+}
+
 /* Writes a PLY with every scalar type: a quad and a triangle, double coordinates at UTM. */
 static const double utm[5][3] = {{500000.1, 5800000.2, 30.3},
                                  {500001.00000000012, 5800000.2, 30.3},
@@ -324,6 +335,7 @@ int main(void)
         cmocka_unit_test(obj_without_names),
         cmocka_unit_test(obj_numbers_are_exact),
         cmocka_unit_test(obj_random_numbers_are_exact),
+        cmocka_unit_test(obj_long_numbers_are_exact),
         cmocka_unit_test(obj_is_read_exactly),
         cmocka_unit_test(ply_is_read_exactly),
         cmocka_unit_test(ply_in_float_warns),
