@@ -304,7 +304,6 @@ static int read_if_there(struct mtl *m, struct text_span name, uint64_t line, bo
 
 static void warn_of_library(const struct mtl *m, struct text_span name, uint64_t line)
 {
-    if (!build_wants_textures(m->b)) return;
     sh_warn(m->b->report, "%s, line %llu: the material library '%.*s' is missing; put it beside the mesh", m->b->name,
             (unsigned long long)line, (int)(name.n < 200 ? name.n : 200), name.p);
 }

@@ -42,7 +42,8 @@ static void obj_is_read(void **state)
     assert_string_equal(s->surface[1].material, "brick wall");
     assert_string_equal(s->surface[2].material, "tin");
     assert_int_equal(s->counts.not_triangles, 3);
-    assert_int_equal(n_warnings, 1);
+    assert_int_equal(n_warnings, 2);
+    assert_non_null(strstr(warnings, "line 2: the material library 'C:\\dir\\' is missing"));
     assert_non_null(strstr(warnings, "3 points and lines left out"));
     scene_free(s);
 }
