@@ -65,8 +65,9 @@ struct scanhead {
     int64_t points_t_ns, points_t0_ns;  /* device time and time in the scan of its first pulse */
 
     /* state that the stream has reported, up to the frame that was handed out last */
-    int have_seq, have_descriptor, have_anchor, have_pulse;
-    uint32_t last_seq; /* of a frame that is not LOCAL */
+    int have_descriptor, have_anchor, have_pulse;
+    uint32_t last_seq;      /* of a frame that is not LOCAL */
+    uint64_t last_repeated; /* how many frames were repeated up to it */
     struct native_descriptor descriptor;
     struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
     struct native_beam beam[NATIVE_MAX_BEAMS];

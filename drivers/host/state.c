@@ -65,17 +65,21 @@ static void forget(struct scanhead *sh)
 }
 
 /* The parser hands out a number that goes back only where another sequence begins: the head has started again, or
- * recordings were put one after the other. What the stream said before does not hold there, nor do its times. */
+ * recordings were put one after the other. What the stream said before does not hold there, nor do its times. It does
+ * if the new sequence began with frames equal to those before: they were dropped as repeated, and said the same. */
 static void follow_sequence(struct scanhead *sh, const struct native_header *header)
 {
+    const uint64_t repeated = sh->parser.stats.repeated;
     if ((header->flags & NATIVE_LOCAL) != 0) return;
-    if (sh->have_seq && header->seq - sh->last_seq > INT32_MAX) {
-        forget(sh);
+    if (header->seq - sh->last_seq > INT32_MAX) {
         sh->have_pulse = 0;
-        sh->times = (struct host_times){0};
+        if (repeated == sh->last_repeated) {
+            forget(sh);
+            sh->times = (struct host_times){0};
+        }
     }
-    sh->have_seq = 1;
     sh->last_seq = header->seq;
+    sh->last_repeated = repeated;
 }
 
 static int absorb_points(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)

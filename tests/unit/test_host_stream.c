@@ -92,6 +92,37 @@ static void test_restart(void **state)
     scanhead_close(sh);
 }
 
+/* Another sequence begins with the frames of before: its descriptor is dropped as repeated, and holds all the same. */
+static void test_alike(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_point point[3];
+    struct native_descriptor d = make_descriptor(0, 1);
+    struct native_anchor anchor = make_anchor();
+    put_descriptor(head, 0, 1, 0);
+    expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+    put_anchor(head, 0);
+    expect_frame(sh, SCANHEAD_ANCHOR, &f);
+    put_points(head, 3, 500);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    size_t len = native_encode_descriptor(out, sizeof out, &d, 1, 0);
+    native_finish_frame(out, 0);
+    put_all(head, out, len);
+    anchor.station++;
+    len = native_encode_anchor(out, sizeof out, &anchor, 1, 0);
+    native_finish_frame(out, 1);
+    put_all(head, out, len);
+    expect_frame(sh, SCANHEAD_ANCHOR, &f);
+    put_points(head, 3, 100);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
+    close(head);
+    scanhead_close(sh);
+}
+
 static void hash_frame(struct sha256_ctx *ctx, const uint8_t *frame, size_t len)
 {
     sha256_update(ctx, 1, frame + 1);
@@ -147,9 +178,8 @@ static void test_hash(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stats),
-        cmocka_unit_test(test_version_and_types),
-        cmocka_unit_test(test_restart),
+        cmocka_unit_test(test_stats),   cmocka_unit_test(test_version_and_types),
+        cmocka_unit_test(test_restart), cmocka_unit_test(test_alike),
         cmocka_unit_test(test_hash),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

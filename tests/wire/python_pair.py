@@ -146,8 +146,19 @@ def dropped_frames():
     scanhead._QUEUE_BYTES = most
 
 
+def alike():
+    """Another sequence begins with a frame of before, which is dropped as repeated. What was said there still holds."""
+    head, theirs = pair()
+    first, other = (framed(kind, 0, 0, b"", seq) for kind, seq in ((200, 6), (201, 5)))
+    theirs.sendall(first + first + other)
+    head.next_frame(5)
+    head.descriptor = {}
+    assert head.next_frame(5).seq == 5 and head.descriptor == {}
+
+
 def notices():
     """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
+    alike()
     said = []
     head, theirs = pair()
     head.on_notice = lambda n: said.append(tuple(n)[:4])
