@@ -56,14 +56,16 @@ static int fail_hard_link(const char *path, const struct stat *st, struct sh_err
                    path, (unsigned long)st->st_nlink);
 }
 
-/* Names in /dev itself and in /proc are the system's, which nobody else can place. */
-static int is_systems(const char *path)
+/* The number of the open descriptor that a name of the system stands for; -1: it is no such name. */
+static int number_of(const char *path)
 {
-    char copy[PATH_MAX], folder[PATH_MAX];
-    if (strlen(path) >= sizeof copy) return 0;
-    strcpy(copy, path);
-    if (realpath(dirname(copy), folder) == NULL) return 0;
-    return strcmp(folder, "/dev") == 0 || strncmp(folder, "/proc/", 6) == 0;
+    int n = -1;
+    char rest;
+    if (strcmp(path, "/dev/stdout") == 0) return STDOUT_FILENO;
+    if (strcmp(path, "/dev/stderr") == 0) return STDERR_FILENO;
+    const int found =
+        sscanf(path, "/dev/fd/%d%c", &n, &rest) == 1 || sscanf(path, "/proc/self/fd/%d%c", &n, &rest) == 1;
+    return found ? n : -1;
 }
 
 static const char *kind_of(mode_t mode)
@@ -179,19 +181,23 @@ static int empty_it(const char *path, int fd, struct sh_err *err)
 int newfile_open(const char *path, int *out, struct sh_err *err)
 {
     const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* a FIFO can't hold us in open */
-    int fd = open(path, flags | O_NOFOLLOW, 0666);
-    const int is_link = fd < 0 && errno == ELOOP;
-    if (is_link && !is_systems(path)) return fail_link(path, err);
-    if (is_link) fd = open(path, flags | O_APPEND, 0666); /* others write to it, too, and may have before */
+    int fd = open(path, flags | O_NOFOLLOW, 0666), is_shared = 0;
+    if (fd < 0 && errno == ELOOP) {
+        struct stat st;
+        const int n = number_of(path);
+        if (n < 0) return fail_link(path, err);
+        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode); /* a shell goes on where we end */
+        fd = is_shared ? fcntl(n, F_DUPFD_CLOEXEC, 0) : open(path, flags, 0666);
+    }
     if (fd < 0 && errno == ENXIO)
         return sh_fail(err, SH_EINPUT,
                        "%s: is a FIFO without a reader, or a socket; allowed are a regular file, a device, and a FIFO "
                        "with a reader",
                        path);
     if (fd < 0) return newfile_fail(path, "be opened for writing", err);
-    if (fcntl(fd, F_SETFL, is_link ? O_APPEND : 0) != 0)
-        return hand_out(newfile_fail(path, "be opened for writing", err), fd, out);
-    return hand_out(is_link ? SH_OK : empty_it(path, fd, err), fd, out);
+    if (is_shared) return hand_out(SH_OK, fd, out);
+    if (fcntl(fd, F_SETFL, 0) != 0) return hand_out(newfile_fail(path, "be opened for writing", err), fd, out);
+    return hand_out(empty_it(path, fd, err), fd, out);
 }
 
 int newfile_append(const char *path, int *out, struct sh_err *err)

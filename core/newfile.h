@@ -17,9 +17,9 @@
 #include "core/err.h"
 
 /* Opens a file that is written in place: it is made, or emptied. It is locked as long as *fd is open: a second
- * writer is refused before it empties the file. Devices are taken as they are, and pipes that have a reader. Behind the
- * system's own links a file is not emptied, and all is written at its end: others write to it, too. *fd is for writing,
- * and blocks. */
+ * writer is refused before it empties the file. Devices are taken as they are, and pipes that have a reader. A file
+ * behind /dev/stdout or /dev/fd/N is not emptied: *fd then is that descriptor once more, since others write there, too.
+ * *fd is for writing, and blocks. */
 int newfile_open(const char *path, int *fd, struct sh_err *err);
 
 /* Opens a file that grows line by line, for reading and appending: it is made, or stays as it is. It is locked as long

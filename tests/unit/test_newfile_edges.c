@@ -100,23 +100,27 @@ static void test_another_completes(void **state)
     unlink(path);
 }
 
-/* A shell has redirected output to a file, to which it has written before, and writes afterwards: nothing is lost. */
+/* A shell has redirected output to a file, to which it has written before, and writes afterwards: nothing is lost,
+ * whether it appends or not. */
 static void test_redirected(void **state)
 {
     (void)state;
     char name[32];
     int fd;
-    const int shell = open_with(path, "before ");
-    assert_int_equal(fcntl(shell, F_SETFL, O_APPEND), 0);
-    snprintf(name, sizeof name, "/dev/fd/%d", shell);
-    assert_int_equal(newfile_open(name, &fd, &err), 0);
-    assert_int_equal(write(fd, "ours ", 5), 5);
-    assert_int_equal(write(shell, "after ", 6), 6);
-    assert_int_equal(write(fd, "again", 5), 5);
-    expect_text(shell, "before ours after again");
-    close(fd);
-    close(shell);
-    unlink(path);
+    for (int appends = 0; appends < 2; appends++) {
+        const int shell = open_with(path, "before ");
+        assert_int_equal(fcntl(shell, F_SETFL, appends ? O_APPEND : 0), 0);
+        snprintf(name, sizeof name, "/dev/fd/%d", shell);
+        assert_int_equal(newfile_open(name, &fd, &err), 0);
+        assert_int_equal(write(fd, "ours ", 5), 5);
+        assert_int_equal(write(shell, "after ", 6), 6);
+        assert_int_equal(write(fd, "again", 5), 5);
+        expect_text(shell, "before ours after again");
+        assert_int_equal(!!(fcntl(shell, F_GETFL) & O_APPEND), appends);
+        close(fd);
+        close(shell);
+        unlink(path);
+    }
 }
 
 /* A file system without locks: a whole file is one's own all the same. */
