@@ -110,7 +110,7 @@ static int waves_file_finish(void *rec, struct sh_err *err)
     struct waves_file *file = rec;
     const int rc = put_title(file, err);
     if (rc != SH_OK) return rc;
-    if (!file->is_sent)
+    if (!file->is_sent && file->base.track.n_scans > 0)
         sh_warn(file->base.options.report, "%s: there are no waveforms in it: the head sends none (waveform.send)",
                 file->base.file.path);
     recorder_report(rec, file->n_lost,

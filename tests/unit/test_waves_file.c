@@ -83,6 +83,7 @@ static void test_without(void **state)
     struct bytes b = record("a.waves.csv");
     assert_string_equal((const char *)b.data, TITLE);
     assert_non_null(strstr(rig_notes, "1 waveforms left out whose points were lost"));
+    assert_null(strstr(rig_notes, "the head sends none"));
     free(b.data);
 }
 
