@@ -77,7 +77,7 @@ struct recorder {
     struct outfile file;
     struct track track; /* file.path is its path in messages */
     int has_failed;     /* a write failed: the file is not completed */
-    int is_refused;     /* its first scan: no file is made */
+    int is_refused;     /* the first scan was: no file is made */
 };
 
 /* A format. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
