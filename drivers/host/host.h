@@ -65,7 +65,7 @@ struct scanhead {
     int64_t points_t_ns, points_t0_ns;  /* device time and time in the scan of its first pulse */
 
     /* state that the stream has reported, up to the frame that was handed out last */
-    int have_descriptor, have_anchor, have_pulse;
+    int have_seq, have_descriptor, have_anchor, have_pulse;
     uint32_t last_seq;      /* of a frame that is not LOCAL */
     uint64_t last_repeated; /* how many frames were repeated up to it */
     struct native_descriptor descriptor;

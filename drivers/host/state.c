@@ -71,13 +71,14 @@ static void follow_sequence(struct scanhead *sh, const struct native_header *hea
 {
     const uint64_t repeated = sh->parser.stats.repeated;
     if ((header->flags & NATIVE_LOCAL) != 0) return;
-    if (header->seq - sh->last_seq > INT32_MAX) {
+    if (sh->have_seq && header->seq - sh->last_seq > INT32_MAX) {
         sh->have_pulse = 0;
         if (repeated == sh->last_repeated) {
             forget(sh);
             sh->times = (struct host_times){0};
         }
     }
+    sh->have_seq = 1;
     sh->last_seq = header->seq;
     sh->last_repeated = repeated;
 }

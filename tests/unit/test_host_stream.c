@@ -123,6 +123,28 @@ static void test_alike(void **state)
     scanhead_close(sh);
 }
 
+/* Numbers may begin anywhere: what came before the first one holds. */
+static void test_any_start(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_point point[3];
+    const struct line_block block = make_block(3, 100);
+    put_descriptor(head, 0, 1, NATIVE_LOCAL);
+    expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+    put_anchor(head, NATIVE_LOCAL);
+    expect_frame(sh, SCANHEAD_ANCHOR, &f);
+    const size_t len = native_encode_points(out, sizeof out, &block, 500);
+    native_finish_frame(out, 1u << 31 | 5);
+    put_all(head, out, len);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
+    close(head);
+    scanhead_close(sh);
+}
+
 static void hash_frame(struct sha256_ctx *ctx, const uint8_t *frame, size_t len)
 {
     sha256_update(ctx, 1, frame + 1);
@@ -178,9 +200,8 @@ static void test_hash(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stats),   cmocka_unit_test(test_version_and_types),
-        cmocka_unit_test(test_restart), cmocka_unit_test(test_alike),
-        cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_stats), cmocka_unit_test(test_version_and_types), cmocka_unit_test(test_restart),
+        cmocka_unit_test(test_alike), cmocka_unit_test(test_any_start),         cmocka_unit_test(test_hash),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

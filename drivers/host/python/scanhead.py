@@ -1129,7 +1129,7 @@ class Head:
         self._poses, self._earth = _Poses(), None
         self._sha256 = hashlib.sha256()
         self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = self._points_time = None
-        self._last_seq = self._last_repeated = 0  # of a frame that is not LOCAL; how many were repeated up to it
+        self._last_seq, self._last_repeated = None, 0  # of a frame that is not LOCAL; how many were repeated up to it
         self._scan, self.scan_over = None, False  # the number of the present scan; whether it ends with this frame
 
     def __enter__(self) -> "Head":
@@ -1407,11 +1407,12 @@ class Head:
         return frame
 
     def _follow_sequence(self, frame: Frame) -> None:
-        """Forgets what the stream said where its numbers go back: the head has started again, or recordings were put one
-        after the other. Where the new sequence began with frames equal to those before, they said the same."""
+        """Forgets what the stream said where its numbers go back: the head has started again, or recordings were put
+        one after the other. Where the new sequence began with frames equal to those before, they said the same."""
         if frame.flags & LOCAL:
             return
-        repeated, back = self.parser.repeated, (frame.seq - self._last_seq) % 2**32 >= 2**31
+        repeated = self.parser.repeated
+        back = self._last_seq is not None and (frame.seq - self._last_seq) % 2**32 >= 2**31
         if back:
             self._last_pulse0 = None
         if back and repeated == self._last_repeated:
