@@ -100,6 +100,8 @@ static const struct {
     {{"record", "DIR/scan.pcapng", "-o", "DIR/x.ply", "--frames", "2"}, {"--frames: ", "has the scans that it has"}},
     {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--listen", "--frames", "2"},
      {"--frames: --listen sends no command"}},
+    {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--listen", "--station", "all"},
+     {"--station: --listen sends no command"}},
     {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--send=a", "--send=b"}, {"--send", "allowed with --raw"}},
     {{"record", "CONFIG", "-o", "DIR/x.shs", "--colour", "label"}, {"--colour: no .ply, .las, .ptx, .e57, .obj"}},
     {{"map", "CONFIG"}, {"-o"}},

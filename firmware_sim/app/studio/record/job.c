@@ -115,6 +115,7 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;
     after = app_write_json(r->stats, recording_put, result, &why);
+    if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
     return rc == SH_OK && after != SH_OK ? sh_fail(err, after, "%s", why.text) : rc;
 }
 

@@ -179,7 +179,7 @@ static int check_options(const struct record_line *r)
 static int check_commands(const struct record_line *r)
 {
     const int is_file = app_is_recording(r->in.operand[0]);
-    const char *option = r->job.station > 0 ? "--station" : r->job.recording.frames >= 0 ? "--frames" : NULL;
+    const char *option = r->job.station != 0 ? "--station" : r->job.recording.frames >= 0 ? "--frames" : NULL;
     if (option == NULL || (!is_file && !r->job.recording.listen)) return APP_OK;
     return app_usage(&app_record, "%s: %s; allowed with a CONFIG, and with a head on a wire without --listen", option,
                      is_file ? "a recorded stream has the scans that it has" : "--listen sends no command");
