@@ -211,8 +211,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct soak_head head = {0};
     if (cfg->loop.pace == PACE_STEP)
         return sh_fail(err, SH_EINPUT, "loop.pace: step, but no client grants time; allowed realtime and fast");
-    if (o->link > (long)cfg->n_links)
-        return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
+    if (soak_check_link(cfg, (uint32_t)o->link, err) != SH_OK) return SH_EINPUT;
     app_warn_settings_file(cfg, "a soak has the settings of the configuration");
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");

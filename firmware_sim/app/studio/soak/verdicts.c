@@ -34,6 +34,15 @@ static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t
         snprintf(to, cap, "%.*s", len, name);
 }
 
+int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err)
+{
+    if (number <= cfg->n_links) return SH_OK;
+    if (cfg->n_links > 0)
+        return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", number, cfg->n_links);
+    return sh_fail(err, SH_EINPUT, "%s: links: there are none; needed is one, as in --set 'links=[{type: tcp}]'",
+                   cfg->file);
+}
+
 static int check_one(struct config *cfg, void *ctx, struct sh_err *err)
 {
     const struct verdicts_work *work = ctx;
@@ -42,8 +51,8 @@ static int check_one(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT,
                        "--client: loop.pace is not realtime, and the client has no other time; allowed is "
                        "realtime");
-    if (number > cfg->n_links)
-        return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", number, cfg->n_links);
+    const int rc = soak_check_link(cfg, number, err);
+    if (rc != SH_OK) return rc;
     const enum link_type type = cfg->link[number - 1].type;
     if (type == LINK_FILE || type == LINK_NULL || type == LINK_WEB)
         return sh_fail(err, SH_EINPUT,

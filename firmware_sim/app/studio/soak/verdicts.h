@@ -15,6 +15,8 @@ struct verdicts {
     const char *json, *junit;                     /* NULL: none */
 };
 
+/* SH_EINPUT where the configuration has no link of that number; 0 is none. */
+int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err);
 /* Prints the sheets. Returns the exit status: APP_FAILED where there are findings. */
 int verdicts_run(struct verdicts *verdicts, struct app_input *in);
 
