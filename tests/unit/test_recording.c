@@ -107,7 +107,8 @@ static void answer(const char *question, const char *state)
         n++;
     line[n] = '\0';
     if (strcmp(line, question) != 0) head.wrong = "asked something else";
-    if (send(head.fd, state, strlen(state), MSG_NOSIGNAL) != (ssize_t)strlen(state)) head.wrong = "an answer was not taken";
+    if (send(head.fd, state, strlen(state), MSG_NOSIGNAL) != (ssize_t)strlen(state))
+        head.wrong = "an answer was not taken";
 }
 
 static void *play(void *arg)
