@@ -62,8 +62,12 @@ int record_files_have(const struct record_files *files, const char *ending)
 
 int record_files_have_colours(const struct record_files *files)
 {
-    for (int i = 0; i < files->n; i++)
-        if (files->file[i].ops->track.wants_colours) return 1;
+    const unsigned columns = files->recorder.columns;
+    const int ply_has = columns == 0 || (columns & PLY_COLOUR) != 0;
+    for (int i = 0; i < files->n; i++) {
+        const struct recorder_ops *ops = files->file[i].ops;
+        if (ops->track.wants_colours && (ply_has || strcmp(ops->ending, ".ply") != 0)) return 1;
+    }
     return 0;
 }
 
