@@ -156,7 +156,7 @@ static int serve(const struct soak_options *o, struct soak *soak, struct soak_he
 static int say_result(const struct soak_options *o, struct soak *soak, struct sh_err *err)
 {
     soak_conclude(soak);
-    soak_print(soak, stdout);
+    soak_print(soak, verdicts_out(&o->verdicts));
     const int rc = o->verdicts.json != NULL ? app_write_json(o->verdicts.json, soak_put, soak, err) : SH_OK;
     if (rc != SH_OK || soak->n_failures == 0) return rc;
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
@@ -322,7 +322,7 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,
      .help = "write the verdict on the client as JUnit XML, too"},
     {APP_TEXT, "json", "FILE", .at = AT(verdicts.json), .file = APP_WRITES,
-     .help = "write the results as JSON, too; - is standard output"},
+     .help = "write the results as JSON, too; - is standard output, and then all else goes to standard error"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
      .help = "write each fault that is injected as a line of JSON; - is standard output"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace", .help = "realtime or fast"},

@@ -34,6 +34,11 @@ static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t
         snprintf(to, cap, "%.*s", len, name);
 }
 
+FILE *verdicts_out(const struct verdicts *verdicts)
+{
+    return verdicts->json != NULL && strcmp(verdicts->json, "-") == 0 ? stderr : stdout;
+}
+
 int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err)
 {
     if (number <= cfg->n_links) return SH_OK;
@@ -77,7 +82,7 @@ static int judge_one(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_ESTOPPED) return fail_stopped(work, err);
     if (rc != SH_OK) return rc;
     work->n++;
-    verdict_print(made, stdout);
+    verdict_print(made, verdicts_out(work->verdicts));
     fflush(stdout);
     return SH_OK;
 }
@@ -130,7 +135,8 @@ static int say_findings(const struct verdicts_work *work, struct sh_err *err)
         found += verdict_count(&work->made[i], VERDICT_FOUND);
         judged += VERDICT_N_CHECKS - verdict_count(&work->made[i], VERDICT_NOT_JUDGED);
     }
-    printf("findings: %u, of %u checks in %u scenario%s\n", found, judged, work->n, work->n == 1 ? "" : "s");
+    fprintf(verdicts_out(work->verdicts), "findings: %u, of %u checks in %u scenario%s\n", found, judged, work->n,
+            work->n == 1 ? "" : "s");
     return found == 0 ? SH_OK : sh_fail(err, SH_ESTATE, "soak: the client has findings: %u", found);
 }
 
