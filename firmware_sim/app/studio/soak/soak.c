@@ -271,7 +271,6 @@ static int check_options(const struct soak_options *o)
 static int run_theirs(struct soak_options *o)
 {
     struct verdict_options *v = &o->verdicts.options;
-    v->truth = o->device.truth;
     v->duration_s = o->duration_s;
     v->match_m = 1e-3 * o->match_mm;
     if (v->limit_s <= 0.0) v->limit_s = 10.0;
@@ -286,6 +285,7 @@ static int soak_run_command(int argc, char **argv)
     int status = app_parse(&app_soak, argc, argv, &o.in, &o);
     if (status == APP_GO_ON) status = check_options(&o);
     if (status != APP_GO_ON) return status;
+    o.verdicts.options.truth = o.device.truth;
     app_catch_signals();
     if (o.verdicts.options.command != NULL) return run_theirs(&o);
     return app_with_config(&o.in, soak_head, &o);
@@ -322,9 +322,9 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,
      .help = "write the verdict on the client as JUnit XML, too"},
     {APP_TEXT, "json", "FILE", .at = AT(verdicts.json), .file = APP_WRITES,
-     .help = "write the results as JSON, too; - is standard output, and then all else goes to standard error"},
+     .help = "write the results as JSON, too; - is standard output, and the table then goes to standard error"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
-     .help = "write each fault that is injected as a line of JSON; - is standard output"},
+     .help = "write each fault that is injected as a line of JSON; - as with --json"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace", .help = "realtime or fast"},
     OPTION_SET,
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},

@@ -36,7 +36,10 @@ static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t
 
 FILE *verdicts_out(const struct verdicts *verdicts)
 {
-    return verdicts->json != NULL && strcmp(verdicts->json, "-") == 0 ? stderr : stdout;
+    const char *const file[] = {verdicts->json, verdicts->options.truth};
+    for (int i = 0; i < 2; i++)
+        if (file[i] != NULL && strcmp(file[i], "-") == 0) return stderr;
+    return stdout;
 }
 
 int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err)

@@ -17,7 +17,7 @@ struct verdicts {
     const char *json, *junit;                     /* NULL: none */
 };
 
-/* Where sheets go: standard output, or standard error where --json has that. */
+/* Where sheets go: standard output, or standard error where --json or --truth has that. */
 FILE *verdicts_out(const struct verdicts *verdicts);
 /* SH_EINPUT where the configuration has no link of that number; 0 is none. */
 int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err);
