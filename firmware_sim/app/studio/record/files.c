@@ -361,10 +361,10 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
     } else if (files->spooling && is_other) {
         rc = add_spool(files, err);
     }
-    if (frame->type == SCANHEAD_POINTS) files->has_points = 1;
     if (rc == SH_OK && files->spooling) rc = colour_spool_frame(files->spool[files->n_spools - 1], sh, frame, err);
     for (int i = 0; i < files->n && rc == SH_OK; i++)
         if (!files->spooling || !files->file[i].ops->track.wants_colours)
             rc = recorder_frame(files->file[i].rec, sh, frame, err);
+    if (rc == SH_OK && frame->type == SCANHEAD_POINTS) files->has_points = 1;
     return rc;
 }
