@@ -134,12 +134,50 @@ static void test_early_frames(void **state)
     bench_close(&bench);
 }
 
+/* A client sends commands and closes at once. They are read before its end, also where the owner has not heard of its
+ * session by then, or has something to write. Half a message is not. */
+static void test_last_words(void **state)
+{
+    (void)state;
+    static const char words[] = "\x81\x84" MASK "STOP\x01\x84" MASK "HALF", end[] = "\x88\x82" MASK "\x03\xe8";
+    for (int early = 0; early < 2; early++)
+        for (int closes = 0; closes < 2; closes++) {
+            char place[64], bytes[500], text[16];
+            struct bench bench = web_open(place);
+            int fd = early ? web_dial(place) : web_upgrade(&bench, place, "/ws", "");
+            if (!early) bench_expect(&bench, LINK_OPENED, 0);
+            size_t n = early ? (size_t)snprintf(bytes, sizeof bytes,
+                                                "GET /ws HTTP/1.1\r\nHost: %s\r\nUpgrade: websocket\r\n"
+                                                "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                                                "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
+                                                place)
+                             : 0;
+            memcpy(bytes + n, words, sizeof words - 1);
+            n += sizeof words - 1;
+            memcpy(bytes + n, end, sizeof end - 1);
+            if (closes) n += sizeof end - 1;
+            assert_int_equal(send(fd, bytes, n, MSG_NOSIGNAL), n);
+            assert_int_equal(shutdown(fd, SHUT_WR), 0);
+            if (early) bench_expect(&bench, LINK_OPENED, 0);
+            bench_expect(&bench, LINK_READABLE, 1); /* with a writable session poll reports before it works */
+            assert_true(bench.ops->write(bench.link, 0, "\xd5", 1) >= 0);
+            ssize_t got = bench.ops->read(bench.link, 0, text, sizeof text);
+            assert_in_range(got, 5, 9);
+            assert_memory_equal(text, "STOP\nHALF", (size_t)got);
+            bench_expect(&bench, LINK_CLOSED, 0);
+            assert_int_equal(bench.ops->write(bench.link, 0, "\xd5", 1), SH_ECLOSED);
+            close(fd);
+            bench_close(&bench);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ends),
         cmocka_unit_test(test_pings),
         cmocka_unit_test(test_early_frames),
+        cmocka_unit_test(test_last_words),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
