@@ -86,8 +86,7 @@ static void test_stream(void **state)
     struct bench bench = redir_bench(USB_RATE_HIGH);
     struct guest *g = guest_new(&bench);
     guest_configure(g);
-    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
-    assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 1);
+    guest_open_stream(g);
     for (size_t i = 0; i < sizeof sent; i++)
         sent[i] = (uint8_t)rng_u64(9, i);
     uint64_t id = 1, next = 1;
@@ -135,8 +134,7 @@ static void test_cancel_and_halt(void **state)
     struct bench bench = redir_bench(USB_RATE_HIGH);
     struct guest *g = guest_new(&bench);
     guest_configure(g);
-    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
-    bench_expect(&bench, LINK_OPENED, 0);
+    guest_open_stream(g);
     guest_bulk(g, 1, 0x83, 512, NULL);
     guest_bulk(g, 2, 0x83, 512, NULL);
     usbredirparser_send_cancel_data_packet(g->parser, 1);
@@ -180,12 +178,6 @@ static void test_cancel_and_halt(void **state)
     bench_close(&bench);
 }
 
-static void expect_notice(struct bench *bench, const char *part)
-{
-    const struct link_event event = bench_expect(bench, LINK_NOTICE, 0);
-    if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
-}
-
 /* The head's owner reads why a session was cut off. A guest that enumerates also resets the bus, which is not
  * reported. */
 static void test_reset_is_no_unplugging(void **state)
@@ -195,23 +187,20 @@ static void test_reset_is_no_unplugging(void **state)
     struct guest *g = guest_new(&bench);
     usbredirparser_send_reset(g->parser);
     guest_configure(g);
-    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
-    bench_expect(&bench, LINK_OPENED, 0);
+    guest_open_stream(g);
     usbredirparser_send_reset(g->parser);
     guest_turn(g, 0);
     bench_expect(&bench, LINK_CLOSED, 0);
-    expect_notice(&bench, "the host reset the bus");
+    bench_expect_notice(&bench, "the host reset the bus");
     guest_configure(g);
-    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
-    bench_expect(&bench, LINK_OPENED, 0);
+    guest_open_stream(g);
     guest_configure(g); /* a host with a reset of its own does this here */
     bench_expect(&bench, LINK_CLOSED, 0);
-    expect_notice(&bench, "configured the device again");
-    guest_control(g, 0x41, 0x22, 1, 2, 0, NULL);
-    bench_expect(&bench, LINK_OPENED, 0);
+    bench_expect_notice(&bench, "configured the device again");
+    guest_open_stream(g);
     guest_free(g);
     bench_expect(&bench, LINK_CLOSED, 0);
-    expect_notice(&bench, "unplugged");
+    bench_expect_notice(&bench, "unplugged");
     bench_close(&bench);
 }
 
