@@ -33,7 +33,7 @@ static int file_open(const struct link_spec *spec, void **link, struct sh_err *e
     struct file_link *file = calloc(1, sizeof *file);
     if (file == NULL)
         rc = sh_fail(err, SH_ENOMEM, "link file:%s: no memory", spec->path);
-    else if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND) != 0)
+    else if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND | (S_ISCHR(st.st_mode) ? O_NONBLOCK : 0)) != 0)
         rc = sh_fail(err, SH_EIO, "link file:%s: %s", spec->path, strerror(errno));
     else if (!S_ISREG(st.st_mode) && !S_ISCHR(st.st_mode))
         rc = sh_fail(err, SH_EINPUT,
@@ -62,7 +62,14 @@ static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_m
     if (!file->reported_opened) file->reported_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
     if (file->failed != 0 && !file->reported_closed)
         file->reported_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
-    return link_poll_sink(wake_fd, (want_write & 1u) != 0 && file->failed == 0, timeout_ms, &events);
+    /* A device may be full, such as a serial port with flow control; a regular file never is. */
+    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = -1, .events = POLLOUT}};
+    if ((want_write & 1u) != 0 && file->failed == 0) fds[1].fd = file->fd;
+    const int rc = link_wait(fds, 2, events.n > 0 ? 0 : timeout_ms);
+    if (rc != SH_OK) return rc;
+    link_take_wake(&fds[0], &events);
+    if (fds[1].revents != 0) link_events_push(&events, LINK_WRITABLE, 0, NULL);
+    return events.n;
 }
 
 static ssize_t file_read(void *link, int session, void *buf, size_t len)
