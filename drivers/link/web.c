@@ -271,10 +271,10 @@ static void report_session(struct web_session *s, int slot, uint32_t want_write,
 static void web_report(struct web_link *web, uint32_t want_write, struct link_events *events)
 {
     if (web->woken && link_events_push(events, LINK_WOKEN, 0, NULL)) web->woken = 0;
+    for (int s = 0; s < web->n_sessions; s++) /* first: a crowd that is turned away would take all the room */
+        report_session(&web->session[s], s, want_write, events);
     for (; web->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, web->refused[0]); web->n_refused--)
         memmove(web->refused[0], web->refused[1], sizeof web->refused - sizeof web->refused[0]);
-    for (int s = 0; s < web->n_sessions; s++)
-        report_session(&web->session[s], s, want_write, events);
 }
 
 static void time_is_over(lws_sorted_usec_list_t *timer)

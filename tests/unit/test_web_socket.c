@@ -171,13 +171,44 @@ static void test_last_words(void **state)
         }
 }
 
+/* The events of clients that are turned away leave room for those of sessions. */
+static void test_crowd(void **state)
+{
+    (void)state;
+    enum { CROWD = 100, LAST = WEB_SESSIONS - 1 };
+    int fd[WEB_SESSIONS + CROWD], n_refused = 0;
+    char place[64];
+    struct bench bench = web_open(place);
+    for (int i = 0; i < WEB_SESSIONS; i++) {
+        fd[i] = web_upgrade(&bench, place, "/ws", "");
+        bench_expect(&bench, LINK_OPENED, 0);
+        web_send_frame(fd[i], 0x81, "STOP", 4);
+    }
+    while (bench_expect(&bench, LINK_READABLE, 0).session != LAST)
+        continue;
+    for (int i = 0; i < CROWD; i++)
+        fd[WEB_SESSIONS + i] = web_dial(place);
+    for (int turn = 0; n_refused < CROWD / 2; turn++) {
+        struct link_event event[LINK_MAX_EVENTS];
+        int is_heard = 0;
+        assert_in_range(turn, 0, CROWD);
+        const int n = bench.ops->poll(bench.link, -1, UINT32_MAX, 0, event, LINK_MAX_EVENTS);
+        for (int i = 0; i < n; i++) {
+            n_refused += event[i].kind == LINK_REFUSED;
+            is_heard |= event[i].kind == LINK_READABLE && event[i].session == LAST;
+        }
+        assert_true(is_heard);
+    }
+    for (int i = 0; i < WEB_SESSIONS + CROWD; i++)
+        close(fd[i]);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ends),
-        cmocka_unit_test(test_pings),
-        cmocka_unit_test(test_early_frames),
-        cmocka_unit_test(test_last_words),
+        cmocka_unit_test(test_ends),       cmocka_unit_test(test_pings), cmocka_unit_test(test_early_frames),
+        cmocka_unit_test(test_last_words), cmocka_unit_test(test_crowd),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
