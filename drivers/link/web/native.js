@@ -194,8 +194,8 @@ export class Decoder {
     this.shots += shots;
     c.amplitude.fill(NaN, from, c.n);
     if (this.batch.rgb) c.rgb.fill(128, 3 * from, 3 * c.n);
-    if (this.descriptor.layout === 0 && this.anchor.moving & 1) this.#placeMoving(view, from, t0_ns);
     this.stats.empty += n - (c.n - from);
+    if (this.descriptor.layout === 0 && this.anchor.moving & 1) this.#placeMoving(view, from, t0_ns);
     if (content & 3) this.last = {from, shots, pulse0, low, high, line, n, seq: frame.seq, content};
   }
 
