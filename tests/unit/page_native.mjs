@@ -306,6 +306,7 @@ test('points without a pose are not placed, and are not counted as shots without
   const moving = readAll([Buffer.concat([descriptor, signed(anchor), points])]).decoder.stats;
   equal(moving.empty, still.empty, 'shots without echo');
   equal(moving.unplaced_points, moving.points - still.empty, 'unplaced');
+  equal(moving.unplaced_shots, 2, 'pulses of these');
 });
 
 // ---- replies
