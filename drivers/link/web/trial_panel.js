@@ -3,7 +3,7 @@
 // alone, the surface that they see together, and the best next place. It takes the place of the list of stations while
 // it is open.
 
-import {bodyOf, grouped, kept, make, numberOf, percent, say} from './page.js';
+import {bodyOf, grouped, kept, make, markField, numberOf, percent, say} from './page.js';
 import {why} from './session.js';
 import {Cloud} from './cloud.js';
 import {SETTINGS, Trial} from './trial.js';
@@ -224,8 +224,7 @@ export class TrialPanel {
   #edit(number, key, input) {
     const value = input.value.trim() === '' && SETTINGS.includes(key) ? null : numberOf(input.value);
     const isNumber = value === null || Number.isFinite(value);
-    if (isNumber) input.removeAttribute('aria-invalid');
-    else input.setAttribute('aria-invalid', 'true');
+    markField(input, isNumber);
     if (isNumber) return this.#trial.change(number, {[key]: value});
     this.#trial.get(number).error = `${input.value.trim() || 'An empty field'} is no number.`;
     return this.#fill(this.#trial.get(number));
