@@ -100,7 +100,9 @@ export async function testTools(browser, url, points) {
     near(Math.hypot(x - max_at[0], y - max_at[1], z - max_at[2]), 0, 2e-6, 'the point of the page less that of the head, as floats');
     const seen = await place(page, max_at), middle = await page.eval('[scanhead.view.camera.width / 2, scanhead.view.camera.height / 2]');
     near(Math.hypot(...seen.map((v, k) => v - middle[k])), 0, 1, 'pixels from the middle');
-    is((await page.eval(`document.querySelector('#point').textContent`)).includes('Range'), 'its figures are shown');
+    const card = await page.until(`(({hidden, textContent}) => !hidden && textContent)(document.querySelector('#point'))`);
+    const largest = await page.eval(`document.querySelector('#figure-dev-max').textContent`);
+    is(card.includes('Range') && card.includes(`Deviation${largest}`), `its figures are shown, with ${largest}: ${card}`);
     await page.eval(`Object.assign(scanhead.view.camera, ${JSON.stringify(before)}), scanhead.view.pointed.mark(null), scanhead.view.cameraMoved()`);
   });
 
