@@ -121,6 +121,14 @@ export async function testTools(browser, url, points) {
     await page.until(`Math.abs(scanhead.view.camera.section.from_m - ${from + 0.05}) < 1e-9`, 'its bottom is 5 cm higher');
     near(Number(await page.eval('document.querySelector("#section-from").value')), from + 0.05, 5e-4, 'the field has it');
     await page.until(`Math.abs(document.querySelector("#handle-bottom").getAttribute("aria-valuenow") - ${from + 0.05}) < 1e-3`, 'the handle says it');
+    await page.fill('#section-from', -0.5);
+    const field = await page.where('#section-from');
+    for (const clickCount of [1, 2]) {
+      for (const [type, buttons] of [['mousePressed', 1], ['mouseReleased', 0]]) await page.mouse(type, field, buttons, {clickCount});
+    }
+    await page.send('Input.insertText', {text: '-0.1'});
+    await page.key('Enter');
+    near(await page.eval('scanhead.view.camera.section.from_m'), -0.1, 1e-9, 'a double click takes the sign, too');
     await page.click('#section-off');
     equal(await page.eval('scanhead.view.camera.section'), null, 'switched off');
     await page.key('Escape');
