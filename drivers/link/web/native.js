@@ -25,8 +25,8 @@ const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -3
  * counted, and otherwise ignored. Only callbacks may throw. */
 export class Decoder {
   /** Each callback may be left out: points(batch), descriptor(d), anchor(a), emitter(e), names(list), lineEnd(l),
-   * telemetry(t), event(e), poses(list), refused(why, frame). All but lists have the header's `t_ns` (BigInt),
-   * and `repeat` and `local` from its flags. */
+   * telemetry(t), event(e), poses(list), refused(why, frame), restarted({}). Values of frames have the header's `t_ns`
+   * (BigInt), and `repeat` and `local` from its flags; lists don't. */
   constructor(callbacks = {}) {
     this.on = callbacks;
     this.descriptor = this.anchor = null;
@@ -65,6 +65,14 @@ export class Decoder {
       this.stats.refused++;
       this.on.refused?.(error.message, frame);
     }
+  }
+
+  /** Takes a notice of the parser. Where another sequence begins, all that the stream has said is void. */
+  notice({kind}) {
+    if (kind !== 'restarted') return;
+    this.#forget();
+    this.waves.clear(); // pulses and scans may have the numbers of earlier ones
+    this.on.restarted?.({});
   }
 
   /** The windows of a pulse, as Waves.of has them. */
