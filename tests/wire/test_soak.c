@@ -36,6 +36,14 @@ static const struct room_config SLOW = {.prr_hz = 30000,
                                         .more = "loop: {late_ms: 900, queue_ms: 2000}\n"
                                                 "time: {epoch: \"2026-01-01T00:00:00Z\", ptp: {follower: on}}\n"};
 
+/* A link of protocol cola makes a head one that may ask a time server. */
+static const struct room_config SCANNER = {
+    .profile = "sick-lms111",
+    .prr_hz = 36000,
+    .lines_hz = 50,
+    .links = "links: [{type: tcp, port: 0}, {type: pty, path: port}, {type: tcp, port: 0, protocol: cola}]\n",
+    .more = "loop: {late_ms: 900, queue_ms: 2000}\n"};
+
 static const char *path_of(const struct wire *wire, const char *name, const char *ending)
 {
     char file[64];
@@ -47,7 +55,8 @@ static const char *path_of(const struct wire *wire, const char *name, const char
 static pid_t start(struct wire *wire, const char *name, const char *seconds, const char *link)
 {
     char config[352], file[352], json[352], truth[352], out[64], err[64];
-    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(config, sizeof config, "%s",
+             wire_path(wire, strcmp(name, "time-server") == 0 ? "scanner.yaml" : "config.yaml"));
     snprintf(json, sizeof json, "%s", path_of(wire, name, "json"));
     snprintf(truth, sizeof truth, "%s", path_of(wire, name, "truth"));
     snprintf(file, sizeof file, strchr(name, '/') != NULL ? "%s" : "config/faults/%s.yaml", name);
@@ -130,7 +139,10 @@ static void test_each_scenario_over_tcp(void **state)
 {
     struct wire *wire = *state;
     pid_t pid[N_SCENARIOS];
+    char scanner[352];
     room_write(wire);
+    snprintf(scanner, sizeof scanner, "%s", wire_path(wire, "scanner.yaml"));
+    assert_int_equal(rename(room_config_write(wire, &SCANNER), scanner), 0);
     room_config_write(wire, &SLOW);
     for (int i = 0; i < N_SCENARIOS; i++)
         pid[i] = start(wire, SCENARIOS[i].name, "2", "1");
