@@ -40,9 +40,15 @@ static int open_trajectory(const struct site *site, const struct sh_report *repo
     trajectory_span(part->trajectory, &first_s, &last_s);
     part->start_s = first_s + p->start_s;
     part->end_s = p->has_end ? first_s + p->end_s : last_s;
-    int wrong_end = p->has_end && part->end_s > last_s;
-    if (!wrong_end && part->start_s <= last_s) return SH_OK;
+    const int wrong_end = p->has_end && part->end_s > last_s;
+    /* A scan that stops at the end has no pulse if it begins there. One stop may be there, or a platform that waits. */
+    const int must_go = p->kind == PLATFORM_TRAJECTORY && p->at_end == PLATFORM_STOP;
+    if (!wrong_end && (must_go ? part->start_s < last_s : part->start_s <= last_s)) return SH_OK;
     trajectory_free(part->trajectory);
+    if (!wrong_end && must_go)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: platform.start_s: %.9g s is not before the trajectory's end; allowed 0 to below %.9g",
+                       site->cfg->file, p->start_s, last_s - first_s);
     return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is after the trajectory's end; allowed %.9g to %.9g",
                    site->cfg->file, wrong_end ? "end_s" : "start_s", wrong_end ? p->end_s : p->start_s,
                    wrong_end ? p->start_s : 0.0, last_s - first_s);
