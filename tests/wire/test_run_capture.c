@@ -80,14 +80,8 @@ static void test_tcp(void **state)
 
 static int open_receiver(int *port)
 {
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), room = 1 << 22;
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const int fd = wire_bind(SOCK_DGRAM, port), room = 1 << 22;
     setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    *port = ntohs(at.sin_port);
     return fd;
 }
 

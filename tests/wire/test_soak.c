@@ -195,14 +195,9 @@ static void test_datagrams(void **state)
 {
     struct wire *wire = *state;
     char config[352], json[352], truth[352], links[128];
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    socklen_t len = sizeof at;
-    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0); /* a port that is free */
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    close(fd);
-    snprintf(links, sizeof links, "links: [{type: udp, protocol: velodyne, address: 127.0.0.1, port: %d}]\n",
-             ntohs(at.sin_port));
+    int port;
+    close(wire_bind(SOCK_DGRAM, &port)); /* a port that is free */
+    snprintf(links, sizeof links, "links: [{type: udp, protocol: velodyne, address: 127.0.0.1, port: %d}]\n", port);
     room_write(wire);
     snprintf(config, sizeof config, "%s", wire_path(wire, "beams.yaml"));
     FILE *f = fopen(config, "w");

@@ -166,14 +166,9 @@ static void write_files(const struct wire *wire)
 static void test_every_command(void **state)
 {
     struct wire *wire = *state;
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
     char nobody[32];
-    int wrong = 0, fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0); /* bound, not listening: nobody is there */
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    snprintf(nobody, sizeof nobody, "127.0.0.1:%d", ntohs(at.sin_port));
+    int wrong = 0, port, fd = wire_bind(SOCK_STREAM, &port);
+    snprintf(nobody, sizeof nobody, "127.0.0.1:%d", port);
     write_files(wire);
     for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
         if (strstr(CASES[i].line, "cut.shs") != NULL) cut_stream(wire);

@@ -212,18 +212,13 @@ static void test_links(void **state)
         (const char *const[]){"check", config, "--set", "platform.kind=live", "--set", "platform.address=x y", NULL}, 2,
         (const char *const[]){"platform.address x y: no such address", NULL});
 
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    int port, fd = wire_bind(SOCK_STREAM, &port);
     assert_int_equal(listen(fd, 1), 0);
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    snprintf(link, sizeof link, "{type: tcp, port: %d}", ntohs(at.sin_port));
+    snprintf(link, sizeof link, "{type: tcp, port: %d}", port);
     /* The status is 2, as the remedy is another port in the configuration. */
     expect_link(wire, "port in use", link, 2, "Address already in use; port 0 lets the system choose");
     /* A pty made before the link that failed is removed again. */
-    snprintf(link, sizeof link, "{type: pty, path: port}, {type: tcp, port: %d}", ntohs(at.sin_port));
+    snprintf(link, sizeof link, "{type: pty, path: port}, {type: tcp, port: %d}", port);
     expect_link(wire, "port in use, after a pty", link, 2, "Address already in use");
     close(fd);
     assert_int_equal(usage_complaints, 0);
@@ -245,13 +240,8 @@ static void test_system_failures(void **state)
                  (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats",
                                        "/none/x", NULL},
                  2, (const char *const[]){"/none/x", "No such file", NULL});
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0); /* bound, not listening: nobody is there */
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    snprintf(port, sizeof port, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
+    int number, fd = wire_bind(SOCK_STREAM, &number); /* nobody listens there */
+    snprintf(port, sizeof port, "tcp:127.0.0.1:%d", number);
     usage_expect(wire, "nobody listens", (const char *const[]){"record", port, "-o", wire_path(wire, "x.ply"), NULL}, 1,
                  (const char *const[]){port, "Connection refused", NULL});
     close(fd);
