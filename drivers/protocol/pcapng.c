@@ -130,32 +130,24 @@ static int pcapng_fail(const struct pcapng_reader *reader, struct sh_err *err, c
     return sh_fail(err, SH_EFORMAT, "at byte %llu: %s", (unsigned long long)reader->at_byte, what);
 }
 
-/* if_tsresol: 10^-n s, or with the top bit 2^-n s. Times that are later than 292 years are INT64_MAX. */
-static int64_t to_ns(uint64_t time, int resolution)
+/* if_tsresol: 10^-n s, or with the top bit 2^-n s. if_tsoffset: whole seconds more, from 1970 on. Times farther than 292
+ * years from it are INT64_MAX or INT64_MIN. */
+static int64_t to_ns(uint64_t time, const struct pcapng_interface *interface)
 {
-    const int n = resolution & 0x7f;
-    if (resolution & 0x80) {
+    const int n = interface->resolution & 0x7f;
+    __int128 ns = time;
+    if (interface->resolution & 0x80) {
         const uint64_t whole = n < 64 ? time >> n : 0, part = n < 64 ? time & ((UINT64_C(1) << n) - 1) : 0;
         const double part_ns = n < 64 ? 1e9 * (double)part / (double)(UINT64_C(1) << n) : 0.0;
-        return whole > 9000000000 ? INT64_MAX : (int64_t)(whole * 1000000000 + (uint64_t)part_ns);
+        ns = (__int128)whole * 1000000000 + (__int128)part_ns;
+    } else {
+        for (int i = 9; i < n; i++)
+            ns /= 10;
+        for (int i = n; i < 9; i++)
+            ns *= 10;
     }
-    for (int i = 9; i < n; i++)
-        time /= 10;
-    for (int i = n; i < 9; i++) {
-        if (time > INT64_MAX / 10) return INT64_MAX;
-        time *= 10;
-    }
-    return time > INT64_MAX ? INT64_MAX : (int64_t)time;
-}
-
-/* if_tsoffset: whole seconds that count from 1970 and belong to all times of the interface. The sum of an earlier time
- * than 1970 is negative. */
-static int64_t add_offset(int64_t t_ns, int64_t offset_s)
-{
-    const int64_t second_ns = 1000000000, most_s = INT64_MAX / second_ns;
-    if (offset_s < -most_s) return -1;
-    if (offset_s > most_s || offset_s * second_ns > INT64_MAX - t_ns) return INT64_MAX;
-    return t_ns + offset_s * second_ns;
+    ns += (__int128)interface->offset_s * 1000000000;
+    return ns > INT64_MAX ? INT64_MAX : ns < INT64_MIN ? INT64_MIN : (int64_t)ns;
 }
 
 static int read_section(struct pcapng_reader *reader, const uint8_t *block, size_t len, struct sh_err *err)
@@ -196,7 +188,7 @@ static int read_packet(struct pcapng_reader *reader, const uint8_t *block, size_
     const uint64_t time = (uint64_t)le_get32(block + 12) << 32 | le_get32(block + 16);
     *packet = (struct pcapng_packet){.link = interface->link,
                                      .has_time = 1,
-                                     .t_ns = add_offset(to_ns(time, interface->resolution), interface->offset_s),
+                                     .t_ns = to_ns(time, interface),
                                      .data = block + PCAPNG_PACKET_HEAD,
                                      .len = n,
                                      .original_len = le_get32(block + 24)};

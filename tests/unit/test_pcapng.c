@@ -185,12 +185,19 @@ static void test_loss(void **state)
 static void test_time_offset(void **state)
 {
     (void)state;
-    static const struct {
+    const uint64_t five = UINT64_C(5000000007);
+    const struct {
+        uint64_t ns;
         int64_t offset_s, t_ns;
-    } cases[] = {{-2, INT64_C(3000000007)},        {1700000000, INT64_C(1700000005000000007)},
-                 {-6, INT64_C(-999999993)},        {INT64_C(9223372031), INT64_C(9223372036000000007)},
-                 {INT64_C(9223372032), INT64_MAX}, /* beyond 292 years */
-                 {INT64_MAX, INT64_MAX},           {INT64_MIN, -1}};
+    } cases[] = {{five, -2, INT64_C(3000000007)},
+                 {five, 1700000000, INT64_C(1700000005000000007)},
+                 {five, -6, INT64_C(-999999993)},
+                 {five, INT64_C(9223372031), INT64_C(9223372036000000007)},
+                 {five, INT64_C(9223372032), INT64_MAX}, /* beyond 292 years */
+                 {five, INT64_MAX, INT64_MAX},
+                 {five, INT64_MIN, INT64_MIN},
+                 /* a clock that counts from 1601: 134,774 days more */
+                 {UINT64_C(13344473600000000007), INT64_C(-134774) * 86400, INT64_C(1700000000000000007)}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         uint8_t file[512], option[12] = {14, 0, 8, 0};
         struct pcapng_reader reader = {0};
@@ -203,7 +210,7 @@ static void test_time_offset(void **state)
         end += sizeof option;
         le_put32(file + at + 4, (uint32_t)(end - at));
         le_put32(file + end - 4, (uint32_t)(end - at));
-        end += pcapng_put_packet(file + end, 0, INT64_C(5000000007), "x", 1, 0);
+        end += pcapng_put_packet(file + end, 0, (int64_t)cases[i].ns, "x", 1, 0);
         for (at = 0; pcapng_read(&reader, file + at, end - at, &packet, &used, &err) == PCAPNG_OTHER;)
             at += used;
         assert_true(used > 0 && at + used == end);
