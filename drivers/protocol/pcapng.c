@@ -17,6 +17,7 @@ enum {
     OPTION_NAME = 2,
     OPTION_APPLICATION = 4,
     OPTION_TIME_RESOLUTION = 9,
+    OPTION_TIME_OFFSET = 14,
     OPTION_LOST = 4,     /* of a packet */
     OPTION_RECEIVED = 4, /* of statistics */
     OPTION_DROPPED_BY_SYSTEM = 7,
@@ -49,14 +50,19 @@ static uint8_t *put_text_option(uint8_t *to, uint16_t code, const char *text)
     return text != NULL ? put_option(to, code, text, strnlen(text, PCAPNG_MAX_TEXT)) : to;
 }
 
-/* The end of the options; then a block's length, which stands at both its ends. */
-static size_t end_block(uint8_t *block, uint8_t *to)
+/* A block's length stands at both its ends. */
+static size_t put_length(uint8_t *block, uint8_t *to)
 {
-    to = put_option(to, OPTION_END, "", 0);
     const uint32_t len = (uint32_t)(to - block) + 4;
     le_put32(block + 4, len);
     le_put32(to, len);
     return len;
+}
+
+/* The end of the options, and of their block. */
+static size_t end_block(uint8_t *block, uint8_t *to)
+{
+    return put_length(block, put_option(to, OPTION_END, "", 0));
 }
 
 size_t pcapng_put_section(uint8_t *to, const char *application)
@@ -94,8 +100,8 @@ static uint8_t *put_number_option(uint8_t *to, uint16_t code, uint64_t number)
     return put_option(to, code, bytes, sizeof bytes);
 }
 
-/* All but the block's length, which ends it. Returns where that goes. */
-static uint8_t *put_packet_body(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len)
+size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
+                         uint64_t lost)
 {
     le_put32(to, BLOCK_PACKET);
     le_put32(to + 8, interface);
@@ -103,23 +109,8 @@ static uint8_t *put_packet_body(uint8_t *to, uint32_t interface, int64_t t_ns, c
     le_put32(to + 16, (uint32_t)t_ns);
     le_put32(to + 20, (uint32_t)data_len);
     le_put32(to + 24, (uint32_t)data_len);
-    return put_padded(to + PCAPNG_PACKET_HEAD, data, data_len);
-}
-
-size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len)
-{
-    const size_t len = pcapng_packet_len(data_len);
-    uint8_t *end = put_packet_body(to, interface, t_ns, data, data_len);
-    le_put32(to + 4, (uint32_t)len);
-    le_put32(end, (uint32_t)len);
-    return len;
-}
-
-size_t pcapng_put_packet_after_loss(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
-                                    uint64_t lost)
-{
-    uint8_t *options = put_packet_body(to, interface, t_ns, data, data_len);
-    return end_block(to, put_number_option(options, OPTION_LOST, lost));
+    uint8_t *end = put_padded(to + PCAPNG_PACKET_HEAD, data, data_len);
+    return lost > 0 ? end_block(to, put_number_option(end, OPTION_LOST, lost)) : put_length(to, end);
 }
 
 size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped)
@@ -139,22 +130,24 @@ static int pcapng_fail(const struct pcapng_reader *reader, struct sh_err *err, c
     return sh_fail(err, SH_EFORMAT, "at byte %llu: %s", (unsigned long long)reader->at_byte, what);
 }
 
-/* if_tsresol: 10^-n s, or with the top bit 2^-n s. Times that are later than 292 years are INT64_MAX. */
-static int64_t to_ns(uint64_t time, int resolution)
+/* if_tsresol: 10^-n s, or with the top bit 2^-n s. if_tsoffset: whole seconds more, from 1970 on. Times farther than 292
+ * years from it are INT64_MAX or INT64_MIN. */
+static int64_t to_ns(uint64_t time, const struct pcapng_interface *interface)
 {
-    const int n = resolution & 0x7f;
-    if (resolution & 0x80) {
+    const int n = interface->resolution & 0x7f;
+    __int128 ns = time;
+    if (interface->resolution & 0x80) {
         const uint64_t whole = n < 64 ? time >> n : 0, part = n < 64 ? time & ((UINT64_C(1) << n) - 1) : 0;
         const double part_ns = n < 64 ? 1e9 * (double)part / (double)(UINT64_C(1) << n) : 0.0;
-        return whole > 9000000000 ? INT64_MAX : (int64_t)(whole * 1000000000 + (uint64_t)part_ns);
+        ns = (__int128)whole * 1000000000 + (__int128)part_ns;
+    } else {
+        for (int i = 9; i < n; i++)
+            ns /= 10;
+        for (int i = n; i < 9; i++)
+            ns *= 10;
     }
-    for (int i = 9; i < n; i++)
-        time /= 10;
-    for (int i = n; i < 9; i++) {
-        if (time > INT64_MAX / 10) return INT64_MAX;
-        time *= 10;
-    }
-    return time > INT64_MAX ? INT64_MAX : (int64_t)time;
+    ns += (__int128)interface->offset_s * 1000000000;
+    return ns > INT64_MAX ? INT64_MAX : ns < INT64_MIN ? INT64_MIN : (int64_t)ns;
 }
 
 static int read_section(struct pcapng_reader *reader, const uint8_t *block, size_t len, struct sh_err *err)
@@ -177,6 +170,7 @@ static int read_interface(struct pcapng_reader *reader, const uint8_t *block, si
         const uint16_t code = le_get16(block + at), n = le_get16(block + at + 2);
         if (code == OPTION_END || at + 4 + n > len - 4) break;
         if (code == OPTION_TIME_RESOLUTION && n == 1) interface->resolution = block[at + 4];
+        if (code == OPTION_TIME_OFFSET && n == 8) interface->offset_s = (int64_t)le_get64(block + at + 4);
         at += 4 + ((size_t)n + 3) / 4 * 4;
     }
     return PCAPNG_OTHER;
@@ -194,7 +188,7 @@ static int read_packet(struct pcapng_reader *reader, const uint8_t *block, size_
     const uint64_t time = (uint64_t)le_get32(block + 12) << 32 | le_get32(block + 16);
     *packet = (struct pcapng_packet){.link = interface->link,
                                      .has_time = 1,
-                                     .t_ns = to_ns(time, interface->resolution),
+                                     .t_ns = to_ns(time, interface),
                                      .data = block + PCAPNG_PACKET_HEAD,
                                      .len = n,
                                      .original_len = le_get32(block + 24)};

@@ -37,12 +37,10 @@ size_t pcapng_put_interface(uint8_t *to, enum pcapng_link link, uint32_t snap_le
                             const char *comment);
 /* The length of a packet's block. */
 size_t pcapng_packet_len(size_t data_len);
-/* t_ns from 0 on. */
-size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len);
-/* The same, where packets of this interface were lost since the one before; PCAPNG_LOST bytes more than
- * pcapng_packet_len. */
-size_t pcapng_put_packet_after_loss(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
-                                    uint64_t lost);
+/* t_ns from 0 on. lost: packets of this interface since the one before; from 1 on, the block is PCAPNG_LOST bytes
+ * longer than pcapng_packet_len. */
+size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
+                         uint64_t lost);
 /* Frames that came at an interface until t_ns, and those that the system dropped; within PCAPNG_FRONT_ROOM. */
 size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped);
 
@@ -56,14 +54,15 @@ struct pcapng_reader { /* begins as zeros */
     struct pcapng_interface {
         uint16_t link;
         uint32_t snap_len;
-        int resolution; /* as in the option if_tsresol; 6 where there is none */
+        int resolution;   /* as in the option if_tsresol; 6 where there is none */
+        int64_t offset_s; /* as in the option if_tsoffset */
     } interface[PCAPNG_MAX_INTERFACES];
 };
 
 struct pcapng_packet {
     uint16_t link; /* enum pcapng_link, or another link type */
     int has_time;
-    int64_t t_ns;
+    int64_t t_ns;               /* since 1970; negative: before it */
     const uint8_t *data;        /* within the bytes that were given */
     uint32_t len, original_len; /* original_len > len: the capture cut it */
 };

@@ -47,9 +47,7 @@ int capture_add(struct capture *capture, const struct capture_frame *f, struct s
 {
     uint8_t *to = outfile_room(&capture->file, pcapng_packet_len(f->len) + PCAPNG_LOST, err);
     if (to == NULL) return SH_EIO;
-    outfile_used(&capture->file,
-                 f->lost == 0 ? pcapng_put_packet(to, f->interface, f->t_ns, f->bytes, f->len)
-                              : pcapng_put_packet_after_loss(to, f->interface, f->t_ns, f->bytes, f->len, f->lost));
+    outfile_used(&capture->file, pcapng_put_packet(to, f->interface, f->t_ns, f->bytes, f->len, f->lost));
     capture->packets++;
     return SH_OK;
 }

@@ -28,7 +28,7 @@ static int pcapng_frame(void *rec, struct scanhead *sh, const struct scanhead_fr
     (void)sh;
     uint8_t *to = outfile_room(file, pcapng_packet_len(frame->raw_len), err);
     if (to == NULL) return SH_EIO;
-    outfile_used(file, pcapng_put_packet(to, 0, frame->t_ns, frame->raw, frame->raw_len));
+    outfile_used(file, pcapng_put_packet(to, 0, frame->t_ns, frame->raw, frame->raw_len, 0));
     return 0;
 }
 

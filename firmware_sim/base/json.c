@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/text.h"
+
 void json_begin(struct json *json, FILE *out)
 {
     memset(json, 0, sizeof *json);
@@ -19,43 +21,17 @@ void json_begin_one_line(struct json *json, FILE *out)
     json->one_line = 1;
 }
 
-/* Length of the UTF-8 sequence at p, 0 when it is not well-formed (Unicode 15, table 3-7). */
-static int utf8_len(const unsigned char *p)
-{
-    unsigned char low = 0x80, high = 0xbf;
-    int len;
-    if (p[0] < 0x80) return 1;
-    if (p[0] >= 0xc2 && p[0] <= 0xdf) {
-        len = 2;
-    } else if (p[0] >= 0xe0 && p[0] <= 0xef) {
-        len = 3;
-        if (p[0] == 0xe0) low = 0xa0;  /* below it, a shorter form exists */
-        if (p[0] == 0xed) high = 0x9f; /* surrogates */
-    } else if (p[0] >= 0xf0 && p[0] <= 0xf4) {
-        len = 4;
-        if (p[0] == 0xf0) low = 0x90;
-        if (p[0] == 0xf4) high = 0x8f; /* beyond U+10FFFF */
-    } else {
-        return 0;
-    }
-    if (p[1] < low || p[1] > high) return 0;
-    for (int i = 2; i < len; i++)
-        if (p[i] < 0x80 || p[i] > 0xbf) return 0;
-    return len;
-}
-
 static void put_string(FILE *out, const char *text)
 {
-    const unsigned char *p = (const unsigned char *)text;
     fputc('"', out);
-    while (*p != '\0') {
-        const int len = utf8_len(p);
+    for (const char *p = text; *p != '\0';) {
+        const int len = text_utf8_len(p, 4);
         if (len == 0)
             fputs("\\ufffd", out);
         else if (*p == '"' || *p == '\\')
             fprintf(out, "\\%c", *p);
-        else if (*p < 0x20)
-            fprintf(out, "\\u%04x", *p);
+        else if ((unsigned char)*p < 0x20)
+            fprintf(out, "\\u%04x", (unsigned)*p);
         else
             fwrite(p, 1, (size_t)len, out);
         p += len == 0 ? 1 : len;

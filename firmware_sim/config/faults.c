@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
@@ -169,10 +170,35 @@ static int needs_ptp(enum fault_kind kind)
     return kind >= FAULT_PTP_LOST && kind <= FAULT_PTP_JITTER;
 }
 
+static int needs_server(enum fault_kind kind)
+{
+    return kind >= FAULT_NTP_SILENT && kind <= FAULT_NTP_STEP;
+}
+
 static int needs_time(enum fault_kind kind)
 {
     return kind == FAULT_CLOCK_JUMP || kind == FAULT_CLOCK_DRIFT || kind == FAULT_CLOCK_STOP ||
            kind == FAULT_LEAP_SECOND || (kind >= FAULT_PPS_LOST && kind <= FAULT_NMEA_CHECKSUM);
+}
+
+/* ntp.role is no need: a client may set it later by telegram. */
+static int can_ask_server(const struct config *cfg)
+{
+    return cfg->links_are_not_here || (config_speaks(cfg, PROTOCOL_COLA) && cfg->loop.pace == PACE_REALTIME);
+}
+
+static void check_needs(struct cfg_reader *rd, const struct config *cfg, const struct fault *f, uint32_t i)
+{
+    const char *name = fault_names[f->kind];
+    if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
+        cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none", name);
+    if (needs_ptp(f->kind) && !cfg->time.ptp.follower)
+        cfg_fail_key(rd, "faults[].kind", i, "%s needs a follower of PTP; allowed where time.ptp.follower is on", name);
+    if (needs_server(f->kind) && !can_ask_server(cfg) && CFG_SOUND(rd, 0, "links", "loop.pace"))
+        cfg_fail_key(rd, "faults[].kind", i,
+                     "%s needs a scanner that can ask a time server; allowed with a link of protocol: cola, and "
+                     "loop.pace: realtime",
+                     name);
 }
 
 /* Whether faults of the kind can strike on the link. */
@@ -188,13 +214,7 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
     for (uint32_t i = 0; i < list->n; i++) {
         const struct fault *f = &list->fault[i];
         if (!CFG_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
-        if (!cfg->has_no_head && needs_time(f->kind) &&
-            (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
-            cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none",
-                         fault_names[f->kind]);
-        if (!cfg->has_no_head && needs_ptp(f->kind) && !cfg->time.ptp.follower)
-            cfg_fail_key(rd, "faults[].kind", i, "%s needs a follower of PTP; allowed where time.ptp.follower is on",
-                         fault_names[f->kind]);
+        if (!cfg->has_no_head) check_needs(rd, cfg, f, i);
         if (cfg->links_are_not_here) continue; /* checked with the scanner that has the links */
         if (f->link > cfg->n_links)
             cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);

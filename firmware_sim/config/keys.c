@@ -166,6 +166,7 @@ static const struct cfg_key config_keys[] = {
      WORDS([PROTOCOL_NATIVE] = "native", [PROTOCOL_NMEA] = "nmea", [PROTOCOL_SCIP] = "scip", [PROTOCOL_COLA] = "cola",
            [PROTOCOL_VELODYNE] = "velodyne", [PROTOCOL_VELODYNE_POSITION] = "velodyne-position",
            [PROTOCOL_VELODYNE_HTTP] = "velodyne-http", [PROTOCOL_CAPTURE] = "capture"),
+     .allowed = "native, nmea, scip, cola, velodyne, velodyne-position, velodyne-http; with `run FILE.pcap`: capture",
      .help = "native: the head's own stream and commands; nmea: the GNSS receiver, which sends NMEA 0183 and takes no "
              "commands; scip: as a Hokuyo; cola: as a SICK scanner, CoLa-A and CoLa-B; velodyne: data packets, "
              "velodyne-position: position packets, velodyne-http: settings, as a VLP-16; capture: what a device said, "

@@ -134,6 +134,9 @@ static int pass_time(struct replay_capture *c, const struct pcapng_packet *packe
         c->counts.untimed++;
         return SH_OK;
     }
+    if (packet->t_ns < 0)
+        return sh_fail(err, SH_EFORMAT, "packet %llu has a time before 1970; allowed are times from then on",
+                       (unsigned long long)c->counts.packets);
     if (!c->has_clock) c->clock_ns = packet->t_ns;
     c->has_clock = 1;
     const int64_t passed_ns = packet->t_ns - c->clock_ns; /* neither is negative */

@@ -29,8 +29,12 @@ for file in config/faults/*.yaml; do
     echo "soak: $name, $seconds s"
     # The head of udp.yaml has 16 beams, and nobody can command it. So it leaves out the scenarios that it could not go
     # through.
-    if ! grep -q 'mirror_\|power_cycle\|unplug\|cable\|self_test' "$file"; then soak "$file" tests/soak/udp.yaml "$name-udp" & fi
-    soak "$file" tests/soak/room.yaml "$name" --set "links.1.path=$out/port"
+    if ! grep -q 'mirror_\|power_cycle\|unplug\|cable\|self_test\|ntp_' "$file"; then
+        soak "$file" tests/soak/udp.yaml "$name-udp" &
+    fi
+    head=room
+    if grep -q ntp_ "$file"; then head=scanner; fi # the others can't ask a time server
+    soak "$file" "tests/soak/$head.yaml" "$name" --set "links.1.path=$out/port"
     wait
 done
 

@@ -30,7 +30,7 @@ function readAll(pieces, last = true) {
   const hand = (value) => out.values.push(value);
   const decoder = new Decoder({points: (b) => out.batches.push(b), descriptor: hand, anchor: hand, emitter: hand, names: hand,
     lineEnd: hand, telemetry: hand, event: hand, poses: hand, refused: (why) => out.refused.push(why)});
-  const parser = new Parser({text: (t) => out.texts.push(t), frame(f) {
+  const parser = new Parser({text: (t) => out.texts.push(t), notice: (n) => decoder.notice(n), frame(f) {
     out.frames.push({type: f.type, flags: f.flags, seq: f.seq, t_ns: f.t_ns, payload: f.payload.slice()});
     decoder.take(f);
   }});
@@ -300,6 +300,27 @@ test('points without a pose are not placed, and are not counted as shots without
   equal(moving.unplaced_shots, 2, 'pulses of these');
 });
 
+test('another sequence: its points have no place before its own descriptor and anchor', () => {
+  const at = (type) => samples.findIndex(({bytes}) => bytes[1] === type);
+  const renumbered = ({bytes}, seq, pulses) => {
+    const frame = Buffer.from(bytes);
+    frame.writeUInt32LE(seq >>> 0, 8);
+    if (pulses) frame.writeBigInt64LE(frame.readBigInt64LE(28 + 8) + pulses, 28 + 8);
+    return signed(frame);
+  };
+  const [d, a, p] = [1, 2, 3].map((type) => samples[at(type)]), front = [d, a, p].map((s, i) => renumbered(s, 1000 + i));
+  const gone = readAll([...front, renumbered(p, 2000, 1000n)]).decoder.stats;
+  equal(gone.unplaced_shots, 0, 'after a gap');
+  const first = readAll([...front, renumbered(p, 7, 1000n)]);
+  equal(first.stats.jumps_back, 1, 'restarts');
+  equal(first.decoder.stats.unplaced_shots, 3, 'after a restart');
+  const whole = readAll([...front, ...[d, a].map((s, i) => renumbered(s, 7 + i)), renumbered(p, 9, 1000n)]);
+  equal(whole.decoder.stats.unplaced_shots, 0, 'after its anchor');
+  const repeated = Object.assign(Buffer.from(d.bytes), {3: REPEAT}); // the descriptor alone says the same scan
+  const again = readAll([...front, renumbered({bytes: repeated}, 7), renumbered(p, 8, 1000n)]);
+  equal(again.decoder.stats.unplaced_shots, 3, 'after a repeated descriptor without its anchor');
+});
+
 // ---- replies
 
 test('the hash of points: pulse numbers of more than 32 bits go on', () => {
@@ -403,6 +424,8 @@ test('where a scan ends, with SCAN_END and without, and what is missing of it', 
   equal(lossesOf(d(1), telemetry(2, 1), d(1)), '', 'at rest');
   equal(lossesOf(d(1), points, event('SCAN_START', {scan: 2}), ['points', {scan: 2}], event('SCAN_END', {scan: 2, fired: 9, lost: 0})),
     'scan 1 null null null 100 null; scan 2 9 null 0 100 null', 'the next scan');
+  equal(lossesOf(start, d(1), points, ['restarted', {}], start, d(1), points, telemetry(5, 1), end),
+    `scan 1 null null null 100 null; ${whole}`, 'another sequence, whose scan has the same number');
   const counted = new Losses(() => {});
   counted.event({...end[1], shots: 0});
   equal(counted.byHead, 7, 'by SCAN_END, of a scan that was not seen');

@@ -24,7 +24,7 @@ void made_begin(struct made *m)
 void made_add(struct made *m, int64_t t_ms, const uint8_t *frame, size_t len)
 {
     assert_true(m->len + len + 64 < sizeof m->bytes);
-    m->len += pcapng_put_packet(m->bytes + m->len, 0, t_ms * MS, frame, len);
+    m->len += pcapng_put_packet(m->bytes + m->len, 0, t_ms * MS, frame, len, 0);
 }
 
 void made_connect(struct made *m, int64_t t_ms)

@@ -127,6 +127,32 @@ static void test_without_times(void **state)
     client_close(&c);
 }
 
+/* Times of two interfaces are compared, whatever seconds each one's times leave out (if_tsoffset, code 14). */
+static void test_time_offsets(void **state)
+{
+    (void)state;
+    struct replay_capture *capture;
+    struct sh_err err = {0};
+    /* length 32, microseconds, 4 s less than its times say; little-endian, as this machine */
+    const uint32_t interface[8] = {1, 32, PCAPNG_ETHERNET, 0, 14 | 8 << 16, (uint32_t)-4, UINT32_MAX, 32};
+    uint8_t frame[ETHERNET_MAX_FRAME];
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 1000, 0, "a\n");
+    memcpy(m.bytes + m.len, interface, sizeof interface);
+    m.len += sizeof interface;
+    m.len += pcapng_put_packet(m.bytes + m.len, 1, 5004000, frame, tcp_put_data(&m.talk, 1, "one\n", 4, frame), 0);
+    const size_t len = m.len;
+    client_open(&c, &m, 0, NULL);
+    assert_string_equal(client_ask(&c, "a\n", 5), "4:one\n|");
+    client_close(&c);
+    m.len = len + pcapng_put_packet(m.bytes + len, 1, 3999999, frame, 60, 0);
+    const char *path = made_write(&m, m.len);
+    assert_int_equal(capture_load(path, NULL, &capture, &err), SH_EFORMAT);
+    assert_non_null(strstr(err.text, "packet 6 has a time before 1970; allowed are"));
+    unlink(path);
+}
+
 /* ---- files */
 
 /* A capture is known by its bytes, also where its first block is long. Section header: type, length, magic, version
@@ -159,7 +185,7 @@ static void test_unknown_link(void **state)
     const uint8_t junk[20] = {0};
     made_begin(&m);
     m.len += pcapng_put_interface(m.bytes + m.len, (enum pcapng_link)220, 0, NULL, NULL);
-    m.len += pcapng_put_packet(m.bytes + m.len, 1, 0, junk, sizeof junk);
+    m.len += pcapng_put_packet(m.bytes + m.len, 1, 0, junk, sizeof junk, 0);
     const char *path = made_write(&m, m.len);
     assert_int_equal(capture_load(path, NULL, &capture, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "link type 220; allowed are Ethernet (1)"));
@@ -344,6 +370,7 @@ int main(void)
         cmocka_unit_test(test_equal_times),
         cmocka_unit_test(test_clock_steps),
         cmocka_unit_test(test_without_times),
+        cmocka_unit_test(test_time_offsets),
         cmocka_unit_test(test_swapped_beginning),
         cmocka_unit_test(test_scans_stop),
         cmocka_unit_test(test_pipelined_turns),

@@ -74,6 +74,20 @@ static char *print_example(void)
     return text;
 }
 
+/* A head has all protocols but capture, which belongs to `run FILE.pcap`. */
+static void an_unknown_protocol_gets_those_of_heads(void **state)
+{
+    (void)state;
+    const struct cfg_key *key = cfg_find(&cfg_config_table, "links[].protocol");
+    assert_int_equal(load_set("links[0].protocol=x"), SH_EINPUT);
+    char *heads = strdup(strstr(err.text, "allowed ") + strlen("allowed ")), *rest = strchr(heads, ';');
+    assert_string_equal(rest, "; with `run FILE.pcap`: capture");
+    *rest = '\0';
+    for (size_t i = 0; key->names[i] != NULL; i++)
+        assert_int_equal(cfg_list_has(heads, key->names[i]), strcmp(key->names[i], "capture") != 0);
+    free(heads);
+}
+
 static void the_example_loads(void **state)
 {
     (void)state;
@@ -228,6 +242,7 @@ int main(void)
         cmocka_unit_test(every_key_is_on_a_page),
         cmocka_unit_test(the_reference_names_every_key),
         cmocka_unit_test(rows_are_sound),
+        cmocka_unit_test(an_unknown_protocol_gets_those_of_heads),
         cmocka_unit_test(the_example_loads),
         cmocka_unit_test(the_example_has_every_key),
         cmocka_unit_test(a_section_has_its_keys),

@@ -67,6 +67,26 @@ static void a_time_server_needs_dates(void **state)
     assert_says("ntp.role: client, but no link sends dates; allowed with a link of protocol: cola");
 }
 
+/* Nothing else asks a time server. The role may be set later, by telegram. */
+static void its_faults_need_somebody_who_asks(void **state)
+{
+    (void)state;
+    static const char *const list[] = {"{kind: ntp_silent}", "{kind: ntp_kiss}", "{kind: ntp_unsync}",
+                                       "{kind: ntp_step, jump_s: 1}"};
+    static const char *const cola[] = {"links=[{type: tcp, port: 0, protocol: cola}]"};
+    for (size_t i = 0; i < sizeof list / sizeof *list; i++) {
+        assert_int_equal(load_with_head("sick-tim781", "", ""), SH_OK);
+        assert_int_equal(read_fault(list[i]), SH_EINPUT);
+        assert_says("faults[0].kind: ntp_");
+        assert_says("needs a scanner that can ask a time server; allowed with a link of protocol: cola, and "
+                    "loop.pace: realtime");
+        assert_int_equal(load_sets(cola, 1), SH_OK);
+        assert_int_equal(read_fault(list[i]), SH_OK);
+        cfg->loop.pace = PACE_FAST;
+        assert_int_equal(read_fault(list[i]), SH_EINPUT);
+    }
+}
+
 /* The list is not cut off. */
 static void an_unknown_kind_is_told_all_kinds(void **state)
 {
@@ -279,6 +299,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_unknown_kind_is_told_all_kinds),
         cmocka_unit_test(a_time_server_needs_dates),
+        cmocka_unit_test(its_faults_need_somebody_who_asks),
         cmocka_unit_test(a_kind_has_its_keys_and_no_others),
         cmocka_unit_test(what_is_not_given_is_as_said),
         cmocka_unit_test(wrong_ones_are_refused_with_what_is_allowed),

@@ -29,8 +29,8 @@ enum { N_FILES = 600, PROCESSES = 2, ROOM = 1 << 18 };
 
 enum { USUAL_EVERY = SANITIZED ? 30 : 1 };
 
-/* Figures of a broken model are small; what is honest needs a tenth of that. */
-/* IFC by Assimp: its other readers, which take a second each, have test_ifc_broken. */
+/* These limits are small for a broken model, and ten times what a sound one needs. The other readers of IFC, which take
+ * a second each, have test_ifc_broken. */
 static const struct scene_import_limits LIMITS = {
     .memory_mib = 128, .time_s = 2, .files = 16, .ifc_reader = IFC_READER_ASSIMP};
 

@@ -42,7 +42,10 @@ static void texts_are_whole(void **state)
     decodes("'M\\X\\FCnchen'", "M\xc3\xbcnchen");
     decodes("'M\\S\\|nchen'", "M\xc3\xbcnchen");
     decodes("'M\xc3\xbcnchen'", "M\xc3\xbcnchen");
-    decodes("'M\xfcnchen'", "M\xc3\xbcnchen"); /* Latin-1 */
+    decodes("'M\xfcnchen'", "M\xc3\xbcnchen");                         /* Latin-1 */
+    decodes("'\xe0\x80\x80'", "\xc3\xa0\xc2\x80\xc2\x80");             /* no character of UTF-8 has these bytes: */
+    decodes("'\xed\xa0\x80'", "\xc3\xad\xc2\xa0\xc2\x80");             /* a surrogate */
+    decodes("'\xf4\x90\x80\x80'", "\xc3\xb4\xc2\x90\xc2\x80\xc2\x80"); /* beyond U+10FFFF */
     decodes("'it''s \\\\ here'", "it's \\ here");
     decodes("''", "");
     decodes("$", "");

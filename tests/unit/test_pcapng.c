@@ -68,7 +68,7 @@ static size_t put_file(uint8_t *to)
     len += pcapng_put_interface(to + len, PCAPNG_USER0, 100, NULL, "second");
     for (uint32_t i = 0; i < 40; i++) {
         memset(data, (int)i, sizeof data);
-        len += pcapng_put_packet(to + len, i % 2, i * INT64_C(1000000007), data, i);
+        len += pcapng_put_packet(to + len, i % 2, i * INT64_C(1000000007), data, i, 0);
     }
     return len;
 }
@@ -171,14 +171,51 @@ static void test_loss(void **state)
     struct pcapng_packet packet;
     struct sh_err err = {0};
     size_t used;
-    const size_t plain = pcapng_put_packet(file, 0, 7, "abcde", 5);
-    const size_t len = pcapng_put_packet_after_loss(with, 0, 7, "abcde", 5, 300);
+    const size_t plain = pcapng_put_packet(file, 0, 7, "abcde", 5, 0);
+    const size_t len = pcapng_put_packet(with, 0, 7, "abcde", 5, 300);
     assert_true(plain == pcapng_packet_len(5) && len == plain + PCAPNG_LOST);
     assert_int_equal(pcapng_read(&reader, with, len, &packet, &used, &err), PCAPNG_PACKET);
     assert_true(used == len && packet.t_ns == 7 && packet.len == 5 && memcmp(packet.data, "abcde", 5) == 0);
     assert_memory_equal(with + 8, file + 8, plain - 12);
     assert_true(rig_uint(with + 36, 4) == (4 | 8 << 16) && rig_uint(with + 40, 8) == 300);
     assert_int_equal(rig_uint(with + 48, 4), 0);
+}
+
+/* The option is code 14 with 8 bytes, seconds that are added to each time (draft-ietf-opsawg-pcapng, if_tsoffset). */
+static void test_time_offset(void **state)
+{
+    (void)state;
+    const uint64_t five = UINT64_C(5000000007);
+    const struct {
+        uint64_t ns;
+        int64_t offset_s, t_ns;
+    } cases[] = {{five, -2, INT64_C(3000000007)},
+                 {five, 1700000000, INT64_C(1700000005000000007)},
+                 {five, -6, INT64_C(-999999993)},
+                 {five, INT64_C(9223372031), INT64_C(9223372036000000007)},
+                 {five, INT64_C(9223372032), INT64_MAX}, /* beyond 292 years */
+                 {five, INT64_MAX, INT64_MAX},
+                 {five, INT64_MIN, INT64_MIN},
+                 /* a clock that counts from 1601: 134,774 days more */
+                 {UINT64_C(13344473600000000007), INT64_C(-134774) * 86400, INT64_C(1700000000000000007)}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        uint8_t file[512], option[12] = {14, 0, 8, 0};
+        struct pcapng_reader reader = {0};
+        struct pcapng_packet packet;
+        struct sh_err err = {0};
+        size_t used, at = pcapng_put_section(file, NULL), end = at + pcapng_put_interface(file + at, 1, 0, NULL, NULL);
+        le_put64(option + 4, (uint64_t)cases[i].offset_s);
+        memmove(file + at + 16 + sizeof option, file + at + 16, end - at - 16);
+        memcpy(file + at + 16, option, sizeof option);
+        end += sizeof option;
+        le_put32(file + at + 4, (uint32_t)(end - at));
+        le_put32(file + end - 4, (uint32_t)(end - at));
+        end += pcapng_put_packet(file + end, 0, (int64_t)cases[i].ns, "x", 1, 0);
+        for (at = 0; pcapng_read(&reader, file + at, end - at, &packet, &used, &err) == PCAPNG_OTHER;)
+            at += used;
+        assert_true(used > 0 && at + used == end);
+        assert_int_equal(packet.t_ns, cases[i].t_ns);
+    }
 }
 
 /* Other programs write microseconds, an unknown block, or a simple packet that is cut by the interface's limit. */
@@ -197,7 +234,7 @@ static void test_of_others(void **state)
     memcpy(file + len + sizeof interface, unknown, sizeof unknown);
     memcpy(file + len + sizeof interface + sizeof unknown, simple, sizeof simple);
     len += sizeof interface + sizeof unknown + sizeof simple;
-    len += pcapng_put_packet(file + len, 0, 3000007, "x", 1);
+    len += pcapng_put_packet(file + len, 0, 3000007, "x", 1, 0);
     assert_int_equal(pcapng_read(&reader, file, len, &packet, &used, &err), PCAPNG_OTHER);
     for (int i = 0; i < 2; i++, at += used)
         assert_int_equal(pcapng_read(&reader, file + at, len - at, &packet, &used, &err), PCAPNG_OTHER);
@@ -218,6 +255,6 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets),   cmocka_unit_test(test_disk_full),
                                        cmocka_unit_test(test_read),      cmocka_unit_test(test_damaged),
                                        cmocka_unit_test(test_of_others), cmocka_unit_test(test_statistics),
-                                       cmocka_unit_test(test_loss)};
+                                       cmocka_unit_test(test_loss),      cmocka_unit_test(test_time_offset)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -33,7 +33,7 @@ uint32_t capture_interface(struct capture *c, enum capture_link link)
 void capture_packet(struct capture *c, uint32_t interface, const void *data, size_t len)
 {
     room_for(c, pcapng_packet_len(len));
-    c->len += pcapng_put_packet(c->bytes + c->len, interface, (int64_t)c->n_packets++ * PACKET_NS, data, len);
+    c->len += pcapng_put_packet(c->bytes + c->len, interface, (int64_t)c->n_packets++ * PACKET_NS, data, len, 0);
 }
 
 static void put_be16(uint8_t *to, uint32_t v)

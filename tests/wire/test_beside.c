@@ -75,12 +75,9 @@ static void scan(struct wire *wire, const struct personality *p, int with, const
     int udp[2];
     char port[2][64];
     for (int i = 0; i < 2; i++) {
-        struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
-        socklen_t len = sizeof at;
-        udp[i] = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-        assert_int_equal(bind(udp[i], (struct sockaddr *)&at, sizeof at), 0);
-        getsockname(udp[i], (struct sockaddr *)&at, &len);
-        snprintf(port[i], sizeof port[i], "links.%d.port=%d", i, p->asks == NULL && with ? ntohs(at.sin_port) : 0);
+        int number;
+        udp[i] = wire_bind(SOCK_DGRAM, &number);
+        snprintf(port[i], sizeof port[i], "links.%d.port=%d", i, p->asks == NULL && with ? number : 0);
     }
     const char *keys[] = {port[0], "noise.range=on", "head.start=off", frames, NULL, NULL, NULL};
     if (p->asks == NULL) keys[4] = port[1], keys[5] = "links.2.port=0";

@@ -16,18 +16,6 @@ static struct sockaddr_in place(int host, int port)
     return at;
 }
 
-/* Returns a socket at 127.0.0.1 and a port of the system's choice, which is free on the addresses after it, too. */
-static int open_at(int type, int *port)
-{
-    struct sockaddr_in at = place(0, 0);
-    socklen_t len = sizeof at;
-    const int fd = socket(AF_INET, type | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    *port = ntohs(at.sin_port);
-    return fd;
-}
-
 /* The room has only walls, so the nearest point is half a side away. */
 static struct head start(struct wire *wire, int i, const char *profile, const char *link)
 {
@@ -127,8 +115,8 @@ static void one_client_reads_four_heads(void **state)
     struct wire *wire = *state;
     struct head head[2 * N];
     char link[200];
-    int udp_port, tcp_port;
-    const int fd = open_at(SOCK_DGRAM, &udp_port), reserve = open_at(SOCK_STREAM, &tcp_port);
+    int udp_port, tcp_port; /* of 127.0.0.1; they are free on the addresses after it, too */
+    const int fd = wire_bind(SOCK_DGRAM, &udp_port), reserve = wire_bind(SOCK_STREAM, &tcp_port);
     for (int i = 0; i < N; i++) {
         snprintf(link, sizeof link, "{type: udp, protocol: velodyne, port: %d, source: 127.0.0.%d, source_port: %d}",
                  udp_port, i + 2, udp_port);

@@ -275,18 +275,6 @@ static void check_packet(const struct shot *shot, const uint8_t *packet)
     }
 }
 
-static int udp_socket(int *port)
-{
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    getsockname(fd, (struct sockaddr *)&at, &len);
-    *port = ntohs(at.sin_port);
-    return fd;
-}
-
 static int read_shots(struct scanhead *sh)
 {
     static struct scanhead_point point[4096];
@@ -309,7 +297,7 @@ static void test_velodyne(void **state)
     struct wire *wire = *state;
     static uint8_t packet[PACKETS][1206 + 1];
     char port[2][64];
-    int number[2], fd = udp_socket(&number[0]), position = udp_socket(&number[1]);
+    int number[2], fd = wire_bind(SOCK_DGRAM, &number[0]), position = wire_bind(SOCK_DGRAM, &number[1]);
     for (int i = 0; i < 2; i++)
         snprintf(port[i], sizeof port[i], "links.%d.port=%d", i, number[i]);
     const char *const ptys[] = {"links.4.path", NULL}, *const sets[] = {port[0], port[1], "links.2.port=0", NULL};

@@ -187,6 +187,24 @@ static void test_end_of_the_path(void **state)
     }
 }
 
+/* It may begin at the end only where the platform waits there. */
+static void test_beginning_at_the_end(void **state)
+{
+    struct wire *wire = *state;
+    room_write(wire);
+    write_ride(wire);
+    char config[352];
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &RIDE));
+    const char *const stop[] = {"check", config, "--set", "platform.start_s=1.5", NULL},
+                      *const hold[] = {
+                          "check", config, "--set", "platform.start_s=1.5", "--set", "platform.at_end=hold", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, stop, "out", "err", -1)), 2);
+    char *text = wire_read(wire_path(wire, "err"), NULL);
+    assert_non_null(strstr(text, "platform.start_s: 1.5 s is not before the trajectory's end; allowed 0 to below 1.5"));
+    free(text);
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, hold, "out", "err", -1)), 0);
+}
+
 /* The house is scanned from a car, off line, and compared with its mesh by the distance code of `scanhead report`. */
 static void test_house(void **state)
 {
@@ -405,6 +423,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_undistorted, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_of_the_path, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_beginning_at_the_end, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_house, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_long_path, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_poses_over_udp, wire_setup, wire_teardown),

@@ -16,13 +16,9 @@ static void read_ports(const struct raw_recorder *recorder, int port[2])
 
 static uint16_t sender_open(int *fd)
 {
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    *fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(*fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(getsockname(*fd, (struct sockaddr *)&at, &len), 0);
-    return ntohs(at.sin_port);
+    int port;
+    *fd = wire_bind(SOCK_DGRAM, &port);
+    return (uint16_t)port;
 }
 
 static void send_to(int fd, int port, const uint8_t *data, size_t len)
@@ -309,16 +305,11 @@ static void test_usage(void **state)
 {
     struct wire *wire = *state;
     char file[352], taken[64], relay[64];
-    struct sockaddr_in at = {.sin_family = AF_INET};
-    socklen_t len = sizeof at;
-    int fd;
+    int fd, port;
     snprintf(file, sizeof file, "%s", wire_path(wire, "x.pcapng"));
     snprintf(taken, sizeof taken, "udp:127.0.0.1:%d", sender_open(&fd));
-    const int tcp = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    assert_int_equal(bind(tcp, (struct sockaddr *)&at, sizeof at), 0); /* bound, not listening: nobody is there */
-    getsockname(tcp, (struct sockaddr *)&at, &len);
-    snprintf(relay, sizeof relay, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
+    const int tcp = wire_bind(SOCK_STREAM, &port); /* nobody listens there */
+    snprintf(relay, sizeof relay, "tcp:127.0.0.1:%d", port);
     usage_complaints = 0;
     const struct {
         const char *const *args;

@@ -36,6 +36,14 @@ static const struct room_config SLOW = {.prr_hz = 30000,
                                         .more = "loop: {late_ms: 900, queue_ms: 2000}\n"
                                                 "time: {epoch: \"2026-01-01T00:00:00Z\", ptp: {follower: on}}\n"};
 
+/* A link of protocol cola makes a head one that may ask a time server. */
+static const struct room_config SCANNER = {
+    .profile = "sick-lms111",
+    .prr_hz = 36000,
+    .lines_hz = 50,
+    .links = "links: [{type: tcp, port: 0}, {type: pty, path: port}, {type: tcp, port: 0, protocol: cola}]\n",
+    .more = "loop: {late_ms: 900, queue_ms: 2000}\n"};
+
 static const char *path_of(const struct wire *wire, const char *name, const char *ending)
 {
     char file[64];
@@ -47,7 +55,8 @@ static const char *path_of(const struct wire *wire, const char *name, const char
 static pid_t start(struct wire *wire, const char *name, const char *seconds, const char *link)
 {
     char config[352], file[352], json[352], truth[352], out[64], err[64];
-    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(config, sizeof config, "%s",
+             wire_path(wire, strcmp(name, "time-server") == 0 ? "scanner.yaml" : "config.yaml"));
     snprintf(json, sizeof json, "%s", path_of(wire, name, "json"));
     snprintf(truth, sizeof truth, "%s", path_of(wire, name, "truth"));
     snprintf(file, sizeof file, strchr(name, '/') != NULL ? "%s" : "config/faults/%s.yaml", name);
@@ -130,7 +139,10 @@ static void test_each_scenario_over_tcp(void **state)
 {
     struct wire *wire = *state;
     pid_t pid[N_SCENARIOS];
+    char scanner[352];
     room_write(wire);
+    snprintf(scanner, sizeof scanner, "%s", wire_path(wire, "scanner.yaml"));
+    assert_int_equal(rename(room_config_write(wire, &SCANNER), scanner), 0);
     room_config_write(wire, &SLOW);
     for (int i = 0; i < N_SCENARIOS; i++)
         pid[i] = start(wire, SCENARIOS[i].name, "2", "1");
@@ -183,14 +195,9 @@ static void test_datagrams(void **state)
 {
     struct wire *wire = *state;
     char config[352], json[352], links[128];
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    socklen_t len = sizeof at;
-    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0); /* a port that is free */
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    close(fd);
-    snprintf(links, sizeof links, "links: [{type: udp, protocol: velodyne, address: 127.0.0.1, port: %d}]\n",
-             ntohs(at.sin_port));
+    int port;
+    close(wire_bind(SOCK_DGRAM, &port)); /* a port that is free */
+    snprintf(links, sizeof links, "links: [{type: udp, protocol: velodyne, address: 127.0.0.1, port: %d}]\n", port);
     room_write(wire);
     snprintf(config, sizeof config, "%s", wire_path(wire, "beams.yaml"));
     FILE *f = fopen(config, "w");

@@ -132,14 +132,8 @@ static void empty(struct client *c, int64_t before_ns)
 
 static int udp_socket(int *port)
 {
-    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), room = 1 << 22;
-    struct sockaddr_in address = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    socklen_t len = sizeof address;
-    assert_true(fd >= 0);
+    const int fd = wire_bind(SOCK_DGRAM, port), room = 1 << 22;
     setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &room, sizeof room);
-    assert_int_equal(bind(fd, (struct sockaddr *)&address, sizeof address), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&address, &len), 0);
-    *port = ntohs(address.sin_port);
     return fd;
 }
 

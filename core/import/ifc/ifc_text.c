@@ -54,17 +54,6 @@ static const char *wide(const char *p, const char *end, int digits, char **out)
     return end - p >= 4 && memcmp(p, "\\X0\\", 4) == 0 ? p + 4 : p;
 }
 
-/* Bytes of one character in UTF-8; 0: it is not UTF-8. Some programs write UTF-8, others Latin-1. */
-static int utf8_length(const char *p, const char *end)
-{
-    const unsigned char c = (unsigned char)*p;
-    const int n = c < 0x80 ? 1 : c >= 0xc2 && c < 0xe0 ? 2 : c >= 0xe0 && c < 0xf0 ? 3 : c >= 0xf0 && c < 0xf5 ? 4 : 0;
-    if (n == 0 || end - p < n) return 0;
-    for (int i = 1; i < n; i++)
-        if (((unsigned char)p[i] & 0xc0) != 0x80) return 0;
-    return n;
-}
-
 /* Reads an escape at p, which is a backslash. Returns the place after it; p: it is no escape. */
 static const char *escape(const char *p, const char *end, char **out)
 {
@@ -95,7 +84,7 @@ char *ifc_text(struct text_span quoted)
     while (text != NULL && p < end) {
         const char *next = *p == '\\' ? escape(p, end, &out) : p;
         if (next == p) {
-            const int n = utf8_length(p, end);
+            const int n = text_utf8_len(p, (size_t)(end - p)); /* some programs write Latin-1 */
             if (n == 0) {
                 out = ifc_text_put(out, (unsigned char)*p);
             } else {

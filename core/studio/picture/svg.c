@@ -3,8 +3,10 @@
 #include <math.h>
 #include <nettle/base64.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/studio/picture/inside.h"
+#include "core/text.h"
 
 struct svg {
     FILE *out; /* into text */
@@ -33,23 +35,18 @@ static void put_colour(FILE *out, const char *name, const uint8_t rgb[3])
 }
 
 /* Length of a whole UTF-8 character that XML allows; 0: it is none. */
-static size_t character(const unsigned char *p)
+static int character(const char *p)
 {
-    if (*p < 0x80) return *p >= 0x20 && *p != 0x7f ? 1 : 0;
-    const size_t n = *p >= 0xc2 && *p < 0xe0 ? 2 : *p >= 0xe0 && *p < 0xf0 ? 3 : *p >= 0xf0 && *p < 0xf5 ? 4 : 0;
-    for (size_t i = 1; i < n; i++)
-        if ((p[i] & 0xc0) != 0x80) return 0;
-    if ((*p == 0xe0 && p[1] < 0xa0) || (*p == 0xed && p[1] >= 0xa0) || (*p == 0xf0 && p[1] < 0x90) ||
-        (*p == 0xf4 && p[1] >= 0x90) || (*p == 0xef && p[1] == 0xbf && p[2] >= 0xbe))
-        return 0;
-    return n;
+    const int is_control = (unsigned char)*p < 0x20 || *p == 0x7f;
+    const int is_none = strncmp(p, "\xef\xbf\xbe", 3) == 0 || strncmp(p, "\xef\xbf\xbf", 3) == 0; /* U+FFFE, U+FFFF */
+    return is_control || is_none ? 0 : text_utf8_len(p, 4);
 }
 
 /* Bytes that are no character of XML become U+FFFD, the sign for that. */
 void picture_put_escaped(FILE *out, const char *text)
 {
-    for (const unsigned char *p = (const unsigned char *)text; *p != '\0';) {
-        const size_t n = character(p);
+    for (const char *p = text; *p != '\0';) {
+        const int n = character(p);
         if (*p == '&')
             fputs("&amp;", out);
         else if (*p == '<')
@@ -59,7 +56,7 @@ void picture_put_escaped(FILE *out, const char *text)
         else if (*p == '"')
             fputs("&quot;", out);
         else if (n > 0)
-            fwrite(p, 1, n, out);
+            fwrite(p, 1, (size_t)n, out);
         else
             fputs("\xef\xbf\xbd", out);
         p += n > 0 ? n : 1;

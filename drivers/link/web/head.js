@@ -29,6 +29,7 @@ export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ?
  *   'page' (dropped here)
  * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; null for what was lost on the way
  * - `waves` {pulse, scan, windows}: what askWaves asked for
+ * - `restarted`: the sequence of frames began anew, so all that the head said before is void
  * - `points`, `descriptor`, `anchor`, `emitter`, `names`, `line-end`, `telemetry`, `event`, `poses` as the Decoder has
  *   them; `refused`, the words for a frame that was refused
  */
@@ -186,6 +187,7 @@ export class Head extends EventTarget {
       case 'descriptor': this.#described(value); return;
       case 'anchor': this.anchor = value; break;
       case 'emitter': this.emitter = value; break;
+      case 'restarted': this.#restarted(value); break;
       case 'names': value.forEach(({label, ...words}) => this.names.set(label, words)); break;
       case 'telemetry': this.#measured(value); break;
       case 'event': this.#happened(value); break;
@@ -273,6 +275,12 @@ export class Head extends EventTarget {
     if (!d.repeat) this.emitter = null;
     this.#losses.descriptor(d);
     this.#say('descriptor', d);
+  }
+
+  #restarted(value) {
+    this.descriptor = this.anchor = this.emitter = this.telemetry = null;
+    this.names.clear();
+    this.#losses.restarted(value);
   }
 
   #measured(t) {

@@ -35,6 +35,13 @@ export class Losses {
     this.#begin(d.scan, d.shots);
   }
 
+  /** Another sequence of frames begins: its scans may have the numbers of earlier ones. */
+  restarted({shots}) {
+    this.#begin(null, shots);
+    this.#counts = null;
+    this.#before = {scan: null, shots: 0};
+  }
+
   points(batch) {
     this.#isRunning ||= batch.scan === this.#scan;
   }

@@ -59,7 +59,7 @@ export class Past {
     this.#seen = null;
     if (this.#first === null) this.#last = null;
     this.decoder = new Decoder({points: (batch) => this.#give(Object.assign(batch, {past: true}))});
-    this.parser = new Parser({frame: (frame) => this.#take(frame)});
+    this.parser = new Parser({frame: (frame) => this.#take(frame), notice: (notice) => this.decoder.notice(notice)});
   }
 
   /** A connection has begun; url is that of its /past. */

@@ -63,8 +63,8 @@ export class Wire {
     this.decoder = new Decoder({points: (batch) => this.#addPoints(batch), descriptor: handCounted('descriptor'),
       anchor: hand('anchor'), emitter: hand('emitter'), names: hand('names'), lineEnd: hand('line-end'),
       telemetry: handCounted('telemetry'), event: handCounted('event'), poses: hand('poses'),
-      refused: hand('refused')});
-    this.parser = new Parser({text: hand('text'), frame: (frame) => {
+      refused: hand('refused'), restarted: handCounted('restarted')});
+    this.parser = new Parser({text: hand('text'), notice: (notice) => this.decoder.notice(notice), frame: (frame) => {
       this.#keeper.take(frame);
       if (this.#past.takes(frame, this.decoder.canPlace)) this.decoder.take(frame);
     }});
