@@ -225,7 +225,8 @@ static void test_links_as_run(void **state)
     for (int i = 0; i < 2; i++) {
         char links[120] = "links: [{type: usb, port: 0, speed: full}]\n", *said[2], *from[2];
         if (i == 0)
-            snprintf(links, sizeof links, "links: [{type: tcp, port: %d}, {type: tcp, port: %d}]\n", port, port);
+            snprintf(links, sizeof links, "links: [{type: tcp, port: %d}, {type: tcp, address: 127.1, port: %d}]\n",
+                     port, port);
         const struct room_config c = {
             .prr_hz = 500000, .lines_hz = 50, .pan_deg_s = 360, .pan_stop_deg = 36, .links = links};
         room_config_write(wire, &c);
