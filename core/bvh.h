@@ -88,6 +88,20 @@ struct bvh_rays {
     float *steep;       /* 1 / cos^2 of the incidence, of rays from one point; NULL: not asked for */
 };
 
+/* The chunk of rays that begins with ray `at`: up to BVH_CHUNK of them. */
+static inline struct bvh_rays bvh_rays_chunk(const struct bvh_rays *rays, uint32_t at)
+{
+    struct bvh_rays part = *rays;
+    part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
+    part.dir = VEC3_IN(rays->dir, at);
+    if (rays->from.own.x != NULL) part.from.own = VEC3_IN(rays->from.own, at);
+    part.range_m = rays->range_m + at;
+    part.triangle = rays->triangle + at;
+    part.label = rays->label != NULL ? rays->label + at : NULL;
+    part.steep = rays->steep != NULL ? rays->steep + at : NULL;
+    return part;
+}
+
 struct bvh_counters {
     uint64_t leaves;  /* that packets were tested against, each for all its rays */
     uint64_t decided; /* pairs of ray and triangle so near an edge that they were examined singly */

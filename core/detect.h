@@ -30,7 +30,8 @@
  *
  *     sigma^2 = floor^2 + (X^2 - floor^2) (A_Y / A)^2,  and a part per distance added to sigma
  *
- * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on.
+ * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on. With k below 8 noise
+ * alone may be detected, where A is nearly 0: A counts as DETECT_LEAST_AMPLITUDE or more here, so that ranges stay finite.
  *
  * Random numbers are keyed by (seed, scan, pulse, echo, purpose): nothing depends on what else was detected.
  * Entries without echo stay so. Pure; any thread; allocates nothing. */
@@ -43,6 +44,8 @@
 #include "core/surface.h"
 
 enum { DETECT_MAX_REACHES = 8 };
+/* With k of 8 or more a lower A isn't detected: the largest random number of all is 6.8 sigmas. */
+#define DETECT_LEAST_AMPLITUDE 0.1
 
 /* A data sheet's range for a reflectance. */
 struct detect_reach {

@@ -56,14 +56,16 @@ static int fail_hard_link(const char *path, const struct stat *st, struct sh_err
                    path, (unsigned long)st->st_nlink);
 }
 
-/* Names in /dev itself and in /proc are the system's, which nobody else can place. */
-static int is_systems(const char *path)
+/* The number of the open descriptor that a name of the system stands for; -1: it is no such name. */
+static int number_of(const char *path)
 {
-    char copy[PATH_MAX], folder[PATH_MAX];
-    if (strlen(path) >= sizeof copy) return 0;
-    strcpy(copy, path);
-    if (realpath(dirname(copy), folder) == NULL) return 0;
-    return strcmp(folder, "/dev") == 0 || strncmp(folder, "/proc/", 6) == 0;
+    int n = -1;
+    char rest;
+    if (strcmp(path, "/dev/stdout") == 0) return STDOUT_FILENO;
+    if (strcmp(path, "/dev/stderr") == 0) return STDERR_FILENO;
+    const int found =
+        sscanf(path, "/dev/fd/%d%c", &n, &rest) == 1 || sscanf(path, "/proc/self/fd/%d%c", &n, &rest) == 1;
+    return found ? n : -1;
 }
 
 static const char *kind_of(mode_t mode)
@@ -119,10 +121,26 @@ static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
     return sh_fail(err, code, "%s: is being written by process %ld (%s); choose another file name", path, pid, name);
 }
 
-/* Locks the file as long as fd is open. Does nothing on a file system without locks. */
-static int lock(const char *path, int fd, int code, struct sh_err *err)
+/* Locks the file as long as fd is open. Returns 0 where another process has the lock. On a file system without locks it
+ * does nothing. */
+static int has_locked(int fd)
 {
-    return flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, code, err) : SH_OK;
+    return flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+}
+
+/* Does the name still belong to what was opened? Another writer may have renamed it before we had the lock. */
+static int is_named(const char *name, int fd)
+{
+    struct stat open_st, named;
+    return fstat(fd, &open_st) == 0 && lstat(name, &named) == 0 && open_st.st_dev == named.st_dev &&
+           open_st.st_ino == named.st_ino;
+}
+
+/* Locks a file that is written in place. What is written to a file without a name is lost. */
+static int lock_named(const char *path, int fd, int code, struct sh_err *err)
+{
+    if (!has_locked(fd)) return fail_locked(path, fd, code, err);
+    return is_named(path, fd) ? SH_OK : sh_fail(err, code, "%s: another process has just written it anew", path);
 }
 
 /* A file that somebody writes in place must not be replaced: its writer would go on in a file without a
@@ -139,27 +157,9 @@ static int check_unlocked(const char *path, struct sh_err *err)
 
 /* ---- files in place */
 
-int newfile_open(const char *path, int *out, struct sh_err *err)
+/* Hands an open file out, or closes it after an error. */
+static int hand_out(int rc, int fd, int *out)
 {
-    const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* a FIFO can't hold us in open */
-    struct stat st;
-    int fd = open(path, flags | O_NOFOLLOW, 0666);
-    if (fd < 0 && errno == ELOOP) {
-        if (!is_systems(path)) return fail_link(path, err);
-        fd = open(path, flags, 0666);
-    }
-    if (fd < 0 && errno == ENXIO)
-        return sh_fail(
-            err, SH_EINPUT,
-            "%s: is a FIFO without a reader, or a socket; allowed are a regular file, a device, and a FIFO with a "
-            "reader",
-            path);
-    if (fd < 0) return newfile_fail(path, "be opened for writing", err);
-    int rc = SH_OK;
-    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, 0) != 0) rc = newfile_fail(path, "be opened for writing", err);
-    if (rc == SH_OK && S_ISREG(st.st_mode) && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
-    if (rc == SH_OK && S_ISREG(st.st_mode)) rc = lock(path, fd, SH_EINPUT, err);
-    if (rc == SH_OK && S_ISREG(st.st_mode) && ftruncate(fd, 0) != 0) rc = newfile_fail(path, "be emptied", err);
     if (rc != SH_OK)
         close(fd);
     else
@@ -167,12 +167,37 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
     return rc;
 }
 
-/* Does the name still belong to what was opened? Another writer may have renamed it before we had the lock. */
-static int is_named(const char *name, int fd)
+/* Locks and empties a regular file. */
+static int empty_it(const char *path, int fd, struct sh_err *err)
 {
-    struct stat open_st, named;
-    return fstat(fd, &open_st) == 0 && lstat(name, &named) == 0 && open_st.st_dev == named.st_dev &&
-           open_st.st_ino == named.st_ino;
+    struct stat st;
+    if (fstat(fd, &st) != 0) return newfile_fail(path, "be opened for writing", err);
+    if (!S_ISREG(st.st_mode)) return SH_OK;
+    if (st.st_nlink > 1) return fail_hard_link(path, &st, err);
+    const int rc = lock_named(path, fd, SH_EINPUT, err);
+    return rc == SH_OK && ftruncate(fd, 0) != 0 ? newfile_fail(path, "be emptied", err) : rc;
+}
+
+int newfile_open(const char *path, int *out, struct sh_err *err)
+{
+    const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* a FIFO can't hold us in open */
+    int fd = open(path, flags | O_NOFOLLOW, 0666), is_shared = 0;
+    if (fd < 0 && errno == ELOOP) {
+        struct stat st;
+        const int n = number_of(path);
+        if (n < 0) return fail_link(path, err);
+        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode); /* a shell goes on where we end */
+        fd = is_shared ? fcntl(n, F_DUPFD_CLOEXEC, 0) : open(path, flags, 0666);
+    }
+    if (fd < 0 && errno == ENXIO)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: is a FIFO without a reader, or a socket; allowed are a regular file, a device, and a FIFO "
+                       "with a reader",
+                       path);
+    if (fd < 0) return newfile_fail(path, "be opened for writing", err);
+    if (is_shared) return hand_out(SH_OK, fd, out);
+    if (fcntl(fd, F_SETFL, 0) != 0) return hand_out(newfile_fail(path, "be opened for writing", err), fd, out);
+    return hand_out(empty_it(path, fd, err), fd, out);
 }
 
 int newfile_append(const char *path, int *out, struct sh_err *err)
@@ -184,14 +209,8 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
     if (fd < 0) return newfile_fail(path, "be opened for writing", err);
     if (fstat(fd, &st) != 0) rc = newfile_fail(path, "be opened for writing", err);
     if (rc == SH_OK && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
-    if (rc == SH_OK) rc = lock(path, fd, SH_ESTATE, err);
-    if (rc == SH_OK && !is_named(path, fd))
-        rc = sh_fail(err, SH_ESTATE, "%s: another process has just written it anew", path);
-    if (rc != SH_OK)
-        close(fd);
-    else
-        *out = fd;
-    return rc;
+    if (rc == SH_OK) rc = lock_named(path, fd, SH_ESTATE, err);
+    return hand_out(rc, fd, out);
 }
 
 /* ---- files that appear whole */
@@ -229,22 +248,16 @@ static int open_part(const char *part, int *fd, struct sh_err *err)
 /* newfile_part, for a path that may be replaced. */
 static int lock_part(const char *part, int *out, struct sh_err *err)
 {
-    int rc = SH_OK, fd;
-    for (int i = 0; rc == SH_OK && i < TRIES; i++) {
-        rc = open_part(part, &fd, err);
-        if (rc == 0) continue;
-        if (rc < 0) break;
-        rc = lock(part, fd, SH_EINPUT, err);
-        if (rc == SH_OK && is_named(part, fd)) {
-            if (ftruncate(fd, 0) != 0) rc = newfile_fail(part, "create", err);
-            if (rc == SH_OK) {
-                *out = fd;
-                return SH_OK;
-            }
-        }
+    for (int fd, i = 0; i < TRIES; i++) {
+        const int opened = open_part(part, &fd, err);
+        if (opened < 0) return opened;
+        if (opened == 0) continue;
+        if (!has_locked(fd)) return hand_out(fail_locked(part, fd, SH_EINPUT, err), fd, out);
+        if (is_named(part, fd))
+            return hand_out(ftruncate(fd, 0) == 0 ? SH_OK : newfile_fail(part, "create", err), fd, out);
         close(fd);
     }
-    return rc != SH_OK ? rc : sh_fail(err, SH_EIO, "%s: appears and disappears; another program writes it", part);
+    return sh_fail(err, SH_EIO, "%s: appears and disappears; another program writes it", part);
 }
 
 int newfile_part(const char *path, const char *part, int *out, struct sh_err *err)
@@ -261,15 +274,11 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
     const int fd = open(part, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     if (fd < 0) return newfile_fail(part, "be opened for reading and writing", err);
     rc = check_left(part, fd, err);
-    if (rc == SH_OK && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+    if (rc == SH_OK && !has_locked(fd))
         rc = sh_fail(err, SH_ESTATE, "%s: is still being written by another process", part);
     if (rc == SH_OK && !is_named(part, fd))
         rc = sh_fail(err, SH_ESTATE, "%s: another process has just completed or removed it", part);
-    if (rc != SH_OK)
-        close(fd);
-    else
-        *out = fd;
-    return rc;
+    return hand_out(rc, fd, out);
 }
 
 int newfile_whole(const char *path, int *out, struct sh_err *err)
@@ -278,10 +287,7 @@ int newfile_whole(const char *path, int *out, struct sh_err *err)
     int rc = check_target(path, err);
     if (rc != SH_OK) return rc;
     int fd = open(path, O_RDWR | flags);
-    if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && flock(fd, LOCK_EX | LOCK_NB) == 0) {
-        *out = fd;
-        return SH_OK;
-    }
+    if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && has_locked(fd)) return hand_out(SH_OK, fd, out);
     if (fd >= 0) close(fd);
     *out = open(path, O_RDONLY | flags);
     return *out >= 0 ? SH_OK : newfile_fail(path, "be opened", err);
@@ -365,7 +371,8 @@ static int rename_free(const char *path, const char *part)
 
 int newfile_settle_free(const char *path, const char *part, int fd, struct sh_err *err)
 {
-    if (fsync(fd) != 0) return newfile_fail(part, "be synced", err);
+    const int rc = newfile_sync(part, fd, err);
+    if (rc != SH_OK) return rc;
     if (rename_free(path, part) == 0) return close_renamed(path, fd);
     return errno == EEXIST ? sh_fail(err, SH_ESTATE, "%s: exists, and is not replaced by %s", path, part)
                            : fail_rename(path, part, err);
@@ -388,8 +395,12 @@ static int write_part(const char *path, int fd, newfile_put *put, const void *so
 {
     struct sh_err why = {0};
     FILE *file = fdopen(dup(fd), "wb");
-    int rc = file != NULL ? put(source, file, &why) : sh_fail(&why, SH_EIO, "%s", strerror(errno));
-    if (file != NULL && fclose(file) != 0 && rc == SH_OK) rc = sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    int rc = file != NULL ? SH_OK : sh_fail(&why, SH_EIO, "%s", strerror(errno));
+    errno = 0;
+    if (rc == SH_OK) rc = put(source, file, &why);
+    const int has_failed = file != NULL && ferror(file); /* the last write may succeed where an earlier one failed */
+    if (file != NULL && (fclose(file) != 0 || has_failed) && rc == SH_OK)
+        rc = sh_fail(&why, SH_EIO, "%s", strerror(errno != 0 ? errno : EIO));
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: cannot be written: %.300s", path, why.text);
 }
 

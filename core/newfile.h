@@ -17,8 +17,9 @@
 #include "core/err.h"
 
 /* Opens a file that is written in place: it is made, or emptied. It is locked as long as *fd is open: a second
- * writer is refused before it empties the file. Devices are taken as they are, and pipes that have a reader. *fd is
- * for writing, and blocks. */
+ * writer is refused before it empties the file. Devices are taken as they are, and pipes that have a reader. A file
+ * behind /dev/stdout or /dev/fd/N is not emptied: *fd then is that descriptor once more, since others write there, too.
+ * *fd is for writing, and blocks. */
 int newfile_open(const char *path, int *fd, struct sh_err *err);
 
 /* Opens a file that grows line by line, for reading and appending: it is made, or stays as it is. It is locked as long
@@ -30,7 +31,8 @@ int newfile_append(const char *path, int *fd, struct sh_err *err);
  * has its name, so that a second writer of the same file is refused. A writer of a file that is being written in
  * place is refused, too. A `part` that a killed writer has left is taken over. *fd is for reading and writing. */
 int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
-/* Such a file, written by put in one go, as PATH.part. Its errors follow "PATH: cannot be written: ". */
+/* Such a file, written by put in one go, as PATH.part. Its errors follow "PATH: cannot be written: ". put need not check
+ * its writes to the file: one that fails is an error here. */
 typedef int newfile_put(const void *source, FILE *file, struct sh_err *why);
 int newfile_write(const char *path, newfile_put *put, const void *source, struct sh_err *err);
 /* The same for a file that newfile_append has opened: it stays locked, and *fd becomes that of the new file.

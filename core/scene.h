@@ -33,6 +33,7 @@ enum {
     SCENE_GUID_LEN = 24,        /* of its GlobalId, likewise */
     SCENE_MAX_SURFACES = 65534, /* labels are 16 bits on the wire; 0xffff means "none" */
 };
+#define SCENE_MAX_COORDINATE_M 1e9
 
 /* Bodies of IFC are read by two readers, by Assimp where they are not installed, or by one alone. */
 enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
@@ -252,14 +253,6 @@ static inline void scene_copy_turn(const struct scene_copy *c, const double v[3]
     out[2] = v[2];
 }
 
-static inline void scene_copy_turn_back(const struct scene_copy *c, const double v[3], double out[3])
-{
-    const double x = v[0], y = v[1];
-    out[0] = c->cosine * x - c->sine * y;
-    out[1] = c->cosine * y + c->sine * x;
-    out[2] = v[2];
-}
-
 /* Likewise for a point. */
 static inline void scene_copy_put(const struct scene_copy *c, const double v[3], double out[3])
 {
@@ -270,10 +263,10 @@ static inline void scene_copy_put(const struct scene_copy *c, const double v[3],
 
 static inline void scene_copy_put_back(const struct scene_copy *c, const double p[3], double out[3])
 {
-    const double v[3] = {p[0] - c->shift_m[0], p[1] - c->shift_m[1], p[2] - c->shift_m[2]};
-    scene_copy_turn_back(c, v, out);
-    for (int k = 0; k < 3; k++)
-        out[k] /= c->scale;
+    const double x = p[0] - c->shift_m[0], y = p[1] - c->shift_m[1];
+    out[0] = (c->cosine * x - c->sine * y) / c->scale;
+    out[1] = (c->cosine * y + c->sine * x) / c->scale;
+    out[2] = (p[2] - c->shift_m[2]) / c->scale;
 }
 
 /* Texture coordinates at point p of a triangle's plane; scene->uv must be there. corner and p are in the

@@ -168,10 +168,10 @@ bool text_is_word(struct text_span span, const char *word)
     return span.n == strlen(word) && strncasecmp(span.p, word, span.n) == 0;
 }
 
-bool text_is_one_of(const char *text, const char *const *list)
+bool text_is_one_of(struct text_span span, const char *const *list)
 {
     for (; *list != NULL; list++)
-        if (strcmp(text, *list) == 0) return true;
+        if (text_is(span, *list)) return true;
     return false;
 }
 
@@ -218,6 +218,7 @@ static const char *scan_decimal(const char *p, struct decimal *d)
         if (fraction && d->exponent > -1000) d->exponent--;
     }
     if (n_digits == 0) return NULL;
+    d->simple &= d->exponent > -1000; /* there may be more decimals than were counted */
     if (*p != 'e' && *p != 'E') return p;
     p++;
     bool down = *p == '-';

@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "core/err.h"
 
@@ -17,13 +18,18 @@ struct text_span {
     size_t n;
 };
 
+static inline struct text_span text_span_of(const char *text)
+{
+    return (struct text_span){text, strlen(text)};
+}
+
 /* The same text? */
 bool text_is(struct text_span span, const char *text);
 /* The same word, whatever its case? */
 bool text_is_word(struct text_span span, const char *word);
 
 /* Whether the list has the text. NULL ends the list. */
-bool text_is_one_of(const char *text, const char *const *list);
+bool text_is_one_of(struct text_span span, const char *const *list);
 
 struct text {
     const char *path; /* the caller's */

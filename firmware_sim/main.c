@@ -36,22 +36,15 @@ static int is_elsewhere(const char *word)
 
 static int fail_elsewhere(const char *word)
 {
-    fprintf(stderr, "%s: %s: not in scanheadd; use scanhead\n", app_program, word);
+    app_say("%s: not in scanheadd; use scanhead", word);
     return APP_USAGE;
 }
 
 static int fail_unknown(const char *word)
 {
-    enum { MOST = 32 };
-    const char *known[MOST], *meant;
-    size_t n = 0;
-    while (COMMANDS[n] != NULL && n < MOST) {
-        known[n] = COMMANDS[n]->name;
-        n++;
-    }
-    meant = app_nearest(word, known, n);
-    fprintf(stderr, "%s: unknown command %s%s%s%s; see %s --help\n", app_program, word,
-            meant != NULL ? ", did you mean " : "", meant != NULL ? meant : "", meant != NULL ? "?" : "", app_program);
+    const char *meant = help_nearest(COMMANDS, word);
+    app_say("unknown command %s%s%s%s; see %s --help", word, meant != NULL ? ", did you mean " : "",
+            meant != NULL ? meant : "", meant != NULL ? "?" : "", app_program);
     return APP_USAGE;
 }
 
@@ -69,7 +62,7 @@ static int main_run(int argc, char **argv)
     if (is_elsewhere(word)) return fail_elsewhere(word);
     if (strcmp(argv[1], "help") == 0) return help_run(COMMANDS, argc - 1, argv + 1);
     if (strcmp(argv[1], "--version") == 0) {
-        printf("scanhead %s\n", scanhead_version());
+        printf("%s %s\n", app_program, scanhead_version());
         return APP_OK;
     }
     for (const struct app_command *const *c = COMMANDS; *c != NULL; c++)
@@ -83,7 +76,7 @@ static int check_stack(void)
     enum { NEEDED_KIB = 1024 };
     struct rlimit limit;
     if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= NEEDED_KIB * 1024) return APP_OK;
-    fprintf(stderr, "%s: the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d\n", app_program,
+    app_say("the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d",
             (unsigned long long)limit.rlim_cur / 1024, NEEDED_KIB, NEEDED_KIB);
     return APP_USAGE;
 }
@@ -114,10 +107,12 @@ int main(int argc, char **argv)
     if (status == APP_OK) status = main_run(argc, argv);
     errno = 0;
     const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
-    if (!failed || status != APP_OK) return status;
-    /* A write that failed earlier has emptied the buffer, so that the last one had no reason to fail. */
-    if (errno == 0 && write(STDOUT_FILENO, "\n", 1) == 1) errno = 0;
-    fprintf(stderr, "%s: standard output: writing failed%s%s\n", app_program, errno != 0 ? ": " : "",
-            errno != 0 ? strerror(errno) : "");
-    return APP_FAILED;
+    if (failed && status == APP_OK) {
+        /* A write that failed earlier has emptied the buffer, so that the last one had no reason to fail. */
+        if (errno == 0 && write(STDOUT_FILENO, "\n", 1) == 1) errno = 0;
+        app_say("standard output: writing failed%s%s", errno != 0 ? ": " : "", errno != 0 ? strerror(errno) : "");
+        status = APP_FAILED;
+    }
+    app_end_messages();
+    return status;
 }

@@ -51,6 +51,7 @@ name() {
     [ "$pages" = "scanheadd.1 scanheadd-run.1 scanheadd-plan.1 scanheadd-check.1 scanheadd-list.1 scanheadd-help.1 scanhead.yaml.5 " ] || { echo "$pages"; return 1; }
     "$head" help --man scanheadd-run.1 | grep -q '^\\fBscanheadd run\\fR' || return
     "$head" run --help | grep -q '^usage: scanheadd run ' || return
+    [ "$("$head" --version)" = "$("$built/scanhead" --version | sed 's/^scanhead /scanheadd /')" ] || return
     said=$("$head" check "$work/none.yaml" 2>&1)
     [[ $said == "scanheadd: "* ]] || return
     "$head" help --completion bash >"$work/completion" || return

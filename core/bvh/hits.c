@@ -206,14 +206,7 @@ static void cast_chunk(struct bvh_work *w, const struct bvh *bvh, const struct b
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays)
 {
     for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
-        struct bvh_rays part = *rays;
-        part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
-        part.dir = VEC3_IN(rays->dir, at);
-        if (rays->from.own.x != NULL) part.from.own = VEC3_IN(rays->from.own, at);
-        part.range_m = rays->range_m + at;
-        part.triangle = rays->triangle + at;
-        part.label = rays->label != NULL ? rays->label + at : NULL;
-        part.steep = rays->steep != NULL ? rays->steep + at : NULL;
+        const struct bvh_rays part = bvh_rays_chunk(rays, at);
         cast_chunk(work, bvh, &part);
     }
 }

@@ -90,14 +90,10 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     if (geo) k->linear = !moves && reading_rotation(s, to_crs);
     const struct kernel_reading reading = {s, moves ? pose : to_crs,
                                            turns_later ? VEC3_OUT(c->read, 0) : VEC3_OUT(c->list.e, 0)};
-    if (geo && even)
-        kernel_sweep_read(&c->steps, &sweep, rotation, &d, &reading);
-    else if (geo)
-        kernel_directions_read(turns, rotation, &d, &reading);
-    else if (even)
-        kernel_sweep(&c->steps, &sweep, rotation, &d);
+    if (even)
+        kernel_sweep(&c->steps, &sweep, rotation, &d, geo ? &reading : NULL);
     else
-        kernel_directions(turns, rotation, &d);
+        kernel_directions(turns, rotation, &d, geo ? &reading : NULL);
     if (straight) kernel_place_leg(&leg, k->dt_ns, k->n, &VEC3_OUT(c->list.p, 0));
     if (!turns_later) return;
     const struct move m = {VEC3_IN(c->socs, 0), geo ? VEC3_IN(c->read, 0) : (struct vec3_in){0}, VEC3_OUT(c->d, 0),
@@ -185,10 +181,10 @@ static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint
     double to_crs[9];
     if (s->n_knots == 0) {
         reading_rotation(s, to_crs);
-        kernel_directions_read(&turns, s->rotation, &socs, &(struct kernel_reading){s, to_crs, e});
+        kernel_directions(&turns, s->rotation, &socs, &(struct kernel_reading){s, to_crs, e});
         return;
     }
-    kernel_directions_read(&turns, mat3_unit, &socs, &(struct kernel_reading){s, mat3_unit, VEC3_OUT(c->read, 0)});
+    kernel_directions(&turns, mat3_unit, &socs, &(struct kernel_reading){s, mat3_unit, VEC3_OUT(c->read, 0)});
     const struct move m = {VEC3_IN(c->read, 0), {0}, e, {0}, VEC3_OUT(l->p, at)};
     move(s, k, dt_ns, n, &m);
 }

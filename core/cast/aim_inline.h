@@ -3,7 +3,7 @@
 #ifndef CORE_CAST_AIM_INLINE_H
 #define CORE_CAST_AIM_INLINE_H
 
-#include "core/cast.h"
+#include "core/cast/kernels_aim.h"
 #include "core/vecmath.h"
 
 /* A matrix as values of its own, which no store to an array can change. */
@@ -33,10 +33,18 @@ VEC_INLINE void aim_direction(struct aim_matrix m, struct aim_axes a, struct vec
 struct aim_encoder {
     double counts, count_rad;
 };
-VEC_INLINE struct aim_encoder aim_encoder(const struct cast_setup *setup, double counts)
+/* The encoders of a head, and the matrix to the frame of positions. */
+struct aim_reading {
+    struct aim_encoder mirror, pan;
+    struct aim_matrix m;
+};
+VEC_INLINE struct aim_reading aim_reading(const struct kernel_reading *reading)
 {
-    const int ideal = setup->mirror_counts >= 4294967296.0 && setup->pan_counts >= 4294967296.0;
-    return (struct aim_encoder){counts, ideal ? 0.0 : VEC_TURN_RAD / counts};
+    const double mirror = reading->setup->mirror_counts, pan = reading->setup->pan_counts;
+    const int ideal = mirror >= 4294967296.0 && pan >= 4294967296.0;
+    return (struct aim_reading){{mirror, ideal ? 0.0 : VEC_TURN_RAD / mirror},
+                                {pan, ideal ? 0.0 : VEC_TURN_RAD / pan},
+                                aim_matrix(reading->rotation)};
 }
 
 /* Sine and cosine of an angle become those of what the encoder reads, whole counts. Its error d is at most half
@@ -49,6 +57,15 @@ VEC_INLINE void aim_read(struct aim_encoder e, double turn, double *sine, double
     const double h = 1.0 - 0.5 * d * d, s = *sine, c = *cosine;
     *sine = s * h + c * d;
     *cosine = c * h - s * d;
+}
+
+/* The direction that the encoders read at these angles, whose sines and cosines are a. */
+VEC_INLINE void aim_direction_read(struct aim_reading r, double mirror_turn, double pan_turn, struct aim_axes a,
+                                   struct vec3_out e, uint32_t i)
+{
+    aim_read(r.mirror, mirror_turn, &a.sm, &a.cm);
+    aim_read(r.pan, pan_turn, &a.sp, &a.cp);
+    aim_direction(r.m, a, e, i);
 }
 
 #endif

@@ -32,38 +32,30 @@ void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_
     }
 }
 
-VEC_CLONES
-void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *out)
+/* reading is NULL or not as a constant, so that there is a loop of its own for each. */
+VEC_INLINE void directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *out,
+                           const struct kernel_reading *reading)
 {
+    const struct aim_reading r = reading != NULL ? aim_reading(reading) : (struct aim_reading){.mirror = {0.0, 0.0}};
     const struct aim_matrix m = aim_matrix(rotation);
     const struct kernel_turns t = *turns;
-    const struct vec3_out d = *out;
+    const struct vec3_out d = *out, e = reading != NULL ? reading->e : d;
     VEC_LOOP
     for (uint32_t i = 0; i < t.n; i++) {
         struct aim_axes a;
         vec_sincos_turn(t.mirror[i], &a.sm, &a.cm);
         vec_sincos_turn(t.pan[i], &a.sp, &a.cp);
         aim_direction(m, a, d, i);
+        if (reading != NULL) aim_direction_read(r, t.mirror[i], t.pan[i], a, e, i);
     }
 }
 
 VEC_CLONES
-void kernel_directions_read(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *out,
-                            const struct kernel_reading *reading)
+void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *out,
+                       const struct kernel_reading *reading)
 {
-    const struct aim_encoder mirror = aim_encoder(reading->setup, reading->setup->mirror_counts);
-    const struct aim_encoder pan = aim_encoder(reading->setup, reading->setup->pan_counts);
-    const struct aim_matrix m = aim_matrix(rotation), q = aim_matrix(reading->rotation);
-    const struct kernel_turns t = *turns;
-    const struct vec3_out d = *out, e = reading->e;
-    VEC_LOOP
-    for (uint32_t i = 0; i < t.n; i++) {
-        struct aim_axes a;
-        vec_sincos_turn(t.mirror[i], &a.sm, &a.cm);
-        vec_sincos_turn(t.pan[i], &a.sp, &a.cp);
-        aim_direction(m, a, d, i);
-        aim_read(mirror, t.mirror[i], &a.sm, &a.cm);
-        aim_read(pan, t.pan[i], &a.sp, &a.cp);
-        aim_direction(q, a, e, i);
-    }
+    if (reading != NULL)
+        directions(turns, rotation, out, reading);
+    else
+        directions(turns, rotation, out, NULL);
 }

@@ -17,16 +17,14 @@ struct kernel_turns {
     uint32_t n;
     const double *mirror, *pan;
 };
-/* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). */
-void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d);
 /* Directions as the encoders read them, in whole counts: how they are turned, and where they go. */
 struct kernel_reading {
     const struct cast_setup *setup; /* has the counts */
     const double *rotation;         /* to the frame of positions */
     struct vec3_out e;
 };
-/* As kernel_directions, and the directions that are read as well. */
-void kernel_directions_read(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d,
-                            const struct kernel_reading *reading);
+/* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). reading NULL: only those of the beams. */
+void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d,
+                       const struct kernel_reading *reading);
 
 #endif

@@ -88,37 +88,13 @@ VEC_INLINE void turn_on(const struct middles *m, uint32_t b, double s, double c1
     *cosine = m->cosine[b] + (m->cosine1[b] + (m->cosine[b] * c1 - m->sine[b] * s));
 }
 
-VEC_CLONES
-void kernel_sweep(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
-                  const struct vec3_out *out)
+/* reading is NULL or not as a constant, so that there is a loop of its own for each. */
+VEC_INLINE void sweep_blocks(const struct kernel_steps *steps, const struct kernel_pulses *sweep,
+                             const double rotation[9], const struct vec3_out *out, const struct kernel_reading *reading)
 {
+    const struct aim_reading r = reading != NULL ? aim_reading(reading) : (struct aim_reading){.mirror = {0.0, 0.0}};
     const struct aim_matrix m = aim_matrix(rotation);
-    const double *sin_m = steps->sm, *cos_m = steps->cm, *sin_p = steps->sp, *cos_p = steps->cp;
-    const uint32_t n = sweep->turns.n;
-    struct part p;
-    begin(sweep, &p);
-    for (uint32_t b = 0, at = 0, k = p.skip; b < p.blocks; b++, k = 0) {
-        const uint32_t count = n - at < BLOCK - k ? n - at : BLOCK - k;
-        const struct vec3_out d = {out->x + at, out->y + at, out->z + at};
-        VEC_LOOP
-        for (uint32_t i = 0; i < count; i++) {
-            struct aim_axes a;
-            turn_on(&p.mirror, b, sin_m[k + i], cos_m[k + i], &a.sm, &a.cm);
-            turn_on(&p.pan, b, sin_p[k + i], cos_p[k + i], &a.sp, &a.cp);
-            aim_direction(m, a, d, i);
-        }
-        at += count;
-    }
-}
-
-VEC_CLONES
-void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
-                       const struct vec3_out *out, const struct kernel_reading *reading)
-{
-    const struct aim_encoder mirror = aim_encoder(reading->setup, reading->setup->mirror_counts);
-    const struct aim_encoder pan = aim_encoder(reading->setup, reading->setup->pan_counts);
-    const struct aim_matrix m = aim_matrix(rotation), q = aim_matrix(reading->rotation);
-    const struct vec3_out *read = &reading->e;
+    const struct vec3_out *read = reading != NULL ? &reading->e : out;
     const double *sin_m = steps->sm, *cos_m = steps->cm, *sin_p = steps->sp, *cos_p = steps->cp;
     const uint32_t n = sweep->turns.n;
     struct part p;
@@ -126,18 +102,25 @@ void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pul
     for (uint32_t b = 0, at = 0, k = p.skip; b < p.blocks; b++, k = 0) {
         const uint32_t count = n - at < BLOCK - k ? n - at : BLOCK - k;
         const double *mirror_turn = sweep->turns.mirror + at, *pan_turn = sweep->turns.pan + at;
-        const struct vec3_out d = {out->x + at, out->y + at, out->z + at};
-        const struct vec3_out e = {read->x + at, read->y + at, read->z + at};
+        const struct vec3_out d = VEC3_OUT(*out, at), e = VEC3_OUT(*read, at);
         VEC_LOOP
         for (uint32_t i = 0; i < count; i++) {
             struct aim_axes a;
             turn_on(&p.mirror, b, sin_m[k + i], cos_m[k + i], &a.sm, &a.cm);
             turn_on(&p.pan, b, sin_p[k + i], cos_p[k + i], &a.sp, &a.cp);
             aim_direction(m, a, d, i);
-            aim_read(mirror, mirror_turn[i], &a.sm, &a.cm);
-            aim_read(pan, pan_turn[i], &a.sp, &a.cp);
-            aim_direction(q, a, e, i);
+            if (reading != NULL) aim_direction_read(r, mirror_turn[i], pan_turn[i], a, e, i);
         }
         at += count;
     }
+}
+
+VEC_CLONES
+void kernel_sweep(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
+                  const struct vec3_out *out, const struct kernel_reading *reading)
+{
+    if (reading != NULL)
+        sweep_blocks(steps, sweep, rotation, out, reading);
+    else
+        sweep_blocks(steps, sweep, rotation, out, NULL);
 }

@@ -23,10 +23,8 @@ struct kernel_pulses {
     uint32_t first;
     struct kernel_turns turns; /* from kernel_angles */
 };
-/* As kernel_directions, and kernel_directions_read. */
+/* As kernel_directions. */
 void kernel_sweep(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
-                  const struct vec3_out *d);
-void kernel_sweep_read(const struct kernel_steps *steps, const struct kernel_pulses *sweep, const double rotation[9],
-                       const struct vec3_out *d, const struct kernel_reading *reading);
+                  const struct vec3_out *d, const struct kernel_reading *reading);
 
 #endif

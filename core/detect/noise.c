@@ -19,8 +19,10 @@ void detect_range_noise(const struct detect_signal *signal, const struct detect_
         const double *restrict a = amplitude + at;
         double *restrict r = range_m + at;
         m = rng_bits(range_key, key + at, n - at, bits);
-        for (uint32_t i = 0; i < m; i++)
-            r[i] += (sqrt(floor2 + jitter2 / (a[i] * a[i])) + per_distance * r[i]) * rng_normal_of(bits[i]);
+        for (uint32_t i = 0; i < m; i++) {
+            const double least = a[i] > DETECT_LEAST_AMPLITUDE ? a[i] : DETECT_LEAST_AMPLITUDE;
+            r[i] += (sqrt(floor2 + jitter2 / (least * least)) + per_distance * r[i]) * rng_normal_of(bits[i]);
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/angle.h"
+#include "core/digits.h"
 #include "core/georef/state.h"
 
 /* Half a count less than 2^31, for rounding; -2^31 says that there is no point. */
@@ -58,7 +59,7 @@ int georef_scale(const struct georef *georef, double scale_m, double reach_m, do
     return sh_fail(
         err, SH_EINPUT,
         "coordinates up to %g m from their anchor do not fit into 31 bits at %g m per count; at least %.3g m", reach_m,
-        scale_m, least_m);
+        scale_m, digits_up(least_m, 3));
 }
 
 double georef_count_m(const struct georef *georef, double reach_m, const double scale[3])

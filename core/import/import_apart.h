@@ -10,6 +10,8 @@
 #ifndef CORE_IMPORT_IMPORT_APART_H
 #define CORE_IMPORT_IMPORT_APART_H
 
+#include <stdbool.h>
+
 #include "core/import/import_child.h"
 
 /* At the end of errors, after ": ". */

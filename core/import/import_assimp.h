@@ -3,7 +3,9 @@
 #ifndef CORE_IMPORT_IMPORT_ASSIMP_H
 #define CORE_IMPORT_IMPORT_ASSIMP_H
 
-#include "core/scene/build.h"
+#include "core/err.h"
+
+struct scene_build;
 
 /* Fills b as a reader does. Needs the whole process: Assimp's logger is global. */
 int import_assimp(struct scene_build *b, struct sh_err *err);

@@ -18,6 +18,7 @@
 
 #include "core/import/import_apart.h"
 #include "core/import/import_result.h"
+#include "core/scene/build_load.h"
 
 enum { RESULT_FD = 3, NOTE_FD, FIRST_FREE_FD };
 enum { PROGRAM_FILES = 256 }; /* node opens some 30 of its own */

@@ -5,7 +5,9 @@
 
 #include <sys/types.h>
 
-#include "core/scene/build.h"
+#include "core/scene.h"
+
+struct scene_build;
 
 /* Messages of the child come by a pipe, each written in one piece. */
 enum import_note_kind { IMPORT_WARNING = 1, IMPORT_PROGRESS, IMPORT_ERROR };

@@ -3,12 +3,15 @@
 #ifndef CORE_IMPORT_IMPORT_MATERIAL_H
 #define CORE_IMPORT_IMPORT_MATERIAL_H
 
-#include "core/scene/build.h"
+#include <stdbool.h>
+
+#include "core/scene.h"
 
 struct assimp_lib;
 struct aiScene;
 struct aiMaterial;
 struct aiColor4D;
+struct scene_build;
 
 /* Takes the properties of a surface from its material; values that are set already stay. */
 int import_material(const struct assimp_lib *lib, struct scene_build *b, const struct aiScene *in,

@@ -239,7 +239,7 @@ static int take_vertices(struct result *r)
         rc = import_result_take(r, s->vertex_m[s->n_vertices], n * sizeof *s->vertex_m);
         for (uint32_t i = 0; i < n && rc == SH_OK; i++)
             for (int k = 0; k < 3; k++)
-                if (!(fabs(s->vertex_m[s->n_vertices + i][k]) <= BUILD_MAX_COORDINATE_M))
+                if (!(fabs(s->vertex_m[s->n_vertices + i][k]) <= SCENE_MAX_COORDINATE_M))
                     return wrong(r, "the place of vertex", s->n_vertices + i - r->b->vertex0);
         if (rc == SH_OK) s->n_vertices += n;
         if (rc == SH_OK) rc = sh_check_stop(r->b->report, r->err);
@@ -323,11 +323,11 @@ static int take_head(struct result *r)
     if (rc == SH_OK && r->head.n_triangles == 0) rc = wrong(r, "number of triangles:", 0);
     if (rc == SH_OK && r->head.has_uv > 1) rc = wrong(r, "texture coordinates:", r->head.has_uv);
     if (rc == SH_OK && r->head.has_rgb > 1) rc = wrong(r, "colours:", r->head.has_rgb);
-    if (rc == SH_OK && !(r->head.error_m >= 0.0 && r->head.error_m <= BUILD_MAX_COORDINATE_M))
-        rc = wrong(r, "the error of its vertices is not from 0 m to", (uint64_t)BUILD_MAX_COORDINATE_M);
+    if (rc == SH_OK && !(r->head.error_m >= 0.0 && r->head.error_m <= SCENE_MAX_COORDINATE_M))
+        rc = wrong(r, "the error of its vertices is not from 0 m to", (uint64_t)SCENE_MAX_COORDINATE_M);
     if (rc == SH_OK && least_size(&r->head) > r->size) rc = wrong(r, "its size is", r->size);
-    if (rc == SH_OK && !(r->head.says.unit_m >= 0.0 && r->head.says.unit_m <= BUILD_MAX_COORDINATE_M))
-        rc = wrong(r, "its unit is not from 0 m to", (uint64_t)BUILD_MAX_COORDINATE_M);
+    if (rc == SH_OK && !(r->head.says.unit_m >= 0.0 && r->head.says.unit_m <= SCENE_MAX_COORDINATE_M))
+        rc = wrong(r, "its unit is not from 0 m to", (uint64_t)SCENE_MAX_COORDINATE_M);
     if (rc == SH_OK && (r->head.says.up < -3 || r->head.says.up > 3)) rc = wrong(r, "its axes are not from -3 to", 3);
     if (rc == SH_OK && (r->head.says.is_left_handed & ~1) != 0)
         rc = wrong(r, "the handedness of its axes is not 0 or", 1);

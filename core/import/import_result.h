@@ -3,7 +3,9 @@
 #ifndef CORE_IMPORT_IMPORT_RESULT_H
 #define CORE_IMPORT_IMPORT_RESULT_H
 
-#include "core/scene/build.h"
+#include "core/scene.h"
+
+struct scene_build;
 
 /* Writes the scene to an empty file. Its arrays are released on the way. */
 int import_result_write(struct scene *scene, int fd, struct sh_err *err);

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "core/import/readers.h"
+#include "core/scene/build_load.h"
 #include "core/scene/copies.h"
 #include "core/scene/cutouts.h"
 

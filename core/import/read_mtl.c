@@ -71,7 +71,7 @@ static bool read_mtl_is_same(struct text_span a, struct text_span b)
 
 static bool has_material(const struct scene_surface *s, struct text_span material)
 {
-    const struct text_span used = {s->material, strlen(s->material)};
+    const struct text_span used = text_span_of(s->material);
     return read_mtl_is_same(used, material) || read_mtl_is_same(without_quotes(used), without_quotes(material)) ||
            read_mtl_is_same(without_comment(used), material);
 }
@@ -81,7 +81,7 @@ static bool has_material(const struct scene_surface *s, struct text_span materia
 static void set_material(struct mtl *m, struct text_span material)
 {
     scene_copy_name(m->name, sizeof m->name, material.p, material.n);
-    m->material = (struct text_span){m->name, strlen(m->name)};
+    m->material = text_span_of(m->name);
     m->has_opacity = false;
     m->definition++;
     for (uint32_t i = m->first; i < m->b->scene->n_surfaces; i++)
@@ -163,21 +163,17 @@ static struct text_span next_word(const char **p, const char *end)
     return word;
 }
 
-static bool is_number(struct text_span word, double *value)
+static bool is_number(struct text t, struct text_span word, double *value)
 {
-    char text[32], *end;
-    if (word.n == 0 || word.n >= sizeof text) return false;
-    memcpy(text, word.p, word.n);
-    text[word.n] = '\0';
-    *value = strtod(text, &end);
-    return *end == '\0' && isfinite(*value);
+    t.p = word.p;
+    return text_number(&t, value) && t.p == word.p + word.n && isfinite(*value);
 }
 
 /* Takes one value of an option; false: the word is no value, so the file's name begins there. */
-static bool take_value(struct map *map, struct text_span option, struct text_span word, int n)
+static bool take_value(const struct text *t, struct map *map, struct text_span option, struct text_span word, int n)
 {
     double value = 0.0;
-    const bool number = is_number(word, &value), scale = text_is(option, "-s"), shift = text_is(option, "-o");
+    const bool number = is_number(*t, word, &value), scale = text_is(option, "-s"), shift = text_is(option, "-o");
     if (scale || shift || text_is(option, "-t")) {
         if (!number || n == 3) return false;
         if (n < 2 && (scale || shift)) (scale ? map->scale : map->shift)[n] = value;
@@ -189,7 +185,7 @@ static bool take_value(struct map *map, struct text_span option, struct text_spa
 
 /* Options before the file's name: -clamp on, -s u v w, -o u v w, and others, which have one or two values. The name is
  * the rest, blanks and all. */
-static void read_map(struct text_span text, struct map *map)
+static void read_map(const struct text *t, struct text_span text, struct map *map)
 {
     const char *p = text.p, *end = text.p + text.n;
     *map = (struct map){.scale = {1.0, 1.0}};
@@ -197,7 +193,7 @@ static void read_map(struct text_span text, struct map *map)
         const struct text_span option = next_word(&p, end);
         for (int n = 0; p < end; n++) {
             const char *at = p;
-            if (take_value(map, option, next_word(&p, end), n)) continue;
+            if (take_value(t, map, option, next_word(&p, end), n)) continue;
             p = at;
             break;
         }
@@ -223,7 +219,7 @@ static int set_texture(struct mtl *m, struct text_span text, bool is_opacity, st
     struct map map;
     int rc = SH_OK;
     bool is_missing = false;
-    read_map(text, &map);
+    read_map(&m->t, text, &map);
     map.image.folder = m->folder;
     for (uint32_t i = m->first; i < scene->n_surfaces && map.image.name.n > 0 && rc == SH_OK; i++) {
         struct scene_surface *s = &scene->surface[i];
@@ -308,7 +304,6 @@ static int read_if_there(struct mtl *m, struct text_span name, uint64_t line, bo
 
 static void warn_of_library(const struct mtl *m, struct text_span name, uint64_t line)
 {
-    if (!build_wants_textures(m->b)) return;
     sh_warn(m->b->report, "%s, line %llu: the material library '%.*s' is missing; put it beside the mesh", m->b->name,
             (unsigned long long)line, (int)(name.n < 200 ? name.n : 200), name.p);
 }

@@ -137,7 +137,7 @@ static int set_corner_uv(struct obj *o, int64_t index, float uv[2], struct sh_er
     return SH_OK;
 }
 
-/* One v, v/vt, v//vn or v/vt/vn; vn doesn't count, and vt where no textures are asked for. */
+/* Reads one v, v/vt, v//vn or v/vt/vn. vn is not used; vt is used where textures are asked for. */
 static int read_corner(struct obj *o, uint32_t *corner, float uv[2], uint8_t rgb[4], struct sh_err *err)
 {
     struct text at = o->t;
@@ -248,13 +248,6 @@ static int count_left_out(struct obj *o, bool points)
     return SH_OK;
 }
 
-static bool is_among(struct text_span word, const char *const *list)
-{
-    for (; *list != NULL; list++)
-        if (text_is(word, *list)) return true;
-    return false;
-}
-
 static int read_other(struct obj *o, struct text_span word)
 {
     static const char *const numbers[] = {"vt",  "vn",  "vp",  "s",    "parm", "trim",   "hole", "scrv", "sp",
@@ -262,10 +255,10 @@ static int read_other(struct obj *o, struct text_span word)
     static const char *const texts[] = {"usemap", "maplib",     "lod",       "bevel", "c_interp", "d_interp", "ctech",
                                         "stech",  "shadow_obj", "trace_obj", "call",  "csh",      NULL};
     static const char *const free_form[] = {"l", "curv", "curv2", "surf", NULL};
-    if (is_among(word, free_form)) return count_left_out(o, false);
-    if (is_among(word, numbers)) {
+    if (text_is_one_of(word, free_form)) return count_left_out(o, false);
+    if (text_is_one_of(word, numbers)) {
         skip_statement(o);
-    } else if (!is_among(word, texts)) {
+    } else if (!text_is_one_of(word, texts)) {
         if (o->n_unknown++ == 0) {
             o->unknown_line = o->t.line;
             memcpy(o->unknown, word.p, word.n < sizeof o->unknown ? word.n : sizeof o->unknown - 1);

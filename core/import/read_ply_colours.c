@@ -88,7 +88,7 @@ static int use_label(struct ply *y, int i, struct sh_err *err)
     const char *name = is_named ? y->texture_name[i] : "";
     const int texture = y->has_texnumbers ? i : 0;
     if (!y->has_label[i]) {
-        int rc = build_label(y->b, build_base_name(y->b), (struct text_span){name, strlen(name)}, &y->labels[i], err);
+        int rc = build_label(y->b, build_base_name(y->b), text_span_of(name), &y->labels[i], err);
         if (rc != SH_OK) return rc;
         y->has_label[i] = true;
         struct scene_surface *surface = &y->b->scene->surface[y->labels[i]];

@@ -68,10 +68,10 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
     s->t_s = v[T];
     memcpy(s->pose.position_m, v + X, sizeof s->pose.position_m);
     if (csv->has & 1u << QW) {
-        double norm2 = v[QW] * v[QW] + v[QX] * v[QX] + v[QY] * v[QY] + v[QZ] * v[QZ];
-        if (!(fabs(norm2 - 1.0) < 1e-3))
-            return text_fail(&csv->text, csv->line, SH_EINPUT, err, "a quaternion of length %.6g; allowed 1 to 0.0005",
-                             sqrt(norm2));
+        double length = sqrt(v[QW] * v[QW] + v[QX] * v[QX] + v[QY] * v[QY] + v[QZ] * v[QZ]);
+        if (!(length >= 0.9995 && length <= 1.0005))
+            return text_fail(&csv->text, csv->line, SH_EINPUT, err,
+                             "a quaternion of length %.6g; allowed 0.9995 to 1.0005", length);
         memcpy(s->pose.quat, v + QW, sizeof s->pose.quat);
     } else {
         if (fabs(v[PITCH]) > 90.0 || fabs(v[HEADING]) > 1e6 || fabs(v[ROLL]) > 360.0)

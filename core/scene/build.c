@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "core/scene/build.h"
+#include "core/scene/build_load.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/digits.h"
 #include "core/grow.h"
 #include "core/huge_pages.h"
 #include "core/monotonic.h"
@@ -165,13 +166,6 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 
-/* Rounds up to two digits. */
-static double two_digits_up(double x)
-{
-    double digit = pow(10.0, floor(log10(x)) - 1.0);
-    return ceil(x / digit * (1.0 - 1e-9)) * digit;
-}
-
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err)
 {
     const double most_m = 1.0;    /* of the tolerance */
@@ -179,7 +173,7 @@ int build_single(struct scene_build *b, double largest, double error, bool refus
     double error_m = error * b->spec->scale;
     char set[48] = "";
     if (!(error_m > 0.0)) return SH_OK;
-    error_m = two_digits_up(error_m);
+    error_m = digits_up(error_m, 2);
     if (error_m > b->tolerance_m && refuse) {
         if (error_m <= most_m) snprintf(set, sizeof set, "set it to %.2g, ", error_m);
         return build_fail(b, SH_EINPUT, err,
@@ -237,11 +231,11 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
     double *p = s->vertex_m[s->n_vertices];
     for (int k = 0; k < 3; k++) {
         p[k] = turned[k] * spec->scale + spec->offset_m[k];
-        if (!(fabs(p[k]) <= BUILD_MAX_COORDINATE_M))
+        if (!(fabs(p[k]) <= SCENE_MAX_COORDINATE_M))
             return build_fail(
                 b, SH_EINPUT, err,
                 "vertex %llu is at %g m; allowed are coordinates up to %g m: check the scale of %g metres per unit",
-                number, p[k], BUILD_MAX_COORDINATE_M, spec->scale);
+                number, p[k], SCENE_MAX_COORDINATE_M, spec->scale);
     }
     s->n_vertices++;
     return SH_OK;

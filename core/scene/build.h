@@ -5,11 +5,11 @@
 #define CORE_SCENE_BUILD_H
 
 #include "core/scene.h"
+#include "core/scene/build_say.h"
 #include "core/scene/triangulate.h"
 #include "core/text.h"
 
 enum { SCENE_MAX_CORNERS = 65536 }; /* of one polygon: ear clipping is quadratic */
-#define BUILD_MAX_COORDINATE_M 1e9
 
 struct scene_build {
     struct scene *scene;
@@ -40,18 +40,6 @@ struct scene_build {
     int64_t start_ns, file_ns, reported_ns; /* of the load, of this file, of the last report */
 };
 
-int build_init(struct scene_build *b, double tolerance_m, const struct sh_report *report, struct sh_err *err);
-void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec);
-/* Warns of what was left out; SH_EINPUT when the file gave no triangle. */
-int build_end_file(struct scene_build *b, struct sh_err *err);
-/* Hands the scene over; it may be empty where something else follows. build_release is due in any case. */
-int build_finish(struct scene_build *b, int may_be_empty, struct scene **out, struct sh_err *err);
-void build_release(struct scene_build *b);
-
-/* Fails with "FILE, line N, mesh 'M': text". Returns code. */
-int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *fmt, ...)
-    __attribute__((format(printf, 4, 5)));
-
 /* Room for that many more, so that a reader that knows its counts allocates once. */
 int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, struct sh_err *err);
 
@@ -81,13 +69,6 @@ static inline bool build_wants_colours(const struct scene_build *b)
 {
     return b->spec->textures;
 }
-
-/* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
- * stop: SH_ESTOPPED. build: a struct scene_build. */
-int build_progress(void *build, double fraction, struct sh_err *err);
-
-/* Reports "reading FILE" with an unknown fraction, at once. */
-void build_announce(struct scene_build *b);
 
 /* The file's name without folders and ending: the object's name where a file has none. */
 struct text_span build_base_name(const struct scene_build *b);

@@ -11,7 +11,6 @@
 
 #include "core/grow.h"
 #include "core/rng.h"
-#include "core/scene/build.h"
 #include "core/scene/find_file.h"
 
 static int compare_surfaces(const void *a, const void *b)

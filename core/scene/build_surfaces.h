@@ -4,10 +4,7 @@
 #ifndef CORE_SCENE_BUILD_SURFACES_H
 #define CORE_SCENE_BUILD_SURFACES_H
 
-#include "core/scene.h"
-#include "core/text.h"
-
-struct scene_build;
+#include "core/scene/build.h"
 
 /* The label of a pair of names; a new pair gets the next number. Pointers into the scene's surfaces last until the next
  * label. */

@@ -9,7 +9,6 @@
 
 #include "core/angle.h"
 #include "core/grow.h"
-#include "core/scene/build.h"
 #include "core/scene/hull.h"
 #include "core/vec3.h"
 
@@ -121,12 +120,12 @@ static int set_copy(const struct copied *of, size_t number, uint32_t label0, str
     memcpy(copy->shift_m, place->at_m, sizeof copy->shift_m);
     scene_set_copy_bounds(of->mesh, of->hull, copy);
     for (int k = 0; k < 3; k++)
-        if (!(fabs(copy->min_m[k]) <= BUILD_MAX_COORDINATE_M && fabs(copy->max_m[k]) <= BUILD_MAX_COORDINATE_M))
+        if (!(fabs(copy->min_m[k]) <= SCENE_MAX_COORDINATE_M && fabs(copy->max_m[k]) <= SCENE_MAX_COORDINATE_M))
             return sh_fail(
                 err, SH_EINPUT,
                 "%s: copy %zu goes from %g to %g m; allowed are coordinates up to %g m: check its place and its scale "
                 "of %g",
-                of->places->says, number + 1, copy->min_m[k], copy->max_m[k], BUILD_MAX_COORDINATE_M, copy->scale);
+                of->places->says, number + 1, copy->min_m[k], copy->max_m[k], SCENE_MAX_COORDINATE_M, copy->scale);
     return SH_OK;
 }
 

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "core/grow.h"
-#include "core/scene/build.h"
+#include "core/scene/build_load.h"
 
 const struct scene_import_limits scene_import_defaults = {.memory_mib = 8192, .time_s = 300, .files = 64};
 

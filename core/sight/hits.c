@@ -148,13 +148,7 @@ void sight_hits(struct sight_work *work, struct bvh_work *bvh_work, const struct
                 const struct bvh_rays *rays)
 {
     for (uint32_t at = 0; at < rays->n; at += BVH_CHUNK) {
-        struct bvh_rays part = *rays;
-        part.n = rays->n - at < BVH_CHUNK ? rays->n - at : BVH_CHUNK;
-        part.dir = VEC3_IN(rays->dir, at);
-        part.range_m = rays->range_m + at;
-        part.triangle = rays->triangle + at;
-        part.label = rays->label != NULL ? rays->label + at : NULL;
-        part.steep = rays->steep != NULL ? rays->steep + at : NULL;
+        const struct bvh_rays part = bvh_rays_chunk(rays, at);
         look_up_chunk(work, bvh_work, sight, &part);
     }
 }

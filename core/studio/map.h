@@ -31,7 +31,7 @@ enum {
     MAP_MAX_SIDE_PX = 16384,   /* longest side of the map */
     MAP_MAX_PIXELS = 16777216, /* of the map: 16 bytes each while it is made, 256 MiB */
     MAP_MAX_STATIONS = 4096,
-    MAP_MAX_EDGES = 100000, /* an SVG has a line for each; and as many lines of fields */
+    MAP_MAX_LINES = 100000, /* of a kind; an SVG has an element for each */
     MAP_MIN_WIDTH_PX = 512, /* of the image; a narrower map is centred */
     MAP_NAME_LEN = 96,
 };
@@ -61,18 +61,18 @@ struct map_station {
 /* SH_EINPUT outside the area or beyond MAP_MAX_STATIONS. */
 int map_add_station(struct map *map, const struct map_station *station, struct sh_err *err);
 
-/* Adds a line from a to b, prcs, such as an open edge of the scene: red, under the stations. Ends outside of the area
- * are moved to its border. Beyond MAP_MAX_EDGES it is left out and counted. SH_ENOMEM. */
-int map_add_edge(struct map *map, const double a[2], const double b[2], struct sh_err *err);
+enum map_line { MAP_OPEN_EDGE, MAP_FIELD, MAP_LINES };
 
-/* The same for a line of a monitored field: blue. */
-int map_add_field(struct map *map, const double a[2], const double b[2], struct sh_err *err);
+/* Adds a line from a to b, prcs: an open edge of the scene, red, or a line of a monitored field, blue. They are drawn
+ * under the stations. Ends outside of the area are moved to its border. Beyond MAP_MAX_LINES of its kind it is left out
+ * and counted. SH_ENOMEM. */
+int map_add_line(struct map *map, enum map_line kind, const double a[2], const double b[2], struct sh_err *err);
 
 struct map_counts {
     uint64_t drawn;   /* points that lie in the area */
     uint64_t outside; /* points beyond the area, or with |z| above MAP_MAX_Z_M */
     uint64_t empty;   /* points that are not finite */
-    uint64_t edges, edges_left_out;
+    uint64_t lines[MAP_LINES], lines_left_out[MAP_LINES];
 };
 void map_get_counts(const struct map *map, struct map_counts *counts);
 

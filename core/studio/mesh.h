@@ -33,10 +33,9 @@ enum {
 };
 
 /* The type of a figure, in memory and in the file. */
-enum mesh_type { MESH_DOUBLE, MESH_FLOAT, MESH_UINT16, MESH_UINT8 };
+enum mesh_type { MESH_DOUBLE, MESH_FLOAT, MESH_UINT16 };
 
-/* A figure for each vertex, in .ply only. value: [n_vertices] of double, float, uint16_t or uint8_t, as type
- * says. */
+/* A figure for each vertex, in .ply only. value: [n_vertices] of double, float or uint16_t, as type says. */
 struct mesh_scalar {
     const char *name; /* of the property: a word */
     const void *value;

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stddef.h>
 
+#include "core/digits.h"
 #include "core/light.h"
 #include "core/waveform/waveform_inside.h"
 
@@ -69,7 +70,8 @@ static int check_gate(const struct waveform_spec *spec, struct sh_err *err)
     if (long_m >= sample_m && long_m <= (WAVEFORM_MAX_SAMPLES - 1) * sample_m) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "a window from %.6g to %.6g m: %.4g to %.6g m of length are allowed, 1 to %d samples", spec->near_m,
-                   spec->far_m, sample_m, (WAVEFORM_MAX_SAMPLES - 1) * sample_m, WAVEFORM_MAX_SAMPLES - 1);
+                   spec->far_m, digits_up(sample_m, 4), digits_down((WAVEFORM_MAX_SAMPLES - 1) * sample_m, 6),
+                   WAVEFORM_MAX_SAMPLES - 1);
 }
 
 static int check_windows(const struct waveform_spec *spec, struct sh_err *err)
@@ -79,10 +81,11 @@ static int check_windows(const struct waveform_spec *spec, struct sh_err *err)
     if (!(spec->keep >= 1e-6 && spec->keep <= 1e9))
         return sh_fail(err, SH_EINPUT, "windows around a signal of %.6g times the threshold: 1e-06 to 1e+09 is allowed",
                        spec->keep);
-    if (samples <= most) return SH_OK;
+    /* Times in ns that add up to `most` do so in s but for rounding. */
+    if (samples <= most * (1.0 + 1e-9)) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "%.6g ns kept before an echo and %.6g ns behind it: together at most %.6g ns, %.0f samples",
-                   1e9 * spec->before_s, 1e9 * spec->after_s, 1e9 * most * spec->sample_s, most);
+                   1e9 * spec->before_s, 1e9 * spec->after_s, digits_down(1e9 * most * spec->sample_s, 6), most);
 }
 
 int waveform_check(const struct waveform_spec *spec, struct sh_err *err)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/digits.h"
 #include "core/waveform/waveform_inside.h"
 
 /* sigma of a Gaussian of width 1, full at half maximum */
@@ -149,8 +150,8 @@ static int check_ripple(const struct waveform_spec *spec, const double *h, uint3
     return sh_fail(
         err, SH_EINPUT,
         "samples %.4g ns apart are too coarse for this pulse: the energy in them changes by %.2g %% with the "
-        "range; 0.1 %% is allowed, so at most %.4g ns, or a longer pulse, or a receiver of less bandwidth",
-        1e9 * spec->sample_s, 1e2 * off, 1e-3 * floor(1e12 * spec->sample_s * apart / phases));
+        "range; 0.1 %% is allowed, so at most %.3g ns, or a longer pulse, or a receiver of less bandwidth",
+        1e9 * spec->sample_s, 1e2 * off, digits_down(1e9 * spec->sample_s * apart / phases, 3));
 }
 
 static int fold(const struct waveform_spec *spec, const double *h, uint32_t n, struct waveform_pulse *pulse,

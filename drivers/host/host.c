@@ -91,6 +91,7 @@ int scanhead_reattach(struct scanhead *sh, int timeout_ms)
     if (rc != SH_OK) return rc;
     sh->ended = sh->lost = sh->reset = sh->stuck = 0;
     native_parser_resume(&sh->parser);
+    host_count_reader_lost(sh, 0);
     host_note_reattached(sh);
     return SCANHEAD_OK;
 }

@@ -65,7 +65,9 @@ struct scanhead {
     int64_t points_t_ns, points_t0_ns;  /* device time and time in the scan of its first pulse */
 
     /* state that the stream has reported, up to the frame that was handed out last */
-    int have_descriptor, have_anchor, have_pulse;
+    int have_seq, have_descriptor, have_anchor, have_pulse;
+    uint32_t last_seq;      /* of a frame that is not LOCAL */
+    uint64_t last_repeated; /* how many frames were repeated up to it */
     struct native_descriptor descriptor;
     struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
     struct native_beam beam[NATIVE_MAX_BEAMS];
@@ -77,8 +79,8 @@ struct scanhead {
     size_t surface_room;
     uint32_t n_surfaces;
 
-    uint64_t dropped, reader_lost;
-    uint64_t pulses_lost_told, pulses_lost_ended; /* by OVERRUN events, by SCAN_END events */
+    uint64_t dropped, reader_lost, reader_lost_before; /* by the present session; by those before it */
+    uint64_t pulses_lost_told, pulses_lost_ended;      /* by OVERRUN events, by SCAN_END events */
     int hashing;
     struct sha256_ctx sha256;
     struct sh_err err;
@@ -96,6 +98,9 @@ void host_note_reattached(struct scanhead *sh);
 /* Takes a frame into the state: descriptor, anchor, names, counters, hash. It is called once per frame, in stream
  * order. */
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload);
+
+/* Takes the number of frames that the session has left out so far. A session begins anew with 0. */
+void host_count_reader_lost(struct scanhead *sh, uint64_t n);
 
 /* SCANHEAD_EINPUT, unless frame is the one that scanhead_next returned last, and of this type. */
 int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type);

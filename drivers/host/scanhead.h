@@ -76,10 +76,10 @@ void scanhead_close(struct scanhead *sh);
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
- * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters, the hash and what the
- * stream has reported so far are kept; a jump in the sequence shows what was lost meanwhile. On USB the same
- * head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: the
- * head did not come back in time, or a signal came; call again, or close. */
+ * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters and the hash are kept, and
+ * what the stream has reported, too, until its sequence begins anew after a restart. A jump in the sequence shows what
+ * was lost meanwhile. On USB the same head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file
+ * or "fd:N". Any other error: the head did not come back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* Heads on USB now. */
@@ -426,8 +426,8 @@ int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t 
 /* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);
 
-struct scanhead_stats {
-    uint64_t bytes, frames, bad_payload, bad_bytes, seq_gaps, seq_lost; /* of this connection */
+struct scanhead_stats { /* over all connections of the handle */
+    uint64_t bytes, frames, bad_payload, bad_bytes, seq_gaps, seq_lost;
     uint64_t dropped;     /* frames dropped here while waiting for a reply */
     uint64_t reader_lost; /* frames the head says it could not give us */
     uint64_t pulses_lost; /* pulses the head says it could not compute */

@@ -128,9 +128,14 @@ static int open_tcp(const char *address, struct host_source *out, struct sh_err 
     struct addrinfo hints = {.ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM}, *list;
     int gai = getaddrinfo(host, port, &hints, &list);
     if (gai != 0) return sh_fail(err, SH_EIO, "%s: cannot find the host: %s", out->name, gai_strerror(gai));
-    int64_t deadline_ns = host_deadline_ns(CONNECT_TIMEOUT_MS);
-    for (const struct addrinfo *ai = list; ai != NULL && out->fd < 0; ai = ai->ai_next)
-        out->fd = connect_one(ai, deadline_ns);
+    const int64_t deadline_ns = host_deadline_ns(CONNECT_TIMEOUT_MS);
+    int n = 0;
+    for (const struct addrinfo *ai = list; ai != NULL; ai = ai->ai_next)
+        n++;
+    for (const struct addrinfo *ai = list; ai != NULL && out->fd < 0; ai = ai->ai_next, n--) {
+        const int64_t now_ns = host_deadline_ns(0);
+        out->fd = connect_one(ai, now_ns + (deadline_ns - now_ns) / n); /* the others need some of the time */
+    }
     int error = errno;
     freeaddrinfo(list);
     out->is_socket = 1;

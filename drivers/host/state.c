@@ -64,6 +64,25 @@ static void forget(struct scanhead *sh)
     host_forget_poses(sh);
 }
 
+/* The parser hands out a number that goes back only where another sequence begins: the head has started again, or
+ * recordings were put one after the other. What the stream said before does not hold there, nor do its times. It does
+ * if the new sequence began with frames equal to those before: they were dropped as repeated, and said the same. */
+static void follow_sequence(struct scanhead *sh, const struct native_header *header)
+{
+    const uint64_t repeated = sh->parser.stats.repeated;
+    if ((header->flags & NATIVE_LOCAL) != 0) return;
+    if (sh->have_seq && header->seq - sh->last_seq > INT32_MAX) {
+        sh->have_pulse = 0;
+        if (repeated == sh->last_repeated) {
+            forget(sh);
+            sh->times = (struct host_times){0};
+        }
+    }
+    sh->have_seq = 1;
+    sh->last_seq = header->seq;
+    sh->last_repeated = repeated;
+}
+
 static int absorb_points(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     struct native_points points;
@@ -118,11 +137,17 @@ static void absorb_time(struct scanhead *sh, const struct native_event *event)
     if (event->code == NATIVE_EV_PPS) set_gps(sh, event->b, event->c * 1000000000u);
 }
 
+void host_count_reader_lost(struct scanhead *sh, uint64_t n)
+{
+    if (n < sh->reader_lost) sh->reader_lost_before += sh->reader_lost;
+    sh->reader_lost = n;
+}
+
 static int absorb_event(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     struct native_event event;
     if (native_decode_event(payload, header->length, &event) != 0) return bad(sh, "a wrong event");
-    if (event.code == NATIVE_EV_READER_LOST) sh->reader_lost = event.c;
+    if (event.code == NATIVE_EV_READER_LOST) host_count_reader_lost(sh, event.c);
     if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost_told += event.b;
     if (event.code == NATIVE_EV_SCAN_END) sh->pulses_lost_ended += event.c;
     if (event.code == NATIVE_EV_SCAN_START && sh->have_descriptor && event.a != sh->descriptor.scan) forget(sh);
@@ -187,6 +212,7 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
     if (header->version != NATIVE_VERSION)
         return sh_fail(&sh->err, SH_EFORMAT, "%s: the head speaks version %u of the protocol; this library reads %d",
                        sh->source.name, header->version, NATIVE_VERSION);
+    follow_sequence(sh, header);
     switch (header->type) {
     case NATIVE_DESCRIPTOR:
         return absorb_descriptor(sh, header, payload);
@@ -340,7 +366,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .seq_gaps = s->seq_gaps,
         .seq_lost = s->seq_lost,
         .dropped = sh->dropped,
-        .reader_lost = sh->reader_lost,
+        .reader_lost = sh->reader_lost_before + sh->reader_lost,
         /* both count the same losses; some events of either kind may not have come */
         .pulses_lost = sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
         .repeated = s->repeated,

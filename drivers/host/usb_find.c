@@ -11,8 +11,7 @@
     "no permission; a udev rule gives it: run `sudo make install`, or copy drivers/host/70-scanhead.rules to " \
     "/etc/udev/rules.d; then `sudo udevadm control --reload`, and plug the head in again"
 
-/* Reads the number of "1209:" or "1209", and returns where it ends; NULL when it isn't one to four hexadecimal digits.
- * */
+/* Reads the number of "1209:" or "1209". Returns where it ends; NULL: it isn't one to four hexadecimal digits. */
 static const char *parse_id(const char *text, int *id)
 {
     size_t digits = strspn(text, "0123456789abcdefABCDEF");

@@ -14,8 +14,8 @@
 #include <string.h>
 #include <time.h>
 
-/* A read is a multiple of every packet size (64, 512, 1024 bytes). So no packet is longer than the room that is left.
- * */
+/* A read is a multiple of every packet size (64, 512, 1024 bytes), so no packet is longer than the room that is
+ * left. */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
 /* How long a bus may fail with the device still on it, as it does until the hub notices an unplugged device. */
 enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };

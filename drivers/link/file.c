@@ -22,35 +22,29 @@ struct file_link {
     char path[256];
 };
 
-static int file_open_fd(const char *path, int *out, struct sh_err *err)
+static int file_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
     struct sh_err why = {0};
     struct stat st;
-    int fd, rc = newfile_open(path, &fd, &why);
+    int fd;
+    if (spec->path[0] == '\0') return sh_fail(err, SH_EINPUT, "link file: a path is needed");
+    int rc = newfile_open(spec->path, &fd, &why);
     if (rc != SH_OK) return sh_fail(err, rc, "link file:%s", why.text);
-    if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND) != 0)
-        rc = sh_fail(err, SH_EIO, "link file:%s: %s", path, strerror(errno));
+    struct file_link *file = calloc(1, sizeof *file);
+    if (file == NULL)
+        rc = sh_fail(err, SH_ENOMEM, "link file:%s: no memory", spec->path);
+    else if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND | (S_ISCHR(st.st_mode) ? O_NONBLOCK : 0)) != 0)
+        rc = sh_fail(err, SH_EIO, "link file:%s: %s", spec->path, strerror(errno));
     else if (!S_ISREG(st.st_mode) && !S_ISCHR(st.st_mode))
         rc = sh_fail(err, SH_EINPUT,
-                     "link file:%s: neither a regular file nor a character device; use a pty or tcp link", path);
-    if (rc != SH_OK)
-        close(fd);
-    else
-        *out = fd;
-    return rc;
-}
-
-static int file_open(const struct link_spec *spec, void **link, struct sh_err *err)
-{
-    if (spec->path[0] == '\0') return sh_fail(err, SH_EINPUT, "link file: a path is needed");
-    struct file_link *file = calloc(1, sizeof *file);
-    if (file == NULL) return sh_fail(err, SH_ENOMEM, "link file:%s: no memory", spec->path);
-    snprintf(file->path, sizeof file->path, "%s", spec->path);
-    int rc = file_open_fd(file->path, &file->fd, err);
+                     "link file:%s: neither a regular file nor a character device; use a pty or tcp link", spec->path);
     if (rc != SH_OK) {
+        close(fd);
         free(file);
         return rc;
     }
+    file->fd = fd;
+    snprintf(file->path, sizeof file->path, "%s", spec->path);
     *link = file;
     return SH_OK;
 }
@@ -68,7 +62,14 @@ static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_m
     if (!file->reported_opened) file->reported_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
     if (file->failed != 0 && !file->reported_closed)
         file->reported_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
-    return link_poll_sink(wake_fd, (want_write & 1u) != 0 && file->failed == 0, timeout_ms, &events);
+    /* A device may be full, such as a serial port with flow control; a regular file never is. */
+    struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = -1, .events = POLLOUT}};
+    if ((want_write & 1u) != 0 && file->failed == 0) fds[1].fd = file->fd;
+    const int rc = link_wait(fds, 2, events.n > 0 ? 0 : timeout_ms);
+    if (rc != SH_OK) return rc;
+    link_take_wake(&fds[0], &events);
+    if (fds[1].revents != 0) link_events_push(&events, LINK_WRITABLE, 0, NULL);
+    return events.n;
 }
 
 static ssize_t file_read(void *link, int session, void *buf, size_t len)

@@ -4,7 +4,8 @@
  * A kind of link is one file of this folder with one `const struct link_ops`, whose members are the contract;
  * null.c is the skeleton for a new one, link.c has the list. A link has sessions: readers and commanders that
  * come and go. A pty or a file has one, TCP several, USB two (console and stream) or one. One thread owns a link and
- * makes all calls on it but endpoint(). Only poll() waits; write() of `file` may wait for the disk. */
+ * makes all calls on it but endpoint(). Only poll() waits, except that open() may wait for names and connections,
+ * write() of `file` for the disk, and fault() and close() for clients, for some seconds at most. */
 #ifndef DRIVERS_LINK_LINK_H
 #define DRIVERS_LINK_LINK_H
 
@@ -133,7 +134,7 @@ struct link_ops {
 
     /* Bytes written to a session that its reader has not taken: closing the link loses them. There may be more: the
      * system learns of the last ones a moment late, and counts only up to a limit. 0 also where it can't be known.
-     * NULL: closing loses none. */
+     * NULL: closing loses none that the client takes. */
     int (*unread)(void *link, int session);
 
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of

@@ -1,11 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* Shared by the poll functions of links that wait in poll(2): the wait, the wake-up. Private. */
+/* The poll functions of links share these: the events that they fill in; for those that wait in poll(2) also the wait
+ * and the wake-up. Private. */
 #ifndef DRIVERS_LINK_LINK_POLL_H
 #define DRIVERS_LINK_LINK_POLL_H
 
 #include <poll.h>
 
-#include "drivers/link/link_events.h"
+#include "drivers/link/link.h"
+
+/* Events of one poll call. push answers 0 when there is no room. The caller then leaves its state as it is,
+ * so that the event comes with the next call. */
+struct link_events {
+    struct link_event *event;
+    int n, max;
+};
+int link_events_push(struct link_events *events, enum link_event_kind kind, int session, const char *peer);
 
 /* poll(2). An interruption by a signal counts as "nothing yet". Returns 0 or SH_EIO. */
 int link_wait(struct pollfd *fds, nfds_t n, int timeout_ms);

@@ -51,12 +51,6 @@ struct pty_link {
     int due_closed, due_opened; /* events that the caller still has to get, in this order */
 };
 
-static int pty_watch(struct pty_link *pty)
-{
-    pty->watch = inotify_add_watch(pty->inotify, pty->device.slave, IN_OPEN | IN_CLOSE);
-    return pty->watch < 0 ? SH_EIO : SH_OK;
-}
-
 static void pty_endpoint(const void *link, char *buf, size_t len)
 {
     const struct pty_link *pty = link;
@@ -77,7 +71,7 @@ static void pty_begin(struct pty_link *pty, unsigned count)
 {
     pty->open = 1;
     pty->count = count;
-    pty_line_forget(&pty->line);
+    pty->line.n_out = 0;
     pty->due_opened = 1;
     pty->open_event_due = 0;
 }
@@ -123,7 +117,8 @@ static short pty_now(const struct pty_link *pty)
 /* Sets up the watch. A client that came before it is found by the master's state. */
 static int pty_wait_for_client(struct pty_link *pty)
 {
-    if (pty_watch(pty) != SH_OK) return SH_EIO;
+    pty->watch = inotify_add_watch(pty->inotify, pty->device.slave, IN_OPEN | IN_CLOSE);
+    if (pty->watch < 0) return SH_EIO;
     pty_read_inotify(pty, 0); /* before we look: a client that comes and goes afterwards is noted */
     short now = pty_now(pty);
     if ((now & POLLHUP) == 0) {
@@ -167,7 +162,7 @@ static int pty_end(struct pty_link *pty)
 {
     pty->open = pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
     pty->count = 0;
-    pty_line_forget(&pty->line);
+    pty->line.n_out = 0;
     pty->due_closed = 1;
     inotify_rm_watch(pty->inotify, pty->watch);
     pty_read_inotify(pty, 0);
@@ -268,20 +263,19 @@ static void pty_let_go(struct pty_link *pty)
     pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
     pty->open = pty->due_opened = pty->open_event_due = 0;
     pty->count = 0;
-    pty_line_forget(&pty->line);
+    pty->line.n_out = 0;
     inotify_rm_watch(pty->inotify, pty->watch);
     pty_read_inotify(pty, 0);
 }
 
 static int pty_cut(struct pty_link *pty)
 {
-    if (!pty->open) return SH_ESTATE;
-    pty_let_go(pty);
     struct pty_device device = pty->device;
-    const int renewed = pty_device_renew(&device) == SH_OK;
+    if (!pty->open || pty_device_renew(&device) != SH_OK) return SH_ESTATE; /* the session goes on */
+    pty_let_go(pty);
     pty_set_device(pty, &device);
     pty->is_deaf = pty_wait_for_client(pty) != SH_OK;
-    return renewed && !pty->is_deaf ? SH_OK : SH_ESTATE;
+    return pty->is_deaf ? SH_ESTATE : SH_OK;
 }
 
 static int pty_unplug(struct pty_link *pty)
@@ -328,7 +322,7 @@ static void pty_close(void *link)
     close(pty->inotify);
     if (!pty->unplugged) pty_device_close(&pty->device);
     pthread_mutex_destroy(&pty->naming);
-    pty_line_free(&pty->line);
+    free(pty->line.out);
     free(pty);
 }
 

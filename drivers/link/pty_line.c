@@ -5,15 +5,13 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "core/err.h"
 #include "drivers/link/pty_rate.h"
 
 ssize_t pty_line_read(const struct pty_line *line, int master, void *buf, size_t len)
 {
     struct uart uart;
     uint8_t sent[4096];
-    if (line->baud == 0 || pty_rate_from_client(master, line->baud, &uart) != SH_OK || uart_reads_right(&uart))
-        return read(master, buf, len);
+    if (!pty_rate_differs(master, line->baud, 0, &uart)) return read(master, buf, len);
     if (len > sizeof sent * UART_MOST_PER_BYTE) len = sizeof sent * UART_MOST_PER_BYTE;
     if (len < UART_MOST_PER_BYTE) return 0; /* its owner has no room now */
     const ssize_t n = read(master, sent, len / UART_MOST_PER_BYTE);
@@ -30,10 +28,8 @@ int pty_line_flush(struct pty_line *line, int master)
 ssize_t pty_line_write(struct pty_line *line, int master, const void *buf, size_t len)
 {
     struct uart uart;
-    if (line->baud == 0) return write(master, buf, len);
     if (!pty_line_flush(line, master)) return 0;
-    if (pty_rate_to_client(master, line->baud, &uart) != SH_OK || uart_reads_right(&uart))
-        return write(master, buf, len);
+    if (!pty_rate_differs(master, line->baud, 1, &uart)) return write(master, buf, len);
     if (line->out_room < len * UART_MOST_PER_BYTE) {
         uint8_t *out = realloc(line->out, len * UART_MOST_PER_BYTE);
         if (out == NULL) return 0; /* the reader loses frames, which is counted */
@@ -43,14 +39,4 @@ ssize_t pty_line_write(struct pty_line *line, int master, const void *buf, size_
     line->n_out = uart_read(&uart, buf, len, line->out);
     pty_line_flush(line, master);
     return (ssize_t)len;
-}
-
-void pty_line_forget(struct pty_line *line)
-{
-    line->n_out = 0;
-}
-
-void pty_line_free(struct pty_line *line)
-{
-    free(line->out);
 }

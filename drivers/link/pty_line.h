@@ -13,8 +13,9 @@
 
 struct pty_line {
     uint32_t baud; /* of the head; 0: any rate will do */
-    uint8_t *out;  /* bytes of a write that the terminal has not taken yet, as they are read there */
-    size_t n_out, out_room;
+    uint8_t *out;  /* bytes of a write that the terminal has not taken yet, as they are read there; to be freed */
+    size_t n_out;  /* to be set to 0 when the client has gone */
+    size_t out_room;
 };
 
 /* As read(2) and write(2) on the master, with errno. Where the rates differ, a byte that was sent may be read as up to
@@ -23,8 +24,5 @@ ssize_t pty_line_read(const struct pty_line *line, int master, void *buf, size_t
 ssize_t pty_line_write(struct pty_line *line, int master, const void *buf, size_t len);
 /* Writes what waits. 1: nothing waits any more. */
 int pty_line_flush(struct pty_line *line, int master);
-/* The client has gone: drops what waits. */
-void pty_line_forget(struct pty_line *line);
-void pty_line_free(struct pty_line *line);
 
 #endif

@@ -4,33 +4,21 @@
 #include <asm/termbits.h>
 #include <sys/ioctl.h>
 
-#include "core/err.h"
-
-/* The master's ioctls for settings act on the slave. */
-static int get_settings(int master, struct termios2 *settings)
-{
-    return ioctl(master, TCGETS2, settings) == 0 ? SH_OK : SH_EIO;
-}
-
-int pty_rate_from_client(int master, uint32_t baud, struct uart *uart)
+/* The master's ioctls for settings act on the slave. Without INPCK Linux's drivers pass on a byte with a wrong stop bit
+ * as it was sampled. PARMRK's marks can't be made on a pseudo terminal, whose line discipline would mark them again, so
+ * its client gets 0. */
+int pty_rate_differs(int master, uint32_t baud, int to_client, struct uart *uart)
 {
     struct termios2 settings;
     *uart = (struct uart){baud, baud, UART_KEEPS_ERRORS, 0};
-    if (get_settings(master, &settings) != SH_OK) return SH_EIO;
-    if (settings.c_ospeed != 0) uart->sender_baud = settings.c_ospeed;
-    return SH_OK;
-}
-
-/* Without INPCK Linux's drivers pass on a byte with a wrong stop bit as it was sampled. PARMRK's marks can't be made on
- * a pseudo terminal, whose line discipline would mark them again, so its client gets 0. */
-int pty_rate_to_client(int master, uint32_t baud, struct uart *uart)
-{
-    struct termios2 settings;
-    *uart = (struct uart){baud, baud, UART_KEEPS_ERRORS, 0};
-    if (get_settings(master, &settings) != SH_OK) return SH_EIO;
+    if (baud == 0 || ioctl(master, TCGETS2, &settings) != 0) return 0;
+    if (!to_client) {
+        if (settings.c_ospeed != 0) uart->sender_baud = settings.c_ospeed;
+        return !uart_reads_right(uart);
+    }
     if (settings.c_ispeed != 0) uart->receiver_baud = settings.c_ispeed;
     if ((settings.c_iflag & INPCK) != 0)
         uart->errors = (settings.c_iflag & IGNPAR) != 0 ? UART_DROPS_ERRORS : UART_ZEROES_ERRORS;
     uart->drops_breaks = (settings.c_iflag & IGNBRK) != 0;
-    return SH_OK;
+    return !uart_reads_right(uart);
 }

@@ -6,9 +6,9 @@
 
 #include "drivers/link/uart.h"
 
-/* Fill in how bytes from the client, and to the client, are read where the head has a rate. A client that has set rate
- * 0 (hang up) has the head's. Return 0, or SH_EIO. */
-int pty_rate_from_client(int master, uint32_t baud, struct uart *uart);
-int pty_rate_to_client(int master, uint32_t baud, struct uart *uart);
+/* Whether bytes to the client, or from it, are read as others, since its rate differs from the head's; baud 0: from no
+ * other. uart then has how they are read. A client that has set rate 0 (hang up), or whose rate can't be had, has the
+ * head's. */
+int pty_rate_differs(int master, uint32_t baud, int to_client, struct uart *uart);
 
 #endif

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The TCP link: a listener and up to max_sessions clients.
  *
- * A session is over when its peer resets, takes no more, or vanishes (keep-alive, about 25 s). A peer that shuts down
- * its sending side is LINK_SHUT, and goes on reading. One that has closed its socket looks the same until something is
- * written to it.
+ * A session is over when its peer resets the connection, has closed its socket, or vanishes (keep-alive, about 25 s). A
+ * peer that shuts down its sending side is reported as LINK_SHUT, and goes on reading. One that has closed its socket
+ * looks the same until something is written to it.
  * A client that finds all sessions taken is accepted and closed at once, so that it does not wait. Where
  * clients come for one request, the session that has been silent for longest ends instead. A client that comes while
  * another client sends no more gets that one's session, as soon as what was sent has been read. */
@@ -13,9 +13,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "drivers/link/link_listen.h"
 #include "drivers/link/link_poll.h"
 #include "drivers/socket/silence.h"
-#include "drivers/socket/socket.h"
 
 enum { SEND_BUFFER_BYTES = 1 << 20 };
 
@@ -30,40 +30,24 @@ struct tcp_session {
 };
 
 struct tcp_link {
-    int listener;   /* -1: unplugged */
-    int is_silent;  /* its cable is pulled */
-    int reserve_fd; /* given up for a moment to turn a client away when descriptors run out */
+    struct link_listener listener;
+    int is_silent; /* its cable is pulled */
     int n_sessions, brief;
     uint64_t turns;
-    int port;      /* of the listener */
-    char host[64]; /* as the user named it */
-    char name[80];
     struct tcp_session session[LINK_MAX_SESSIONS];
 };
 
 static int tcp_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
-    const char *host = spec->address[0] != '\0' ? spec->address : "127.0.0.1";
-    if (spec->port < 0 || spec->port > 65535)
-        return sh_fail(err, SH_EINPUT, "link tcp:%s:%d: allowed ports are 0 to 65535", host, spec->port);
-    if (spec->max_sessions < 1 || spec->max_sessions > LINK_MAX_SESSIONS)
-        return sh_fail(err, SH_EINPUT, "link tcp:%s:%d: %d sessions; allowed are 1 to %d", host, spec->port,
-                       spec->max_sessions, LINK_MAX_SESSIONS);
     struct tcp_link *tcp = calloc(1, sizeof *tcp);
-    if (tcp == NULL) return sh_fail(err, SH_ENOMEM, "link tcp:%s:%d: no memory", host, spec->port);
-    const struct socket_place place = {.what = "link tcp", .host = host, .port = spec->port};
-    char at[72] = "";
-    int rc = socket_open(&place, &tcp->listener, at, sizeof at, err);
+    if (tcp == NULL) return sh_fail(err, SH_ENOMEM, "link tcp: no memory");
+    const int rc = link_listen("link tcp", spec, &tcp->listener, err);
     if (rc != SH_OK) {
         free(tcp);
         return rc;
     }
-    snprintf(tcp->name, sizeof tcp->name, "tcp:%s", at);
-    snprintf(tcp->host, sizeof tcp->host, "%s", host);
-    tcp->port = atoi(strrchr(at, ':') + 1);
     tcp->n_sessions = spec->max_sessions;
     tcp->brief = spec->brief;
-    tcp->reserve_fd = socket_reserve();
     *link = tcp;
     return SH_OK;
 }
@@ -71,7 +55,7 @@ static int tcp_open(const struct link_spec *spec, void **link, struct sh_err *er
 static void tcp_endpoint(const void *link, char *buf, size_t len)
 {
     const struct tcp_link *tcp = link;
-    snprintf(buf, len, "%s", tcp->name);
+    snprintf(buf, len, "tcp:%s", tcp->listener.at);
 }
 
 static int free_slot(const struct tcp_link *tcp)
@@ -93,7 +77,7 @@ static void give_up_one(struct tcp_link *tcp)
     }
 }
 
-/* A session whose client has gone, or sends no more, though the owner may not have heard of it yet. */
+/* Whether some session's client has gone, or sends no more. The owner may not have heard of it yet. */
 static int is_any_ending(const struct tcp_link *tcp)
 {
     struct pollfd fds[LINK_MAX_SESSIONS];
@@ -110,7 +94,7 @@ static int is_any_ending(const struct tcp_link *tcp)
  * the owner is not silent. */
 static void tcp_make_room(struct tcp_link *tcp)
 {
-    struct pollfd waiting = {.fd = tcp->listener, .events = POLLIN};
+    struct pollfd waiting = {.fd = tcp->listener.fd, .events = POLLIN};
     struct tcp_session *oldest = NULL;
     if (!tcp->brief || poll(&waiting, 1, 0) <= 0) return;
     for (int i = 0; i < tcp->n_sessions; i++) {
@@ -136,7 +120,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
             return;
         }
         if (slot == tcp->n_sessions && tcp->brief) return; /* all have asked something, and are answered soon */
-        if (!socket_accept(tcp->listener, &tcp->reserve_fd, &fd, &from, &len))
+        if (!socket_accept(tcp->listener.fd, &tcp->listener.reserve_fd, &fd, &from, &len))
             return; /* none left, or one that gave up before we came */
         socket_address_text((struct sockaddr *)&from, len, peer, sizeof peer);
         if (fd < 0 || slot == tcp->n_sessions) {
@@ -156,17 +140,15 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
     }
 }
 
-/* Returns 1 when the slot is free now. */
-static int tcp_report_closed(struct tcp_session *session, int slot, struct link_events *events)
+static void tcp_report_closed(struct tcp_session *session, int slot, struct link_events *events)
 {
-    session->state = TCP_ENDED;
-    if (!link_events_push(events, LINK_CLOSED, slot, session->peer)) return 0;
+    session->state = TCP_ENDED; /* until there is room for the event */
+    if (!link_events_push(events, LINK_CLOSED, slot, session->peer)) return;
     close(session->fd);
     session->state = TCP_FREE;
-    return 1;
 }
 
-/* A session's entry for poll: the events that it waits for. */
+/* Returns a session's entry for poll(2). */
 static struct pollfd tcp_slot(const struct tcp_session *session, int want_write)
 {
     const int events = (session->shut ? 0 : POLLIN) | (want_write ? POLLOUT : 0);
@@ -195,7 +177,7 @@ static int tcp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     struct pollfd fds[2 + LINK_MAX_SESSIONS];
     if (tcp->is_silent) return link_poll_sink(wake_fd, 0, timeout_ms, &events);
     fds[0] = (struct pollfd){.fd = wake_fd, .events = POLLIN};
-    fds[1] = (struct pollfd){.fd = tcp->listener, .events = POLLIN};
+    fds[1] = (struct pollfd){.fd = tcp->listener.fd, .events = POLLIN};
     for (int s = 0; s < tcp->n_sessions; s++) {
         struct tcp_session *session = &tcp->session[s];
         if (session->state == TCP_ENDED) tcp_report_closed(session, s, &events);
@@ -216,7 +198,7 @@ static struct tcp_session *tcp_session(struct tcp_link *tcp, int session)
     return &tcp->session[session];
 }
 
-/* n: what a call for the session has moved. */
+/* Notes that a call has moved n bytes for the session; below 0: that it has ended. */
 static ssize_t moved(struct tcp_link *tcp, struct tcp_session *session, ssize_t n)
 {
     if (n < 0) session->state = TCP_ENDED;
@@ -267,31 +249,29 @@ static int tcp_cut(struct tcp_link *tcp, int session)
     return SH_OK;
 }
 
-/* Collects the sockets of the link: its listener's, and its sessions' from 1 on. */
-static void tcp_sockets(const struct tcp_link *tcp, int fds[1 + LINK_MAX_SESSIONS])
+/* Collects the sockets of its sessions. */
+static void tcp_sockets(const struct tcp_link *tcp, int fds[LINK_MAX_SESSIONS])
 {
-    fds[0] = tcp->listener;
     for (int s = 0; s < LINK_MAX_SESSIONS; s++)
-        fds[1 + s] = tcp->session[s].state != TCP_FREE ? tcp->session[s].fd : -1;
+        fds[s] = tcp->session[s].state != TCP_FREE ? tcp->session[s].fd : -1;
 }
 
 static int tcp_silence(struct tcp_link *tcp)
 {
-    int fds[1 + LINK_MAX_SESSIONS];
-    if (tcp->listener < 0 || tcp->is_silent) return SH_ESTATE;
+    int fds[LINK_MAX_SESSIONS];
+    if (tcp->listener.fd < 0 || tcp->is_silent) return SH_ESTATE;
     tcp_sockets(tcp, fds);
-    if (sockets_silence(fds, 1) != SH_OK) return SH_ESTATE; /* first: no new client comes while it waits */
-    tcp->is_silent = sockets_silence(fds + 1, LINK_MAX_SESSIONS) == SH_OK;
-    if (!tcp->is_silent) sockets_speak(fds, 1);
-    return tcp->is_silent ? SH_OK : SH_ESTATE;
+    const int rc = sockets_silence(tcp->listener.fd, fds, LINK_MAX_SESSIONS);
+    tcp->is_silent = rc == SH_OK;
+    return rc;
 }
 
 static void tcp_speak(struct tcp_link *tcp, int resets)
 {
-    int fds[1 + LINK_MAX_SESSIONS];
+    int fds[LINK_MAX_SESSIONS];
     if (!tcp->is_silent) return;
     tcp_sockets(tcp, fds);
-    sockets_speak(fds, 1 + LINK_MAX_SESSIONS);
+    sockets_speak(tcp->listener.fd, fds, LINK_MAX_SESSIONS);
     tcp->is_silent = 0;
     for (int s = 0; s < tcp->n_sessions && resets; s++)
         tcp_cut(tcp, s);
@@ -299,10 +279,10 @@ static void tcp_speak(struct tcp_link *tcp, int resets)
 
 static int tcp_unplug(struct tcp_link *tcp)
 {
-    if (tcp->listener < 0) return SH_ESTATE;
-    tcp->is_silent = 0;   /* what is left of its sockets ends here */
-    close(tcp->listener); /* the system turns clients away that wait there */
-    tcp->listener = -1;
+    if (tcp->listener.fd < 0) return SH_ESTATE;
+    tcp->is_silent = 0;      /* what is left of its sockets ends here */
+    close(tcp->listener.fd); /* the system turns clients away that wait there */
+    tcp->listener.fd = -1;
     for (int s = 0; s < tcp->n_sessions; s++)
         tcp_cut(tcp, s);
     return SH_OK;
@@ -310,12 +290,9 @@ static int tcp_unplug(struct tcp_link *tcp)
 
 static int tcp_plug(struct tcp_link *tcp, int resets)
 {
-    const struct socket_place place = {.what = "link tcp", .host = tcp->host, .port = tcp->port};
-    char at[72];
-    struct sh_err err;
     tcp_speak(tcp, resets);
-    if (tcp->listener >= 0) return SH_OK;
-    return socket_open(&place, &tcp->listener, at, sizeof at, &err) == SH_OK ? SH_OK : SH_ESTATE;
+    if (tcp->listener.fd < 0) tcp->listener.fd = socket_listen_again(&tcp->listener.address);
+    return tcp->listener.fd >= 0 ? SH_OK : SH_ESTATE;
 }
 
 static int tcp_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
@@ -340,10 +317,12 @@ static void tcp_close(void *link)
 {
     struct tcp_link *tcp = link;
     tcp_speak(tcp, 0); /* else its clients would not hear of the end */
-    for (int s = 0; s < tcp->n_sessions; s++)
+    for (int s = 0; s < tcp->n_sessions; s++) {
+        tcp_end(tcp, s); /* else a client that has sent something loses bytes that are on their way to it */
         if (tcp->session[s].state != TCP_FREE) close(tcp->session[s].fd);
-    if (tcp->reserve_fd >= 0) close(tcp->reserve_fd);
-    if (tcp->listener >= 0) close(tcp->listener);
+    }
+    if (tcp->listener.reserve_fd >= 0) close(tcp->listener.reserve_fd);
+    if (tcp->listener.fd >= 0) close(tcp->listener.fd);
     free(tcp);
 }
 

@@ -14,8 +14,8 @@
  * port of a protocol is not used there unless the link names its source.
  *
  * A receiver that is not there is no failure: datagrams to it are lost, as are those that the system has no room for.
- * Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. What arrives at
- * the socket can be read. */
+ * Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. Datagrams that
+ * arrive at the socket can be read. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <ifaddrs.h>
@@ -49,6 +49,8 @@ static const char *host_of(const struct link_spec *spec)
     return spec->address[0] != '\0' ? spec->address : "127.0.0.1";
 }
 
+/* A name with addresses of both kinds, such as localhost, leads to the IPv4 one: the receivers of these protocols often
+ * have no other, and no answer of theirs would show which one they listen on. */
 static int find_receiver(const struct link_spec *spec, struct sockaddr_storage *to, socklen_t *len, struct sh_err *err)
 {
     struct addrinfo *list;
@@ -56,8 +58,12 @@ static int find_receiver(const struct link_spec *spec, struct sockaddr_storage *
         return sh_fail(err, SH_EINPUT, "link udp:%s:%d: allowed ports are 1 to 65535", host_of(spec), spec->port);
     const int rc = socket_resolve("link udp", host_of(spec), spec->port, SOCK_DGRAM, &list, err);
     if (rc != SH_OK) return rc;
-    memcpy(to, list->ai_addr, list->ai_addrlen);
-    *len = list->ai_addrlen;
+    const struct addrinfo *chosen = list;
+    while (chosen != NULL && chosen->ai_family != AF_INET)
+        chosen = chosen->ai_next;
+    if (chosen == NULL) chosen = list;
+    memcpy(to, chosen->ai_addr, chosen->ai_addrlen);
+    *len = chosen->ai_addrlen;
     freeaddrinfo(list);
     return SH_OK;
 }
@@ -67,7 +73,7 @@ static in_addr_t ipv4_of(const struct sockaddr *at)
     return ((const struct sockaddr_in *)(const void *)at)->sin_addr.s_addr;
 }
 
-/* Properties of an interface that the link needs. */
+/* An interface, as far as the link needs it. */
 struct network {
     int found, has_broadcast;
     struct sockaddr_storage own; /* its address, of the receiver's family */
@@ -75,18 +81,28 @@ struct network {
     in_addr_t broadcast;
 };
 
-/* name: of the interface; NULL: any that has `to` as its broadcast address. */
+static int is_in_network(const struct ifaddrs *i, const struct sockaddr *to)
+{
+    return to->sa_family == AF_INET && i->ifa_netmask != NULL &&
+           ((ipv4_of(i->ifa_addr) ^ ipv4_of(to)) & ipv4_of(i->ifa_netmask)) == 0;
+}
+
+/* name: of the interface; NULL: any that has `to` as its broadcast address. Where the interface has several addresses,
+ * that of the receiver's network is taken, else the first. */
 static int find_network(const char *name, const struct sockaddr *to, struct network *out, struct sh_err *err)
 {
     struct ifaddrs *list;
+    int is_near = 0;
     memset(out, 0, sizeof *out);
     if (getifaddrs(&list) != 0) return sh_fail(err, SH_EIO, "link udp: the interfaces: %s", strerror(errno));
-    for (const struct ifaddrs *i = list; i != NULL && !out->found; i = i->ifa_next) {
+    for (const struct ifaddrs *i = list; i != NULL && !is_near; i = i->ifa_next) {
         if (i->ifa_addr == NULL || i->ifa_addr->sa_family != to->sa_family) continue;
         int is_v4 = to->sa_family == AF_INET;
         int broadcasts = is_v4 && (i->ifa_flags & IFF_BROADCAST) != 0 && i->ifa_broadaddr != NULL;
         if (name != NULL ? strcmp(i->ifa_name, name) != 0 : !broadcasts || ipv4_of(i->ifa_broadaddr) != ipv4_of(to))
             continue;
+        is_near = is_in_network(i, to);
+        if (out->found && !is_near) continue;
         out->found = 1;
         out->own_len = is_v4 ? sizeof(struct sockaddr_in) : sizeof(struct sockaddr_in6);
         memcpy(&out->own, i->ifa_addr, out->own_len);
@@ -98,7 +114,7 @@ static int find_network(const char *name, const struct sockaddr *to, struct netw
 }
 
 /* Broadcasts go out on the interface that is named, and on no other. `to` becomes that interface's broadcast address
- * where it was that of all networks. *broadcast: it is one. */
+ * where it was that of all networks. *broadcast: whether it is a broadcast address. */
 static int check_receiver(const struct link_spec *spec, struct sockaddr *to, struct network *net, int *broadcast,
                           struct sh_err *err)
 {
@@ -186,8 +202,10 @@ static int is_of_one(const struct sockaddr_storage *at)
     if (!ok || getifaddrs(&list) != 0) return ok;
     for (const struct ifaddrs *i = list; i != NULL; i = i->ifa_next) {
         if (i->ifa_addr == NULL || i->ifa_netmask == NULL || i->ifa_addr->sa_family != AF_INET) continue;
-        const in_addr_t mask = ipv4_of(i->ifa_netmask), is_here = ((own ^ ipv4_of(i->ifa_addr)) & mask) == 0;
-        if (is_here && mask != INADDR_BROADCAST && (own | mask) == INADDR_BROADCAST) ok = 0;
+        const in_addr_t mask = ipv4_of(i->ifa_netmask);
+        if (mask != INADDR_BROADCAST && (own | mask) == INADDR_BROADCAST &&
+            is_in_network(i, (const struct sockaddr *)at))
+            ok = 0;
     }
     freeifaddrs(list);
     return ok;
@@ -360,7 +378,7 @@ static ssize_t udp_write(void *link, int session, const void *buf, size_t len)
     return (ssize_t)len; /* without a cable, a route or memory the datagram is lost, as it may be on any way */
 }
 
-/* The socket stays, so that the source of the datagrams stays the same. What came meanwhile is dropped. */
+/* The socket stays, so that the source of the datagrams stays the same. Datagrams that came meanwhile are dropped. */
 static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
 {
     struct udp_link *udp = link;

@@ -22,8 +22,9 @@ struct usb_link {
     int n;                          /* sessions of its USB identity */
     int reported[USB_MAX_SESSIONS]; /* the caller takes it to be open */
     uint32_t plugged;               /* attaches that the caller knows of */
-    const char *news;               /* the back end's, until reported */
-    const char *refused;            /* likewise */
+    char news[200];                 /* to be reported; empty: none */
+    char refused[64];               /* the client that was turned away last */
+    int n_refused;                  /* of those, to be reported */
     struct usb_claims claims;       /* of the head's own identity */
 };
 
@@ -41,6 +42,8 @@ static void free_link(struct usb_link *self)
 
 static int usb_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
+    const struct usb_personality *personality = usb_personality_get((enum usb_personality_id)spec->personality);
+    if (personality == NULL) return sh_fail(err, SH_EINPUT, "link usb: no such USB identity");
     struct usb_link *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "link usb: no memory");
     struct usb_identity id = {
@@ -50,26 +53,22 @@ static int usb_open(const struct link_spec *spec, void **link, struct sh_err *er
                                        .attach = spec->attach,
                                        .retry_ms = spec->retry_ms};
     snprintf(id.serial, sizeof id.serial, "%s", spec->serial);
-    self->claims = USB_NO_CLAIMS;
     snprintf(backend.address, sizeof backend.address, "%s", spec->address);
     snprintf(backend.path, sizeof backend.path, "%s", spec->path);
     snprintf(backend.udc, sizeof backend.udc, "%s", spec->udc);
+    self->claims = USB_NO_CLAIMS;
+    self->n = personality->n_sessions;
     self->ops = usb_backend_ops_get(backend.type);
-    const struct usb_personality *personality = usb_personality_get((enum usb_personality_id)spec->personality);
-    if (personality != NULL) self->n = personality->n_sessions;
-    int rc = personality != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: no such USB identity");
-    if (rc == SH_OK)
-        rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build does not have that back end");
+    int rc = self->ops != NULL ? SH_OK : sh_fail(err, SH_EINPUT, "link usb: this build does not have that back end");
     if (rc == SH_OK && spec->own_serial) rc = usb_own_identity(&id, spec->whose, &self->claims, err);
-    if (rc == SH_OK && spec->own_serial && !personality->has_serial) id.serial[0] = '\0';
+    if (spec->own_serial && !personality->has_serial) id.serial[0] = '\0';
     if (rc == SH_OK) rc = scanhead_usb_create(personality, &id, &self->head, err);
     if (rc == SH_OK) rc = self->ops->open(&backend, self->head.device, &self->backend, err);
-    if (rc != SH_OK) {
+    if (rc == SH_OK)
+        *link = self;
+    else
         free_link(self);
-        return rc;
-    }
-    *link = self;
-    return SH_OK;
+    return rc;
 }
 
 static void usb_endpoint(const void *link, char *buf, size_t len)
@@ -88,20 +87,13 @@ static double usb_capacity(const void *link)
     return rate[usb_device_identity(self->head.device)->highest];
 }
 
-/* Number of unread bytes from a session that is over. */
-static size_t left_over(const struct usb_link *self, int i)
+/* Of a session that is over, only bytes from before its end are read. */
+static int is_readable(const struct usb_link *self, int i)
 {
     const uint8_t out = row_of(self, i)->out;
     uint32_t epoch = 0;
-    size_t n = usb_device_can_read(self->head.device, out, &epoch);
-    return n != 0 && epoch != usb_device_epoch(self->head.device, out) ? n : 0;
-}
-
-static int is_readable(const struct usb_link *self, int i)
-{
-    if (!self->reported[i]) return 0;
-    if (!self->head.session[i].open) return left_over(self, i) != 0;
-    return usb_device_can_read(self->head.device, row_of(self, i)->out, NULL) != 0;
+    if (!self->reported[i] || usb_device_can_read(self->head.device, out, &epoch) == 0) return 0;
+    return self->head.session[i].open || epoch != usb_device_epoch(self->head.device, out);
 }
 
 static int is_writable(const struct usb_link *self, int i)
@@ -131,6 +123,19 @@ static int go_on(void *ctx)
     return 1;
 }
 
+static void say(void *ctx, const char *text)
+{
+    struct usb_link *self = ctx;
+    snprintf(self->news, sizeof self->news, "%s", text);
+}
+
+static void refuse(void *ctx, const char *client)
+{
+    struct usb_link *self = ctx;
+    snprintf(self->refused, sizeof self->refused, "%s", client);
+    self->n_refused++;
+}
+
 static void usb_link_report(struct usb_link *self, int i, uint32_t want_write, struct link_events *events)
 {
     const struct scanhead_usb_session *session = &self->head.session[i];
@@ -143,25 +148,22 @@ static void usb_link_report(struct usb_link *self, int i, uint32_t want_write, s
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
-/* Takes the next news. The back end's own come first; of an unplug they say more than scanhead_usb_cut, which is then
- * left out. */
-static void take_news(struct usb_link *self)
+/* The back end's news come first; of an unplug they say more than scanhead_usb_cut, which is then left out. */
+static void report_news(struct usb_link *self, struct link_events *events)
 {
-    if (self->news == NULL && self->ops->news != NULL) self->news = self->ops->news(self->backend);
-    if (self->news != NULL && self->head.cut == USB_END_UNPLUGGED) self->head.cut_due = 0;
-    if (self->news == NULL) self->news = scanhead_usb_cut(&self->head);
-}
-
-static void take_refused(struct usb_link *self)
-{
-    if (self->refused == NULL && self->ops->refused != NULL) self->refused = self->ops->refused(self->backend);
+    if (self->news[0] != '\0' && self->head.cut == USB_END_UNPLUGGED) self->head.cut_due = 0;
+    const char *cut = self->news[0] == '\0' ? scanhead_usb_cut(&self->head) : NULL;
+    if (cut != NULL) say(self, cut);
+    if (self->news[0] != '\0' && link_events_push(events, LINK_NOTICE, 0, self->news)) self->news[0] = '\0';
+    while (self->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, self->refused))
+        self->n_refused--;
 }
 
 static int has_news(const struct usb_link *self, uint32_t want_write)
 {
     int news = is_plugged_anew(self);
-    news |= (self->ops->more != NULL && self->ops->more(self->backend)) || self->news != NULL ||
-            self->refused != NULL || self->head.cut_due;
+    news |= (self->ops->more != NULL && self->ops->more(self->backend)) || self->news[0] != '\0' ||
+            self->n_refused > 0 || self->head.cut_due;
     for (int i = 0; i < self->n; i++)
         news |= has_to_report(self, i) || is_readable(self, i) || ((want_write >> i & 1u) != 0 && is_writable(self, i));
     return news;
@@ -181,12 +183,13 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 {
     struct usb_link *self = link;
     struct link_events events = {event, 0, max};
+    const struct usb_owner owner = {go_on, say, refuse, self};
     struct pollfd fds[1 + USB_BACKEND_MAX_FDS] = {{.fd = wake_fd, .events = POLLIN}};
     int n = self->ops->prepare(self->backend, fds + 1);
     int rc = link_wait(fds, (nfds_t)(1 + n), has_news(self, want_write) ? 0 : wait_ms(self, timeout_ms));
     if (rc != SH_OK) return rc;
     link_take_wake(&fds[0], &events);
-    rc = self->ops->handle(self->backend, fds + 1, n, go_on, self);
+    rc = self->ops->handle(self->backend, fds + 1, n, &owner);
     if (rc != SH_OK) return rc;
     scanhead_usb_update(&self->head);
     self->ops->flush(self->backend);
@@ -194,12 +197,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
         self->plugged = usb_device_attaches(self->head.device);
     for (int i = 0; i < self->n; i++)
         usb_link_report(self, i, want_write, &events);
-    take_news(self);
-    if (self->news != NULL && link_events_push(&events, LINK_NOTICE, 0, self->news)) self->news = NULL;
-    for (take_refused(self); self->refused != NULL; take_refused(self)) {
-        if (!link_events_push(&events, LINK_REFUSED, 0, self->refused)) break;
-        self->refused = NULL;
-    }
+    report_news(self, &events);
     return events.n;
 }
 
@@ -224,7 +222,7 @@ static ssize_t usb_write(void *link, int session, const void *buf, size_t len)
         if (n != 0) self->ops->flush(self->backend);
         return (ssize_t)n;
     }
-    usb_device_drop(self->head.device, row->out, usb_device_epoch(self->head.device, row->out));
+    usb_device_drop(self->head.device, row->out);
     self->ops->flush(self->backend);
     return SH_ECLOSED;
 }

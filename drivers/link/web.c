@@ -19,7 +19,6 @@
 
 #include "drivers/link/link_poll.h"
 #include "drivers/link/web_inside.h"
-#include "drivers/socket/socket.h"
 
 struct websockets_lib web_lws;
 
@@ -62,36 +61,28 @@ static int open_context(struct web_link *web)
 
 static int web_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
-    const char *host = spec->address[0] != '\0' ? spec->address : "127.0.0.1";
-    if (spec->port < 0 || spec->port > 65535)
-        return sh_fail(err, SH_EINPUT, "link web:%s:%d: allowed ports are 0 to 65535", host, spec->port);
-    if (spec->max_sessions < 1 || spec->max_sessions > LINK_MAX_SESSIONS)
-        return sh_fail(err, SH_EINPUT, "link web:%s:%d: %d sessions; allowed are 1 to %d", host, spec->port,
-                       spec->max_sessions, LINK_MAX_SESSIONS);
     int rc = websockets_lib_load(&web_lws, err);
     if (rc != SH_OK) return rc;
     struct web_link *web = calloc(1, sizeof *web);
-    if (web == NULL) return sh_fail(err, SH_ENOMEM, "link web:%s:%d: no memory", host, spec->port);
-    const struct socket_place place = {.what = "link web", .host = host, .port = spec->port};
-    rc = socket_open(&place, &web->listener, web->at, sizeof web->at, err);
+    if (web == NULL) return sh_fail(err, SH_ENOMEM, "link web: no memory");
+    rc = link_listen("link web", spec, &web->listener, err);
     if (rc != SH_OK) {
         free(web);
         return rc;
     }
-    snprintf(web->host, sizeof web->host, "%s", host);
-    web->port = atoi(strrchr(web->at, ':') + 1);
+    snprintf(web->host, sizeof web->host, "%s", spec->address);
+    web->port = atoi(strrchr(web->listener.at, ':') + 1);
     web->n_sessions = spec->max_sessions;
     web->source = spec->web;
-    web->reserve_fd = socket_reserve();
-    if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener, NULL);
+    if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener.fd, NULL);
     if (web->listening == NULL) {
-        if (web->vhost == NULL) close(web->listener);
+        rc = sh_fail(err, SH_ENOMEM, "link web:%s: libwebsockets has too little memory or too few file descriptors",
+                     web->listener.at);
+        if (web->vhost == NULL) close(web->listener.fd);
         if (web->context != NULL) web_lws.lws_context_destroy(web->context);
-        if (web->reserve_fd >= 0) close(web->reserve_fd);
+        if (web->listener.reserve_fd >= 0) close(web->listener.reserve_fd);
         free(web);
-        return sh_fail(err, SH_ENOMEM,
-                       "link web:%s:%d: libwebsockets has too little memory or too few file descriptors", host,
-                       spec->port);
+        return rc;
     }
     *link = web;
     return SH_OK;
@@ -100,7 +91,7 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
 static void web_endpoint(const void *link, char *buf, size_t len)
 {
     const struct web_link *web = link;
-    snprintf(buf, len, "http://%s/", web->at);
+    snprintf(buf, len, "http://%s/", web->listener.at);
 }
 
 /* ---- sessions */
@@ -120,7 +111,7 @@ static void session_open(struct web_link *web, struct web_conn *conn)
     web_set_phase(conn, WEB_TALKING);
     s->state = WEB_OPENING;
     s->wsi = conn->wsi;
-    s->in_len = s->out_len = 0;
+    s->in_len = s->whole_len = s->out_len = 0;
     snprintf(s->peer, sizeof s->peer, "%s", conn->peer);
     conn->session = s;
 }
@@ -141,8 +132,9 @@ void web_session_gone(struct web_conn *conn)
     struct web_session *s = conn->session;
     if (s == NULL) return;
     s->wsi = NULL;
-    /* An owner that has not heard of the session need not hear of its end. */
-    s->state = s->state == WEB_OPENING ? WEB_FREE : WEB_ENDED;
+    s->in_len = s->whole_len;
+    /* An owner that has not heard of the session need not hear of its end, unless it has something to read. */
+    if (s->state == WEB_OPENING && s->in_len == 0) s->state = WEB_FREE;
     conn->session = NULL;
     web_set_phase(conn, WEB_PARTING);
 }
@@ -188,7 +180,10 @@ static int take_text(struct web_conn *conn, struct lws *wsi, const void *in, siz
         return close_for(conn, LWS_CLOSE_STATUS_MESSAGE_TOO_LARGE, "a message must have at most 4096 bytes");
     memcpy(s->in + s->in_len, in, len);
     s->in_len += len;
-    if (web_lws.lws_is_final_fragment(wsi) && s->in_len > 0 && s->in[s->in_len - 1] != '\n') s->in[s->in_len++] = '\n';
+    if (web_lws.lws_is_final_fragment(wsi)) {
+        if (s->in_len > 0 && s->in[s->in_len - 1] != '\n') s->in[s->in_len++] = '\n';
+        s->whole_len = s->in_len;
+    }
     if (s->in_len > WEB_IN_ROOM / 2) web_lws.lws_rx_flow_control(wsi, 0);
     return 0;
 }
@@ -251,6 +246,7 @@ static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void 
 
 /* ---- the owner's side */
 
+/* The owner gives the same descriptor to each poll, so it is taken once. */
 static int take_wake_fd(struct web_link *web, int wake_fd)
 {
     if (web->wake != NULL || wake_fd < 0) return SH_OK;
@@ -263,25 +259,36 @@ static int take_wake_fd(struct web_link *web, int wake_fd)
 static void report_session(struct web_session *s, int slot, uint32_t want_write, struct link_events *events)
 {
     if (s->wsi != NULL && is_closing(s->wsi)) web_session_gone(web_lws.lws_get_opaque_user_data(s->wsi));
-    if (s->state == WEB_ENDED && link_events_push(events, LINK_CLOSED, slot, s->peer)) s->state = WEB_FREE;
     if (s->state == WEB_OPENING && link_events_push(events, LINK_OPENED, slot, s->peer)) s->state = WEB_OPEN;
     if (s->state != WEB_OPEN) return;
     if (s->in_len > 0) link_events_push(events, LINK_READABLE, slot, NULL);
-    if ((want_write >> slot & 1u) != 0 && s->out_len == 0) link_events_push(events, LINK_WRITABLE, slot, NULL);
+    if (s->wsi != NULL && (want_write >> slot & 1u) != 0 && s->out_len == 0)
+        link_events_push(events, LINK_WRITABLE, slot, NULL);
+    /* The commands of a client that sent them and left are read first. */
+    if (s->wsi == NULL && s->in_len == 0 && link_events_push(events, LINK_CLOSED, slot, s->peer)) s->state = WEB_FREE;
 }
 
 static void web_report(struct web_link *web, uint32_t want_write, struct link_events *events)
 {
     if (web->woken && link_events_push(events, LINK_WOKEN, 0, NULL)) web->woken = 0;
+    for (int s = 0; s < web->n_sessions; s++) /* first: a crowd that is turned away would take all the room */
+        report_session(&web->session[s], s, want_write, events);
     for (; web->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, web->refused[0]); web->n_refused--)
         memmove(web->refused[0], web->refused[1], sizeof web->refused - sizeof web->refused[0]);
-    for (int s = 0; s < web->n_sessions; s++)
-        report_session(&web->session[s], s, want_write, events);
 }
 
 static void time_is_over(lws_sorted_usec_list_t *timer)
 {
     (void)timer; /* lws_service returns */
+}
+
+/* Has libwebsockets work, and wait for most_us at most (below 0: for ever; 0: not at all). Returns 0 or SH_EIO. */
+static int serve(struct web_link *web, lws_usec_t most_us)
+{
+    if (most_us > 0) web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, most_us);
+    const int rc = web_lws.lws_service(web->context, most_us == 0 ? -1 : 0);
+    web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
+    return rc >= 0 ? SH_OK : SH_EIO;
 }
 
 static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
@@ -291,11 +298,7 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (web->is_silent) return link_poll_sink(wake_fd, 0, timeout_ms, &events);
     if (take_wake_fd(web, wake_fd) != SH_OK) return SH_EIO;
     web_report(web, want_write, &events);
-    if (events.n > 0) timeout_ms = 0;
-    if (timeout_ms > 0)
-        web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, (lws_usec_t)timeout_ms * 1000);
-    if (web_lws.lws_service(web->context, timeout_ms == 0 ? -1 : 0) < 0) return SH_EIO;
-    web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
+    if (serve(web, events.n > 0 ? 0 : (lws_usec_t)timeout_ms * 1000) != SH_OK) return SH_EIO;
     if (events.n == 0) web_report(web, want_write, &events);
     return events.n;
 }
@@ -303,7 +306,8 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 struct web_session *web_session(struct web_link *web, int session)
 {
     if (session < 0 || session >= web->n_sessions || web->session[session].state != WEB_OPEN) return NULL;
-    return &web->session[session];
+    struct web_session *s = &web->session[session];
+    return s->wsi != NULL || s->in_len > 0 ? s : NULL;
 }
 
 static ssize_t web_read(void *link, int session, void *buf, size_t len)
@@ -314,7 +318,8 @@ static ssize_t web_read(void *link, int session, void *buf, size_t len)
     memcpy(buf, s->in, len);
     memmove(s->in, s->in + len, s->in_len - len);
     s->in_len -= len;
-    if (s->in_len <= WEB_IN_ROOM / 2) web_lws.lws_rx_flow_control(s->wsi, 1);
+    s->whole_len -= len < s->whole_len ? len : s->whole_len;
+    if (s->wsi != NULL && s->in_len <= WEB_IN_ROOM / 2) web_lws.lws_rx_flow_control(s->wsi, 1);
     return (ssize_t)len;
 }
 
@@ -322,7 +327,7 @@ static ssize_t web_write(void *link, int session, const void *buf, size_t len)
 {
     struct web_session *s = web_session(link, session);
     if (s == NULL) return SH_ECLOSED;
-    if (s->out_len != 0 || len == 0 || ((const struct web_link *)link)->is_silent) return 0;
+    if (s->wsi == NULL || s->out_len != 0 || len == 0 || ((const struct web_link *)link)->is_silent) return 0;
     if (len > s->out_room) {
         unsigned char *out = realloc(s->out, LWS_PRE + len);
         if (out == NULL) return 0; /* the reader loses frames, which is counted */
@@ -351,11 +356,8 @@ static void say_goodbye(struct web_link *web)
         web_lws.lws_callback_on_writable(web->session[s].wsi);
     }
     lws_usec_t end = web_lws.lws_now_usecs() + (lws_usec_t)WEB_GOODBYE_MS * 1000;
-    for (lws_usec_t now; any_session(web) && (now = web_lws.lws_now_usecs()) < end;) {
-        web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, end - now);
-        if (web_lws.lws_service(web->context, 0) < 0) break;
-    }
-    web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, LWS_SET_TIMER_USEC_CANCEL);
+    for (lws_usec_t now; any_session(web) && (now = web_lws.lws_now_usecs()) < end;)
+        if (serve(web, end - now) != SH_OK) return;
 }
 
 static void web_close(void *link)
@@ -364,7 +366,7 @@ static void web_close(void *link)
     web_speak(web, 0); /* else its clients would not hear of the end */
     say_goodbye(web);
     web_lws.lws_context_destroy(web->context);
-    if (web->reserve_fd >= 0) close(web->reserve_fd);
+    if (web->listener.reserve_fd >= 0) close(web->listener.reserve_fd);
     for (int s = 0; s < LINK_MAX_SESSIONS; s++)
         free(web->session[s].out);
     free(web);

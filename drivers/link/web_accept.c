@@ -124,7 +124,7 @@ static void accept_some(struct web_link *web)
         socklen_t len = sizeof from;
         char peer[64];
         int fd;
-        if (!socket_accept(web->listener, &web->reserve_fd, &fd, &from, &len)) return;
+        if (!socket_accept(web->listener.fd, &web->listener.reserve_fd, &fd, &from, &len)) return;
         socket_address_text((const struct sockaddr *)&from, len, peer, sizeof peer);
         if (fd >= 0)
             welcome(web, fd, &from, peer);
@@ -135,8 +135,8 @@ static void accept_some(struct web_link *web)
 
 /* ---- requests */
 
-/* Hands the connection to libwebsockets, which reads the new request at once, for its answer or its WebSocket. Without a
- * descriptor for that, the client gets the reason. */
+/* Hands the connection to libwebsockets, which reads the new request at once, for its answer or its WebSocket. Without
+ * a descriptor for that, the client gets the reason. */
 static int hand_over(struct web_link *web, struct web_conn *conn)
 {
     char text[400] = "GET / HTTP/1.1\r\n\r\n";
@@ -150,7 +150,7 @@ static int hand_over(struct web_link *web, struct web_conn *conn)
         snprintf(text, sizeof text,
                  "GET /ws HTTP/1.1\r\nHost: %s\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                  "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: %s\r\n%s\r\n",
-                 web->at, conn->request.key,
+                 web->listener.at, conn->request.key,
                  conn->request.names_protocol ? "Sec-WebSocket-Protocol: scanhead-native-1\r\n" : "");
     /* While it answers, libwebsockets does not read, but would wake up again and again. */
     wait_for_more(fd, conn->request.key[0] != '\0' ? 0 : WEB_CHUNK);

@@ -4,7 +4,6 @@
 
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/silence.h"
-#include "drivers/socket/socket.h"
 
 /* Breaks the connection, or the listening socket, at once; libwebsockets closes it when it finds out. */
 static void web_break(struct lws *wsi)
@@ -21,6 +20,8 @@ static int web_cut(struct web_link *web, int session)
 {
     struct web_session *s = web_session(web, session);
     if (s == NULL) return SH_ESTATE;
+    s->in_len = s->whole_len = 0;
+    if (s->wsi == NULL) return SH_ESTATE;
     web_break(s->wsi);
     web_session_gone(web_lws.lws_get_opaque_user_data(s->wsi));
     return SH_OK;
@@ -47,10 +48,9 @@ static int web_silence(struct web_link *web)
     int fds[WEB_PLACES];
     if (web->listening == NULL || web->is_silent) return SH_ESTATE;
     web_sockets(web, fds);
-    if (sockets_silence(&web->listener, 1) != SH_OK) return SH_ESTATE; /* first: no new client comes while it waits */
-    web->is_silent = sockets_silence(fds, WEB_PLACES) == SH_OK;
-    if (!web->is_silent) sockets_speak(&web->listener, 1);
-    return web->is_silent ? SH_OK : SH_ESTATE;
+    const int rc = sockets_silence(web->listener.fd, fds, WEB_PLACES);
+    web->is_silent = rc == SH_OK;
+    return rc;
 }
 
 void web_speak(struct web_link *web, int resets)
@@ -58,8 +58,7 @@ void web_speak(struct web_link *web, int resets)
     int fds[WEB_PLACES];
     if (!web->is_silent) return;
     web_sockets(web, fds);
-    sockets_speak(fds, WEB_PLACES);
-    sockets_speak(&web->listener, 1);
+    sockets_speak(web->listener.fd, fds, WEB_PLACES);
     web->is_silent = 0;
     if (resets) web_break_all(web);
 }
@@ -76,13 +75,10 @@ static int web_unplug(struct web_link *web)
 
 static int web_plug(struct web_link *web, int resets)
 {
-    const struct socket_place place = {.what = "link web", .host = web->host, .port = web->port};
-    char at[72];
-    struct sh_err err;
     web_speak(web, resets);
     if (web->listening != NULL) return SH_OK;
-    if (socket_open(&place, &web->listener, at, sizeof at, &err) != SH_OK) return SH_ESTATE;
-    web->listening = web_wait_for(web, web->listener, NULL);
+    web->listener.fd = socket_listen_again(&web->listener.address);
+    if (web->listener.fd >= 0) web->listening = web_wait_for(web, web->listener.fd, NULL);
     return web->listening != NULL ? SH_OK : SH_ESTATE;
 }
 

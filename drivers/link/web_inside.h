@@ -6,7 +6,7 @@
 #include <libwebsockets.h>
 
 #include "core/late.h"
-#include "drivers/link/link.h"
+#include "drivers/link/link_listen.h"
 #include "drivers/link/web.h"
 #include "drivers/link/web_places.h"
 #include "drivers/protocol/http_head.h"
@@ -62,14 +62,14 @@ enum web_state {
     WEB_OPENING, /* LINK_OPENED is to be reported */
     WEB_OPEN,
     WEB_LEAVING, /* the link is closed: what waits goes out */
-    WEB_ENDED,   /* LINK_CLOSED is to be reported */
 };
 
 struct web_session {
     enum web_state state;
-    struct lws *wsi;
+    struct lws *wsi;    /* NULL: the client is gone, and LINK_CLOSED is to be reported */
     size_t message_len; /* of the message that is coming in */
     size_t in_len, out_len, out_room;
+    size_t whole_len; /* of in: what belongs to whole messages; the rest is void if the client goes now */
     unsigned char in[WEB_IN_ROOM];
     unsigned char *out; /* LWS_PRE bytes, then the message that is to go out */
     char peer[64];
@@ -105,11 +105,10 @@ struct web_link {
     struct lws *listening, *wake; /* listening NULL: unplugged */
     int is_silent;                /* its cable is pulled */
     lws_sorted_usec_list_t timer;
-    int listener, wake_fd, woken;
-    int reserve_fd; /* given up when there are no more, to turn a connection away; -1: none */
+    struct link_listener listener; /* libwebsockets closes its socket */
+    int wake_fd, woken;
     int port, n_sessions, n_refused;
     char refused[WEB_AT_A_TIME][64]; /* n_refused clients, to be reported; the last place has the newest one */
-    char at[72];                     /* "127.0.0.1:40123" */
     char host[64];                   /* as the user named it */
     const struct web_source *source;
     struct web_conn *entering; /* the one that libwebsockets is being given */
@@ -132,7 +131,7 @@ static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
 void web_refused(struct web_link *web, const char *peer);
 /* Forgets a connection whose wsi has ended or belongs to nobody any more. Twice does no harm. */
 void web_conn_end(struct web_conn *conn);
-/* Returns the session, if its owner may use it; else NULL. */
+/* Returns the session, if its owner may use it; else NULL. Its client may be gone, and left something to be read. */
 struct web_session *web_session(struct web_link *web, int session);
 /* The connection's session is over; LINK_CLOSED is to be reported. */
 void web_session_gone(struct web_conn *conn);

@@ -11,7 +11,7 @@
 
 struct fields {
     struct http_text host, origin, site, key, version, protocol, upgrade;
-    int n_host, n_length, has_coding, has_origin, has_protocol, is_upgrade, expects_other;
+    int n_host, n_origin, n_length, has_coding, has_protocol, is_upgrade, expects_other;
     size_t length;
 };
 
@@ -22,7 +22,7 @@ static int read_field(struct fields *all, struct http_text line)
     if (http_text_is(f.name, "host"))
         all->host = f.value, all->n_host++;
     else if (http_text_is(f.name, "origin"))
-        all->origin = f.value, all->has_origin = 1;
+        all->origin = f.value, all->n_origin++;
     else if (http_text_is(f.name, "sec-fetch-site"))
         all->site = f.value;
     else if (http_text_is(f.name, "sec-websocket-key"))
@@ -125,10 +125,10 @@ static int read_upgrade(const struct fields *f, struct web_request *out, const c
 /* Checks Host and Origin. */
 static int check_asker(struct fields *f, int minor, struct http_text place_of_target, struct http_place *place)
 {
-    if (f->n_host > 1 || (f->n_host == 0 && minor > 0)) return 400;
+    if (f->n_host > 1 || f->n_origin > 1 || (f->n_host == 0 && minor > 0)) return 400;
     if (place_of_target.s != NULL) f->host = place_of_target; /* RFC 9112 3.2.2 */
     if (http_read_place(f->host, place) != 0) return 400;
-    return f->has_origin && !is_own_origin(f) ? WEB_FOREIGN : 0;
+    return f->n_origin > 0 && !is_own_origin(f) ? WEB_FOREIGN : 0;
 }
 
 static int read_all(const char *head, size_t len, struct http_line *line, struct fields *f)
@@ -154,7 +154,7 @@ int web_request_read(const struct web_link *web, const char *head, size_t len, s
     if (status != 0) return status;
     http_split_target(line.target, &target);
     out->head_only = http_text_is(line.method, "HEAD");
-    *words = "a request must have one Host: the address that scanhead printed";
+    *words = "a request must have one Host, the address that scanhead printed, and at most one Origin";
     if ((status = check_asker(&f, line.minor, target.place, &place)) != 0) return status;
     *words = "only GET and HEAD are answered; commands go over the WebSocket at /ws";
     if (!out->head_only && !http_text_is(line.method, "GET")) return 405;
@@ -171,5 +171,6 @@ int web_request_read(const struct web_link *web, const char *head, size_t len, s
     const int query = decode(target.query, out->query, sizeof out->query);
     if (query == 400) return 400;
     out->query_long = query == 1;
+    f.is_upgrade &= !out->head_only && line.minor > 0; /* RFC 6455 4.1: only a GET of HTTP/1.1 is one */
     return strcmp(out->path, "/ws") == 0 ? read_upgrade(&f, out, words) : 0;
 }

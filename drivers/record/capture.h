@@ -26,7 +26,7 @@ struct capture_frame {
     uint64_t lost; /* frames of its interface that the system threw away just before it */
 };
 int capture_add(struct capture *capture, const struct capture_frame *frame, struct sh_err *err);
-/* Statistics of an interface, at the end: how many frames came, and how many the system had no room for. */
+/* Adds the statistics of an interface, at the end: how many frames came, and how many the system had no room for. */
 int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t t_ns, uint64_t received,
                            uint64_t dropped, struct sh_err *err);
 /* To be called each second: as outfile_save. */

@@ -4,8 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char INCOMPLETE[] = "# " REPAIR_INCOMPLETE "\n";
-
 struct rows {
     const struct csv_format *format;
     int titled, n_columns;
@@ -34,7 +32,7 @@ static int take_row(void *ctx, const char *line, size_t len)
 {
     struct rows *rows = ctx;
     if (!rows->titled) return take_title(rows, line, len);
-    rows->is_marked = len == sizeof INCOMPLETE - 2 && memcmp(line, INCOMPLETE, len) == 0;
+    rows->is_marked = repair_is_mark(line, len);
     if (line[0] == '#') return 1;
     if (strspn(line, rows->format->letters) != len || count_columns(line) != rows->n_columns) return 0;
     const long scan = strtol(line, NULL, 10);
@@ -55,8 +53,5 @@ int csv_repair(struct repair *r, const struct csv_format *format, struct sh_err 
     r->unit = format->unit;
     r->n_kept = rows.n;
     r->n_scans = rows.n_scans;
-    r->was_whole = end == r->len && (!repair_is_part(r) || rows.is_marked);
-    rc = repair_cut(r, end, err);
-    if (rc == SH_OK && !r->was_whole && !rows.is_marked) repair_append_note(r, end, INCOMPLETE, sizeof INCOMPLETE - 1);
-    return rc;
+    return repair_end_text(r, end, rows.is_marked, 1, err);
 }

@@ -5,7 +5,6 @@
 
 #include "drivers/record/e57_pages.h"
 #include "drivers/record/e57_xml.h"
-#include "drivers/record/repair.h"
 
 enum {
     E57_XML_ROOM = 16384,
@@ -15,8 +14,5 @@ enum {
 /* Writes the XML section, cuts the file after it, then writes the headers of the scans. The file's own header comes
  * last, once all that is on the disk. report: its stop gives up; may be NULL. */
 int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct sh_report *report, struct sh_err *err);
-
-/* recorder_ops.repair: keeps all whole packets. */
-int e57_repair(struct repair *repair, struct sh_err *err);
 
 #endif

@@ -15,6 +15,7 @@
 #include "drivers/record/e57_end.h"
 #include "drivers/record/e57_note.h"
 #include "drivers/record/e57_packet.h"
+#include "drivers/record/repair.h"
 
 enum { PAGES_BETWEEN_STOPS = 1 << 14 };
 

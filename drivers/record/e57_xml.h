@@ -16,7 +16,8 @@ struct e57_scan {
     uint64_t section;     /* of its binary section */
     uint64_t section_len; /* logical */
     uint64_t n_records, n_points;
-    uint32_t number, station; /* in the file, from 1 */
+    uint32_t number; /* in the file, from 1 */
+    uint32_t station;
     char idn[96], profile[32];
     struct station_pose pose;
     double scale_m;

@@ -13,7 +13,6 @@
 #include <string.h>
 
 #include "drivers/record/las_inside.h"
-#include "drivers/record/las_repair.h"
 
 static int las_begin(void *rec, struct sh_err *err)
 {

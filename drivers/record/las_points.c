@@ -7,8 +7,8 @@
 
 #define M_PER_PS (0.5 * 299792458e-12) /* range, of a pulse's way out and back */
 
-/* ---- the batch's columns. Functions with an rc return how many points are good; where that is not all, *rc says why.
- * */
+/* ---- the batch's columns. Functions with an rc return how many points are good. Where that is not all of them, *rc
+ * says why. */
 
 static int too_far(const struct las *las, const double p[3], struct sh_err *err)
 {

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-#include "drivers/record/las_repair.h"
-
+/* The repair of .las (repair.h): LAS 1.2 and 1.4 as las.c writes them. It counts points, returns and bounds again from
+ * the records. */
 #include <string.h>
 
 #include "core/bytes.h"
 #include "drivers/record/las_header.h"
 #include "drivers/record/las_waves_repair.h"
+#include "drivers/record/repair.h"
 #include "drivers/record/scan_count.h"
 
 struct records {

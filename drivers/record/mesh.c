@@ -18,12 +18,10 @@
 #include "core/newfile.h"
 #include "drivers/record/mesh_recorder.h"
 #include "drivers/record/mesh_texture.h"
-#include "drivers/record/obj_repair.h"
-#include "drivers/record/ply_repair.h"
 
 static const double GIB = 1073741824.0;
-/* Bytes per point, with its grid and triangles, also while arrays grow; what the exporter takes besides (measured with
- * 6.5 million points). */
+/* Memory per point, measured with 6.5 million points. The first has the point, its place in the grid and its triangles,
+ * also while arrays grow. The exporter takes the second besides. */
 enum { BYTES_A_POINT = 170, BYTES_OF_EXPORTER = 900 };
 
 static int check_points(const char *path, double n, struct sh_err *err)

@@ -2,13 +2,12 @@
 /* Repair of .obj. A mesh is held in memory until all scans are over. So only a recorder that was killed while it wrote
  * the file leaves something: lines of text, in which a triangle follows its vertices. All whole lines are kept. The
  * file of materials is written after them, so it is missing. */
-#include "drivers/record/obj_repair.h"
+#include "drivers/record/repair.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 enum { LINE_MOST = 512 };
-static const char INCOMPLETE[] = "# " REPAIR_INCOMPLETE "\n";
 
 struct obj_lines {
     uint64_t n_vertices, n_objects;
@@ -44,7 +43,7 @@ static int obj_repair_take_line(void *ctx, const char *line, size_t len)
 {
     struct obj_lines *o = ctx;
     if (len >= LINE_MOST) return 0;
-    o->is_marked = len == sizeof INCOMPLETE - 2 && memcmp(line, INCOMPLETE, len) == 0;
+    o->is_marked = repair_is_mark(line, len);
     if (begins(line, "v ")) {
         if (!are_numbers(line + 2)) return 0;
         o->n_vertices++;
@@ -68,9 +67,5 @@ int obj_repair(struct repair *r, struct sh_err *err)
     r->unit = "points";
     r->n_kept = o.n_vertices;
     r->n_scans = o.n_objects;
-    r->was_whole = end == r->len && (!repair_is_part(r) || o.is_marked);
-    if (!r->was_whole && !o.is_ours) return repair_fail_foreign(r, err);
-    rc = repair_cut(r, end, err);
-    if (rc == SH_OK && !r->was_whole && !o.is_marked) repair_append_note(r, end, INCOMPLETE, sizeof INCOMPLETE - 1);
-    return rc;
+    return repair_end_text(r, end, o.is_marked, o.is_ours, err);
 }

@@ -16,7 +16,6 @@
 #include "core/decimal.h"
 #include "drivers/protocol/native.h"
 #include "drivers/record/ply_columns.h"
-#include "drivers/record/ply_repair.h"
 #include "drivers/record/recorder.h"
 
 enum { TEXT_LEN = 512, TEXT_ROOM = 9 * DECIMAL_FIXED_ROOM + 9 * DECIMAL_GENERAL_ROOM };
@@ -320,6 +319,8 @@ static int add_head(struct ply *ply)
     ply->last.station = info->station;
     snprintf(ply->last.idn, sizeof ply->last.idn, "%s", info->idn);
     snprintf(ply->last.profile, sizeof ply->last.profile, "%s", info->profile);
+    sh_keep_line(ply->last.idn); /* neither may end its line of the header */
+    sh_keep_line(ply->last.profile);
     if (facts->n_heads > 0 && strcmp(before.idn, ply->last.idn) == 0 && strcmp(before.profile, ply->last.profile) == 0)
         return 0;
     if (facts->n_heads == PLY_MAX_HEADS) {

@@ -20,13 +20,6 @@ enum {
     WEEK_S = 604800,
 };
 
-/* A name must not end its line. */
-static void printable(char *text)
-{
-    for (; *text != 0; text++)
-        if ((unsigned char)*text < 0x20 || *text == 0x7f) *text = '?';
-}
-
 const char *ply_crs_text(const struct track *t)
 {
     static const char *const text[] = {"scene frame, metres", "ECEF, metres",
@@ -47,7 +40,7 @@ static uint64_t put_names(FILE *out, const char *before, const struct scanhead *
         char line[NAMES_MAX];
         if (!scanhead_surface(sh, label, &object, &material)) continue;
         snprintf(line, sizeof line, "label %u %s | %s", label, object, material);
-        printable(line);
+        sh_keep_line(line);
         const size_t len = strlen(before) + strlen(line) + 1;
         if (len <= room)
             fprintf(out, "%s%s\n", before, line);
@@ -65,14 +58,9 @@ void ply_put_names(FILE *out, const char *before, const struct scanhead *sh)
 
 static void put_head(FILE *out, const struct ply_head *head, int several)
 {
-    char idn[sizeof head->idn], profile[sizeof head->profile], whose[32] = "";
-    memcpy(idn, head->idn, sizeof idn);
-    memcpy(profile, head->profile, sizeof profile);
-    printable(idn);
-    printable(profile);
+    char whose[32] = "";
     if (several) snprintf(whose, sizeof whose, "station %u ", head->station);
-    fprintf(out, "comment %sidn %s\n", whose, idn);
-    fprintf(out, "comment %sprofile %s\n", whose, profile);
+    fprintf(out, "comment %sidn %s\ncomment %sprofile %s\n", whose, head->idn, whose, head->profile);
 }
 
 static void put_colour_comment(FILE *out, const struct track *t)

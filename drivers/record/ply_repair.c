@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-#include "drivers/record/ply_repair.h"
-
+/* The repair of .ply (repair.h): points, binary or text, with any columns of one number each. The count in the header
+ * is corrected within the header's room: lines of blank comment make place.
+ *
+ * A mesh is written in one piece at the end. So a mesh is kept only if it is complete, as after a kill just before the
+ * file got its name. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,6 +11,7 @@
 
 #include "core/bytes.h"
 #include "drivers/record/ply_columns.h"
+#include "drivers/record/repair.h"
 #include "drivers/record/scan_count.h"
 
 enum { HEADER_BEGIN = 1 << 16, HEADER_MOST = 64 << 20, WORD = 32, NO_COLUMN = -1 };

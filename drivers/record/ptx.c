@@ -5,7 +5,7 @@
  * no multiple of the line rate.
  *
  * The grid of a planar head has a column per turn and a row per step; the first row is the first step that is cast.
- * That of a sphere has a column per ring, and of a pole one shot. Beams and lists of directions have
+ * The grid of a sphere has a column per ring; that of a pole has one shot. Beams and lists of directions have
  * no rows and columns: they are refused.
  *
  * With colours each line goes on with red, green and blue, 0 to 255; all 0 for a place without a point.

@@ -17,6 +17,7 @@
 
 #include "core/infile.h"
 #include "drivers/record/ptx_text.h"
+#include "drivers/record/repair.h"
 
 enum { LINE_MOST = 512, HEADER_LINES = 10 };
 static const uint64_t MOST = UINT32_MAX; /* columns, rows */

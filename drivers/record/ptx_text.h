@@ -6,7 +6,6 @@
 
 #include "drivers/record/outfile.h"
 #include "drivers/record/ptx_grid.h"
-#include "drivers/record/repair.h"
 
 enum { PTX_ROWS_MAX = 1 << 22 }; /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
 
@@ -24,9 +23,5 @@ struct ptx_text {
 
 /* Puts the grid, whose shots are then gone (ptx_grid_drain). SH_EFORMAT: a coordinate is too long. */
 int ptx_text_put(struct ptx_text *text, struct sh_err *err);
-
-/* recorder_ops.repair: keeps all whole grids, and the points of the last one. The rest of its last column is filled
- * up. */
-int ptx_repair(struct repair *repair, struct sh_err *err);
 
 #endif

@@ -73,9 +73,11 @@ void recorder_set_limits(struct recorder *rec, double low, double high)
 
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
+    const int is_first = rec->ops->track.points != NULL && rec->track.n_scans == 0;
     const int rc =
         rec->ops->frame != NULL ? rec->ops->frame(rec, sh, frame, err) : track_frame(&rec->track, sh, frame, err);
     rec->has_failed |= rc == SH_EIO;
+    rec->is_refused |= is_first && (rc == SH_EFORMAT || rc == SH_EINPUT);
     return rc;
 }
 
@@ -157,6 +159,7 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
 {
     const struct recorder_ops *ops = rec->ops;
     char *path = strdup(rec->file.path);
+    keep &= !rec->is_refused; /* a file without a scan would replace an older one that may be good */
     const int rc = keep ? recorder_finish(rec, err) : SH_OK;
     if (keep && rc == SH_OK) report_losses(rec);
     const enum outfile_end how = how_it_ends(rec, keep, rc);

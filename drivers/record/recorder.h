@@ -37,8 +37,8 @@ enum ply_column {
     PLY_DEVIATION = 1 << 11, /* no word for it: it comes with the attributes, where the head sends it */
 };
 extern const char *const ply_column_words[]; /* by bit; NULL at the end */
-/* Reads such words with commas between them; "xyz" stands for none. Returns 0 if a word is not known, or comes twice.
- * */
+/* Reads such words with commas between them. "xyz" stands for none. Returns 0 if a word is not known, or comes
+ * twice. */
 int ply_columns_read(const char *text, unsigned *columns);
 
 struct recorder_options {
@@ -77,6 +77,7 @@ struct recorder {
     struct outfile file;
     struct track track; /* file.path is its path in messages */
     int has_failed;     /* a write failed: the file is not completed */
+    int is_refused;     /* the first scan was: no file is made */
 };
 
 /* A format. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text

@@ -184,6 +184,22 @@ void repair_append_note(const struct repair *r, uint64_t end, const void *note, 
     if (ftruncate(r->fd, (off_t)end) != 0) return; /* the piece of a note is cut by the next repair */
 }
 
+static const char MARK[] = "# " REPAIR_INCOMPLETE "\n";
+
+int repair_is_mark(const char *line, size_t len)
+{
+    return len == sizeof MARK - 2 && memcmp(line, MARK, len) == 0;
+}
+
+int repair_end_text(struct repair *r, uint64_t end, int is_marked, int is_ours, struct sh_err *err)
+{
+    r->was_whole = end == r->len && (!repair_is_part(r) || is_marked);
+    if (!r->was_whole && !is_ours) return repair_fail_foreign(r, err);
+    const int rc = repair_cut(r, end, err);
+    if (rc == SH_OK && !r->was_whole && !is_marked) repair_append_note(r, end, MARK, sizeof MARK - 1);
+    return rc;
+}
+
 int repair_fail_foreign(const struct repair *r, struct sh_err *err)
 {
     return sh_fail(

@@ -85,4 +85,18 @@ int repair_fail_foreign(const struct repair *repair, struct sh_err *err);
 /* SH_EFORMAT: the file is not of that format, or too short to tell. */
 int repair_fail_none(const struct repair *repair, const char *format, struct sh_err *err);
 
+/* Ends a text after its last good line, and sets was_whole. Unless it was whole, its last line then is a comment: the
+ * note. is_marked: that line is there already. SH_EFORMAT where it is not whole and not ours. */
+int repair_end_text(struct repair *repair, uint64_t end, int is_marked, int is_ours, struct sh_err *err);
+/* Returns whether a line is that comment. */
+int repair_is_mark(const char *line, size_t len);
+
+/* ---- the repairs, each in a file of its name */
+
+int e57_repair(struct repair *repair, struct sh_err *err);
+int las_repair(struct repair *repair, struct sh_err *err);
+int obj_repair(struct repair *repair, struct sh_err *err);
+int ply_repair(struct repair *repair, struct sh_err *err);
+int ptx_repair(struct repair *repair, struct sh_err *err);
+
 #endif

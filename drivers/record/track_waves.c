@@ -46,8 +46,8 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
     if (t->ops->points == NULL) return 0;
-    if (!t->has_waves) {
-        t->missing.n_waves_unheld += frame->n_points;
+    if (!t->has_waves) { /* of a recorder that wants them, no scan has begun */
+        *(t->ops->wants_waves ? &t->missing.n_waves_unplaced : &t->missing.n_waves_unheld) += frame->n_points;
         return 0;
     }
     const int64_t lost = scanhead_waves_lost(t->sh, frame);

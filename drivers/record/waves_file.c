@@ -69,9 +69,14 @@ static int put_waves(struct waves_file *file, struct scanhead *sh, const struct 
                      struct sh_err *err)
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
+    struct scanhead_info info;
     const int64_t lost = scanhead_waves_lost(sh, frame);
     int rc = put_title(file, err);
     if (lost > 0) file->n_samples_lost += (uint64_t)lost;
+    if (scanhead_get_info(sh, &info) != SCANHEAD_OK) { /* the track still has the scan before */
+        file->n_lost += frame->n_points;
+        return rc;
+    }
     for (uint32_t first = 0; rc == SH_OK && first < frame->n_points;) {
         const int n = scanhead_waves(sh, frame, first, wave, WAVES_AT_ONCE);
         if (n <= 0) {
@@ -105,10 +110,11 @@ static int waves_file_finish(void *rec, struct sh_err *err)
     struct waves_file *file = rec;
     const int rc = put_title(file, err);
     if (rc != SH_OK) return rc;
-    if (!file->is_sent)
+    if (!file->is_sent && file->base.track.n_scans > 0)
         sh_warn(file->base.options.report, "%s: there are no waveforms in it: the head sends none (waveform.send)",
                 file->base.file.path);
-    recorder_report(rec, file->n_lost, "waveforms left out whose points were lost");
+    recorder_report(rec, file->n_lost,
+                    "waveforms left out whose points were lost, or that came before the anchor of their scan");
     recorder_report(rec, file->n_samples_lost, "samples of waveforms that found no room in the head");
     return SH_OK;
 }

@@ -34,23 +34,7 @@ static int is_any_unconfirmed(const int *fds, int n)
     return 0;
 }
 
-int sockets_silence(const int *fds, int n)
-{
-    const int off = 0;
-    for (int ms = 0; ms < CONFIRM_MS && is_any_unconfirmed(fds, n); ms++)
-        poll(NULL, 0, 1);
-    for (int i = 0; i < n; i++) {
-        if (fds[i] < 0) continue;
-        if (take_from(fds[i], MOST_HOPS) != SH_OK) {
-            sockets_speak(fds, i + 1); /* of a socket of IPv6, one of the two may have been set */
-            return SH_ESTATE;
-        }
-        setsockopt(fds[i], SOL_SOCKET, SO_KEEPALIVE, &off, sizeof off);
-    }
-    return SH_OK;
-}
-
-void sockets_speak(const int *fds, int n)
+static void speak(const int *fds, int n)
 {
     const int on = 1;
     for (int i = 0; i < n; i++) {
@@ -58,4 +42,34 @@ void sockets_speak(const int *fds, int n)
         take_from(fds[i], 0);
         setsockopt(fds[i], SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
     }
+}
+
+static int silence(const int *fds, int n)
+{
+    const int off = 0;
+    for (int i = 0; i < n; i++) {
+        if (fds[i] < 0) continue;
+        if (take_from(fds[i], MOST_HOPS) != SH_OK) {
+            speak(fds, i + 1); /* of a socket of IPv6, one of the two may have been set */
+            return SH_ESTATE;
+        }
+        setsockopt(fds[i], SOL_SOCKET, SO_KEEPALIVE, &off, sizeof off);
+    }
+    return SH_OK;
+}
+
+int sockets_silence(int listener, const int *fds, int n)
+{
+    if (silence(&listener, 1) != SH_OK) return SH_ESTATE; /* first: no new client comes while it waits */
+    for (int ms = 0; ms < CONFIRM_MS && is_any_unconfirmed(fds, n); ms++)
+        poll(NULL, 0, 1);
+    if (silence(fds, n) == SH_OK) return SH_OK;
+    speak(&listener, 1);
+    return SH_ESTATE;
+}
+
+void sockets_speak(int listener, const int *fds, int n)
+{
+    speak(&listener, 1);
+    speak(fds, n);
 }

@@ -48,16 +48,38 @@ static int start(int fd, const struct sockaddr *at, socklen_t len, int connectin
     return bind(fd, at, len) == 0 ? listen(fd, BACKLOG) : -1;
 }
 
+int socket_is_own_end(int fd)
+{
+    struct sockaddr_storage own = {0}, peer = {0};
+    socklen_t own_len = sizeof own, peer_len = sizeof peer;
+    return getsockname(fd, (struct sockaddr *)&own, &own_len) == 0 &&
+           getpeername(fd, (struct sockaddr *)&peer, &peer_len) == 0 && own.ss_family != AF_UNIX &&
+           own_len == peer_len && memcmp(&own, &peer, own_len) == 0;
+}
+
 /* Connects while blocking, since the other end is on this machine or near; not blocking from then on. */
 int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting)
 {
     int fd = socket(at->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (fd < 0) return -1;
-    if (start(fd, at, len, connecting) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
-    int error = errno;
+    const int is_open = start(fd, at, len, connecting) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0;
+    const int is_own = is_open && connecting && socket_is_own_end(fd);
+    if (is_open && !is_own) return fd;
+    int error = is_own ? ECONNREFUSED : errno;
     close(fd);
     errno = error;
     return -1;
+}
+
+void socket_note_address(int listener, struct socket_address *at)
+{
+    at->len = sizeof at->at;
+    if (getsockname(listener, (struct sockaddr *)&at->at, &at->len) != 0) at->len = 0; /* then it can't listen again */
+}
+
+int socket_listen_again(const struct socket_address *at)
+{
+    return socket_open_at((const struct sockaddr *)&at->at, at->len, 0);
 }
 
 int socket_reserve(void)
@@ -115,7 +137,8 @@ int socket_open(const struct socket_place *place, int *fd, char *name, size_t le
     const int rc = socket_resolve(place->what, host, place->port, SOCK_STREAM, &list, err);
     if (rc != SH_OK) return rc;
     *fd = -1;
-    for (const struct addrinfo *at = list; at != NULL && *fd < 0; at = at->ai_next)
+    errno = 0;
+    for (const struct addrinfo *at = list; at != NULL && *fd < 0 && errno != EINTR; at = at->ai_next)
         *fd = socket_open_at(at->ai_addr, at->ai_addrlen, place->connecting);
     int error = errno;
     freeaddrinfo(list);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Stream sockets, for links and USB back ends: opening, settings, bytes in and out. Nothing but socket_open
- * waits.
+/* Stream sockets, for links and USB back ends: opening, settings, bytes in and out. Only socket_open and socket_open_at
+ * wait (for a connection), and socket_open and socket_resolve (for names).
  *
  * Errors: SH_E; where there is an err, its text names the socket by socket_place.what. Any thread. */
 #ifndef DRIVERS_SOCKET_SOCKET_H
@@ -33,6 +33,18 @@ int socket_is_group(const struct sockaddr *address);
 int socket_open(const struct socket_place *place, int *fd, char *name, size_t len, struct sh_err *err);
 /* The same at a known address of any family: a descriptor, or -1 with errno. */
 int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting);
+/* Listens again where a listener has listened, whose socket is closed by now. So no name is looked up, which may lead
+ * to several addresses. A descriptor, or -1 with errno. */
+struct socket_address {
+    struct sockaddr_storage at;
+    socklen_t len;
+};
+int socket_listen_again(const struct socket_address *at);
+/* Fills in the address of a listener, for socket_listen_again. */
+void socket_note_address(int listener, struct socket_address *at);
+/* Whether a socket is connected to itself. TCP does that where nobody listens on a port of this machine, and the system
+ * gives that same port to the socket that connects to it. */
+int socket_is_own_end(int fd);
 /* SH_E for an errno of either. */
 int socket_error_code(int error);
 

@@ -204,16 +204,6 @@ void stamped_begin(struct stamped_socket *keeper)
 
 /* ---- streams */
 
-/* Where nobody listens and the system chose that same port for us, TCP connects the socket to itself. */
-static int is_own_end(int fd)
-{
-    struct sockaddr_storage own = {0}, peer = {0};
-    socklen_t own_len = sizeof own, peer_len = sizeof peer;
-    return getsockname(fd, (struct sockaddr *)&own, &own_len) == 0 &&
-           getpeername(fd, (struct sockaddr *)&peer, &peer_len) == 0 && own_len == peer_len &&
-           memcmp(&own, &peer, own_len) == 0;
-}
-
 static int connect_at(const struct addrinfo *at, int timeout_ms)
 {
     const struct timeval limit = {.tv_sec = timeout_ms / 1000, .tv_usec = timeout_ms % 1000 * 1000};
@@ -222,7 +212,7 @@ static int connect_at(const struct addrinfo *at, int timeout_ms)
     setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
     stamped_enable(fd);
     const int is_open = connect(fd, at->ai_addr, at->ai_addrlen) == 0;
-    const int is_own = is_open && is_own_end(fd);
+    const int is_own = is_open && socket_is_own_end(fd);
     if (is_open && !is_own && fcntl(fd, F_SETFL, O_NONBLOCK) == 0) return fd;
     const int error = is_own ? ECONNREFUSED : errno == EINPROGRESS ? ETIMEDOUT : errno;
     close(fd);
@@ -236,7 +226,8 @@ int stamped_connect(const char *host, int port, int timeout_ms, int *fd, struct 
     const int rc = socket_resolve("tcp", host, port, SOCK_STREAM, &list, err);
     if (rc != SH_OK) return rc;
     *fd = -1;
-    for (const struct addrinfo *at = list; at != NULL && *fd < 0; at = at->ai_next)
+    errno = 0;
+    for (const struct addrinfo *at = list; at != NULL && *fd < 0 && errno != EINTR; at = at->ai_next)
         *fd = connect_at(at, timeout_ms);
     const int error = errno;
     freeaddrinfo(list);

@@ -8,7 +8,6 @@
 #define DRIVERS_USB_BACKEND_H
 
 #include <poll.h>
-#include <sys/socket.h>
 
 #include "drivers/usb/usb.h"
 
@@ -33,9 +32,15 @@ enum usb_fault { USB_FAULT_UNPLUG, USB_FAULT_PLUG, USB_FAULT_RESET };
 /* Injected faults of transfers and requests, which a back end may lack. All back ends can unplug and reset. */
 enum { USB_CAN_STALL = 1, USB_CAN_SHORTEN = 2, USB_CAN_ENUMERATE_WRONG = 4 };
 
-struct usb_backend_ops {
-    const char *name;
+/* The owner of a back end, which handle() calls. */
+struct usb_owner {
+    int (*go_on)(void *ctx);
+    void (*say)(void *ctx, const char *text);      /* a line for the person who runs the head */
+    void (*refuse)(void *ctx, const char *client); /* it was turned away, for want of a descriptor */
+    void *ctx;
+};
 
+struct usb_backend_ops {
     /* Opens as spec says. When it fails, nothing of it stays. The device is the caller's and outlives the
      * back end, which attaches and detaches it. */
     int (*open)(const struct usb_backend_spec *spec, struct usb_device *device, void **backend, struct sh_err *err);
@@ -47,17 +52,10 @@ struct usb_backend_ops {
     int (*prepare)(void *backend, struct pollfd *fds);
 
     /* After poll(2) on exactly these. Works through what came; after each of the host's acts it asks
-     * go_on(ctx), and stops where that is 0. The rest waits for the next call. Then `more` returns 1, so
+     * owner->go_on, and stops where that is 0. The rest waits for the next call. Then `more` returns 1, so
      * the owner calls again even if no descriptor is ready. SH_EIO ends the back end for good. */
-    int (*handle)(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx);
+    int (*handle)(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner);
     int (*more)(const void *backend); /* NULL: poll(2) says it all */
-
-    /* One line for the person who runs the head, each only once; NULL: nothing. Valid until the next call. The
-     * member itself is NULL for a back end that never has any. */
-    const char *(*news)(void *backend);
-    /* The client turned away since the last call for want of a descriptor; NULL: none. The member itself is NULL for
-     * a back end without clients. */
-    const char *(*refused)(void *backend);
 
     /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and
      * usb_device_read. */
@@ -83,26 +81,16 @@ const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
  * taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
-/* Clients of a listener that come while there is no descriptor for them. backend_socket.c */
-struct usb_door {
-    int reserve; /* socket_reserve() */
-    int n_refused;
-    char who[64]; /* of the last one */
-};
-/* The next client's descriptor, not blocking; -1: none. */
-int usb_backend_accept(int listener, struct usb_door *door);
-/* As the member `refused`. */
-const char *usb_backend_refused(struct usb_door *door);
+/* The next client's descriptor, not blocking; -1: none. reserve: socket_reserve()'s. The owner hears of clients for
+ * whom there is no descriptor. backend_socket.c */
+int usb_backend_accept(int listener, int *reserve, const struct usb_owner *owner);
 
 /* The address that a socket of usb_backend_socket is connected to. usb_backend_connect connects to it again,
  * without waiting or looking up names. 0: *fd is connected. EINPROGRESS: once poll(2) finds *fd writable,
  * usb_backend_connect_error says how it went. Any other errno: *fd is -1. backend_socket.c */
-struct usb_backend_address {
-    struct sockaddr_storage at;
-    socklen_t len;
-};
-void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_backend_address *out);
-int usb_backend_connect(const struct usb_backend_address *to, int *fd);
+struct socket_address; /* drivers/socket/socket.h */
+void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket_address *out);
+int usb_backend_connect(const struct socket_address *to, int *fd);
 int usb_backend_connect_error(int fd);
 /* To be called before closing. Sends nothing more, and waits until the peer has read everything and hung up,
  * or until timeout_ms pass without a byte; eight times that at most. Closing with unread requests of the peer

@@ -11,7 +11,7 @@
 #include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 
-int usb_backend_connect(const struct usb_backend_address *to, int *fd)
+int usb_backend_connect(const struct socket_address *to, int *fd)
 {
     *fd = socket(to->at.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (*fd < 0) return errno;
@@ -23,25 +23,15 @@ int usb_backend_connect(const struct usb_backend_address *to, int *fd)
     return error;
 }
 
-/* Where nobody listens on a port of this machine, TCP may connect a socket to itself, from that same port. */
-static int is_own(int fd)
-{
-    struct sockaddr_storage here = {0}, there = {0};
-    socklen_t len = sizeof here;
-    if (getsockname(fd, (struct sockaddr *)&here, &len) != 0 || here.ss_family == AF_UNIX) return 0;
-    len = sizeof there;
-    return getpeername(fd, (struct sockaddr *)&there, &len) == 0 && memcmp(&here, &there, sizeof here) == 0;
-}
-
 int usb_backend_connect_error(int fd)
 {
     int error = 0;
     socklen_t len = sizeof error;
     if (getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &len) != 0) return errno;
-    return error == 0 && is_own(fd) ? ECONNREFUSED : error;
+    return error == 0 && socket_is_own_end(fd) ? ECONNREFUSED : error;
 }
 
-static int unix_address(const char *path, struct usb_backend_address *out)
+static int unix_address(const char *path, struct socket_address *out)
 {
     struct sockaddr_un at = {.sun_family = AF_UNIX};
     if (strlen(path) >= sizeof at.sun_path) return 0;
@@ -51,7 +41,7 @@ static int unix_address(const char *path, struct usb_backend_address *out)
     return 1;
 }
 
-void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_backend_address *out)
+void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket_address *out)
 {
     if (spec->path[0] != '\0') {
         unix_address(spec->path, out); /* it has fitted before */
@@ -63,7 +53,7 @@ void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct usb_ba
 
 /* Nobody answers on it: its owner is gone and has not removed it. A socket whose queue is full is alive; this
  * does not wait for it. */
-static int is_left_behind(const char *path, const struct usb_backend_address *at)
+static int is_left_behind(const char *path, const struct socket_address *at)
 {
     struct stat st;
     int fd;
@@ -75,7 +65,7 @@ static int is_left_behind(const char *path, const struct usb_backend_address *at
 
 static int unix_socket(const struct usb_backend_spec *spec, const char *what, int *fd, struct sh_err *err)
 {
-    struct usb_backend_address at;
+    struct socket_address at;
     if (!unix_address(spec->path, &at))
         return sh_fail(err, SH_EINPUT, "%s:%s: the path is too long for a socket; allowed %zu bytes", what, spec->path,
                        sizeof((struct sockaddr_un *)0)->sun_path - 1);
@@ -98,25 +88,19 @@ int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, in
     return socket_open(&place, fd, name, len, err);
 }
 
-int usb_backend_accept(int listener, struct usb_door *door)
+int usb_backend_accept(int listener, int *reserve, const struct usb_owner *owner)
 {
     enum { AT_ONCE = 16 }; /* turned away; those that come without end have to wait for the next call */
     struct sockaddr_storage from;
     socklen_t len = sizeof from;
+    char client[64];
     int fd = -1;
-    for (int i = 0; i < AT_ONCE && socket_accept(listener, &door->reserve, &fd, &from, &len) && fd < 0; i++) {
-        socket_address_text((const struct sockaddr *)&from, len, door->who, sizeof door->who);
-        door->n_refused++;
+    for (int i = 0; i < AT_ONCE && socket_accept(listener, reserve, &fd, &from, &len) && fd < 0; i++) {
+        socket_address_text((const struct sockaddr *)&from, len, client, sizeof client);
+        owner->refuse(owner->ctx, client);
         len = sizeof from;
     }
     return fd;
-}
-
-const char *usb_backend_refused(struct usb_door *door)
-{
-    if (door->n_refused == 0) return NULL;
-    door->n_refused--;
-    return door->who;
 }
 
 void usb_backend_hang_up(int fd, int timeout_ms)

@@ -153,16 +153,15 @@ static int set_interface_feature(struct usb_device *device, const struct setup *
 static int get_interface(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     if (!names_interface(device, s) || s->value != 0 || s->length != 1) return USB_STALL;
-    data[0] = device->alt[s->index];
+    data[0] = 0; /* the only alternate setting */
     return 1;
 }
 
 static int set_interface(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     (void)data;
-    if (!names_interface(device, s) || s->length != 0) return USB_STALL;
-    if (usb_find_row(device->model, s->index, s->value) == NULL) return USB_STALL;
-    usb_select_alt(device, s->index, s->value);
+    if (!names_interface(device, s) || s->value != 0 || s->length != 0) return USB_STALL;
+    usb_restart_interface(device, s->index);
     return 0;
 }
 

@@ -51,13 +51,6 @@ static void patch16(struct sink *to, size_t at, unsigned v)
     if (at + 1 < to->room) to->out[at + 1] = (uint8_t)(v >> 8);
 }
 
-const struct usb_interface_row *usb_find_row(const struct usb_model *model, unsigned interface, unsigned alt)
-{
-    for (unsigned i = 0; i < model->n_rows; i++)
-        if (model->interface[i].number == interface && model->interface[i].alt == alt) return &model->interface[i];
-    return NULL;
-}
-
 static unsigned count_strings(const struct usb_model *model)
 {
     unsigned n = 0;
@@ -115,7 +108,7 @@ static void put_endpoint(struct sink *to, const struct usb_endpoint_row *row, en
 
 static void put_interface(struct sink *to, const struct usb_interface_row *row, enum usb_rate rate)
 {
-    PUT(to, USB_DT_INTERFACE_SIZE, USB_DT_INTERFACE, row->number, row->alt, row->n_endpoints, row->class, row->subclass,
+    PUT(to, USB_DT_INTERFACE_SIZE, USB_DT_INTERFACE, row->number, 0, row->n_endpoints, row->class, row->subclass,
         row->protocol, row->string);
     if (row->extra_len > 0) descriptor_put(to, row->extra, row->extra_len);
     for (unsigned i = 0; i < row->n_endpoints; i++)
@@ -143,8 +136,8 @@ size_t usb_describe_config(const struct usb_model *model, const struct usb_ident
     const unsigned unit_ma = rate == USB_RATE_SUPER ? 8 : 2;
     PUT(&to, USB_DT_CONFIG_SIZE, type, U16(LATER), model->n_interfaces, USB_CONFIGURATION, model->configuration,
         0x80 | (usb_is_self_powered(model) ? SELF_POWERED : 0), U8((model->max_power_ma + unit_ma - 1) / unit_ma));
-    for (unsigned i = 0; i < model->n_rows; i++) {
-        if (model->interface[i].alt == 0) put_association(&to, model, model->interface[i].number);
+    for (unsigned i = 0; i < model->n_interfaces; i++) {
+        put_association(&to, model, i);
         put_interface(&to, &model->interface[i], rate);
     }
     patch16(&to, 2, (unsigned)to.len);

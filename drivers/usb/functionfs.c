@@ -105,16 +105,18 @@ static void disable(struct functionfs *self, int unplugged)
 /* The controller chooses the endpoints' addresses, and some controllers lack those that the model asks for. */
 static void look_at_addresses(struct functionfs *self)
 {
+    char text[200];
     uint8_t given = 0;
-    if (!usb_device_model(self->device)->fixed_addresses || self->moved[0] != '\0') return;
+    if (!usb_device_model(self->device)->fixed_addresses || self->has_said_moved) return;
     const uint8_t wanted = ffs_pipes_moved(&self->pipes, &given);
     if (wanted == 0) return;
     snprintf(
-        self->moved, sizeof self->moved,
+        text, sizeof text,
         "the controller %.40s gives endpoint %02x in place of %02x; clients that look for the device's own endpoints "
         "don't find it: use backend usbip or usbredir",
         self->gadget.udc, given, wanted);
-    self->moved_due = 1;
+    self->owner->say(self->owner->ctx, text);
+    self->has_said_moved = 1;
 }
 
 /* The host has configured the device. */
@@ -173,7 +175,7 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
 static void take_state(struct functionfs *self, int hung_up)
 {
     char text[32];
-    /* Reading makes poll(2) wait for the next change. It comes first, so that no change is missed between both reads. */
+    /* Reading lets poll(2) wait for the next change. It comes first, so that no change between both reads is missed. */
     if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return;
     const int was = usb_device_configuration(self->device) != 0;
     const int is = gadget_is_configured(&self->gadget, was);
@@ -216,11 +218,12 @@ static void functionfs_flush(void *backend)
     ffs_pipes_withdraw(&self->pipes);
 }
 
-static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx)
+static int functionfs_handle(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner)
 {
     struct functionfs *self = backend;
     if (n != N_FDS) return SH_OK;
-    int going = go_on(ctx), any = 1;
+    self->owner = owner;
+    int going = owner->go_on(owner->ctx), any = 1;
     const int hung_up = fds[AT_TTY].fd == self->console.fd && (fds[AT_TTY].revents & POLLHUP) != 0;
     if (going && self->ep0 < 0 && (fds[AT_EP0].revents != 0 || hung_up)) take_state(self, hung_up);
     /* Data on the endpoints came before the event on ep0. So they are taken first: a session is not closed before
@@ -228,23 +231,15 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, int
     for (int events = 0; going && any && events < MAX_EVENTS; events++) {
         int taken = 0;
         for (; going && taken < MAX_TAKEN && ffs_pipes_take(&self->pipes); taken++)
-            going = go_on(ctx);
+            going = owner->go_on(owner->ctx);
         any = going && (functionfs_take_event(self) || taken == MAX_TAKEN);
-        going = going && go_on(ctx);
+        going = going && owner->go_on(owner->ctx);
     }
     if (going && (fds[AT_TTY].fd == self->console.fd || fds[AT_TIMER].revents != 0))
         ffs_console_handle(&self->console, fds[AT_TTY].fd >= 0 ? fds[AT_TTY].revents : 0, fds[AT_TIMER].revents != 0);
     self->backlog = !going || any;
     functionfs_flush(self);
     return SH_OK;
-}
-
-static const char *functionfs_news(void *backend)
-{
-    struct functionfs *self = backend;
-    if (!self->moved_due) return NULL;
-    self->moved_due = 0;
-    return self->moved;
 }
 
 static int functionfs_more(const void *backend)
@@ -290,13 +285,11 @@ static void functionfs_close(void *backend)
 }
 
 const struct usb_backend_ops usb_backend_functionfs = {
-    .name = "functionfs",
     .open = functionfs_open,
     .endpoint = functionfs_endpoint,
     .prepare = functionfs_prepare,
     .handle = functionfs_handle,
     .more = functionfs_more,
-    .news = functionfs_news,
     .flush = functionfs_flush,
     .faults = USB_CAN_SHORTEN,
     .fault = functionfs_fault,

@@ -56,7 +56,7 @@ int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const str
     if (io_setup(2 * FFS_SLOTS * FFS_MAX_PIPES, &pipes->aio) != 0)
         rc = sh_fail(err, SH_EIO, "functionfs: asynchronous I/O: %s%s", strerror(errno),
                      errno == EAGAIN ? "; see /proc/sys/fs/aio-max-nr" : "");
-    for (unsigned i = 0; i < gadget->part.n_rows && rc == SH_OK; i++)
+    for (unsigned i = 0; i < gadget->part.n_interfaces && rc == SH_OK; i++)
         for (unsigned k = 0; k < gadget->row[i].n_endpoints && rc == SH_OK; k++) {
             if (pipes->n == FFS_MAX_PIPES) {
                 rc = sh_fail(err, SH_EINPUT, "functionfs: too many endpoints; allowed are up to %d", FFS_MAX_PIPES);

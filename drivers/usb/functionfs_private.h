@@ -101,11 +101,11 @@ enum { FFS_MAX_DATA_STAGE = 4096 };
 struct functionfs {
     struct usb_device *device;
     struct gadget gadget;
-    int ep0;         /* -1: nothing of the device is FunctionFS's */
-    char moved[200]; /* message about endpoints with other addresses than the device's; reported once */
-    int moved_due;
-    char unplugged[256]; /* unplugged from this controller by an injected fault; empty: it is not */
-    int backlog;         /* stopped before everything was looked at */
+    int ep0;                       /* -1: nothing of the device is FunctionFS's */
+    int has_said_moved;            /* some endpoint has another address than the device's */
+    const struct usb_owner *owner; /* within handle() */
+    char unplugged[256];           /* unplugged from this controller by an injected fault; empty: it is not */
+    int backlog;                   /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;
     uint8_t data[FFS_MAX_DATA_STAGE];

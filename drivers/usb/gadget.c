@@ -107,7 +107,7 @@ static int take_part(struct gadget *gadget, const struct usb_model *model, struc
     part->function = gadget->function;
     part->interface = gadget->row;
     part->string = gadget->string;
-    part->n_functions = part->n_interfaces = part->n_rows = 0;
+    part->n_functions = part->n_interfaces = 0;
     gadget->tty_number = -1;
     for (unsigned f = 0; f < model->n_functions; f++) {
         const struct usb_function_row *from = &model->function[f];
@@ -124,11 +124,8 @@ static int take_part(struct gadget *gadget, const struct usb_model *model, struc
         to->string = take_string(gadget, model, from->string);
         for (unsigned i = from->first; i < (unsigned)from->first + from->count; i++) {
             gadget->interface[part->n_interfaces] = (uint8_t)i;
-            if (usb_find_row(model, i, 1) != NULL)
-                return sh_fail(err, SH_EINPUT,
-                               "functionfs: alternate settings are not supported by the kernel's FunctionFS");
-            struct usb_interface_row *row = &gadget->row[part->n_rows++];
-            *row = *usb_find_row(model, i, 0);
+            struct usb_interface_row *row = &gadget->row[part->n_interfaces];
+            *row = model->interface[i];
             row->number = part->n_interfaces++;
             row->string = take_string(gadget, model, row->string);
         }

@@ -152,18 +152,9 @@ void scanhead_usb_ended(struct scanhead_usb *head, int session)
 static void send_state(struct scanhead_usb *head, int index)
 {
     const struct usb_session_row *row = &head->personality->session[index];
-    const uint8_t notice[] = {
-        USB_DIR_IN | USB_TYPE_CLASS | USB_RECIP_INTERFACE,
-        USB_CDC_NOTIFY_SERIAL_STATE,
-        0,
-        0,
-        row->interface,
-        0,
-        2,
-        0, /* wValue, wIndex, wLength */
-        SERIAL_STATE_READY,
-        0,
-    };
+    /* bmRequestType, bNotification; wValue, wIndex and wLength of two bytes each; the state */
+    const uint8_t type = USB_DIR_IN | USB_TYPE_CLASS | USB_RECIP_INTERFACE;
+    const uint8_t notice[] = {type, USB_CDC_NOTIFY_SERIAL_STATE, 0, 0, row->interface, 0, 2, 0, SERIAL_STATE_READY, 0};
     if (usb_device_write(head->device, row->notify, notice, sizeof notice) == sizeof notice)
         head->session[index].state_due = 0;
 }

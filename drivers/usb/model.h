@@ -31,9 +31,10 @@ struct usb_endpoint_row {
     uint8_t units; /* IN: the data of one write are a unit, whose end goes out at once */
 };
 
-/* One alternate setting of an interface; rows of one interface follow each other, alt 0 first. */
+/* An interface. Its only alternate setting is 0. */
 struct usb_interface_row {
-    uint8_t number, alt, class, subclass, protocol;
+    uint8_t number; /* its place among the rows */
+    uint8_t class, subclass, protocol;
     uint8_t string;       /* index into the model's strings, 0 none */
     const uint8_t *extra; /* class descriptors, as they go out between interface and endpoints */
     uint8_t extra_len;
@@ -59,8 +60,8 @@ struct usb_model {
     uint8_t manufacturer, product; /* indices, 0 none; the serial number's is the one after the list */
     uint8_t configuration;         /* index of its name */
     const struct usb_function_row *function;
-    const struct usb_interface_row *interface; /* rows */
-    uint8_t n_functions, n_interfaces, n_rows;
+    const struct usb_interface_row *interface;
+    uint8_t n_functions, n_interfaces;
     uint8_t fixed_addresses; /* its clients know its endpoints by their addresses, whatever descriptors say */
     uint8_t ms_vendor_code;  /* bRequest for the Microsoft OS 2.0 set; unused without compatible ids */
 };
@@ -98,7 +99,5 @@ static inline unsigned usb_endpoint_index(unsigned address)
 {
     return (address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16u : 0u);
 }
-/* The row of an interface's alternate setting, NULL when there is none. */
-const struct usb_interface_row *usb_find_row(const struct usb_model *model, unsigned interface, unsigned alt);
 
 #endif

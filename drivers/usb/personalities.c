@@ -80,7 +80,6 @@ const struct usb_model scanhead_usb_model = {
     .interface = native_interfaces,
     .n_functions = 2,
     .n_interfaces = 3,
-    .n_rows = 3,
     .ms_vendor_code = 0x20,
 };
 
@@ -106,7 +105,6 @@ static const struct usb_model hokuyo_model = {
     .interface = hokuyo_interfaces,
     .n_functions = 1,
     .n_interfaces = 2,
-    .n_rows = 2,
 };
 
 /* Data begin it, too: for a host that does not raise DTR. */
@@ -138,7 +136,6 @@ static const struct usb_model sick_model = {
     .interface = sick_interfaces,
     .n_functions = 1,
     .n_interfaces = 1,
-    .n_rows = 1,
     .fixed_addresses = 1,
 };
 
@@ -149,10 +146,9 @@ static const struct usb_session_row sick_sessions[] = {
 /* ---- all of them */
 
 static const struct usb_personality personalities[USB_N_PERSONALITIES] = {
-    [USB_PERSONALITY_NATIVE] = {"native", SCANHEAD_USB_VID, SCANHEAD_USB_PID, 1, &scanhead_usb_model, native_sessions,
-                                2},
-    [USB_PERSONALITY_HOKUYO] = {"hokuyo", 0x15d1, 0x0000, 0, &hokuyo_model, hokuyo_sessions, 1},
-    [USB_PERSONALITY_SICK] = {"sick", 0x19a2, 0x5001, 1, &sick_model, sick_sessions, 1},
+    [USB_PERSONALITY_NATIVE] = {SCANHEAD_USB_VID, SCANHEAD_USB_PID, 1, &scanhead_usb_model, native_sessions, 2},
+    [USB_PERSONALITY_HOKUYO] = {0x15d1, 0x0000, 0, &hokuyo_model, hokuyo_sessions, 1},
+    [USB_PERSONALITY_SICK] = {0x19a2, 0x5001, 1, &sick_model, sick_sessions, 1},
 };
 
 const struct usb_personality *usb_personality_get(enum usb_personality_id id)

@@ -51,7 +51,6 @@ struct usb_session_row {
 };
 
 struct usb_personality {
-    const char *name;
     uint16_t vid, pid;
     int has_serial; /* the device has a serial number string, also where none is configured */
     const struct usb_model *model;

@@ -27,16 +27,10 @@ void usb_retry_close(struct usb_retry *retry)
     retry->timer = -1;
 }
 
-static void retry_report(struct usb_retry *retry, const char *text, const char *why)
-{
-    snprintf(retry->news, sizeof retry->news, "%s%s", text, why);
-    retry->has_news = 1;
-}
-
-int usb_retry_start(struct usb_retry *retry)
+int usb_retry_start(struct usb_retry *retry, const struct usb_owner *owner)
 {
     retry->reported = 0;
-    retry_report(retry, "the host has detached the device; it will plug itself in again", "");
+    owner->say(owner->ctx, "the host has detached the device; it will plug itself in again");
     return set_timer(retry, retry->pace_ms);
 }
 
@@ -46,21 +40,16 @@ int usb_retry_is_due(struct usb_retry *retry, short revents)
     return revents != 0 && read(retry->timer, &count, sizeof count) == sizeof count;
 }
 
-void usb_retry_failed(struct usb_retry *retry, const char *why)
+void usb_retry_failed(struct usb_retry *retry, const char *why, const struct usb_owner *owner)
 {
-    if (!retry->reported) retry_report(retry, "not plugged in, will try again: ", why);
+    char text[200];
+    snprintf(text, sizeof text, "not plugged in, will try again: %s", why);
+    if (!retry->reported) owner->say(owner->ctx, text);
     retry->reported = 1;
 }
 
-int usb_retry_done(struct usb_retry *retry)
+int usb_retry_done(struct usb_retry *retry, const struct usb_owner *owner)
 {
-    retry_report(retry, "plugged in again", "");
+    owner->say(owner->ctx, "plugged in again");
     return set_timer(retry, 0);
-}
-
-const char *usb_retry_news(struct usb_retry *retry)
-{
-    if (!retry->has_news) return NULL;
-    retry->has_news = 0;
-    return retry->news;
 }

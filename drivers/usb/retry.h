@@ -6,27 +6,24 @@
 
 #include "drivers/usb/backend.h"
 
-enum { USB_RETRY_MS = 1000, USB_RETRY_TEXT = 200 };
+enum { USB_RETRY_MS = 1000 };
 
 struct usb_retry {
     int timer; /* timerfd; -1: never tries */
     int pace_ms;
     int reported; /* its failure */
-    int has_news;
-    char news[USB_RETRY_TEXT];
 };
 
 /* pace_ms 0: USB_RETRY_MS. what: "usbip", for errors. */
 int usb_retry_open(struct usb_retry *retry, const char *what, int pace_ms, struct sh_err *err);
 void usb_retry_close(struct usb_retry *retry);
-/* The host is gone: an attempt is due every pace_ms from now. SH_EIO: the timer can't be set. */
-int usb_retry_start(struct usb_retry *retry);
+/* The host is gone: an attempt is due every pace_ms from now. SH_EIO: the timer can't be set. Here and below the owner
+ * hears of it. */
+int usb_retry_start(struct usb_retry *retry, const struct usb_owner *owner);
 /* After poll(2) on the timer: 1 when an attempt is due. */
 int usb_retry_is_due(struct usb_retry *retry, short revents);
 /* How an attempt went. Only the first failure is news. */
-void usb_retry_failed(struct usb_retry *retry, const char *why);
-int usb_retry_done(struct usb_retry *retry);
-/* The news, each once; NULL: none. */
-const char *usb_retry_news(struct usb_retry *retry);
+void usb_retry_failed(struct usb_retry *retry, const char *why, const struct usb_owner *owner);
+int usb_retry_done(struct usb_retry *retry, const struct usb_owner *owner);
 
 #endif

@@ -40,7 +40,7 @@ enum usb_status {
     USB_OK,
     USB_CANCELLED, /* by usb_device_cancel */
     USB_STALLED,   /* the endpoint is halted */
-    USB_GONE,      /* no such endpoint now: reset, unplugged, other configuration or alternate setting */
+    USB_GONE,      /* no such endpoint now: reset, unplugged, or not configured */
     USB_OVERFLOW,  /* IN: the rest of the transfer is smaller than the packet that comes */
 };
 
@@ -54,6 +54,7 @@ struct usb_transfer {
     enum usb_status status;
     int zero_packet; /* IN: actual is a whole number of packets and below length: a zero-length packet ends it */
     uint32_t epoch;  /* OUT: usb_device_epoch of its interface when it came */
+    int64_t due_ns;  /* of a control request that is held (usb_hold): when it is to be answered */
     struct usb_transfer *next;
 };
 
@@ -67,7 +68,7 @@ struct usb_hooks {
      * yet; answer as if they had, and do nothing. The interface or endpoint it names exists in the present
      * configuration. */
     int (*request)(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *data);
-    /* An interface came to life or ended: configuration, alternate setting, reset, unplugging. */
+    /* An interface came to life or ended: configuration, SET_INTERFACE, reset, unplugging. */
     void (*interface)(void *ctx, unsigned interface, int active);
 };
 
@@ -109,8 +110,6 @@ enum usb_rate usb_device_rate(const struct usb_device *device);
 enum usb_end usb_device_end(const struct usb_device *device);
 /* 0: not configured. */
 int usb_device_configuration(const struct usb_device *device);
-/* The present alternate setting's row; NULL when not configured. */
-const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface);
 
 /* How often it was attached. */
 uint32_t usb_device_attaches(const struct usb_device *device);
@@ -127,9 +126,18 @@ int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
  * into the one after it. Until the interface ends. */
 void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
-/* How long each control request takes; the back end makes it wait. 0: it is answered at once. */
+/* Sets how long each control request takes. 0: it is answered at once. */
 void usb_device_set_slow(struct usb_device *device, double ms);
-double usb_device_slow_ms(const struct usb_device *device);
+/* For back ends, which make requests wait. Whether a request has to; held: those that wait already. */
+int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held);
+/* Appends a request, with its id set. They are answered one after the other; each takes the time asked for. */
+void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request);
+/* Takes out the request of that id; NULL: there is none. */
+struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id);
+/* Takes out the first request if its time has come; NULL: it has not, or there is none. */
+struct usb_transfer *usb_take_due(struct usb_transfer **held);
+/* When the first one is due; INT64_MAX: there is none. */
+int64_t usb_due_ns(const struct usb_transfer *held);
 /* Makes the configuration descriptor claim n bytes more than it has, with back ends that ask the core for it. */
 void usb_device_lengthen(struct usb_device *device, uint32_t n);
 
@@ -143,8 +151,8 @@ int usb_device_can_write(const struct usb_device *device, uint8_t endpoint);
 size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, size_t len);
 /* Unread bytes of the oldest transfer; *epoch (may be NULL) gets its epoch. */
 size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
-/* Drops what waits on an OUT endpoint from epochs before `epoch`; returns how many bytes. */
-size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch);
+/* Drops what waits on an OUT endpoint from epochs before the present one. */
+void usb_device_drop(struct usb_device *device, uint8_t endpoint);
 /* A count that the function may raise between two sessions. OUT transfers are stamped with it. When it has
  * changed, a back end withdraws IN data that are still on their way. */
 uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint);

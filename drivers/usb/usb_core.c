@@ -60,7 +60,7 @@ static void stop_pipe(struct usb_device *device, struct usb_pipe *pipe)
 
 static void set_interface(struct usb_device *device, unsigned interface, int active)
 {
-    const struct usb_interface_row *row = usb_find_row(device->model, interface, device->alt[interface]);
+    const struct usb_interface_row *row = &device->model->interface[interface];
     for (unsigned i = 0; i < row->n_endpoints; i++) {
         struct usb_pipe *pipe = usb_pipe(device, row->endpoint[i].address);
         if (active)
@@ -79,17 +79,15 @@ void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why
     device->end = why; /* before interfaces end: their hook asks for it */
     for (int i = 0; i < n && before == USB_CONFIGURED; i++)
         set_interface(device, (unsigned)i, 0);
-    memset(device->alt, 0, sizeof device->alt);
     if (state != USB_CONFIGURED) device->u1_enabled = device->u2_enabled = 0;
     for (int i = 0; i < n && state == USB_CONFIGURED; i++)
         set_interface(device, (unsigned)i, 1);
 }
 
-void usb_select_alt(struct usb_device *device, unsigned interface, unsigned alt)
+void usb_restart_interface(struct usb_device *device, unsigned interface)
 {
     device->end = USB_END_CONFIGURED;
     set_interface(device, interface, 0);
-    device->alt[interface] = (uint8_t)alt;
     set_interface(device, interface, 1);
 }
 
@@ -275,17 +273,14 @@ size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, ui
     return pipe->first->length - pipe->used;
 }
 
-size_t usb_device_drop(struct usb_device *device, uint8_t endpoint, uint32_t epoch)
+void usb_device_drop(struct usb_device *device, uint8_t endpoint)
 {
     struct usb_pipe *pipe = usb_pipe(device, endpoint);
-    size_t dropped = 0;
-    while (pipe->first != NULL && pipe->first->epoch != epoch) {
-        dropped += pipe->first->length - pipe->used;
+    while (pipe->first != NULL && pipe->first->epoch != pipe->epoch) {
         pipe->first->actual = pipe->first->length;
         usb_core_finish(device, pipe, USB_OK);
     }
     finish_empty(device, pipe);
-    return dropped;
 }
 
 uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint)
@@ -300,29 +295,23 @@ void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint)
 
 /* ---- the rest */
 
-/* An endpoint belongs to one interface, whose alternate settings may share it. They count up from 0. */
+/* An endpoint belongs to one interface. */
 static int check_model(const struct usb_model *model, struct sh_err *err)
 {
-    uint8_t owner[32];
-    memset(owner, 0xff, sizeof owner);
-    for (unsigned i = 0, number = 0, alt = 0; i < model->n_rows; i++) {
-        const struct usb_interface_row *row = &model->interface[i];
-        if (i > 0 && row->number != number) number++, alt = 0;
-        if (row->number != number || row->alt != alt++)
-            return sh_fail(err, SH_EINPUT, "usb: interface row %u is out of order", i);
-        for (unsigned k = 0; k < row->n_endpoints; k++) {
-            const uint8_t address = row->endpoint[k].address;
-            uint8_t *of = &owner[usb_endpoint_index(address)];
-            if ((address & USB_ENDPOINT_NUMBER_MASK) == 0 || (*of != 0xff && *of != number))
-                return sh_fail(err, SH_EINPUT, "usb: endpoint %02x is number 0, or in two interfaces", address);
-            *of = (uint8_t)number;
-        }
-        if (i + 1 == model->n_rows && number + 1 != model->n_interfaces)
-            return sh_fail(err, SH_EINPUT, "usb: the model has %u interfaces, but rows for %u", model->n_interfaces,
-                           number + 1);
-    }
+    uint32_t taken = 0;
     if (model->n_interfaces == 0 || model->n_interfaces > USB_MAX_INTERFACES)
         return sh_fail(err, SH_EINPUT, "usb: %u interfaces; allowed 1 to %d", model->n_interfaces, USB_MAX_INTERFACES);
+    for (unsigned i = 0; i < model->n_interfaces; i++) {
+        const struct usb_interface_row *row = &model->interface[i];
+        if (row->number != i) return sh_fail(err, SH_EINPUT, "usb: interface row %u is out of order", i);
+        for (unsigned k = 0; k < row->n_endpoints; k++) {
+            const uint8_t address = row->endpoint[k].address;
+            const uint32_t bit = UINT32_C(1) << usb_endpoint_index(address);
+            if ((address & USB_ENDPOINT_NUMBER_MASK) == 0 || (taken & bit) != 0)
+                return sh_fail(err, SH_EINPUT, "usb: endpoint %02x is number 0, or taken twice", address);
+            taken |= bit;
+        }
+    }
     return SH_OK;
 }
 
@@ -376,10 +365,4 @@ enum usb_end usb_device_end(const struct usb_device *device)
 int usb_device_configuration(const struct usb_device *device)
 {
     return device->state == USB_CONFIGURED ? USB_CONFIGURATION : 0;
-}
-
-const struct usb_interface_row *usb_device_row(const struct usb_device *device, unsigned interface)
-{
-    if (device->state != USB_CONFIGURED || interface >= device->model->n_interfaces) return NULL;
-    return usb_find_row(device->model, interface, device->alt[interface]);
 }

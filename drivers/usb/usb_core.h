@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The device core's own struct, for the two files that make it: usb_core.c and control.c. Private. */
+/* The device core's own struct, for the files that make it: usb_core.c, control.c and usb_fault.c. Private. */
 #ifndef DRIVERS_USB_USB_CORE_H
 #define DRIVERS_USB_USB_CORE_H
 
@@ -31,16 +31,16 @@ struct usb_device {
     int suspended;
     int u1_enabled, u2_enabled;
     uint32_t attaches;
-    double slow_ms;    /* how long a control request takes */
-    uint32_t lengthen; /* bytes that the configuration claims and doesn't have */
-    uint8_t alt[USB_MAX_INTERFACES];
+    double slow_ms;           /* how long a control request takes */
+    uint32_t lengthen;        /* bytes that the configuration claims and doesn't have */
     struct usb_pipe pipe[32]; /* 0..15 OUT, 16..31 IN; the two of endpoint 0 stay empty */
 };
 
 /* usb_core.c */
 struct usb_pipe *usb_pipe(struct usb_device *device, unsigned address);
 void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why);
-void usb_select_alt(struct usb_device *device, unsigned interface, unsigned alt);
+/* Ends the interface and begins it again, as SET_INTERFACE does. */
+void usb_restart_interface(struct usb_device *device, unsigned interface);
 void usb_set_halt(struct usb_device *device, struct usb_pipe *pipe, int halted);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults of a device. usb_core.c shortens transfers, control.c lengthens the configuration. */
+#include "core/monotonic.h"
 #include "drivers/usb/usb_core.h"
 
 void usb_device_restart(struct usb_device *device)
@@ -36,9 +37,38 @@ void usb_device_set_slow(struct usb_device *device, double ms)
     device->slow_ms = ms;
 }
 
-double usb_device_slow_ms(const struct usb_device *device)
+int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held)
 {
-    return device->slow_ms;
+    return device->slow_ms > 0.0 || held != NULL; /* none overtakes another */
+}
+
+void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request)
+{
+    int64_t from_ns = monotonic_ns();
+    for (; *held != NULL; held = &(*held)->next)
+        if ((*held)->due_ns > from_ns) from_ns = (*held)->due_ns;
+    request->due_ns = from_ns + (int64_t)(device->slow_ms * 1e6);
+    request->next = NULL;
+    *held = request;
+}
+
+struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id)
+{
+    while (*held != NULL && (*held)->id != id)
+        held = &(*held)->next;
+    struct usb_transfer *request = *held;
+    if (request != NULL) *held = request->next;
+    return request;
+}
+
+struct usb_transfer *usb_take_due(struct usb_transfer **held)
+{
+    return usb_due_ns(*held) <= monotonic_ns() ? usb_let_go(held, (*held)->id) : NULL;
+}
+
+int64_t usb_due_ns(const struct usb_transfer *held)
+{
+    return held != NULL ? held->due_ns : INT64_MAX;
 }
 
 void usb_device_lengthen(struct usb_device *device, uint32_t n)

@@ -16,20 +16,19 @@
 #include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/retry.h"
-#include "drivers/usb/usbip.h"
-#include "drivers/usb/usbip_conn.h"
+#include "drivers/usb/usbip_private.h"
 #include "drivers/usb/vhci.h"
 
 enum { MAX_CONNS = 4, SEND_BUFFER_BYTES = 1 << 20, CLOSE_WAIT_MS = 500 };
 
 struct usbip {
     struct usb_device *device;
-    int here;      /* attached to this machine: nobody else may come */
-    int unplugged; /* by an injected fault */
-    int listener;  /* -1: none */
-    struct usb_door door;
-    struct usb_backend_spec served; /* where it listens; once open with the port that it has */
-    struct usb_retry retry;         /* of what is attached here */
+    int here;                      /* attached to this machine: nobody else may come */
+    int unplugged;                 /* by an injected fault */
+    int listener;                  /* -1: none */
+    int reserve;                   /* of the listener: socket_reserve() */
+    struct socket_address address; /* of the listener */
+    struct usb_retry retry;        /* of what is attached here */
     int taken;
     uint64_t n_welcomed;
     struct usbip_conn conn[MAX_CONNS];
@@ -59,21 +58,14 @@ static int attach_here(struct usbip *self, struct sh_err *err)
     return SH_OK;
 }
 
-static int start_here(struct usbip *self, const struct usb_backend_spec *spec, struct sh_err *err)
-{
-    int rc = usb_retry_open(&self->retry, "usbip", spec->retry_ms, err);
-    return rc == SH_OK ? attach_here(self, err) : rc;
-}
-
 static int listen_here(struct usbip *self, const struct usb_backend_spec *spec, struct sh_err *err)
 {
     char at[USB_BACKEND_NAME_MAX - 8] = "";
     int rc = usb_backend_socket(spec, "usbip", &self->listener, at, sizeof at, err);
     if (rc != SH_OK) return rc;
     snprintf(self->name, sizeof self->name, "usbip:%s", at);
-    if (self->door.reserve < 0) self->door.reserve = socket_reserve();
-    self->served = *spec;
-    if (spec->path[0] == '\0') self->served.port = atoi(strrchr(at, ':') + 1);
+    socket_note_address(self->listener, &self->address);
+    self->reserve = socket_reserve();
     return SH_OK;
 }
 
@@ -83,13 +75,12 @@ static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *de
     struct usbip *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbip: no memory");
     self->device = device;
-    self->listener = self->retry.timer = self->door.reserve = -1;
+    self->listener = self->retry.timer = self->reserve = -1;
     for (int i = 0; i < MAX_CONNS; i++)
         self->conn[i].fd = -1;
-    struct usb_backend_spec served = *spec;
     self->here = spec->attach;
-    served.attach = 0;
-    int rc = spec->attach ? start_here(self, spec, err) : listen_here(self, &served, err);
+    int rc = self->here ? usb_retry_open(&self->retry, "usbip", spec->retry_ms, err) : listen_here(self, spec, err);
+    if (rc == SH_OK && self->here) rc = attach_here(self, err);
     if (rc != SH_OK) {
         usb_retry_close(&self->retry);
         free(self);
@@ -135,11 +126,11 @@ static struct usbip_conn *usbip_make_room(struct usbip *self)
     return oldest;
 }
 
-static void welcome(struct usbip *self)
+static void welcome(struct usbip *self, const struct usb_owner *owner)
 {
     const int size = SEND_BUFFER_BYTES;
     for (int i = 0; i < MAX_CONNS; i++) {
-        int fd = usb_backend_accept(self->listener, &self->door);
+        int fd = usb_backend_accept(self->listener, &self->reserve, owner);
         if (fd < 0) return;
         socket_tune(fd);
         /* The peer is a kernel, which always reads. While a dead one seems alive, no other host gets the device. */
@@ -151,23 +142,23 @@ static void welcome(struct usbip *self)
     }
 }
 
-static int sweep(struct usbip *self)
+static int sweep(struct usbip *self, const struct usb_owner *owner)
 {
     int rc = SH_OK;
     for (int i = 0; i < MAX_CONNS; i++) {
         if (self->conn[i].fd < 0 || !self->conn[i].broken) continue;
         usbip_conn_end(&self->conn[i]);
-        if (self->here && !self->unplugged) rc = usb_retry_start(&self->retry);
+        if (self->here && !self->unplugged) rc = usb_retry_start(&self->retry, owner);
     }
     return rc;
 }
 
-static int attach_again(struct usbip *self)
+static int attach_again(struct usbip *self, const struct usb_owner *owner)
 {
     struct sh_err err = {0, ""};
     const int is_attached = self->conn[0].fd >= 0; /* the end of an injected fault has plugged it in meanwhile */
-    if (is_attached || attach_here(self, &err) == SH_OK) return usb_retry_done(&self->retry);
-    usb_retry_failed(&self->retry, err.text);
+    if (is_attached || attach_here(self, &err) == SH_OK) return usb_retry_done(&self->retry, owner);
+    usb_retry_failed(&self->retry, err.text, owner);
     return SH_OK;
 }
 
@@ -178,32 +169,20 @@ static void usbip_flush(void *backend)
         if (self->conn[i].fd >= 0) usbip_conn_write(&self->conn[i]);
 }
 
-static int usbip_handle(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx)
+static int usbip_handle(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner)
 {
     struct usbip *self = backend;
     if (n != N_FDS) return SH_OK;
     for (int i = 0; i < MAX_CONNS; i++)
-        if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], go_on, ctx);
+        if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], owner);
     for (int i = 0; i < MAX_CONNS; i++)
-        if (self->conn[i].fd >= 0) usbip_conn_answer_slow(&self->conn[i], go_on, ctx);
-    if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self);
+        if (self->conn[i].fd >= 0) usbip_conn_answer_slow(&self->conn[i], owner);
+    if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self, owner);
     int rc = SH_OK;
     if (fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents) && !self->unplugged)
-        rc = attach_again(self);
+        rc = attach_again(self, owner);
     usbip_flush(self);
-    return rc == SH_OK ? sweep(self) : rc;
-}
-
-static const char *usbip_news(void *backend)
-{
-    struct usbip *self = backend;
-    return usb_retry_news(&self->retry);
-}
-
-static const char *usbip_refused(void *backend)
-{
-    struct usbip *self = backend;
-    return usb_backend_refused(&self->door);
+    return rc == SH_OK ? sweep(self, owner) : rc;
 }
 
 static int64_t usbip_due_ns(const void *backend)
@@ -211,8 +190,7 @@ static int64_t usbip_due_ns(const void *backend)
     const struct usbip *self = backend;
     int64_t due_ns = INT64_MAX;
     for (int i = 0; i < MAX_CONNS; i++)
-        if (self->conn[i].fd >= 0 && usbip_conn_due_ns(&self->conn[i]) < due_ns)
-            due_ns = usbip_conn_due_ns(&self->conn[i]);
+        if (usb_due_ns(self->conn[i].held) < due_ns) due_ns = usb_due_ns(self->conn[i].held);
     return due_ns;
 }
 
@@ -233,10 +211,11 @@ static int plug(struct usbip *self)
 {
     struct sh_err err;
     if (!self->unplugged) return SH_OK;
-    const int rc = self->here ? attach_here(self, &err) : listen_here(self, &self->served, &err);
-    if (rc != SH_OK) return SH_ESTATE;
-    self->unplugged = 0;
-    return SH_OK;
+    if (self->here)
+        self->unplugged = attach_here(self, &err) != SH_OK;
+    else
+        self->unplugged = (self->listener = socket_listen_again(&self->address)) < 0;
+    return self->unplugged ? SH_ESTATE : SH_OK;
 }
 
 static int usbip_fault(void *backend, enum usb_fault what)
@@ -258,19 +237,16 @@ static void usbip_close(void *backend)
         usbip_conn_end(&self->conn[i]);
     }
     if (self->listener >= 0) close(self->listener);
-    if (self->door.reserve >= 0) close(self->door.reserve);
+    if (self->reserve >= 0) close(self->reserve);
     usb_retry_close(&self->retry);
     free(self);
 }
 
 const struct usb_backend_ops usb_backend_usbip = {
-    .name = "usbip",
     .open = usbip_open,
     .endpoint = usbip_endpoint,
     .prepare = usbip_prepare,
     .handle = usbip_handle,
-    .news = usbip_news,
-    .refused = usbip_refused,
     .flush = usbip_flush,
     .due_ns = usbip_due_ns,
     .faults = USB_CAN_STALL | USB_CAN_SHORTEN | USB_CAN_ENUMERATE_WRONG,

@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include "core/bytes.h"
-#include "core/monotonic.h"
 #include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/usbip_private.h"
@@ -24,7 +23,7 @@ static void return_urb(struct usbip_conn *conn, struct usbip_urb *urb, int statu
     if (status == 0 && urb->in && urb->short_is_error && actual < urb->room) status = -WIRE_EREMOTEIO;
     memset(urb->wire, 0, URB_HEADER);
     be_put32(urb->wire, RET_SUBMIT);
-    be_put32(urb->wire + 4, urb->seqnum);
+    be_put32(urb->wire + 4, (uint32_t)urb->transfer.id);
     be_put32(urb->wire + 20, (uint32_t)status);
     be_put32(urb->wire + 24, actual);
     usbip_queue(conn, urb, URB_HEADER + (urb->in ? actual : 0));
@@ -78,51 +77,20 @@ static void run_control(struct usbip_conn *conn, struct usbip_urb *urb)
         return_urb(conn, urb, 0, urb->in ? (uint32_t)n : urb->room);
 }
 
-/* Held requests are answered one after the other: each takes the delay that was asked for. */
-static void hold_control(struct usbip_conn *conn, struct usbip_urb *urb)
+void usbip_conn_answer_slow(struct usbip_conn *conn, const struct usb_owner *owner)
 {
-    const int64_t now_ns = monotonic_ns();
-    const int64_t from_ns =
-        conn->slow_last != NULL && conn->slow_last->due_ns > now_ns ? conn->slow_last->due_ns : now_ns;
-    urb->due_ns = from_ns + (int64_t)(usb_device_slow_ms(conn->device) * 1e6);
-    urb->next = NULL;
-    if (conn->slow_last != NULL)
-        conn->slow_last->next = urb;
-    else
-        conn->slow_first = urb;
-    conn->slow_last = urb;
-}
-
-/* Takes a control request out of those that are held; before: the one before it, NULL for the first. */
-static struct usbip_urb *let_go(struct usbip_conn *conn, struct usbip_urb *before)
-{
-    struct usbip_urb *urb = before != NULL ? before->next : conn->slow_first;
-    *(before != NULL ? &before->next : &conn->slow_first) = urb->next;
-    if (conn->slow_last == urb) conn->slow_last = before;
-    return urb;
-}
-
-int64_t usbip_conn_due_ns(const struct usbip_conn *conn)
-{
-    return conn->slow_first != NULL ? conn->slow_first->due_ns : INT64_MAX;
-}
-
-void usbip_conn_answer_slow(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
-{
-    while (conn->slow_first != NULL && !conn->broken && conn->slow_first->due_ns <= monotonic_ns() && go_on(ctx))
-        run_control(conn, let_go(conn, NULL));
+    struct usb_transfer *request;
+    while (!conn->broken && conn->held != NULL && owner->go_on(owner->ctx) &&
+           (request = usb_take_due(&conn->held)) != NULL)
+        run_control(conn, (struct usbip_urb *)request);
 }
 
 /* 1: it was held, and is gone. */
 static int forget_control(struct usbip_conn *conn, uint32_t seqnum)
 {
-    struct usbip_urb *before = NULL;
-    for (struct usbip_urb *urb = conn->slow_first; urb != NULL; before = urb, urb = urb->next) {
-        if (urb->seqnum != seqnum) continue;
-        usbip_urb_free(conn, let_go(conn, before));
-        return 1;
-    }
-    return 0;
+    struct usb_transfer *request = usb_let_go(&conn->held, seqnum);
+    if (request != NULL) usbip_urb_free(conn, (struct usbip_urb *)request);
+    return request != NULL;
 }
 
 /* All bytes of it are here. */
@@ -131,13 +99,12 @@ static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
     const unsigned number = be_get32(conn->head + 16);
     if (number == 0) {
         memcpy(urb->setup, conn->head + 40, sizeof urb->setup);
-        if (usb_device_slow_ms(conn->device) > 0.0 || conn->slow_first != NULL)
-            hold_control(conn, urb);
+        if (usb_has_to_wait(conn->device, conn->held))
+            usb_hold(conn->device, &conn->held, &urb->transfer);
         else
             run_control(conn, urb);
         return;
     }
-    urb->transfer.id = urb->seqnum;
     urb->transfer.endpoint = (uint8_t)(number | (urb->in ? USB_DIR_IN : 0));
     urb->transfer.length = urb->room;
     urb->transfer.data = urb->wire + URB_HEADER;
@@ -156,7 +123,7 @@ static void take_submit(struct usbip_conn *conn)
         conn->broken = 1;
         return;
     }
-    urb->seqnum = be_get32(conn->head + 4);
+    urb->transfer.id = be_get32(conn->head + 4); /* its sequence number */
     urb->in = direction == DIR_IN;
     urb->short_is_error = (be_get32(conn->head + 20) & URB_SHORT_NOT_OK) != 0;
     if (urb->in || length == 0) {
@@ -230,9 +197,9 @@ static uint32_t read_head(struct usbip_conn *conn)
     return n;
 }
 
-void usbip_conn_read(struct usbip_conn *conn, int (*go_on)(void *ctx), void *ctx)
+void usbip_conn_read(struct usbip_conn *conn, const struct usb_owner *owner)
 {
-    for (int reads = 0; reads < MAX_READS && !conn->broken && go_on(ctx); reads++) {
+    for (int reads = 0; reads < MAX_READS && !conn->broken && owner->go_on(owner->ctx); reads++) {
         if (usbip_conn_is_full(conn)) usbip_conn_write(conn); /* a host may send many requests before it reads */
         if (usbip_conn_is_full(conn)) return;
         if ((conn->incoming != NULL ? read_incoming(conn) : read_head(conn)) == 0) return;
@@ -261,8 +228,8 @@ void usbip_conn_end(struct usbip_conn *conn)
         *conn->taken = 0;
     }
     if (conn->incoming != NULL) usbip_urb_free(conn, conn->incoming);
-    while (conn->slow_first != NULL)
-        usbip_urb_free(conn, let_go(conn, NULL));
+    while (conn->held != NULL)
+        forget_control(conn, (uint32_t)conn->held->id);
     usbip_queue_clear(conn);
     close(conn->fd);
     *conn = (struct usbip_conn){.fd = -1};

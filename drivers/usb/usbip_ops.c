@@ -62,7 +62,7 @@ static void list_devices(struct usbip_conn *conn)
     be_put32(out + 8, 1);
     describe_device(conn, out + 12);
     for (unsigned i = 0; i < model->n_interfaces; i++) {
-        const struct usb_interface_row *row = usb_find_row(model, i, 0);
+        const struct usb_interface_row *row = &model->interface[i];
         uint8_t *at = out + 12 + OP_DEVICE + i * OP_INTERFACE;
         at[0] = row->class;
         at[1] = row->subclass;

@@ -17,7 +17,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "drivers/socket/socket.h"
 #include "drivers/usb/usbredir_private.h"
 
 /* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it.
@@ -41,7 +40,7 @@ static void usbredir_flush(void *backend)
 static int on_read(void *priv, uint8_t *data, int count)
 {
     struct usbredir *self = priv;
-    if (self->broken || self->n_reads++ >= MAX_READS || !self->go_on(self->go_on_ctx)) return 0;
+    if (self->broken || self->n_reads++ >= MAX_READS || !self->owner->go_on(self->owner->ctx)) return 0;
     if (is_full(self)) usbredir_flush(self); /* a guest may send many packets before it reads */
     if (self->broken || is_full(self)) return 0;
     ssize_t n = socket_read(self->fd, data, (size_t)count);
@@ -112,8 +111,8 @@ static void stop(struct usbredir *self)
 /* The attempt to connect self->fd has ended. error: 0, or the errno of its failure. */
 static int end_connect(struct usbredir *self, int error)
 {
-    if (error == 0 && start(self, self->fd) == SH_OK) return usb_retry_done(&self->retry);
-    usb_retry_failed(&self->retry, error != 0 ? strerror(error) : "no memory");
+    if (error == 0 && start(self, self->fd) == SH_OK) return usb_retry_done(&self->retry, self->owner);
+    usb_retry_failed(&self->retry, error != 0 ? strerror(error) : "no memory", self->owner);
     stop(self);
     return SH_OK;
 }
@@ -128,7 +127,7 @@ static int connect_again(struct usbredir *self)
 
 static void welcome(struct usbredir *self)
 {
-    int fd = usb_backend_accept(self->listener, &self->door);
+    int fd = usb_backend_accept(self->listener, &self->reserve, self->owner);
     if (fd < 0) return;
     stop(self); /* one that has not said hello */
     if (start(self, fd) != SH_OK) close(fd);
@@ -163,7 +162,7 @@ static int open_socket(struct usbredir *self, const struct usb_backend_spec *spe
     snprintf(self->name, sizeof self->name, "usbredir:%s", at);
     if (!spec->attach) {
         self->listener = fd;
-        self->door.reserve = socket_reserve();
+        self->reserve = socket_reserve();
         note_path(self, spec->path);
         return SH_OK;
     }
@@ -180,7 +179,7 @@ static int usbredir_open(const struct usb_backend_spec *spec, struct usb_device 
     struct usbredir *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbredir: no memory");
     self->device = device;
-    self->listener = self->fd = self->retry.timer = self->door.reserve = -1;
+    self->listener = self->fd = self->retry.timer = self->reserve = -1;
     int rc = open_socket(self, spec, err);
     if (rc != SH_OK) {
         usb_retry_close(&self->retry);
@@ -210,13 +209,12 @@ static int usbredir_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
-static int usbredir_handle(void *backend, const struct pollfd *fds, int n, int (*go_on)(void *ctx), void *ctx)
+static int usbredir_handle(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner)
 {
     struct usbredir *self = backend;
     int rc = SH_OK;
     if (n != N_FDS) return SH_OK;
-    self->go_on = go_on;
-    self->go_on_ctx = ctx;
+    self->owner = owner;
     self->n_reads = 0;
     if (self->fd >= 0 && self->parser == NULL && fds[AT_GUEST].revents != 0)
         rc = end_connect(self, usb_backend_connect_error(self->fd));
@@ -230,24 +228,13 @@ static int usbredir_handle(void *backend, const struct pollfd *fds, int n, int (
     usbredir_flush(self);
     if (!self->broken) return rc;
     stop(self);
-    return self->listener >= 0 || rc != SH_OK ? rc : usb_retry_start(&self->retry);
-}
-
-static const char *usbredir_news(void *backend)
-{
-    struct usbredir *self = backend;
-    return usb_retry_news(&self->retry);
-}
-
-static const char *usbredir_refused(void *backend)
-{
-    struct usbredir *self = backend;
-    return usb_backend_refused(&self->door);
+    return self->listener >= 0 || rc != SH_OK ? rc : usb_retry_start(&self->retry, self->owner);
 }
 
 static int64_t usbredir_due_ns(const void *backend)
 {
-    return usbredir_slow_due_ns(backend);
+    const struct usbredir *self = backend;
+    return usb_due_ns(self->held);
 }
 
 /* ---- injected faults. The channel to the virtual machine stays: the device alone is unplugged from it. */
@@ -300,19 +287,16 @@ static void usbredir_close(void *backend)
     stop(self);
     remove_path(self);
     if (self->listener >= 0) close(self->listener);
-    if (self->door.reserve >= 0) close(self->door.reserve);
+    if (self->reserve >= 0) close(self->reserve);
     usb_retry_close(&self->retry);
     free(self);
 }
 
 const struct usb_backend_ops usb_backend_usbredir = {
-    .name = "usbredir",
     .open = usbredir_open,
     .endpoint = usbredir_endpoint,
     .prepare = usbredir_prepare,
     .handle = usbredir_handle,
-    .news = usbredir_news,
-    .refused = usbredir_refused,
     .flush = usbredir_flush,
     .due_ns = usbredir_due_ns,
     .faults = USB_CAN_STALL | USB_CAN_SHORTEN | USB_CAN_ENUMERATE_WRONG,
@@ -331,6 +315,6 @@ static int usbredir_open(const struct usb_backend_spec *spec, struct usb_device 
     return sh_fail(err, SH_EINPUT, "usbredir: built without it; install libusbredirparser-dev and build again");
 }
 
-const struct usb_backend_ops usb_backend_usbredir = {.name = "usbredir", .open = usbredir_open};
+const struct usb_backend_ops usb_backend_usbredir = {.open = usbredir_open};
 
 #endif

@@ -100,11 +100,10 @@ void usbredir_on_complete(void *ctx, struct usb_transfer *t)
 /* The endpoint's descriptor; NULL: there is none in the present configuration. */
 static const struct usb_endpoint_row *find_endpoint(const struct usbredir *self, unsigned address)
 {
-    for (unsigned i = 0; i < usb_device_model(self->device)->n_interfaces; i++) {
-        const struct usb_interface_row *row = usb_device_row(self->device, i);
-        for (unsigned k = 0; row != NULL && k < row->n_endpoints; k++)
-            if (row->endpoint[k].address == address) return &row->endpoint[k];
-    }
+    const struct usb_model *model = usb_device_model(self->device);
+    for (unsigned i = 0; i < model->n_interfaces && usb_device_configuration(self->device) != 0; i++)
+        for (unsigned k = 0; k < model->interface[i].n_endpoints; k++)
+            if (model->interface[i].endpoint[k].address == address) return &model->interface[i].endpoint[k];
     return NULL;
 }
 

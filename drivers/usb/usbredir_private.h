@@ -6,31 +6,30 @@
 #include <sys/types.h>
 #include <usbredirparser.h>
 
+#include "drivers/socket/socket.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/retry.h"
 
 struct redir_transfer;
-struct redir_request;
 
 struct usbredir {
     struct usb_device *device;
     int listener, fd;              /* -1: none */
     struct usbredirparser *parser; /* NULL: no connection (yet) */
     int broken;
-    int greeted;                                  /* its hello has come */
-    int unplugged;                                /* by an injected fault */
-    struct redir_request *slow_first, *slow_last; /* requests that take their time */
-    uint32_t n_slow;
-    int (*go_on)(void *ctx);
-    void *go_on_ctx;
-    int n_reads; /* within one call of handle */
+    int greeted;               /* its hello has come */
+    int unplugged;             /* by an injected fault */
+    struct usb_transfer *held; /* requests that take their time, each of a redir_request */
+    uint32_t n_held;
+    const struct usb_owner *owner; /* within handle() */
+    int n_reads;                   /* within one call of handle */
     uint32_t n_pending;
     uint64_t n_bytes;
     struct redir_transfer *receiving[16]; /* by number of the interrupt IN endpoint */
     uint64_t next_id;                     /* of interrupt packets */
-    struct usb_door door;                 /* of the listener */
+    int reserve;                          /* of the listener: socket_reserve() */
     struct usb_retry retry;               /* of a connection we make */
-    struct usb_backend_address peer;      /* where to */
+    struct socket_address peer;           /* where to */
     char path[256];                       /* to be removed; empty: none */
     dev_t path_device;                    /* the socket that we made there; another file may have its place by now */
     ino_t path_inode;
@@ -46,8 +45,6 @@ int usbredir_is_early(struct usbredir *self);
 void usbredir_plug(struct usbredir *self);
 /* Answers requests whose time has come, until go_on says 0. */
 void usbredir_answer_slow(struct usbredir *self);
-/* When the next of these is due; INT64_MAX: there is none. */
-int64_t usbredir_slow_due_ns(const struct usbredir *self);
 /* 1: the request was held, and is answered as cancelled. */
 int usbredir_cancel_slow(struct usbredir *self, uint64_t id);
 void usbredir_forget_slow(struct usbredir *self);

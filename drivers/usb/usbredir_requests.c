@@ -8,7 +8,6 @@
 #include <string.h>
 
 #include "core/bytes.h"
-#include "core/monotonic.h"
 #include "drivers/usb/usbredir_private.h"
 
 /* ---- what the device is */
@@ -21,8 +20,7 @@ static void send_interfaces(struct usbredir *self)
     memset(eps.type, usb_redir_type_invalid, sizeof eps.type);
     eps.type[0] = eps.type[16] = usb_redir_type_control;
     for (unsigned i = 0; i < model->n_interfaces; i++) {
-        const struct usb_interface_row *row = usb_device_row(self->device, i);
-        if (row == NULL) row = usb_find_row(model, i, 0);
+        const struct usb_interface_row *row = &model->interface[i];
         info.interface[i] = row->number;
         info.interface_class[i] = row->class;
         info.interface_subclass[i] = row->subclass;
@@ -40,12 +38,6 @@ static void send_interfaces(struct usbredir *self)
     usbredirparser_send_ep_info(self->parser, &eps);
 }
 
-static void attach(struct usbredir *self)
-{
-    usb_device_attach(self->device, usb_device_identity(self->device)->highest, usbredir_on_complete, self);
-    usb_device_assume_address(self->device); /* the guest's controller gives out addresses, and keeps them */
-}
-
 void usbredir_plug(struct usbredir *self)
 {
     static const uint8_t speed[] = {[USB_RATE_FULL] = usb_redir_speed_full,
@@ -53,7 +45,8 @@ void usbredir_plug(struct usbredir *self)
                                     [USB_RATE_SUPER] = usb_redir_speed_super};
     const struct usb_model *model = usb_device_model(self->device);
     const struct usb_identity *id = usb_device_identity(self->device);
-    attach(self);
+    usb_device_attach(self->device, id->highest, usbredir_on_complete, self);
+    usb_device_assume_address(self->device); /* the guest's controller gives out addresses, and keeps them */
     send_interfaces(self);
     struct usb_redir_device_connect_header connect = {.speed = speed[id->highest],
                                                       .device_class = model->class,
@@ -110,11 +103,10 @@ static void set_configuration(struct usbredir *self, uint64_t id, const struct u
 
 static void send_alt(struct usbredir *self, uint64_t id, unsigned interface, int ok)
 {
-    const struct usb_interface_row *row = usb_device_row(self->device, interface);
-    struct usb_redir_alt_setting_status_header status = {.status =
-                                                             ok && row != NULL ? usb_redir_success : usb_redir_stall,
-                                                         .interface = (uint8_t)interface,
-                                                         .alt = row != NULL ? row->alt : 0};
+    const int is_there =
+        usb_device_configuration(self->device) != 0 && interface < usb_device_model(self->device)->n_interfaces;
+    struct usb_redir_alt_setting_status_header status = {.status = ok && is_there ? usb_redir_success : usb_redir_stall,
+                                                         .interface = (uint8_t)interface};
     usbredirparser_send_alt_setting_status(self->parser, id, &status);
 }
 
@@ -142,13 +134,12 @@ static void answer_control(struct usbredir *self, uint64_t id, struct usb_redir_
 
 /* ---- requests held by an injected fault */
 
-enum { MAX_SLOW = 256 };
+enum { MAX_HELD = 256 };
 
 enum request_kind { CONTROL, SET_CONFIGURATION, SET_ALT };
 
 struct redir_request {
-    struct redir_request *next;
-    int64_t due_ns;
+    struct usb_transfer held; /* its id is only that of a control request, since no other can be cancelled */
     enum request_kind kind;
     uint64_t id;
     struct usb_redir_control_packet_header header;
@@ -168,80 +159,62 @@ static void answer(struct usbredir *self, struct redir_request *r)
     usbredirparser_free_packet_data(self->parser, r->data);
 }
 
-/* Held requests are answered one after the other: each takes the delay that was asked for. */
 static void hold(struct usbredir *self, const struct redir_request *given)
 {
-    const int64_t now_ns = monotonic_ns();
-    const int64_t from_ns =
-        self->slow_last != NULL && self->slow_last->due_ns > now_ns ? self->slow_last->due_ns : now_ns;
-    struct redir_request *r = self->n_slow < MAX_SLOW ? malloc(sizeof *r) : NULL;
+    struct redir_request *r = self->n_held < MAX_HELD ? malloc(sizeof *r) : NULL;
     if (r == NULL) {
         usbredirparser_free_packet_data(self->parser, given->data);
         self->broken = 1;
         return;
     }
     *r = *given;
-    r->next = NULL;
-    r->due_ns = from_ns + (int64_t)(usb_device_slow_ms(self->device) * 1e6);
-    *(self->slow_last != NULL ? &self->slow_last->next : &self->slow_first) = r;
-    self->slow_last = r;
-    self->n_slow++;
+    r->held.id = r->kind == CONTROL ? r->id : UINT64_MAX;
+    usb_hold(self->device, &self->held, &r->held);
+    self->n_held++;
 }
 
 static void usbredir_requests_take(struct usbredir *self, struct redir_request r)
 {
-    if (usb_device_slow_ms(self->device) > 0.0 || self->slow_first != NULL)
+    if (usb_has_to_wait(self->device, self->held))
         hold(self, &r);
     else
         answer(self, &r);
 }
 
-/* Takes a request out of those that are held; before: the one before it, NULL for the first. */
-static struct redir_request *let_go(struct usbredir *self, struct redir_request *before)
+static void free_held(struct usbredir *self, struct redir_request *r)
 {
-    struct redir_request *r = before != NULL ? before->next : self->slow_first;
-    *(before != NULL ? &before->next : &self->slow_first) = r->next;
-    if (self->slow_last == r) self->slow_last = before;
-    self->n_slow--;
-    return r;
-}
-
-int64_t usbredir_slow_due_ns(const struct usbredir *self)
-{
-    return self->slow_first != NULL ? self->slow_first->due_ns : INT64_MAX;
+    self->n_held--;
+    free(r);
 }
 
 void usbredir_answer_slow(struct usbredir *self)
 {
-    while (self->slow_first != NULL && !self->broken && self->slow_first->due_ns <= monotonic_ns() &&
-           self->go_on(self->go_on_ctx)) {
-        struct redir_request *r = let_go(self, NULL);
-        answer(self, r);
-        free(r);
+    struct usb_transfer *request;
+    while (!self->broken && self->held != NULL && self->owner->go_on(self->owner->ctx) &&
+           (request = usb_take_due(&self->held)) != NULL) {
+        answer(self, (struct redir_request *)request);
+        free_held(self, (struct redir_request *)request);
     }
 }
 
 int usbredir_cancel_slow(struct usbredir *self, uint64_t id)
 {
-    struct redir_request *before = NULL;
-    for (struct redir_request *r = self->slow_first; r != NULL; before = r, r = r->next) {
-        if (r->id != id || r->kind != CONTROL) continue;
-        r->header.status = usb_redir_cancelled;
-        r->header.length = 0;
-        usbredirparser_send_control_packet(self->parser, id, &r->header, NULL, 0);
-        usbredirparser_free_packet_data(self->parser, r->data);
-        free(let_go(self, before));
-        return 1;
-    }
-    return 0;
+    struct redir_request *r = (struct redir_request *)usb_let_go(&self->held, id);
+    if (r == NULL) return 0;
+    r->header.status = usb_redir_cancelled;
+    r->header.length = 0;
+    usbredirparser_send_control_packet(self->parser, id, &r->header, NULL, 0);
+    usbredirparser_free_packet_data(self->parser, r->data);
+    free_held(self, r);
+    return 1;
 }
 
 void usbredir_forget_slow(struct usbredir *self)
 {
-    while (self->slow_first != NULL) {
-        struct redir_request *r = let_go(self, NULL);
+    while (self->held != NULL) {
+        struct redir_request *r = (struct redir_request *)usb_let_go(&self->held, self->held->id);
         usbredirparser_free_packet_data(self->parser, r->data);
-        free(r);
+        free_held(self, r);
     }
 }
 

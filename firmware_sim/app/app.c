@@ -61,9 +61,7 @@ void app_catch_signals(void)
 
 int app_fail(const struct sh_err *err)
 {
-    struct sh_err line = *err;
-    sh_keep_line(line.text); /* a path may have any bytes */
-    fprintf(stderr, "%s: %s\n", app_program, line.text);
+    app_say("%s", err->text);
     return err->code == SH_EINPUT ? APP_USAGE : APP_FAILED;
 }
 
@@ -164,13 +162,16 @@ void app_end_messages(void)
     line_writer_close(writer, NULL, NULL); /* there is nobody to tell */
 }
 
-__attribute__((format(printf, 1, 2))) static void print(const char *fmt, ...)
+void app_say(const char *fmt, ...)
 {
     char text[LINE_MOST_BYTES];
+    const int begin = snprintf(text, sizeof text, "%s: ", app_program);
     va_list ap;
     va_start(ap, fmt);
-    vsnprintf(text, sizeof text, fmt, ap);
+    vsnprintf(text + begin, sizeof text - (size_t)begin - 1, fmt, ap); /* and the line's end */
     va_end(ap);
+    sh_keep_line(text); /* a path may have any bytes, and so may texts of files */
+    strcat(text, "\n");
     pthread_mutex_lock(&messages_lock);
     const int is_put = messages != NULL;
     if (is_put) line_writer_put(messages, LINE_PLAIN, text, strlen(text));
@@ -182,9 +183,9 @@ static void print_warning(void *ctx, const char *text)
 {
     (void)ctx;
     if (warned_of == NULL)
-        print("%s: warning: %s\n", app_program, text);
+        app_say("warning: %s", text);
     else if (is_new(text))
-        print("%s: warning: %s: %s\n", app_program, warned_of, text);
+        app_say("warning: %s: %s", warned_of, text);
 }
 
 static void print_progress(void *ctx, const char *what, double fraction)
@@ -196,9 +197,9 @@ static void print_progress(void *ctx, const char *what, double fraction)
     if (left_s >= 0.0 && left_s < 120.0) snprintf(left, sizeof left, ", %.0f s left", ceil(left_s));
     if (left_s >= 120.0) snprintf(left, sizeof left, ", %.0f min left", ceil(left_s / 60.0));
     if (fraction < 0.0)
-        print("%s: %s ...\n", app_program, what);
+        app_say("%s ...", what);
     else
-        print("%s: %s: %.0f %%%s\n", app_program, what, 100.0 * fraction, left);
+        app_say("%s: %.0f %%%s", what, 100.0 * fraction, left);
 }
 
 static void print_each_second(void *ctx, const char *what, double fraction)
@@ -235,6 +236,13 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples)
                 (unsigned long long)lost_samples);
 }
 
+int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err)
+{
+    if (rc == SH_OK && more != SH_OK) return sh_fail(err, more, "%s", why->text);
+    if (more != SH_OK) sh_warn(&app_report_stderr, "%s", why->text);
+    return rc;
+}
+
 int app_ends_in(const char *path, const char *ending)
 {
     const size_t n = strlen(path), m = strlen(ending);
@@ -266,21 +274,38 @@ int app_open_new(const char *path, FILE **out, struct sh_err *err)
     return rc;
 }
 
+static const char *name_of(const char *path)
+{
+    return strcmp(path, "-") == 0 ? "standard output" : path;
+}
+
+int app_close_new(const char *path, FILE *out, struct sh_err *err)
+{
+    errno = 0;
+    int failed = fflush(out) != 0 || ferror(out);
+    int why = errno;
+    if (out != stdout && fclose(out) != 0 && !failed) {
+        failed = 1;
+        why = errno;
+    }
+    if (!failed) return SH_OK;
+    /* A write that failed earlier has emptied the buffer, and its reason is lost. */
+    return sh_fail(err, SH_EIO, "%s: %s", name_of(path), why != 0 ? strerror(why) : "writing failed");
+}
+
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err)
 {
-    const int to_stdout = strcmp(path, "-") == 0;
     struct sh_err why = {0};
+    struct json json;
     FILE *out;
     int rc = app_open_new(path, &out, err);
     if (rc != SH_OK) return rc;
-    struct json json;
     json_begin(&json, out);
     put(&json, ctx);
-    if (json_end(&json, &why) != SH_OK)
-        rc = sh_fail(err, why.code, "%s: %s", to_stdout ? "standard output" : path, why.text);
-    if (!to_stdout && fclose(out) != 0 && rc == SH_OK) rc = sh_fail(err, SH_EIO, "%s: %s", path, strerror(errno));
-    return rc;
+    const int ended = json_end(&json, &why);
+    rc = app_close_new(path, out, err);
+    return ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
 }
 
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)

@@ -34,7 +34,9 @@ struct config_diagnostics;
 #define APP_DECLARE(name) extern const struct app_command app_##name;
 APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 
-/* Prints "PROGRAM: TEXT" and gives the exit status for the error. */
+/* Prints a line to standard error, with the program's name before it. Control characters become question marks. */
+void app_say(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
+/* Prints an error as such a line, and returns the exit status for it. */
 int app_fail(const struct sh_err *err);
 /* The same for each error of a configuration. */
 int app_fail_config(const struct config_diagnostics *diagnostics);
@@ -44,9 +46,13 @@ int app_fail_config(const struct config_diagnostics *diagnostics);
  * configuration is a line. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
-/* The same for links in YAML, of --link, which have no configuration; NULL: as app_with_config. */
+/* The same for `links`, YAML that --link gives in place of a configuration. NULL: as app_with_config. */
 int app_with_links(const struct app_input *in, const char *links,
                    int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
+
+/* Adds the result `more`, with its reason, to rc, that of earlier work. The first failure is returned, and err has its
+ * text; a second one is printed as a warning. */
+int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
 /* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
 void app_warn_settings_file(const struct config *cfg, const char *why);
@@ -58,9 +64,9 @@ int app_check_files(const struct app_input *in, const struct config *cfg, struct
 /* Whether `name` is STEM-N.ENDING of a file of scans, whose ending has n_ending bytes. */
 int app_is_name_of_scan(const char *file, size_t n_ending, const char *name);
 
-/* From here to app_end_messages, a thread writes the messages of the reports below to standard error. So no thread of a
- * head waits for its reader. Messages that find no room in 64 KiB are dropped, and their number is printed.
- * app_end_messages waits at most 2 s for a reader that has stopped. */
+/* From here on a thread writes all lines of app_say to standard error. So no thread of a head waits for its reader, and
+ * the end of the run does not, either. Messages that find no room in 64 KiB are dropped, and their number is printed.
+ * app_end_messages, which main calls last, waits at most 2 s for a reader that has stopped. */
 int app_begin_messages(struct sh_err *err);
 void app_end_messages(void);
 
@@ -96,10 +102,12 @@ int app_is_recording(const char *path);
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
 
-/* The file that a user names for output, new; "-": standard output, which is not to be closed. */
+/* Opens the file that a user names for output, empty; "-": standard output. */
 int app_open_new(const char *path, FILE **out, struct sh_err *err);
+/* Closes it, but not standard output. Returns the first error in writing it; its text begins with the path. */
+int app_close_new(const char *path, FILE *out, struct sh_err *err);
 
-/* One JSON value, written by `put`, to a file; path "-" is standard output. */
+/* Writes one JSON value, by `put`, to a file; path "-" is standard output. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
 

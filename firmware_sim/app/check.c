@@ -6,31 +6,73 @@
 
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
-#include "firmware_sim/app/check_heads.h"
 #include "firmware_sim/app/check_places.h"
 #include "firmware_sim/app/check_scene.h"
+#include "firmware_sim/app/sites.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/device/head_clock.h"
-#include "firmware_sim/loop/pose_feed.h"
+#include "firmware_sim/loop/loop.h"
 #include "firmware_sim/site/waves.h"
 
-/* Opens and closes each link, and the socket of a live platform: a taken port or a wrong path shows now. */
-static int check_links(const struct config *cfg, struct sh_err *err)
+/* Makes the head with its links as `run` does, starts nothing, and closes all. So what `run` would refuse shows now: a
+ * taken port, two links at one port, a link that can't carry the stream. cfg: that of the site. */
+static int check_head(struct config *cfg, const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    for (uint32_t i = 0; i < cfg->n_links; i++) {
-        const struct link_ops *ops = link_ops_get(cfg->link[i].type);
-        if (cfg->link[i].type == LINK_FILE) continue; /* opening it would empty it */
-        void *link = NULL;
-        int rc = ops->open(&cfg->link[i], &link, err);
-        if (rc != SH_OK) return rc;
-        ops->close(link);
-    }
-    struct pose_feed *feed = NULL;
-    if (cfg->platform.kind != PLATFORM_LIVE || cfg->loop.pace == PACE_STEP) return SH_OK;
-    int rc = pose_feed_open(NULL, cfg, &feed, err);
-    pose_feed_close(feed);
+    struct link_spec kept[CONFIG_MAX_LINKS];
+    const uint32_t threads = cfg->loop.threads;
+    struct device *device = NULL;
+    struct loop *loop = NULL;
+    memcpy(kept, cfg->link, sizeof kept);
+    cfg->loop.threads = 1; /* each has memory of its own */
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].type == LINK_FILE)
+            cfg->link[i] = (struct link_spec){.type = LINK_NULL}; /* opening a file would empty it */
+    int rc = device_create(site, &(struct device_options){.report = report}, &device, err);
+    if (rc == SH_OK) rc = loop_create(site, device, &(struct loop_options){.report = report}, &loop, err);
+    loop_free(loop);
+    device_free(device);
+    memcpy(cfg->link, kept, sizeof kept);
+    cfg->loop.threads = threads;
     return rc;
+}
+
+static void print_stations(const struct config *cfg, FILE *out)
+{
+    uint32_t n = 0;
+    for (uint32_t i = 0; i < cfg->n_stations; i++)
+        n += config_serves(cfg, i) != 0;
+    fprintf(out, "station%s ", n > 1 ? "s" : "");
+    for (uint32_t i = 0, k = 0; i < cfg->n_stations; i++)
+        if (config_serves(cfg, i)) fprintf(out, "%s%u", k++ > 0 ? ", " : "", i + 1);
+    fputs(": ", out);
+}
+
+/* Where there are several scanners, the line begins with the stations that this one scans from. */
+static void print_scanner(const struct config *cfg, FILE *out)
+{
+    const struct head_settings *s = &cfg->head.settings;
+    char emitter[160];
+    fputs("head      ", out);
+    if (!config_is_alone(cfg)) print_stations(cfg, out);
+    fprintf(out, "%s %s (%s), %g Hz pulses, %g lines/s, pan %g deg/s\n", cfg->profile.maker, cfg->profile.model,
+            cfg->profile.name, (double)s->prr_uhz * 1e-6, (double)s->lines_uhz * 1e-6, (double)s->pan_udeg_s * 1e-6);
+    if (config_limits_range(cfg))
+        fprintf(out, "range     %g to %g m only (head.range_min_m, range_max_m); the head profile has %g to %g\n",
+                cfg->head.range_min_m, cfg->head.range_max_m, cfg->head.profile_min_m, cfg->head.profile_max_m);
+    emitter_describe(&cfg->profile.emitter, emitter, sizeof emitter);
+    if (emitter[0] != '\0') fprintf(out, "emitter   %s\n", emitter);
+}
+
+static void print_scanners(const struct sites *sites, FILE *out)
+{
+    print_scanner(sites->first->cfg, out);
+    for (uint32_t i = 0; i < sites->n; i++) {
+        const struct site *site = sites->other[i].site;
+        print_scanner(site->cfg, out);
+        if (site->scale_m != sites->first->scale_m)
+            fprintf(out, "output    of this head %g m per count\n", site->scale_m);
+    }
 }
 
 static void print_platform(const struct site *site, FILE *out)
@@ -60,18 +102,23 @@ static double bytes_of(const struct scene *scene, const struct bvh *bvh)
     return bytes;
 }
 
-/* The peak counts all that the program had at once, also while it was loading. */
-static void print_memory(const struct site *site, FILE *out)
+/* Returns the most that the program had at once, also while it was loading. */
+static double peak_mb(void)
 {
     struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return 1024e-6 * (double)usage.ru_maxrss;
+}
+
+static void print_memory(const struct site *site, double all_mb, FILE *out)
+{
     double bytes = bytes_of(site->scene, site->bvh), triangles = (double)scene_n_kept(site->scene);
     for (uint32_t i = 0; i < site->n_movers; i++) {
         bytes += bytes_of(site->mover[i].scene, site->mover[i].bvh);
         triangles += (double)scene_n_kept(site->mover[i].scene);
     }
-    getrusage(RUSAGE_SELF, &usage);
     fprintf(out, "memory    %.4g MB for meshes and BVH, %.0f bytes a triangle; %.4g MB at the peak\n", 1e-6 * bytes,
-            bytes / triangles, 1024e-6 * (double)usage.ru_maxrss);
+            bytes / triangles, all_mb);
 }
 
 static void print_output(const struct config *cfg, const struct site *site, FILE *out)
@@ -125,18 +172,19 @@ static const char *copies_text(const struct scene *scene, char *text, size_t len
     return text;
 }
 
-static int print_summary(const struct config *cfg, const struct sites *sites, FILE *out, struct sh_err *err)
+static int print_summary(const struct config *cfg, const struct sites *sites, double all_mb, FILE *out,
+                         struct sh_err *err)
 {
     const struct site *site = sites->first;
     const struct scene *scene = site->scene;
     char copies[96];
     int rc = SH_OK;
     fprintf(out, "%s: ok\n", cfg->file);
-    check_print_heads(sites, out);
+    print_scanners(sites, out);
     fprintf(out, "scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
             scene->n_surfaces, copies_text(scene, copies, sizeof copies), scene->min_m[0], scene->max_m[0],
             scene->min_m[1], scene->max_m[1], scene->min_m[2], scene->max_m[2]);
-    print_memory(site, out);
+    print_memory(site, all_mb, out);
     print_target(site, out);
     check_print_anchor(site, out);
     if (site->stop != NULL) check_print_stops(site, out);
@@ -187,8 +235,9 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
     int rc = sites_load(cfg, &report, &sites, err);
-    if (rc == SH_OK) rc = check_links(cfg, err);
-    if (rc == SH_OK) rc = print_summary(cfg, &sites, out, err);
+    const double all_mb = peak_mb(); /* of the scene, without the head's queues */
+    if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);
+    if (rc == SH_OK) rc = print_summary(cfg, &sites, all_mb, out, err);
     if (rc == SH_OK && (run->scene || run->csv != NULL))
         rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? out : NULL, err);
     if (rc == SH_OK) rc = print_time(cfg, out, err);
@@ -242,8 +291,8 @@ const struct app_command app_check = {
     .opens_links = 1,
     .notes =
         "Prints the scanners, the memory that the scene takes, and the places of the scene and of each station in\n"
-        "every known coordinate frame. Opens and closes each link except files, so a taken port or a wrong path "
-        "shows.\n"
+        "every known coordinate frame. Opens and closes the links except files, all at once, so a taken port, a wrong\n"
+        "path or a link that can't carry the stream shows. Of files it checks that there is a place for them.\n"
         "If the configuration is wrong, it shows all errors, up to 20, each with its line.\n"
         "\n"
         "--scene: an edge is open where only one triangle of the object has it, with corners at the same place, bit\n"

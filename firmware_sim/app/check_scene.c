@@ -10,7 +10,7 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/csv_file.h"
 
-enum { MAX_ROWS = 50, CELL_LEN = 24 };
+enum { MAX_ROWS = 50 };
 
 static const char *const state_words[] = {[SCENE_OBJECT_EMPTY] = "empty",
                                           [SCENE_OBJECT_CLOSED] = "closed",
@@ -49,7 +49,7 @@ static const struct scene_surface *next_surface(const struct part *p, uint32_t o
     return &p->scene->surface[(*i)++];
 }
 
-static void colour_text(const struct part *p, uint32_t object, char text[CELL_LEN])
+static const char *colour_of(const struct part *p, uint32_t object, char text[CSV_FILE_COLOUR_LEN])
 {
     const struct scene_surface *first = NULL, *s;
     int differ = 0, textures = 0, vertices = 0;
@@ -61,20 +61,10 @@ static void colour_text(const struct part *p, uint32_t object, char text[CELL_LE
         differ |= first != NULL && memcmp(first->colour, s->colour, sizeof s->colour) != 0;
         if (first == NULL) first = s;
     }
-    FILE *cell = fmemopen(text, CELL_LEN, "w");
-    text[0] = '\0';
-    if (cell == NULL) return;
-    if (textures)
-        fputs("texture", cell);
-    else if (vertices)
-        fputs("vertices", cell);
-    else if (differ)
-        fputs("several", cell);
-    else if (first != NULL)
-        csv_file_put_colour(cell, first);
-    else
-        fputs("none", cell);
-    fclose(cell);
+    if (textures) return "texture";
+    if (vertices) return "vertices";
+    if (differ) return "several";
+    return first != NULL ? csv_file_colour(first, text) : "none";
 }
 
 /* An object is as clear as the clearest surface of its name. */
@@ -105,13 +95,12 @@ static int by_area(const void *a, const void *b, void *ctx)
 static void print_row(const struct part *p, uint32_t object, FILE *out)
 {
     const struct scene_object *o = &p->objects.object[object];
-    char colour[CELL_LEN], volume[CELL_LEN] = "-", name[SCENE_NAME_LEN];
-    colour_text(p, object, colour);
+    char colour[CSV_FILE_COLOUR_LEN], volume[24] = "-", name[SCENE_NAME_LEN];
     snprintf(name, sizeof name, "%s", name_of(p, object));
     sh_keep_line(name);
     if (o->state == SCENE_OBJECT_CLOSED) snprintf(volume, sizeof volume, "%.6g", o->volume_m3);
     fprintf(out, "  %10" PRIu64 " %10" PRIu64 " %12.6g %12s  %-7s%-8s %s\n", o->n_triangles, o->n_open, o->area_m2,
-            volume, state_words[o->state], colour, name);
+            volume, state_words[o->state], colour_of(p, object, colour), name);
 }
 
 static void print_sum(const struct part *p, FILE *out)
@@ -207,8 +196,7 @@ static void put_csv(FILE *out, const void *ctx)
         for (uint32_t k = 0; k < p->objects.n; k++) {
             const struct scene_object *o = &p->objects.object[k];
             const struct scene_surface *s = &p->scene->surface[o->surface];
-            char colour[CELL_LEN];
-            colour_text(p, k, colour);
+            char colour[CSV_FILE_COLOUR_LEN];
             csv_file_put_text(out, s->object);
             putc(',', out);
             csv_file_put_text(out, s->type);
@@ -217,7 +205,7 @@ static void put_csv(FILE *out, const void *ctx)
             fprintf(out, ",%s,%" PRIu64 ",%" PRIu64 ",%s,%.12g,", p->is_mover ? "yes" : "no", o->n_triangles, o->n_open,
                     state_words[o->state], o->area_m2);
             if (o->state == SCENE_OBJECT_CLOSED) fprintf(out, "%.12g", o->volume_m3);
-            fprintf(out, ",%u,%s,%.3g\n", o->n_surfaces, colour, (double)clear_of(p, k));
+            fprintf(out, ",%u,%s,%.3g\n", o->n_surfaces, colour_of(p, k, colour), (double)clear_of(p, k));
         }
     }
 }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/csv_file.h"
 
-#include <errno.h>
 #include <math.h>
 #include <string.h>
 
@@ -9,16 +8,11 @@
 
 int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
 {
-    const int to_stdout = strcmp(path, "-") == 0;
     FILE *out;
     const int rc = app_open_new(path, &out, err);
     if (rc != SH_OK) return rc;
     put(out, ctx);
-    int failed = fflush(out) != 0 || ferror(out);
-    const int why = errno;
-    if (!to_stdout) failed |= fclose(out) != 0;
-    if (!failed) return SH_OK;
-    return sh_fail(err, SH_EIO, "%s: %s", to_stdout ? "standard output" : path, strerror(why));
+    return app_close_new(path, out, err);
 }
 
 void csv_file_put_text(FILE *out, const char *text)
@@ -35,11 +29,12 @@ void csv_file_put_text(FILE *out, const char *text)
     putc('"', out);
 }
 
-void csv_file_put_colour(FILE *out, const struct scene_surface *s)
+const char *csv_file_colour(const struct scene_surface *s, char text[CSV_FILE_COLOUR_LEN])
 {
     unsigned rgb[3];
-    if (!s->has_colour) return;
+    if (!s->has_colour) return "";
     for (int k = 0; k < 3; k++)
         rgb[k] = (unsigned)lround(255.0 * (double)s->colour[k]);
-    fprintf(out, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+    snprintf(text, CSV_FILE_COLOUR_LEN, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+    return text;
 }

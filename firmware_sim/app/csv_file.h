@@ -8,12 +8,13 @@
 #include "core/err.h"
 #include "core/scene.h"
 
-/* A file whose lines `put` writes; path "-" is standard output. */
+/* Writes a file, by `put`; path "-" is standard output. */
 int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err);
 
-/* A text, in quotes where it needs them. */
+/* Writes a text, in quotes where it needs them. */
 void csv_file_put_text(FILE *out, const char *text);
-/* #rrggbb, or nothing where the surface has no colour. */
-void csv_file_put_colour(FILE *out, const struct scene_surface *surface);
+/* Returns #rrggbb, or "" where the surface has no colour. */
+enum { CSV_FILE_COLOUR_LEN = 40 };
+const char *csv_file_colour(const struct scene_surface *surface, char text[CSV_FILE_COLOUR_LEN]);
 
 #endif

@@ -9,11 +9,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/err.h"
 #include "firmware_sim/base/nearest.h"
 
 const char *app_program = "scanhead";
 
-enum { FIRST_VALUE = 256, HELP_COLUMNS = 110, APP_MAX_WORDS = 8 };
+enum { FIRST_VALUE = 256, HELP_COLUMNS = 110 };
 
 int app_usage(const struct app_command *command, const char *fmt, ...)
 {
@@ -22,6 +23,7 @@ int app_usage(const struct app_command *command, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
+    sh_keep_line(text); /* a path may have any bytes */
     fprintf(stderr, "%s %s: %s; see %s %s --help\n", app_program, command->name, text, app_program, command->name);
     return APP_USAGE;
 }
@@ -83,13 +85,9 @@ int app_read_numbers(const char *text, char between, double *out, int n)
     return 1;
 }
 
-static int pass(const struct app_command *command, const struct app_option *row, const char *text,
-                struct app_words *words)
+static int pass(const struct app_option *row, const char *text, struct app_words *words)
 {
     char *name = words->name[words->n_names];
-    for (int i = 0; i < words->n_names; i++)
-        if (strcmp(words->name[i] + 2, row->name) == 0)
-            return app_usage(command, "--%s: given twice; one is allowed", row->name);
     snprintf(name, sizeof words->name[0], "--%s", row->name);
     words->n_names++;
     words->word[words->n++] = name;
@@ -119,7 +117,7 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
     rows[n] = (struct app_option)OPTION_END;
 }
 
-/* The number of no open descriptor would be that of a file which is opened later. */
+/* A descriptor that is not open gets the number of a file that is opened later. The line would go into that file. */
 static int check_output(const struct app_command *command, const struct app_option *row, int fd)
 {
     const int flags = fcntl(fd, F_GETFL);
@@ -142,7 +140,6 @@ static int apply(const struct app_command *command, const struct app_option *row
         *(int *)at = 1;
         return APP_OK;
     case APP_TEXT:
-        if (*(const char **)at != NULL) return app_usage(command, "--%s: given twice; one is allowed", row->name);
         *(const char **)at = text;
         return APP_OK;
     case APP_NUMBER:
@@ -161,7 +158,7 @@ static int apply(const struct app_command *command, const struct app_option *row
     case APP_SET:
         return app_add_set(&in->sets, text);
     case APP_PASS:
-        return pass(command, row, text, at);
+        return pass(row, text, at);
     default:
         return row->apply(values, text);
     }
@@ -239,6 +236,13 @@ static void list_options(const struct app_option *row, struct option longs[APP_M
     }
     longs[n] = (struct option){"help", no_argument, NULL, 'h'};
     longs[n + 1] = (struct option){NULL, 0, NULL, 0};
+}
+
+int app_is_given(const struct app_input *in, const char *option)
+{
+    for (int i = 0; in->options[i].kind != APP_LAST; i++)
+        if (strcmp(in->options[i].name, option) == 0) return (in->given >> i & 1) != 0;
+    return 0;
 }
 
 static const struct app_option *find_row(const struct app_option *row, int opt)
@@ -368,6 +372,13 @@ void app_set_help(void (*print)(const struct app_command *command))
 
 /* ---- parsing */
 
+/* Counts all operands, and keeps as many as errors name. */
+static void count_operand(char *words[APP_MAX_OPERANDS + 1], int *n, char *word)
+{
+    if (*n <= APP_MAX_OPERANDS) words[*n] = word;
+    ++*n;
+}
+
 /* One option as getopt gave it, from `word`. APP_OK, or the exit status of an error. *done: the command line
  * ends with it. */
 static int take_option(const struct app_command *command, int opt, const char *word, struct app_input *in, void *values,
@@ -381,9 +392,12 @@ static int take_option(const struct app_command *command, int opt, const char *w
     *done = row->kind == APP_PRINT;
     in->alone |= row->kind == APP_ALONE;
     in->n_options++;
-    if (row->file != APP_NO_FILE &&
-        app_add_file(in, &(struct app_file){.option = row->name, .path = optarg, .use = row->file}) != APP_OK)
-        return APP_USAGE;
+    const uint64_t bit = UINT64_C(1) << (row - command->options);
+    if ((row->kind == APP_TEXT || row->kind == APP_PASS) && (in->given & bit) != 0)
+        return app_usage(command, "--%s: given twice; one is allowed", row->name);
+    in->given |= bit;
+    const struct app_file file = {.option = row->name, .path = optarg, .use = row->file, .is_given = 1};
+    if (row->file != APP_NO_FILE && app_add_file(in, &file) != APP_OK) return APP_USAGE;
     return apply(command, row, optarg, in, values);
 }
 
@@ -398,23 +412,24 @@ static int help(const struct app_command *command, const char *part)
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values)
 {
     struct option longs[APP_MAX_OPTIONS + 2];
-    char letters[2 * APP_MAX_OPTIONS + 4], *words[APP_MAX_WORDS];
+    char letters[2 * APP_MAX_OPTIONS + 4], *words[APP_MAX_OPERANDS + 1];
     int opt, n = 0, done = 0;
     memset(in, 0, sizeof *in);
+    in->options = command->options;
     in->opens_links = command->opens_links;
     list_options(command->options, longs, letters);
     opterr = 0;
     optind = 0; /* from the beginning, whatever was parsed before */
     for (int at = 1; (opt = getopt_long(argc, argv, letters, longs, NULL)) != -1; at = optind) {
         if (opt == 1) {
-            if (n < APP_MAX_WORDS) words[n++] = optarg;
+            count_operand(words, &n, optarg);
             continue;
         }
         if (opt == 'h') return help(command, argc > optind && argv[optind][0] != '-' ? argv[optind] : NULL);
         const int status = take_option(command, opt, argv[at], in, values, &done);
         if (status != APP_OK || done) return status;
     }
-    for (; optind < argc && n < APP_MAX_WORDS; optind++)
-        words[n++] = argv[optind]; /* after -- */
+    for (; optind < argc; optind++)
+        count_operand(words, &n, argv[optind]); /* after -- */
     return take_operands(command, n, words, in);
 }

@@ -7,6 +7,7 @@
 #define FIRMWARE_SIM_APP_OPTIONS_H
 
 #include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 /* The name of the program, as messages, help and manual pages have it: scanhead; main sets another. */
@@ -100,6 +101,7 @@ struct app_file {
     const char *option; /* without the dashes; NULL: an operand */
     const char *path;
     enum app_use use;
+    int is_given; /* by the user, as an option's value: its folder must be there */
     /* Files that are written, as the command knows them: */
     size_t n_ending; /* bytes of the path's ending, as in .ply */
     /* It is a sidecar of `path`, with this ending in place of its own; NULL: it is `path` itself. */
@@ -110,8 +112,10 @@ struct app_file {
 /* All that a command line says, except for the command's own options. */
 struct app_input {
     const char *operand[APP_MAX_OPERANDS];
-    int n_options; /* that were given, --help aside */
-    int alone;     /* an APP_ALONE was: there are no operands */
+    const struct app_option *options; /* those of the command */
+    uint64_t given;                   /* a bit for each of their rows */
+    int n_options;                    /* that were given, --help aside */
+    int alone;                        /* an APP_ALONE was: there are no operands */
     struct app_sets sets;
     struct app_file file[APP_MAX_FILES];
     int n_files;
@@ -122,6 +126,9 @@ struct app_input {
 /* APP_GO_ON with `in` and `values` filled, or the exit status: of a printed help, or of an error with its one
  * line. The strings are argv's own, or lie in `in`, which must stay where it is. */
 int app_parse(const struct app_command *command, int argc, char **argv, struct app_input *in, void *values);
+
+/* Whether an option of the command was given, by its name without the dashes. */
+int app_is_given(const struct app_input *in, const char *option);
 
 /* Adds a file to those of the command line: one that the command chooses itself. APP_OK, or APP_USAGE with the reason
  * printed. */

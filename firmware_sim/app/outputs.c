@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks that a command writes no file twice, and none that it reads, so that none is destroyed. */
+/* Checks of the files that a command names. It writes none twice, and none that it reads, so that none is destroyed.
+ * There is a place for each that it writes. */
+#include <errno.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +17,9 @@
 
 struct named {
     char *who, *path;
-    int is_written;
+    int is_there, is_written;
+    struct stat st;  /* where it is there */
+    int needs_place; /* its folder must be there already */
     int is_beside;   /* it is written with another: meshes of one scan share their image */
     size_t n_ending; /* of files of each scan: bytes of the path's ending; 0: it is one file */
 };
@@ -24,7 +28,7 @@ struct files {
     struct named *file;
     size_t n, room;
     const char *prefix; /* before the names of keys */
-    int keeps_written;  /* paths of keys that are written count */
+    int keeps_written;  /* 1: files that the configuration names for writing are written */
     struct sh_err *err;
 };
 
@@ -63,11 +67,10 @@ static int is_same_name(const struct named *a, const struct named *b)
 /* The same file, also under two names. Devices and pipes may be given twice, and so may -, which is standard output. */
 static int outputs_is_same(const struct named *a, const struct named *b)
 {
-    struct stat sa, sb;
+    const int both = a->is_there && b->is_there;
     if (strcmp(a->path, "-") == 0 || strcmp(b->path, "-") == 0) return 0;
-    const int has_a = stat(a->path, &sa) == 0, has_b = stat(b->path, &sb) == 0;
-    if ((has_a && !S_ISREG(sa.st_mode)) || (has_b && !S_ISREG(sb.st_mode))) return 0;
-    if (has_a && has_b && sa.st_dev == sb.st_dev && sa.st_ino == sb.st_ino) return 1;
+    if ((a->is_there && !S_ISREG(a->st.st_mode)) || (b->is_there && !S_ISREG(b->st.st_mode))) return 0;
+    if (both && a->st.st_dev == b->st.st_dev && a->st.st_ino == b->st.st_ino) return 1;
     return is_same_name(a, b);
 }
 
@@ -77,7 +80,9 @@ static int outputs_is_same(const struct named *a, const struct named *b)
 static int outputs_add(struct files *f, char *who, char *path, int is_written, size_t n_ending)
 {
     if (who != NULL && path != NULL && grow(&f->file, &f->room, f->n + 1, sizeof *f->file)) {
-        f->file[f->n++] = (struct named){.who = who, .path = path, .is_written = is_written, .n_ending = n_ending};
+        struct named *file = &f->file[f->n++];
+        *file = (struct named){.who = who, .path = path, .is_written = is_written, .n_ending = n_ending};
+        file->is_there = stat(path, &file->st) == 0;
         return SH_OK;
     }
     free(who);
@@ -98,15 +103,20 @@ static int add_option(struct files *f, const struct app_file *file)
     char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : strdup(file->path);
     const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending;
     const int rc = outputs_add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
-    if (rc == SH_OK) f->file[f->n - 1].is_beside = file->ending != NULL;
-    return rc;
+    if (rc != SH_OK) return rc;
+    f->file[f->n - 1].is_beside = file->ending != NULL;
+    f->file[f->n - 1].needs_place = file->is_given && file->use == APP_WRITES;
+    return SH_OK;
 }
 
 static int add_key(void *ctx, const char *key, const char *path, int is_written)
 {
     struct files *f = ctx;
     if (is_written && !f->keeps_written) return SH_OK;
-    return outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
+    const int rc = outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
+    /* Not every run uses another one: where a journal is replayed, no settings are stored. */
+    if (rc == SH_OK) f->file[f->n - 1].needs_place = is_written && strncmp(key, "links", 5) == 0;
+    return rc;
 }
 
 static int add_of_mesh(void *ctx, const char *name, const char *path)
@@ -155,11 +165,10 @@ static int add_of_scanners(struct files *f, const struct config *cfg)
 /* 1: a file that is to be written exists already. Where none does, nothing can be overwritten. */
 static int any_is_there(const struct files *f)
 {
-    struct stat st;
-    for (size_t i = 0; i < f->n; i++)
-        if (f->file[i].is_written &&
-            (f->file[i].n_ending > 0 || (stat(f->file[i].path, &st) == 0 && S_ISREG(st.st_mode))))
-            return 1;
+    for (size_t i = 0; i < f->n; i++) {
+        const struct named *file = &f->file[i];
+        if (file->is_written && (file->n_ending > 0 || (file->is_there && S_ISREG(file->st.st_mode)))) return 1;
+    }
     return 0;
 }
 
@@ -178,20 +187,27 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 
 /* ---- the check */
 
-/* A scenario that comes with the program has a bare name, which is no file here: only what is there is read. */
-static int is_there(const struct named *file)
+/* Some files are made at the end of long work. That there is no place for one shows now. */
+static int check_place(const struct named *file, struct sh_err *err)
 {
     struct stat st;
-    return stat(file->path, &st) == 0;
+    const char *name;
+    if (file->is_there && !S_ISDIR(file->st.st_mode)) return SH_OK;
+    if (file->is_there)
+        return sh_fail(err, SH_EINPUT, "%s %s: is a directory; allowed is a file", file->who, file->path);
+    errno = ENOENT;
+    if (file->path[0] != '\0' && (split(file->path, &st, &name) || (errno != ENOENT && errno != ENOTDIR))) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s %s: %s", file->who, file->path, strerror(errno));
 }
 
+/* A scenario that comes with the program has a bare name, which is no file here: only what is there is read. */
 static int check(const struct files *f, struct sh_err *err)
 {
     for (size_t i = 0; i < f->n; i++) {
         const struct named *out = &f->file[i];
         for (size_t k = 0; k < f->n && out->is_written; k++) {
             const struct named *other = &f->file[k];
-            if (!other->is_written && is_there(other) && outputs_is_same(out, other))
+            if (!other->is_written && other->is_there && outputs_is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: is also read as %s, and would be overwritten; name another file",
                                out->who, out->path, other->who);
             if (other->is_written && k < i && !(out->is_beside && other->is_beside) && outputs_is_same(out, other))
@@ -206,6 +222,8 @@ int app_check_files(const struct app_input *in, const struct config *cfg, struct
 {
     struct files f = {.err = err};
     int rc = add_all(&f, in, cfg);
+    for (size_t i = 0; i < f.n && rc == SH_OK; i++)
+        if (f.file[i].needs_place) rc = check_place(&f.file[i], err);
     if (rc == SH_OK) rc = check(&f, err);
     for (size_t i = 0; i < f.n; i++) {
         free(f.file[i].who);

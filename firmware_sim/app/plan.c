@@ -97,8 +97,8 @@ static int plan(struct config *cfg, void *ctx, struct sh_err *err)
     const struct plan_options *o = ctx;
     struct site *site = NULL;
     if (!config_is_alone(cfg))
-        fprintf(stderr, "%s: the plan of the scanner of station %u; others have other scanners: --set head.station=N\n",
-                app_program, cfg->head.settings.station);
+        app_say("the plan of the scanner of station %u; others have other scanners: --set head.station=N",
+                cfg->head.settings.station);
     int rc = site_load_plan(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->json) rc = app_write_json("-", put_rows, &site->plan, err);
     if (rc == SH_OK && !o->json) print_text(&site->plan);

@@ -7,7 +7,7 @@
 #include "firmware_sim/config/limits.h"
 #include "firmware_sim/site/site.h"
 
-/* Begins as zeros. To be freed. */
+/* They begin as zeros, and are to be freed. */
 struct scanner_warnings {
     uint32_t n, n_scanners;
     struct {

@@ -5,7 +5,8 @@
 
 #include "firmware_sim/site/site.h"
 
-/* A line for each label, those of bodies that move, of tripods' legs and of ghosts, too. path -: standard output. */
+/* Writes a line for each label, also those of bodies that move, of tripods' legs and of ghosts. path -: standard
+ * output. */
 int surfaces_write(const char *path, const struct site *site, struct sh_err *err);
 
 #endif

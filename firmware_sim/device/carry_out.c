@@ -83,7 +83,7 @@ static void do_dead(struct device *device, uint32_t session, const char *line, u
     struct command_device *cmd = malloc(sizeof *cmd);
     if (cmd == NULL) return;
     *cmd = device->cmd;
-    cmd->faults = NULL; /* the copy must not change the device's own faults */
+    cmd->faults = &fault_desk_queries; /* the copy must not change the device's own faults */
     command_execute(cmd, session, line, out);
     if (out->changes && out->effect != COMMAND_STEP) command_refuse(cmd, CMD_E_SETTINGS, "the head has no power", out);
     out->took_control = 0;
@@ -131,33 +131,35 @@ void device_carry_out_line(struct device *device, const char *line)
     do_command(device, 0, line, device->next_tick, 0, &result);
 }
 
-void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,
-                    struct command_result *out)
+void device_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     do_command(device, session, line, released, 0, out);
     if (out->effect == COMMAND_MOVE) device_begin_move(device, session, line, -1, out);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_command_once(struct device *device, uint32_t session, const char *line, uint64_t released,
-                         struct command_result *out)
+void device_command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     do_command(device, session, line, released, 1, out);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_report(struct device *device, int number, const char *text)
+void device_report(void *self, int number, const char *text)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     command_queue_push(&device->cmd.queue, number, text);
     device_push_error(&device->events, 0, number, text);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_overlong(struct device *device, uint32_t session, struct command_result *out)
+void device_overlong(void *self, uint32_t session, struct command_result *out)
 {
+    struct device *device = self;
     char text[96];
     snprintf(text, sizeof text, "session %u, longest line %d bytes", session, COMMAND_MAX_LINE);
     memset(out, 0, sizeof *out);
@@ -167,15 +169,17 @@ void device_overlong(struct device *device, uint32_t session, struct command_res
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_session_opened(struct device *device, uint32_t session, const char *who)
+void device_session_opened(void *self, uint32_t session, const char *who)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     command_set_peer(&device->cmd, session, who);
     pthread_mutex_unlock(&device->lock);
 }
 
-void device_session_closed(struct device *device, uint32_t session, const char *who, int partial)
+void device_session_closed(void *self, uint32_t session, const char *who, int partial)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     int in_control = device->cmd.control == session;
     if (in_control) {
@@ -190,6 +194,14 @@ void device_session_closed(struct device *device, uint32_t session, const char *
     if (in_control || scanning) device_report(device, CMD_E_CLIENT_LOST, text);
 }
 
+void device_note_replayed(struct device *device, const struct command_result *result)
+{
+    struct device_journal *journal = &device->journal;
+    if (result->error == 0 || journal->n_refused++ != 0) return;
+    journal->refused = &journal->replay[journal->at - 1];
+    snprintf(journal->why, sizeof journal->why, "%.127s", result->reply);
+}
+
 int device_run_replay(struct device *device, uint64_t tick)
 {
     while (device->journal.at < device->journal.n_replay && device->journal.replay[device->journal.at].tick <= tick) {
@@ -200,6 +212,7 @@ int device_run_replay(struct device *device, uint64_t tick)
             device_begin_move(device, entry->session, entry->line, entry->t_ns, &result);
             return 1;
         }
+        device_note_replayed(device, &result);
     }
     return 0;
 }

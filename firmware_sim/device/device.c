@@ -20,7 +20,8 @@ static int check_live(const struct device *device, struct sh_err *err)
     double ticks = SCHEDULE_PACKET * 1e6 / (double)cfg->profile.prr_min_uhz * (double)device->tick_hz + 3.0;
     if (cfg->platform.kind != PLATFORM_LIVE || ticks <= DEVICE_MAX_POSES) return SH_OK;
     return sh_fail(err, SH_EINPUT, "%s: platform.kind: live needs prr_min_hz of head profile %s to be at least %.0f",
-                   cfg->file, cfg->profile.name, SCHEDULE_PACKET * (double)device->tick_hz / (DEVICE_MAX_POSES - 3.0));
+                   cfg->file, cfg->profile.name,
+                   ceil(SCHEDULE_PACKET * (double)device->tick_hz / (DEVICE_MAX_POSES - 3.0)));
 }
 
 static int set_up_commands(struct device *device, struct sh_err *err)
@@ -173,8 +174,22 @@ int device_replays(const struct device *device)
     return device->options.replay != NULL;
 }
 
-int device_close_journal(struct device *device, struct sh_err *err)
+/* A journal has only commands that had an effect. With other options, or after an edit, the head may refuse some. */
+static void warn_refused(const struct device *device)
 {
+    const struct device_journal *journal = &device->journal;
+    if (journal->n_refused == 0) return;
+    sh_warn(
+        device->options.report,
+        "journal: %.200s:%u: %.60s: %s; of %zu replayed commands the head refused %zu, so the session is another one",
+        device->options.replay, journal->refused->line_no, journal->refused->line, journal->why, journal->at,
+        journal->n_refused);
+}
+
+int device_close_journal(void *self, struct sh_err *err)
+{
+    struct device *device = self;
+    warn_refused(device);
     const uint64_t tick = device->journal.end_tick;
     if (device->journal.out != NULL && device->over)
         journal_end(device->journal.out, tick, (int64_t)tick * device->tick_ns);
@@ -185,8 +200,9 @@ int device_close_journal(struct device *device, struct sh_err *err)
     return rc != SH_OK || truth_rc == SH_OK ? rc : sh_fail(err, truth_rc, "%s", why.text);
 }
 
-int device_files_fill(const struct device *device)
+int device_files_fill(const void *self)
 {
+    const struct device *device = self;
     return journal_is_filling(device->journal.out) || fault_board_is_filling(device->faults);
 }
 
@@ -250,6 +266,7 @@ static void replay(struct device *device, uint64_t tick)
         device_plan_move(device);
         pthread_mutex_lock(&device->lock);
         device_take_move(device, device->moves.plan.t_ns, &result);
+        device_note_replayed(device, &result);
         pthread_mutex_unlock(&device->lock);
         device_end_move(device);
         pthread_mutex_lock(&device->lock);
@@ -335,17 +352,18 @@ int device_is_idle(struct device *device)
     return idle;
 }
 
-void device_end(struct device *device)
+void device_end(void *self)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     device->ending = 1;
     atomic_store(&device->moves.stops, 1);
     pthread_mutex_unlock(&device->lock);
 }
 
-struct device_counters *device_counters(struct device *device)
+struct device_counters *device_counters(void *self)
 {
-    return &device->counters;
+    return &((struct device *)self)->counters;
 }
 
 uint32_t device_last_scan(struct device *device, uint32_t *station)
@@ -366,12 +384,12 @@ int64_t device_scan_ns(struct device *device)
     return ticks * device->tick_ns;
 }
 
-int64_t device_tick_ns(const struct device *device)
+int64_t device_tick_ns(const void *self)
 {
-    return device->tick_ns;
+    return ((const struct device *)self)->tick_ns;
 }
 
-struct fault_board *device_faults(const struct device *device)
+struct fault_board *device_faults(const void *self)
 {
-    return device->faults;
+    return ((const struct device *)self)->faults;
 }

@@ -8,6 +8,8 @@
  * on to that tick. A command takes effect at the first tick that is not claimed yet. A client that asks for
  * the state gets that of the last released tick, not of the last claimed one.
  *
+ * Functions with a parameter `self`, the struct device, are also members of struct loop_source_ops (loop/source.h).
+ *
  * Thread: any. There is one lock inside, held for microseconds; for milliseconds where a site has to be planned for
  * settings (site_vary). The pacing thread never takes it. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_H
@@ -107,7 +109,9 @@ struct device_options {
     const char *replay;             /* NULL: none */
     struct settings_file *settings; /* what clients have stored; the caller's; NULL: nothing is stored */
     const char *truth;              /* file for the faults that are injected; NULL: none */
-    const struct sh_report *report; /* warnings of a station's new place, from the thread that plans it; NULL: none */
+    /* Warnings of a station's new place, from the thread that plans it; and of a replayed journal, at the end. NULL:
+     * none. */
+    const struct sh_report *report;
 };
 
 /* site must outlive the device. Sites that the device makes from it when stations move are freed with the device. */
@@ -118,16 +122,17 @@ void device_free(struct device *device);
 int device_replay_ends(const struct device *device);
 /* 1: a journal is replayed. */
 int device_replays(const struct device *device);
-/* Ends and closes the journal and the file of the truth, if there are any. Returns the first error in writing them; the
- * lines that they lack are counted. A file that takes nothing for 2 s is given up. After the loop is joined. */
-int device_close_journal(struct device *device, struct sh_err *err);
+/* Ends and closes the journal and the file of the truth, if there are any; warns where the head refused commands of the
+ * journal that was replayed. Returns the first error in writing them; the lines that they lack are counted. A file that
+ * takes nothing for 2 s is given up. After the loop is joined. */
+int device_close_journal(void *self, struct sh_err *err);
 /* 1: one of these files is behind; callers that can wait should. Any thread; takes no lock. */
-int device_files_fill(const struct device *device);
+int device_files_fill(const void *self);
 
 /* The board of injected faults, from the configuration and from commands. It belongs to the device. */
-struct fault_board *device_faults(const struct device *device);
+struct fault_board *device_faults(const void *self);
 
-struct device_counters *device_counters(struct device *device);
+struct device_counters *device_counters(void *self);
 
 /* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. */
 int device_claim(struct device *device, struct device_work *work);
@@ -148,20 +153,18 @@ void device_let_go(struct device_held *held); /* afterwards it holds nothing: al
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
 /* Ends the run: stops a running scan first. Not for signal handlers. */
-void device_end(struct device *device);
+void device_end(void *self);
 
 /* Carries out one command line for a session (from 1). */
-void device_command(struct device *device, uint32_t session, const char *line, uint64_t released,
-                    struct command_result *out);
+void device_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
 /* The same for a session of another protocol (drivers/protocol): control is given back at once, without an event. */
-void device_command_once(struct device *device, uint32_t session, const char *line, uint64_t released,
-                         struct command_result *out);
+void device_command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
 /* A line ended that was too long for the command set. */
-void device_overlong(struct device *device, uint32_t session, struct command_result *out);
+void device_overlong(void *self, uint32_t session, struct command_result *out);
 /* A session has begun; who: its kind of link and address, for others to read. */
-void device_session_opened(struct device *device, uint32_t session, const char *who);
+void device_session_opened(void *self, uint32_t session, const char *who);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
-void device_session_closed(struct device *device, uint32_t session, const char *who, int partial);
+void device_session_closed(void *self, uint32_t session, const char *who, int partial);
 /* Gives the pose of a live platform (not of the head on it) at a device time, from TIME:STEP or the socket. v: x, y, z
  * (m), roll, pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart
  * they are. Returns 0, or 1 for a pose that can't be used, which is counted: not later than the one before,
@@ -195,28 +198,26 @@ void device_give_back(struct device_version *version);
 const struct site *device_site_of(const struct device_version *version);
 
 /* Stored settings of a protocol's sessions (settings_file.h). Both return 1 where the head keeps nothing, 0 else. */
-int device_store(struct device *device, const char *name, const char *text);
-int device_stored(const struct device *device, const char *name, char text[SETTINGS_FILE_TEXT]);
+int device_store(void *self, const char *name, const char *text);
+int device_stored(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);
 
 /* Adds an error to the error queue (enum command_error), and an event on the wire. */
-void device_report(struct device *device, int number, const char *text);
+void device_report(void *self, int number, const char *text);
 
 /* Device time begins now, at this time of clock_now_ns(). The time of day is read from the system where
  * time.epoch says so. Before the first tick is claimed. *warning: a warning for the user, or NULL; it
  * belongs to the device. */
-int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err);
+int device_power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
 
-/* UTC by the head's clock at a device time, ns since 1970; INT64_MIN: not known. */
-int64_t device_utc_ns(struct device *device, int64_t t_ns);
 /* The GNSS receiver (receiver_line.h). device_next_fix_ns: when its first sentence at or after t_ns arrives; INT64_MAX:
  * none does. The other gives the last one that had arrived at t_ns, at the head's place then. 0: there is none. */
-int64_t device_next_fix_ns(struct device *device, int64_t t_ns);
-int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix);
+int64_t device_next_fix_ns(void *self, int64_t t_ns);
+int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second, and the time since the top of the hour, at a device time that was claimed (pps.h). */
-enum protocol_pps device_pps(struct device *device, int64_t t_ns, int64_t *hour_ns);
+enum protocol_pps device_pps(void *self, int64_t t_ns, int64_t *hour_ns);
 
 /* The tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
-uint64_t device_rests_from(struct device *device);
+uint64_t device_rests_from(void *self);
 
 /* The last power-up. While power is off, all but the time are those of the power-up before. */
 struct device_power_up {
@@ -224,11 +225,11 @@ struct device_power_up {
     uint32_t ons;       /* how often power has come, including the first time */
     uint32_t near_wrap; /* since then counters begin this far below their wrap; 0: they begin at 0 */
 };
-struct device_power_up device_last_power(struct device *device);
+struct device_power_up device_last_power(void *self);
 
 /* Loss of optical power at the window by injected faults, both ways together, dB; 0 without a scan. It is that of the
  * last tick that was claimed. */
-double device_window_loss_db(struct device *device);
+double device_window_loss_db(void *self);
 
 /* The number of the last scan that began, which is how many have begun; 0: none. *station: where it stands, from 1;
  * NULL: not asked for. */
@@ -236,7 +237,7 @@ uint32_t device_last_scan(struct device *device, uint32_t *station);
 /* The length of the last scan, in whole ticks; 0: none has ended. */
 int64_t device_scan_ns(struct device *device);
 
-int64_t device_tick_ns(const struct device *device);
+int64_t device_tick_ns(const void *self);
 
 /* Fills a work that has only the present descriptor and anchor, as a repetition. */
 void device_describe_now(struct device *device, struct device_work *work);

@@ -66,6 +66,9 @@ struct device_journal {
     size_t n_replay, at; /* next entry to carry out */
     int ends;            /* the replayed one has an end */
     uint64_t end_tick;   /* where the run at hand ended, once it is over */
+    size_t n_refused;    /* commands of the replayed one; the first of them, and its reply: */
+    const struct journal_entry *refused;
+    char why[128];
 };
 
 struct device {
@@ -126,6 +129,9 @@ enum head_state device_visible_state(const struct device *device, uint64_t relea
 uint64_t device_ticks_of(const struct device *device, double s);
 
 /* scan.c */
+/* With options.start, options.duration_s counts from the first scan's tick; before that, from the first tick at which a
+ * self-test failed. */
+void device_count_duration(struct device *device, uint64_t tick);
 void device_begin_scan(struct device *device, uint64_t tick);
 /* Claims the tick's part of the scan that is on: descriptor, names, pulses; and the scan's end. */
 void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work);
@@ -139,6 +145,8 @@ void device_describe(struct device *device, struct device_work *work);
 /* Carries out commands of the replayed journal that are due at the tick. Returns 1 when one of them moves a station:
  * that has to be planned and finished before the others. */
 int device_run_replay(struct device *device, uint64_t tick);
+/* Notes the result of the command that was carried out of it last. */
+void device_note_replayed(struct device *device, const struct command_result *result);
 
 void device_carry_out_line(struct device *device, const char *line);
 

@@ -57,4 +57,18 @@ static void list_faults(void *owner, char *text, size_t len)
     if (i < n) snprintf(text + used, len - used, ", and %u more", n - i);
 }
 
+static int add_none(void *owner, const char *text, uint32_t *number, char *why, size_t len)
+{
+    (void)owner, (void)text, (void)why, (void)len;
+    *number = 0;
+    return 0;
+}
+
+static uint32_t remove_none(void *owner, uint32_t number)
+{
+    (void)owner;
+    return number;
+}
+
 const struct command_faults fault_desk_commands = {add_fault, remove_fault, count_injected, list_faults};
+const struct command_faults fault_desk_queries = {add_none, remove_none, count_injected, list_faults};

@@ -19,6 +19,8 @@ struct fault_desk {
 };
 
 extern const struct command_faults fault_desk_commands; /* their owner is a struct fault_desk */
+/* The same where the caller refuses all changes: adding and taking out do nothing. */
+extern const struct command_faults fault_desk_queries;
 
 /* Why a fault is not possible without a head that computes; NULL: it is. */
 const char *fault_desk_why_not(const struct fault *fault);

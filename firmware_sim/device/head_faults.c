@@ -26,10 +26,9 @@ static void note(struct head_faults *faults, const struct head_fault *f, const s
     fault_board_note(faults->board, &note);
 }
 
-void head_faults_note(struct head_faults *faults, const struct head_fault *fault, int64_t t_ns, int ended,
-                      const char *text)
+void head_faults_note(struct head_faults *faults, const struct head_fault *fault, int64_t t_ns, int ended)
 {
-    note(faults, fault, &(struct head_faults_tick){.t_ns = t_ns}, ended, text);
+    note(faults, fault, &(struct head_faults_tick){.t_ns = t_ns}, ended, NULL);
 }
 
 /* The start of the first tick that begins at t_ns or later. */

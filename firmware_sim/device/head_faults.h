@@ -82,8 +82,7 @@ struct head_fault *head_faults_next(struct head_faults *faults, enum fault_kind 
  * of this tick. Such kinds are in no step themselves: the caller that makes them strike notes them. */
 struct head_fault *head_faults_at(struct head_faults *faults, enum fault_kind kind, int64_t t_ns,
                                   const struct head_fault *before);
-/* Puts a note on the board, without a pulse; text may be NULL. */
-void head_faults_note(struct head_faults *faults, const struct head_fault *fault, int64_t t_ns, int ended,
-                      const char *text);
+/* Puts a note on the board, without a pulse. */
+void head_faults_note(struct head_faults *faults, const struct head_fault *fault, int64_t t_ns, int ended);
 
 #endif

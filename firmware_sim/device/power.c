@@ -18,7 +18,7 @@ static void end_slow_boots(struct device *device, uint64_t tick)
     struct head_fault *f = NULL;
     while ((f = head_faults_next(&device->head_faults, FAULT_SLOW_BOOT, f)) != NULL) {
         f->active = 0;
-        head_faults_note(&device->head_faults, f, time_of(device, tick), 1, NULL);
+        head_faults_note(&device->head_faults, f, time_of(device, tick), 1);
     }
 }
 
@@ -65,7 +65,6 @@ static void turn_on(struct device *device, uint64_t tick)
     set_near_wrap(device, tick);
     device_start_date(device, time_of(device, tick));
     device->power.again++;
-    device->scan.variant = NULL;
     device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, tick);
 }
@@ -81,10 +80,10 @@ static void begin_boot(struct device *device, uint64_t tick)
     while ((f = head_faults_at(faults, FAULT_SLOW_BOOT, t_ns, f)) != NULL) {
         device->machine.due_tick += device_ticks_of(device, 1e-3 * f->fault.for_ms);
         f->active = 1;
-        head_faults_note(faults, f, t_ns, 0, NULL);
+        head_faults_note(faults, f, t_ns, 0);
     }
     while ((f = head_faults_at(faults, FAULT_COUNTERS_HIGH, t_ns, f)) != NULL)
-        head_faults_note(faults, f, t_ns, 0, NULL);
+        head_faults_note(faults, f, t_ns, 0);
 }
 
 int device_end_boot(struct device *device, uint64_t tick)
@@ -96,7 +95,7 @@ int device_end_boot(struct device *device, uint64_t tick)
     if (fault_board_version(device->faults) == 0) return 0;
     end_slow_boots(device, tick);
     while ((f = head_faults_at(faults, FAULT_SELF_TEST, t_ns, f)) != NULL) {
-        head_faults_note(faults, f, t_ns, 0, NULL);
+        head_faults_note(faults, f, t_ns, 0);
         failed = 1;
     }
     if (!failed) return 0;
@@ -105,6 +104,7 @@ int device_end_boot(struct device *device, uint64_t tick)
     device_transition(device, HEAD_EV_FAIL, tick);
     device->cmd.why_fault = "the self-test failed; *RST goes on without it";
     if (device->options.start && device->options.one_scan) device->over = 1; /* there will be no scan to wait for */
+    if (device->scan.number == 0) device_count_duration(device, tick);
     return 1;
 }
 
@@ -146,8 +146,9 @@ int device_is_dead(const struct device *device, uint64_t released)
     return power->on_tick != 0 && device->next_tick > power->off_tick && released < power->on_tick;
 }
 
-struct device_power_up device_last_power(struct device *device)
+struct device_power_up device_last_power(void *self)
 {
+    struct device *device = self;
     const struct device_power *power = &device->power;
     pthread_mutex_lock(&device->lock);
     const struct device_power_up last = {time_of(device, power->on_tick), power->again + 1, power->near_wrap};
@@ -155,8 +156,9 @@ struct device_power_up device_last_power(struct device *device)
     return last;
 }
 
-double device_window_loss_db(struct device *device)
+double device_window_loss_db(void *self)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     const double loss_db = device_beam_loss_db(&device->beam);
     pthread_mutex_unlock(&device->lock);

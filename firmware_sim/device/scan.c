@@ -20,6 +20,16 @@ static int plan_scan(struct device *device, struct device_variant **variant, uin
     return 0;
 }
 
+void device_count_duration(struct device *device, uint64_t tick)
+{
+    const struct device_journal *journal = &device->journal;
+    const uint64_t most = journal->ends ? journal->replay[journal->n_replay].tick : UINT64_MAX;
+    const int is_counted = device->scan.number > 1 || (device->scan.number == 0 && device->end_tick != most);
+    if (!device->options.start || !(device->options.duration_s > 0.0) || is_counted) return;
+    device->end_tick = tick + device_ticks_of(device, device->options.duration_s);
+    if (device->end_tick > most) device->end_tick = most;
+}
+
 void device_begin_scan(struct device *device, uint64_t tick)
 {
     struct schedule_spec spec;
@@ -41,10 +51,7 @@ void device_begin_scan(struct device *device, uint64_t tick)
     device->live.next = 0;
     device_push_event(&device->events, NATIVE_EV_SCAN_START, device->scan.number, tick * (uint64_t)device->tick_ns,
                       (uint64_t)device_gps_ns(device, (int64_t)tick * device->tick_ns), "");
-    if (device->options.start && device->options.duration_s > 0.0 && device->scan.number == 1) {
-        uint64_t end_tick = tick + device_ticks_of(device, device->options.duration_s);
-        if (end_tick < device->end_tick) device->end_tick = end_tick; /* a journal may end it earlier */
-    }
+    device_count_duration(device, tick);
 }
 
 uint32_t device_tick_pulses(const struct config *cfg)
@@ -169,15 +176,21 @@ int device_is_repeated(const struct device *device, uint64_t tick)
     return (since != 0 && since % device->tick_hz == 0) || device->scan.anchor_lost;
 }
 
+/* Stored settings may need a site of their own. Where that can't be planned, the scan's start says why. */
 void device_before_scans(struct device *device)
 {
+    const struct head_settings *settings = &device->cmd.settings;
+    struct device_scan *scan = &device->scan;
     struct schedule_spec spec;
+    struct sh_err err;
     device_end_beam(&device->beam, 0);
-    device_fill_spec(&device->beam, device->site, &spec);
-    schedule_start(&device->scan.segment, &spec);
-    device->scan.site = device->site;
-    device->scan.station = device->cmd.settings.station - 1;
-    device->scan.stretch = site_stretch_at(device->site, 0);
+    scan->station = settings->station - 1;
+    if (device_find_variant(&device->variants, settings, scan->station, &scan->variant, &err) != SH_OK)
+        scan->variant = NULL;
+    scan->site = scan->variant != NULL ? scan->variant->site : device->site;
+    device_fill_spec(&device->beam, scan->site, &spec);
+    schedule_start(&scan->segment, &spec);
+    scan->stretch = site_stretch_at(device->site, 0);
 }
 
 void device_describe(struct device *device, struct device_work *work)

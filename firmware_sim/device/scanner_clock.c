@@ -37,8 +37,9 @@ void device_start_date(struct device *device, int64_t t_ns)
                                .zero_ns = head_clock_ns(&device->clock, t_ns)};
 }
 
-int64_t device_date_ns(struct device *device, int64_t t_ns)
+int64_t device_date_ns(void *self, int64_t t_ns)
 {
+    struct device *device = self;
     const struct head_clock *clock = &device->clock;
     pthread_mutex_lock(&device->lock);
     const int is_before = t_ns < device->date.from_ns;

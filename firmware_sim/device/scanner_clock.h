@@ -24,7 +24,7 @@ struct scanner_clock {
     int64_t shift_ns; /* set once power has come again; until then it is command_device.shift_ns */
 };
 
-int64_t device_date_ns(struct device *device, int64_t t_ns);
+int64_t device_date_ns(void *self, int64_t t_ns);
 
 /* A client of a time server needs to know this. */
 struct device_time_server {

@@ -15,8 +15,9 @@ enum head_state device_visible_state(const struct device *device, uint64_t relea
     return HEAD_OFF;
 }
 
-uint64_t device_rests_from(struct device *device)
+uint64_t device_rests_from(void *self)
 {
+    struct device *device = self;
     const struct device_machine *machine = &device->machine;
     pthread_mutex_lock(&device->lock);
     const int rests = machine->state == HEAD_IDLE || machine->state == HEAD_FAULT || machine->state == HEAD_OFF;

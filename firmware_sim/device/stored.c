@@ -42,13 +42,15 @@ int device_restore(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
-int device_store(struct device *device, const char *name, const char *text)
+int device_store(void *self, const char *name, const char *text)
 {
+    struct device *device = self;
     return device->settings == NULL || settings_file_put(device->settings, name, text) != SH_OK;
 }
 
-int device_stored(const struct device *device, const char *name, char text[SETTINGS_FILE_TEXT])
+int device_stored(const void *self, const char *name, char text[SETTINGS_FILE_TEXT])
 {
+    const struct device *device = self;
     text[0] = '\0';
     if (device->settings == NULL) return 1;
     settings_file_get(device->settings, name, text);

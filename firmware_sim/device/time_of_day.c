@@ -6,8 +6,9 @@
 #include "firmware_sim/device/clock_faults.h"
 #include "firmware_sim/device/device_state.h"
 
-int device_power_up(struct device *device, int64_t now_ns, const char **warning, struct sh_err *err)
+int device_power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock); /* a client may ask for the time already */
     int rc = head_clock_power_up(&device->clock, now_ns, err);
     device->date.zero_ns = head_clock_ns(&device->clock, 0); /* the system's clock was not known before */
@@ -166,34 +167,27 @@ void device_set_time_texts(struct device *device)
              (long long)(gps.ns % UTC_SECOND_NS));
 }
 
-int64_t device_utc_ns(struct device *device, int64_t t_ns)
+enum protocol_pps device_pps(void *self, int64_t t_ns, int64_t *hour_ns)
 {
-    const struct head_clock *clock = &device->clock;
-    if (clock->source == EPOCH_NONE) return INT64_MIN;
-    pthread_mutex_lock(&device->lock); /* faults may change the clock */
-    const int64_t utc_ns = utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns));
-    pthread_mutex_unlock(&device->lock);
-    return utc_ns;
-}
-
-enum protocol_pps device_pps(struct device *device, int64_t t_ns, int64_t *hour_ns)
-{
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     const enum protocol_pps state = pps_at(&device->pps, moment_at(device, t_ns), hour_ns);
     pthread_mutex_unlock(&device->lock);
     return state;
 }
 
-int64_t device_next_fix_ns(struct device *device, int64_t t_ns)
+int64_t device_next_fix_ns(void *self, int64_t t_ns)
 {
+    struct device *device = self;
     pthread_mutex_lock(&device->lock);
     const int64_t next_ns = receiver_line_next_ns(&device->line, &device->gnss, t_ns);
     pthread_mutex_unlock(&device->lock);
     return next_ns;
 }
 
-int device_fix(struct device *device, int64_t t_ns, struct nmea_fix *fix)
+int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
 {
+    struct device *device = self;
     struct receiver_sentence sentence;
     pthread_mutex_lock(&device->lock);
     const int found = receiver_line_last(&device->line, &device->gnss, t_ns, &sentence);

@@ -19,30 +19,53 @@ static double stream_rate(const struct links *links, const struct config *cfg)
     return config_cast_hz(cfg) * point_len + links->waves_bytes_s;
 }
 
+/* Rounds down to two digits, so that the result still fits. */
+static double two_digits_of(double share)
+{
+    const double unit = pow(10.0, floor(log10(share)) - 1.0);
+    return floor(share / unit) * unit;
+}
+
+/* Says how the stream becomes this share of what it is. A head that fires at steps of a turn has no pulse rate of its
+ * own. Some heads have no rate that is low enough. */
+static void advise(const struct config *cfg, double share, char *text, size_t len)
+{
+    const struct config_profile *p = &cfg->profile;
+    const struct head_settings *s = &cfg->head.settings;
+    const int steps = emitter_line_pulses(&p->emitter) != 0;
+    const int64_t wanted_uhz = llround((double)(steps ? s->lines_uhz : s->prr_uhz) * share);
+    const int64_t lower_uhz = steps ? wanted_uhz : config_rate_below(p, wanted_uhz);
+    const int fits =
+        steps ? lower_uhz >= p->lines_min_uhz && p->arrangement.n_geometries == 0 : lower_uhz <= wanted_uhz;
+    const char *less = s->waves != 0                       ? ", or leave out waveform.send"
+                       : cfg->output.attributes            ? ", or leave out output.attributes"
+                       : cfg->output.colour != COLOUR_NONE ? ", or leave out output.colour"
+                                                           : "";
+    if (fits)
+        snprintf(text, len, "lower head.%s to %.0f%s", steps ? "lines_hz" : "prr_hz", floor(1e-6 * (double)lower_uhz),
+                 less);
+    else
+        snprintf(text, len, "no rate of the head is low enough; allowed is a faster link%s", less);
+}
+
 /* A link that can't carry the stream is refused before it loses any of it. Other protocols are not checked: their rates
  * depend on what clients ask for. What such a link can't carry is lost in whole units, and counted. */
 static int check_capacity(const struct links *links, const struct config *cfg, const struct pump *pump,
                           struct sh_err *err)
 {
     struct link_place place;
+    char advice[128];
     pump_get_place(pump, &place);
     if (strcmp(place.protocol, "native") != 0) return SH_OK;
-    double capacity = place.bytes_s, rate = stream_rate(links, cfg);
+    const double capacity = place.bytes_s, rate = stream_rate(links, cfg);
     if (capacity <= 0.0 || capacity >= rate) return SH_OK;
     if (links->source->ops->next != NULL) /* a recording */
-        return sh_fail(err, SH_EINPUT,
-                       "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; allowed is %.2g times this "
-                       "speed, or another link",
-                       place.endpoint, 1e-6 * rate, 1e-6 * capacity, floor(100.0 * capacity / rate) / 100.0);
-    return sh_fail(err, SH_EINPUT,
-                   "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; lower head.prr_hz to %.0f%s",
-                   place.endpoint, 1e-6 * rate, 1e-6 * capacity,
-                   floor(1e-6 * (double)config_rate_below(
-                                    &cfg->profile, llround((double)cfg->head.settings.prr_uhz * capacity / rate))),
-                   cfg->head.settings.waves != 0       ? ", or leave out waveform.send"
-                   : cfg->output.attributes            ? ", or leave out output.attributes"
-                   : cfg->output.colour != COLOUR_NONE ? ", or leave out output.colour"
-                                                       : "");
+        snprintf(advice, sizeof advice, "allowed is %.2g times this speed, or another link",
+                 two_digits_of(capacity / rate));
+    else
+        advise(cfg, capacity / rate, advice, sizeof advice);
+    return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; %s", place.endpoint,
+                   1e-6 * rate, 1e-6 * capacity, advice);
 }
 
 static void identify(struct links *links, const struct config *cfg)

@@ -21,8 +21,7 @@
 
 struct pose_feed;
 
-/* Listens at platform.address and platform.port. device NULL: the caller only tries whether that works, and does not
- * start it. */
+/* Listens at platform.address and platform.port. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
 /* "udp:127.0.0.1:4711" */

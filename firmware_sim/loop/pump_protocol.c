@@ -71,10 +71,7 @@ static enum protocol_pps host_pps(void *ctx, int64_t t_ns, int64_t *hour_ns)
 static int64_t host_date_ns(void *ctx, int64_t t_ns)
 {
     const struct session *s = ctx;
-    const struct loop_source *source = s->pump->links->source;
-    if (source->ops->date_ns != NULL) return source->ops->date_ns(source->self, t_ns);
-    const int64_t utc_ns = source->ops->utc_ns(source->self, t_ns);
-    return utc_ns != INT64_MIN ? utc_ns : t_ns - source->ops->last_power(source->self).t_ns;
+    return s->pump->links->source->ops->date_ns(s->pump->links->source->self, t_ns);
 }
 
 static int host_store(void *ctx, const char *lines)

@@ -82,7 +82,7 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick)
     s->power_from = tick + 1;
     if (pump->protocol->passes_native) return;
     clear(s);
-    faulty_forget(pump->link, session_index(pump, s));
+    session_gone(pump, s); /* units that still wait in the link are not sent */
     if (session_restart_protocol(pump, s) == SH_OK) {
         session_know_next(pump, s);
         return;

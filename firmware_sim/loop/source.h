@@ -28,9 +28,8 @@ struct loop_source_ops {
     uint64_t (*rests_from)(void *self);
     /* ---- sessions of other protocols than the native one. NULL: there are none. */
     void (*command_once)(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
-    int64_t (*utc_ns)(void *self, int64_t t_ns);
+    int64_t (*date_ns)(void *self, int64_t t_ns); /* UTC where it is known; else the time since power-up */
     int64_t (*next_fix_ns)(void *self, int64_t t_ns);
-    int64_t (*date_ns)(void *self, int64_t t_ns); /* NULL: UTC, or the time since power-up */
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
     struct device_power_up (*last_power)(void *self);
     enum protocol_pps (*pps)(void *self, int64_t t_ns, int64_t *hour_ns);

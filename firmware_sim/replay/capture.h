@@ -4,7 +4,8 @@
  * In: a file of tcpdump's, Wireshark's or `record --raw` (.pcap, .pcapng). Out: a talk (drivers/protocol/talk.h) for
  * each port of a device in it. Of the two ends of a TCP connection, the device is the one that was connected to; where
  * the capture begins later than the connection, the one that sent more bytes. Of two ends of UDP it is the one that
- * sent more datagrams. TCP streams are put together as receivers do; what is missing in them is counted.
+ * sent more datagrams; where both sent as many, the one that did not begin. TCP streams are put together as receivers
+ * do; what is missing in them is counted.
  *
  * One thread; constant once it is open. */
 #ifndef FIRMWARE_SIM_REPLAY_CAPTURE_H

@@ -296,7 +296,7 @@ int capture_build(struct replay_capture *c, struct sh_err *err)
 {
     for (size_t i = 0; i < c->n_flows; i++) {
         struct capture_flow *f = &c->flow[i];
-        if (!f->is_tcp) f->device = f->n_sent[1] >= f->n_sent[0]; /* who asks is the first */
+        if (!f->is_tcp) f->device = f->n_sent[1] >= f->n_sent[0]; /* of equals, the second answers */
         if (f->is_tcp && !f->has_begin) f->device = f->bytes_sent[1] > f->bytes_sent[0];
     }
     const int64_t udp_t0_ns = first_datagram_ns(c);

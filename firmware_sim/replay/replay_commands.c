@@ -117,10 +117,11 @@ static void carry_out(struct replay *r, enum command_effect effect)
     if (r->wants_start) r->options.clients = 0; /* a client that commands the start does not wait for others */
 }
 
-/* With the lock held. */
-static void do_command(struct replay *r, uint32_t session, const char *line, uint64_t released,
+/* once: the session does not keep control. */
+static void do_command(struct replay *r, uint32_t session, const char *line, uint64_t released, int once,
                        struct command_result *out)
 {
+    pthread_mutex_lock(&r->lock);
     r->cmd.state = visible_state(r, released);
     r->cmd.t_ns = (int64_t)released * r->tick_ns;
     r->cmd.frames_done = r->frames_done;
@@ -134,23 +135,18 @@ static void do_command(struct replay *r, uint32_t session, const char *line, uin
     command_execute(&r->cmd, session, line, out);
     if (out->error == 0 && out->effect == COMMAND_REPLAY) replay_change(r, &out->replay);
     if (out->error == 0) carry_out(r, out->effect);
+    if (once && out->took_control) r->cmd.control = 0;
+    pthread_mutex_unlock(&r->lock);
 }
 
 void replay_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
 {
-    struct replay *r = self;
-    pthread_mutex_lock(&r->lock);
-    do_command(r, session, line, released, out);
-    pthread_mutex_unlock(&r->lock);
+    do_command(self, session, line, released, 0, out);
 }
 
 void replay_command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out)
 {
-    struct replay *r = self;
-    pthread_mutex_lock(&r->lock);
-    do_command(r, session, line, released, out);
-    if (out->took_control) r->cmd.control = 0;
-    pthread_mutex_unlock(&r->lock);
+    do_command(self, session, line, released, 1, out);
 }
 
 void replay_report(void *self, int number, const char *text)

@@ -76,11 +76,10 @@ int replay_check_links(struct replay *r, const struct native_descriptor *d, cons
 
 /* ---- time of day */
 
-/* A recording may have any number there; dates end in 2199 (core/utc.h). */
-int64_t replay_utc_ns(void *self, int64_t t_ns)
+/* UTC; INT64_MIN: it is not known. A recording may have any number there; dates end in 2199 (core/utc.h). */
+static int64_t utc_at(struct replay *r, int64_t t_ns)
 {
     static const int64_t LAST_NS = INT64_C(7258118400) * UTC_SECOND_NS;
-    struct replay *r = self;
     pthread_mutex_lock(&r->lock);
     const int is_known = r->utc0_ns != INT64_MIN;
     const int64_t utc_ns = native_after_ns(r->utc0_ns, t_ns);
@@ -88,9 +87,15 @@ int64_t replay_utc_ns(void *self, int64_t t_ns)
     return is_known && utc_ns > 0 && utc_ns < LAST_NS ? utc_ns : INT64_MIN;
 }
 
+int64_t replay_date_ns(void *self, int64_t t_ns)
+{
+    const int64_t utc_ns = utc_at(self, t_ns);
+    return utc_ns != INT64_MIN ? utc_ns : t_ns;
+}
+
 enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns)
 {
-    const int64_t utc_ns = replay_utc_ns(self, t_ns);
+    const int64_t utc_ns = utc_at(self, t_ns);
     *hour_ns = (utc_ns != INT64_MIN ? utc_ns : t_ns) % (3600 * UTC_SECOND_NS);
     return utc_ns != INT64_MIN ? PROTOCOL_PPS_LOCKED : PROTOCOL_PPS_ABSENT;
 }
@@ -98,7 +103,7 @@ enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns)
 /* A receiver of one fix a second, at full seconds. */
 int64_t replay_next_fix_ns(void *self, int64_t t_ns)
 {
-    const int64_t utc_ns = replay_utc_ns(self, t_ns);
+    const int64_t utc_ns = utc_at(self, t_ns);
     if (utc_ns == INT64_MIN) return INT64_MAX;
     const int64_t since_ns = utc_ns % UTC_SECOND_NS;
     return since_ns == 0 ? t_ns : t_ns + UTC_SECOND_NS - since_ns;
@@ -109,7 +114,7 @@ int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
 {
     struct replay *r = self;
     struct utc_time utc;
-    const int64_t utc_ns = replay_utc_ns(r, t_ns);
+    const int64_t utc_ns = utc_at(r, t_ns);
     if (utc_ns == INT64_MIN) return 0;
     const struct utc_table *table = utc_table_builtin();
     utc_from_tai(table, utc_tai_from_posix(table, utc_ns - utc_ns % UTC_SECOND_NS), &utc);

@@ -65,6 +65,13 @@ static int read_clock(struct replay *r, struct sh_err *err)
     return got < 0 ? got : recording_rewind(&r->recording, err);
 }
 
+/* A recording may have any bytes there. A reply is one line of ASCII, without the byte that begins a frame. */
+static void keep_ascii(char *text)
+{
+    for (; *text != '\0'; text++)
+        if (*text < 0x20 || *text > 0x7e) *text = '~';
+}
+
 /* Copies "MAKER,MODEL,SERIAL,REST" into the fields of the configuration that links show to hosts. */
 static void take_identity(struct config *cfg, const char *idn)
 {
@@ -160,6 +167,7 @@ int replay_open_recording(struct replay *r, struct sh_err *err)
     const struct replay_front *front = &r->front;
     if (native_decode_descriptor(front->bytes[0] + NATIVE_HEADER_LEN, front->len[0] - NATIVE_HEADER_LEN, &d) != SH_OK)
         return sh_fail(err, SH_EFORMAT, "%s: its descriptor can't be read", r->options.path);
+    keep_ascii(d.idn);
     replay_open_commands(r);
     replay_take_descriptor(r, &d);
     const uint8_t *emitter = front->bytes[1] + NATIVE_HEADER_LEN;

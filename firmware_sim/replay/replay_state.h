@@ -112,7 +112,7 @@ void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tic
 int replay_check_links(struct replay *replay, const struct native_descriptor *d, const struct native_emitter *e,
                        const uint8_t *beams, struct sh_err *err);
 /* As struct loop_source_ops has them. */
-int64_t replay_utc_ns(void *self, int64_t t_ns);
+int64_t replay_date_ns(void *self, int64_t t_ns);
 int64_t replay_next_fix_ns(void *self, int64_t t_ns);
 int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
 enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns);

@@ -61,16 +61,10 @@ static int add_mover(struct site *site, uint32_t number, const struct scene_mesh
 /* Sets the sphere around a body, and its labels, which follow those given before. */
 static void place_mover(struct site_mover *m, uint32_t label)
 {
-    double half2 = 0.0;
     for (uint32_t i = 0; i < m->scene->n_triangles; i++)
         m->scene->label[i] = (uint16_t)(m->scene->label[i] + label);
     m->scene->label0 = label;
-    for (int i = 0; i < 3; i++) {
-        double half = 0.5 * (m->scene->max_m[i] - m->scene->min_m[i]);
-        m->centre_m[i] = m->scene->min_m[i] + half;
-        half2 += half * half;
-    }
-    m->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
+    m->radius_m = site_enclose(m->scene, m->centre_m);
 }
 
 static void place_movers(struct site *site)

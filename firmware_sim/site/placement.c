@@ -194,6 +194,12 @@ static int stand_on_floor(const struct config_station *s, const double level[9],
     return SH_OK;
 }
 
+int placement_level(const struct placement_anchor *anchor, const double at_m[3], double level[9], struct sh_err *err)
+{
+    memcpy(level, mat3_unit, sizeof mat3_unit);
+    return anchor->known ? geoframe_level(&anchor->frame, at_m, level, err) : SH_OK;
+}
+
 static int site_placement_find(const struct config_station *s, const struct placement_anchor *anchor,
                                const struct bvh *bvh, struct placement *out, struct sh_err *err)
 {
@@ -202,8 +208,7 @@ static int site_placement_find(const struct config_station *s, const struct plac
     int rc = given_place(s, &at, err);
     memcpy(out->position_m, s->position_m, sizeof out->position_m);
     if (rc == SH_OK && !s->has_position) rc = find_position(s, &anchor->frame, &at, out->position_m, err);
-    memcpy(level, mat3_unit, sizeof level);
-    if (rc == SH_OK && anchor->known) rc = geoframe_level(&anchor->frame, out->position_m, level, err);
+    if (rc == SH_OK) rc = placement_level(anchor, out->position_m, level, err);
     if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, bvh, out, err);
     if (rc == SH_OK && anchor->known) rc = geoframe_locate(&anchor->frame, out->position_m, &at, err);
     if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both began at the search's start */

@@ -12,6 +12,7 @@
 #include "firmware_sim/site/rate.h"
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/waves.h"
+#include "firmware_sim/site/world.h"
 
 static void name_row(struct plan_row *row, const char *whose)
 {
@@ -47,15 +48,6 @@ static int is_zero(const struct config_instrument *k)
 {
     static const struct config_instrument zero;
     return memcmp(k, &zero, sizeof zero) == 0;
-}
-
-/* The largest error of vertices, of the scene and of movers. */
-static double mesh_error_m(const struct site *site)
-{
-    double error_m = site->scene->error_m;
-    for (uint32_t i = 0; i < site->n_movers; i++)
-        error_m = fmax(error_m, site->mover[i].scene->error_m);
-    return error_m;
 }
 
 static void ask_head(const struct site *site, struct plan_head *head)
@@ -158,7 +150,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     add_program(site, plan);
     add_range(site, plan);
     add_tripods(site, plan);
-    plan_mesh(mesh_error_m(site), &plan->row[plan->n++]);
+    plan_mesh(site_mesh_error_m(site), &plan->row[plan->n++]);
     plan_cast(bvh.packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->sight;
     for (size_t i = 0; i < n; i++) {

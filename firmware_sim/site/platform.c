@@ -23,6 +23,41 @@ struct part {
     double start_s, end_s;
 };
 
+/* A sum of two times is rounded, by up to 2e-7 s where they count from 1970. So a part that ends with the trajectory
+ * may seem to end this much later. */
+static const double ROUNDING_S = 1e-6;
+
+/* The keys that give the times, and their unit, for messages: with frames_per_s the configuration has frames. */
+struct times {
+    const char *start, *end, *step, *unit;
+    double per_s;
+};
+
+static struct times times_of(const struct config_platform *p)
+{
+    if (p->frames_per_s > 0.0)
+        return (struct times){"first_frame", "last_frame", "frame_step", "frames", p->frames_per_s};
+    return (struct times){"start_s", "end_s", "step_s", "s", 1.0};
+}
+
+static int check_part(const struct site *site, double length_s, struct sh_err *err)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    const struct times times = times_of(p);
+    const int wrong_end = p->has_end && p->end_s > length_s + ROUNDING_S;
+    /* A scan that stops at the end has no pulse if it begins there. One stop may be there, or a platform that waits. */
+    const int must_go = p->kind == PLATFORM_TRAJECTORY && p->at_end == PLATFORM_STOP;
+    if (!wrong_end && p->start_s <= length_s + (must_go ? -ROUNDING_S : ROUNDING_S)) return SH_OK;
+    if (!wrong_end && must_go)
+        return sh_fail(err, SH_EINPUT,
+                       "%s: platform.start_s: %.9g s is not before the trajectory's end; allowed 0 to below %.9g",
+                       site->cfg->file, p->start_s, length_s);
+    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g %s is after the trajectory's end; allowed %.9g to %.9g",
+                   site->cfg->file, wrong_end ? times.end : times.start,
+                   times.per_s * (wrong_end ? p->end_s : p->start_s), times.unit,
+                   wrong_end ? times.per_s * p->start_s : 0.0, times.per_s * length_s);
+}
+
 static int open_trajectory(const struct site *site, const struct sh_report *report, struct part *part,
                            struct sh_err *err)
 {
@@ -38,20 +73,11 @@ static int open_trajectory(const struct site *site, const struct sh_report *repo
                                              &part->trajectory, err);
     if (rc != SH_OK) return rc;
     trajectory_span(part->trajectory, &first_s, &last_s);
-    part->start_s = first_s + p->start_s;
-    part->end_s = p->has_end ? first_s + p->end_s : last_s;
-    const int wrong_end = p->has_end && part->end_s > last_s;
-    /* A scan that stops at the end has no pulse if it begins there. One stop may be there, or a platform that waits. */
-    const int must_go = p->kind == PLATFORM_TRAJECTORY && p->at_end == PLATFORM_STOP;
-    if (!wrong_end && (must_go ? part->start_s < last_s : part->start_s <= last_s)) return SH_OK;
-    trajectory_free(part->trajectory);
-    if (!wrong_end && must_go)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: platform.start_s: %.9g s is not before the trajectory's end; allowed 0 to below %.9g",
-                       site->cfg->file, p->start_s, last_s - first_s);
-    return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.9g s is after the trajectory's end; allowed %.9g to %.9g",
-                   site->cfg->file, wrong_end ? "end_s" : "start_s", wrong_end ? p->end_s : p->start_s,
-                   wrong_end ? p->start_s : 0.0, last_s - first_s);
+    part->start_s = fmin(first_s + p->start_s, last_s);
+    part->end_s = p->has_end ? fmin(first_s + p->end_s, last_s) : last_s;
+    rc = check_part(site, last_s - first_s, err);
+    if (rc != SH_OK) trajectory_free(part->trajectory);
+    return rc;
 }
 
 /* Sets the pose of the head on the platform. */
@@ -177,13 +203,16 @@ static int count_stops(const struct site *site, const struct part *part, uint32_
     const struct config_platform *p = &site->cfg->platform;
     double length_s = part->end_s - part->start_s, steps = floor(length_s / p->step_s + 1e-9);
     const double n_each = part->trajectory != NULL ? 1 : site->cfg->n_stations;
+    const struct times times = times_of(p);
+    const double length = times.per_s * length_s;
     if (n_each * (steps + 1.0) > CONFIG_MAX_STOPS && part->trajectory == NULL)
         return sh_fail(err, SH_EINPUT,
-                       "%s: platform.step_s: %.0f stops at %.0f stations in %.9g s; allowed at most %d in all",
-                       site->cfg->file, steps + 1.0, n_each, length_s, CONFIG_MAX_STOPS);
+                       "%s: platform.%s: %.0f stops at %.0f stations in %.9g %s; allowed at most %d in all",
+                       site->cfg->file, times.step, steps + 1.0, n_each, length, times.unit, CONFIG_MAX_STOPS);
     if (steps + 1.0 > CONFIG_MAX_STOPS)
-        return sh_fail(err, SH_EINPUT, "%s: platform.step_s: %.0f stops in %.9g s; allowed at most %d, steps of %.9g s",
-                       site->cfg->file, steps + 1.0, length_s, CONFIG_MAX_STOPS, length_s / (CONFIG_MAX_STOPS - 1));
+        return sh_fail(err, SH_EINPUT, "%s: platform.%s: %.0f stops in %.9g %s; allowed at most %d, steps of %.9g %s",
+                       site->cfg->file, times.step, steps + 1.0, length, times.unit, CONFIG_MAX_STOPS,
+                       length / (CONFIG_MAX_STOPS - 1), times.unit);
     *n = (uint32_t)n_each * ((uint32_t)steps + 1);
     if (site->cfg->head.settings.station > *n)
         return sh_fail(err, SH_EINPUT, "%s: head.station: there is no stop %u; allowed 1 to %u", site->cfg->file,

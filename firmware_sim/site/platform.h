@@ -8,9 +8,10 @@ struct sh_err;
 struct sh_report;
 struct site;
 
-/* Replaces the configuration's only station by the stops. After that station is placed: without an
- * anchor it gives the scene's place on the Earth, as an anchor at its position with the scene's y axis to
- * true north would. */
+/* Replaces the stations, once they are placed, by the stops. Without a trajectory these are all stations at the first
+ * time, then all at the next. Along a trajectory there is one station, and the head stops on the way. Without an anchor
+ * that station gives the scene's place on the Earth, as an anchor at its position with the scene's y axis to true north
+ * would. */
 int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* Reads the trajectory, and cuts the path into stretches. */

@@ -62,11 +62,14 @@ static void check_lines(const struct site *site, const struct sh_report *report)
     }
     if (empty == 0) return;
     const int64_t width_udeg = (s->line_stop_udeg - s->line_start_udeg + spec.sweep_udeg) % spec.sweep_udeg;
+    const char *keys = site->emitter.kind == EMITTER_SPHERE       ? " (head.step_deg)"
+                       : emitter_line_pulses(&site->emitter) == 0 ? " (head.prr_hz, lines_hz)"
+                                                                  : "";
     sh_warn(report,
             "%s: head.line_start_deg, line_stop_deg: %u of %u lines cast no pulse: the window is %.4g deg wide, and "
-            "pulses are %.4g deg apart (head.prr_hz, lines_hz)",
+            "pulses are %.4g deg apart%s",
             site->cfg->file, empty, n, 1e-6 * (double)width_udeg,
-            1e-6 * (double)spec.sweep_udeg * (double)s->lines_uhz / (double)s->prr_uhz);
+            1e-6 * (double)spec.sweep_udeg * (double)s->lines_uhz / (double)s->prr_uhz, keys);
 }
 
 /* Warns where the step of a sphere is rounded, so that a turn has a whole number of steps. */
@@ -229,9 +232,7 @@ static int check_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     const struct site_station *s = &site->station[i];
     const double *p = s->at.position_m;
     double level[9];
-    int rc = SH_OK;
-    memcpy(level, mat3_unit, sizeof level);
-    if (site->anchor.known) rc = geoframe_level(&site->anchor.frame, p, level, err);
+    const int rc = placement_level(&site->anchor, p, level, err);
     if (rc != SH_OK) return rc;
     const double up[3] = {level[2], level[5], level[8]}, down[3] = {-level[2], -level[5], -level[8]};
     const double above_m = bvh_ray(work, site->bvh, p, up);

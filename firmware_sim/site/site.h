@@ -266,10 +266,9 @@ struct site_clear {
 };
 void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n);
 
-/* site_stretch_at: the stretch that a moving head is on at a time of the scan. The other puts what casters need there
- * into a setup for the station.
- */
+/* The stretch that a moving head is on at a time of the scan. */
 size_t site_stretch_at(const struct site *site, int64_t t_ns);
+/* Sets the members of the station's setup that casters need on that stretch: georeference, centre, scale. */
 void site_enter(const struct site *site, uint32_t station, size_t stretch, struct cast_setup *setup);
 
 /* The georeference of a station's points on a stretch, the point of the scene that they are relative to, and the scale.

@@ -7,6 +7,7 @@
  * ground, down to its level: cos(opening) = h / L. */
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/tripod.h"
+#include "firmware_sim/site/world.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -21,10 +22,15 @@
 /* A prism of SIDES faces a leg, and its two ends. */
 enum { LEGS = 3, SIDES = 6, LEG_VERTICES = 2 * SIDES, LEG_TRIANGLES = 2 * SIDES + 2 * (SIDES - 2) };
 
+/* Stops are the stations of the configuration, one round after the other (platform.c). */
+static uint32_t number_of(const struct site *site, uint32_t i)
+{
+    return i % site->cfg->n_stations;
+}
+
 static const struct config_tripod *given(const struct site *site, uint32_t i)
 {
-    const struct config_tripod *t =
-        site->stop != NULL ? &site->cfg->station[i % site->cfg->n_stations].tripod : &site->station[i].station->tripod;
+    const struct config_tripod *t = &site->cfg->station[number_of(site, i)].tripod;
     return t->given ? t : NULL;
 }
 
@@ -45,13 +51,6 @@ int site_name_legs(struct site *site, struct sh_err *err)
     return SH_OK;
 }
 
-/* The columns of level are right, forward and up at a place, in the scene frame. */
-static int level_at(const struct site *site, const double at_m[3], double level[9], struct sh_err *err)
-{
-    memcpy(level, mat3_unit, 9 * sizeof *level);
-    return site->anchor.known ? geoframe_level(&site->anchor.frame, at_m, level, err) : SH_OK;
-}
-
 /* ---- height and opening */
 
 static int open_legs(const struct site *site, struct site_station *s, uint32_t i, struct sh_err *err)
@@ -66,7 +65,7 @@ static int open_legs(const struct site *site, struct site_station *s, uint32_t i
             err, SH_EINPUT,
             "%s: stations[%u] (%s): tripod.head_above_m: %.6g m, but the head is %.6g m above the ground; allowed is "
             "less than that",
-            site->cfg->file, i, s->station->name, t->from->head_above_m, t->head_m);
+            site->cfg->file, number_of(site, i), s->station->name, t->from->head_above_m, t->head_m);
     t->gap_m = t->height_m - t->from->leg_m * cos(least_rad);
     if (t->gap_m > 0.0) return SH_OK;
     t->gap_m = 0.0;
@@ -147,19 +146,6 @@ static void fill_triangles(uint32_t first, uint32_t (*triangle)[3])
     }
 }
 
-/* The sphere around the legs, as cast_mover has it. */
-static void enclose(const struct scene *scene, struct cast_mover *legs)
-{
-    double half2 = 0.0;
-    for (int i = 0; i < 3; i++) {
-        const double half = 0.5 * (scene->max_m[i] - scene->min_m[i]);
-        legs->centre_m[i] = scene->min_m[i] + half;
-        half2 += half * half;
-    }
-    legs->radius_m = sqrt(half2) * (1.0 + 1e-9) + 1e-6;
-    memcpy(legs->rotation, mat3_unit, sizeof legs->rotation);
-}
-
 static int make_legs(const struct site *site, struct site_station *s, const double level[9],
                      const struct sh_report *report, struct sh_err *err)
 {
@@ -187,7 +173,8 @@ static int make_legs(const struct site *site, struct site_station *s, const doub
     t->cast.has_legs = 1;
     rc = bvh_create(t->legs, site->cfg->loop.threads, report, &t->bvh, err);
     if (rc != SH_OK) return rc;
-    enclose(t->legs, &t->cast.legs);
+    t->cast.legs.radius_m = site_enclose(t->legs, t->cast.legs.centre_m);
+    memcpy(t->cast.legs.rotation, mat3_unit, sizeof mat3_unit);
     t->cast.legs.bvh = t->bvh;
     return SH_OK;
 }
@@ -197,7 +184,7 @@ static int tripod_set_up(const struct site *site, struct site_station *s, uint32
 {
     struct site_tripod *t = &s->tripod;
     double level[9];
-    int rc = level_at(site, s->at.position_m, level, err);
+    int rc = placement_level(&site->anchor, s->at.position_m, level, err);
     if (rc != SH_OK) return rc;
     for (int k = 0; k < 3; k++)
         t->cast.down[k] = -level[3 * k + 2];

@@ -102,7 +102,7 @@ static void warn_digits(const struct config *cfg, const struct waveform_spec *sp
         report,
         "%s: waveform.full_scale_db: a count of the samples is %.3g times the detection threshold, so they don't show "
         "weak echoes; with %u bits a full scale up to %.3g dB does",
-        cfg->file, count, spec->bits, 10.0 * log10(spec->full_scale / count));
+        cfg->file, count, spec->bits, 0.1 * floor(100.0 * log10(spec->full_scale / count)));
 }
 
 /* Sigmas of noise at the level. A sample of noise alone reaches 5 of them once in 3 million times. */

@@ -8,18 +8,35 @@
 #include "firmware_sim/site/site.h"
 #include "firmware_sim/site/world.h"
 
+double site_enclose(const struct scene *mesh, double centre_m[3])
+{
+    double half2 = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double half = 0.5 * (mesh->max_m[i] - mesh->min_m[i]);
+        centre_m[i] = mesh->min_m[i] + half;
+        half2 += half * half;
+    }
+    return sqrt(half2) * (1.0 + 1e-9) + 1e-6;
+}
+
+double site_mesh_error_m(const struct site *site)
+{
+    double error_m = site->scene->error_m;
+    for (uint32_t i = 0; i < site->n_movers; i++)
+        error_m = fmax(error_m, site->mover[i].scene->error_m);
+    return error_m;
+}
+
 /* Whether the meshes are read in the same way, with all that this configuration needs. Bytes can be compared, since
  * both structs began as zeros. */
 static int is_same_scene(const struct site *site, const struct site *other)
 {
     const struct config_scene *a = &site->cfg->scene, *b = &other->cfg->scene;
-    double error_m = other->scene != NULL ? other->scene->error_m : INFINITY;
-    for (uint32_t i = 0; i < other->n_movers; i++)
-        error_m = fmax(error_m, other->mover[i].scene->error_m);
-    return a->n_meshes == b->n_meshes && memcmp(a->mesh, b->mesh, sizeof a->mesh) == 0 && a->n_copies == b->n_copies &&
+    return other->scene != NULL && site_mesh_error_m(other) <= a->tolerance_m && a->n_meshes == b->n_meshes &&
+           memcmp(a->mesh, b->mesh, sizeof a->mesh) == 0 && a->n_copies == b->n_copies &&
            memcmp(a->copy, b->copy, sizeof a->copy) == 0 && a->cutouts == b->cutouts &&
            memcmp(&a->target, &b->target, sizeof a->target) == 0 &&
-           (config_wants_textures(other->cfg) || !config_wants_textures(site->cfg)) && error_m <= a->tolerance_m;
+           (config_wants_textures(other->cfg) || !config_wants_textures(site->cfg));
 }
 
 static void take_scene(struct site *site)

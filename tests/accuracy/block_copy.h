@@ -3,15 +3,11 @@
 #ifndef TESTS_ACCURACY_BLOCK_COPY_H
 #define TESTS_ACCURACY_BLOCK_COPY_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/line.h"
+#include "tests/common/cases.h"
 
 struct copy {
     uint32_t n, *a, *b, *c, *dt_ns;

@@ -3,12 +3,6 @@
 
 const double STATION[3] = {0.0, 0.0, 0.0};
 
-void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
-{
-    struct sh_err err;
-    if (beam_rig_open(rig, scene, STATION, view, &err) != 0) fail_msg("%s", err.text);
-}
-
 /* Returns the energy beyond a line at h of the unit disc. The Gaussian's strips across are each an error function long.
  * They are summed by Simpson's rule over x = -cos a, which has no corner at the disc's border. */
 static double energy_beyond(double h)
@@ -32,18 +26,13 @@ struct scene *plates(double near_m, double far_m, int whole_back)
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
     static const uint16_t label[4] = {FRONT, FRONT, BACK, BACK};
     static const struct scene_surface surface[2] = {{.object = "front"}, {.object = "back"}};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 8; v++) {
         int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
         vertex[v][0] = right ? (back ? half : 0.0) : back && !whole_back ? 0.0 : -half;
         vertex[v][1] = back ? far_m : near_m;
         vertex[v][2] = v % 4 >= 2 ? half : -half;
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2});
 }
 
 void open_lit(struct lit *l, struct scene *scene, const struct beam_view *view, double least_at_1_m)
@@ -51,7 +40,7 @@ void open_lit(struct lit *l, struct scene *scene, const struct beam_view *view, 
     struct sh_err err;
     const struct detect_signal_spec spec = {
         .n_reaches = 1, .reach = {{0.9, sqrt(0.9 / fmax(least_at_1_m, 1e-12))}}, .threshold_snr = 8.0, .sharp = 1};
-    open_rig(&l->rig, scene, view);
+    made_beam_rig(&l->rig, scene, view);
     if (surface_table_alloc(2, &l->table, &err) != 0 || detect_signal_set_up(&spec, &l->signal, &err) != 0)
         fail_msg("%s", err.text);
     for (int i = 0; i < 2; i++)
@@ -65,6 +54,13 @@ void close_lit(struct lit *l)
 {
     surface_table_free(&l->table);
     beam_rig_close(&l->rig);
+}
+
+const struct line_block *lit_line(struct lit *l, uint32_t line)
+{
+    beam_rig_directions(&l->rig, line, l->d[0], l->d[1], l->d[2]);
+    beam_rig_line(&l->rig, line);
+    return &l->rig.block;
 }
 
 struct edge at_edge(const struct lit *l, double dx, double dy)

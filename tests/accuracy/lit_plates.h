@@ -5,20 +5,14 @@
 #define TESTS_ACCURACY_LIT_PLATES_H
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/surface.h"
-#include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 
 extern const double STATION[3];
-
-void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view);
 
 /* ---- an edge between two plates */
 
@@ -34,11 +28,15 @@ struct lit {
     struct detect_signal signal;
     struct cast_detect detect;
     double near_m, far_m, rho[2];
+    double d[3][16]; /* of the pulses of a line, by lit_line */
 };
 
 void open_lit(struct lit *l, struct scene *scene, const struct beam_view *view, double least_at_1_m);
 
 void close_lit(struct lit *l);
+
+/* Casts a line of up to 16 pulses. */
+const struct line_block *lit_line(struct lit *l, uint32_t line);
 
 /* The energy of a pulse along d on the front plate, and the light that comes back from both, slope included. */
 struct edge {

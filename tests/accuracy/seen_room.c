@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/mat3.h"
+#include "tests/common/made.h"
 
 enum { MOST_VERTICES = 8000, MOST_TRIANGLES = 8000 };
 
@@ -130,8 +131,6 @@ static void draw_things(struct drawn *d, const double at_m[3], uint64_t *random)
 static struct scene *scene_of(const struct drawn *d)
 {
     struct scene_surface surface[ROOM_LABELS];
-    struct scene *scene;
-    struct sh_err err;
     memset(surface, 0, sizeof surface);
     for (int i = 0; i < ROOM_LABELS; i++)
         surface[i].object[0] = (char)('a' + i);
@@ -142,8 +141,7 @@ static struct scene *scene_of(const struct drawn *d)
                                         d->label,
                                         surface,
                                         ROOM_LABELS};
-    if (scene_from_arrays(&arrays, &scene, &err) != 0) fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&arrays);
 }
 
 static void must(int rc, const struct sh_err *err)

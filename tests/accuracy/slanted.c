@@ -49,24 +49,19 @@ struct scene *slanted(double range_m, double i, double about, const double u[2],
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     static const uint16_t label[2] = {0, 0};
     static const struct scene_surface surface = {.object = "wall"};
-    struct scene *scene;
-    struct sh_err err;
     for (int k = 0; k < 4; k++)
         for (int x = 0; x < 3; x++)
             vertex[k][x] = (x == 1 ? range_m : 0.0) + u[k == 1 || k == 2] * across[x] + v[k >= 2] * up[x];
     *face = (struct face){.n = {across[1] * up[2] - across[2] * up[1], across[2] * up[0] - across[0] * up[2],
                                 across[0] * up[1] - across[1] * up[0]}};
     face->d = face->n[1] * range_m;
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, label, &surface, 1},
-                          &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, label, &surface, 1});
 }
 
 void open_attributes(struct beam_rig *rig, struct scene *scene, const struct beam_view *view, double pulse_s)
 {
     struct sh_err err;
-    open_rig(rig, scene, view);
+    made_beam_rig(rig, scene, view);
     beam_init(&rig->beam.beam, 0.007, 0.35e-3, pulse_s);
     rig->setup.pulse_m = rig->beam.beam.resolution_m;
     rig->setup.range_max_m = 3000.0;

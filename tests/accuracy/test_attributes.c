@@ -150,11 +150,7 @@ static struct scene *slanted_front(void)
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
     static const uint16_t label[4] = {FRONT, FRONT, BACK, BACK};
     static const struct scene_surface surface[2] = {{.object = "front"}, {.object = "back"}};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, label, surface, 2}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, label, surface, 2});
 }
 
 /* Echoes are chosen, crowded out, folded in front of each other, moved by noise, or too far for the integers. Those

@@ -1,23 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* The beam against its definitions (core/footprint.h). */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
-
-static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
-{
-    static const double station_m[3] = {0.0, 0.0, 0.0};
-    struct sh_err err;
-    if (beam_rig_open(rig, scene, station_m, view, &err) != 0) fail_msg("%s", err.text);
-}
 
 /* Writes energy and moment beyond a line, summed over small cells of the disc in polar coordinates. */
 static void sum_half(double h, double *energy, double *moment)
@@ -113,17 +103,12 @@ static struct scene *wall(double range_m, double incidence_rad)
     const double across[3] = {c, s, 0.0};
     double vertex[4][3];
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 4; v++) {
         double along = (v == 1 || v == 2 ? 1.0 : -1.0) * half, up = (v >= 2 ? 1.0 : -1.1) * half;
         for (int i = 0; i < 3; i++)
             vertex[v][i] = along * across[i] + (i == 1 ? range_m : i == 2 ? up : 0.0);
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0});
 }
 
 /* One ray and the closed term are within 0.05 mm of the mean. Without the term the error is 0.14 mm at 800 m and 80
@@ -140,7 +125,7 @@ static void test_wall(void **state)
             const double n[3] = {sin(i), -cos(i), 0.0};
             struct beam_rig rig;
             struct cast_counters counters;
-            open_rig(&rig, wall(range_m[r], i), &view);
+            made_beam_rig(&rig, wall(range_m[r], i), &view);
             beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
             for (uint32_t l = 0; l < view.lines; l++) {
                 beam_rig_directions(&rig, l, d[0], d[1], d[2]);
@@ -174,13 +159,10 @@ static void test_end_of_range(void **state)
     static const double corner_m[8][3] = {{0.17452, 0, -1}, {0.17452, 20, -1}, {0.17452, 20, 1}, {0.17452, 0, 1},
                                           {-1, 50, -1},     {1, 50, -1},       {1, 50, 1},       {-1, 50, 1}};
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    struct scene *scene;
-    struct sh_err err;
     struct beam_rig rig;
     uint32_t cut = 0;
-    assert_int_equal(scene_from_arrays(&(struct scene_arrays){corner_m, 8, triangle, 4, NULL, NULL, 0}, &scene, &err),
-                     SH_OK);
-    open_rig(&rig, scene, &view);
+    struct scene *scene = made_scene(&(struct scene_arrays){corner_m, 8, triangle, 4, NULL, NULL, 0});
+    made_beam_rig(&rig, scene, &view);
     rig.setup.range_max_m = 10.0;
     for (uint32_t rings = 1; rings <= 4; rings++)
         for (uint32_t l = 0; l < view.lines; l++) {
@@ -205,28 +187,6 @@ static void test_end_of_range(void **state)
 
 /* ---- a door edge */
 
-/* The left half of the view is at 20 m, the rest deeper by step_m. */
-static struct scene *door(double step_m)
-{
-    double vertex[8][3];
-    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    static const uint16_t label[4] = {0, 0, 1, 1};
-    static const struct scene_surface surface[2] = {{.object = "door", .material = "wood"},
-                                                    {.object = "wall", .material = "plaster"}};
-    struct scene *scene;
-    struct sh_err err;
-    for (int v = 0; v < 8; v++) {
-        int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
-        vertex[v][0] = right ? (back ? 5.0 : 0.0) : -5.0;
-        vertex[v][1] = 20.0 + back * step_m;
-        vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
-    }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, label, surface, 2}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
-}
-
 /* Steps go from less than a millimetre to more than the resolution. Up to it there is one echo at the energy-weighted
  * mean of both surfaces, beyond it two, for each pulse across the edge. The outlines take up to half a millimetre for
  * no step, and the mean there is wrong by at most half of the step. */
@@ -239,7 +199,7 @@ static void test_door_edge(void **state)
     for (size_t k = 0; k < sizeof step_m / sizeof step_m[0]; k++) {
         struct beam_rig rig;
         uint32_t several = 0;
-        open_rig(&rig, door(step_m[k]), &view);
+        made_beam_rig(&rig, made_door(step_m[k]), &view);
         beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
         for (uint32_t l = 0; l < view.lines; l++) {
             beam_rig_directions(&rig, l, d[0], d[1], d[2]);
@@ -273,7 +233,7 @@ static void test_selection(void **state)
     const struct beam_view view = {0.0, 0.01, -0.03, 0.03, 60, 16};
     struct beam_rig rig;
     uint32_t several = 0;
-    open_rig(&rig, door(1.0), &view);
+    made_beam_rig(&rig, made_door(1.0), &view);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < view.lines; l++) {
         uint32_t range[4][32] = {{0}}, first[17] = {0};

@@ -1,18 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Points do not depend on how a line is cut into runs: a tick or a thread may take any part of it. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "tests/common/generate.h"
 #include "core/rng.h"
 #include "core/surface.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 
 static const double STATION[3] = {0.0, 0.0, 0.0};
 static const struct beam_view VIEW = {-20.0, 20.0, -45.0, 45.0, 6, 3000};
@@ -32,7 +29,7 @@ static void open_rig(struct beam_rig *rig)
                                        .label = (uint16_t)(k % 3 == 0 ? GLASS : GLASS + 1)};
     }
     if (generate_bars(bar, 48, 20.0, &scene, &err) != 0) fail_msg("%s", err.text);
-    if (beam_rig_open(rig, scene, STATION, &VIEW, &err) != 0) fail_msg("%s", err.text);
+    made_beam_rig(rig, scene, &VIEW);
 }
 
 struct points {
@@ -137,12 +134,9 @@ static void within_floats_of_an_edge(void **state)
                                  {-40, 128, -9}, {40, 128, -9}, {40, 128, 9}, {-40, 128, 9}};
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
     struct beam_rig rig;
-    struct scene *scene;
-    struct sh_err err;
     uint64_t pulses = 0, sides[2] = {0};
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    if (beam_rig_open(&rig, scene, STATION, &view, &err) != 0) fail_msg("%s", err.text);
+    struct scene *scene = made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0});
+    made_beam_rig(&rig, scene, &view);
     for (uint32_t l = 0; l < view.lines; l++) {
         beam_rig_mode(&rig, BEAM_SINGLE, 0);
         beam_rig_line(&rig, l);
@@ -177,11 +171,8 @@ static void a_wire_in_the_sky_behind_an_edge(void **state)
                                      {x, 50, -0.05}, {x + w, 50, -0.05}, {to + w, 50, 0.05}, {to, 50, 0.05}};
         static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
         struct beam_rig rig;
-        struct scene *scene;
-        struct sh_err err;
-        if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
-            fail_msg("%s", err.text);
-        if (beam_rig_open(&rig, scene, STATION, &view, &err) != 0) fail_msg("%s", err.text);
+        struct scene *scene = made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0});
+        made_beam_rig(&rig, scene, &view);
         beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
         for (uint32_t l = 0; l < view.lines; l++) {
             beam_rig_directions(&rig, l, d[0], d[1], d[2]);

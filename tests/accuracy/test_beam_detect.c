@@ -55,19 +55,16 @@ static void of_a_crowd_the_strongest_signal_is_sent(void **state)
     static const enum beam_mode modes[] = {BEAM_ADAPTIVE, BEAM_RINGS};
     const double least = 0.05 / 400.0;
     struct lit l = {.near_m = 20.0, .far_m = 60.0, .rho = {0.2, 0.8}};
-    double d[3][16];
     open_lit(&l, plates(l.near_m, l.far_m, 1), &ACROSS, least);
     l.rig.setup.max_echoes = 1;
     for (int m = 0; m < 2; m++) {
         uint32_t sent[2] = {0}, against = 0;
         beam_rig_mode(&l.rig, modes[m], BEAM_MAX_RINGS);
         for (uint32_t line = 0; line < ACROSS.lines; line++) {
-            const struct line_block *b = &l.rig.block;
-            beam_rig_directions(&l.rig, line, d[0], d[1], d[2]);
-            beam_rig_line(&l.rig, line);
+            const struct line_block *b = lit_line(&l, line);
             assert_int_equal(b->n_points, ACROSS.pulses);
             for (uint32_t p = 0; p < ACROSS.pulses; p++) {
-                struct edge e = at_edge(&l, d[0][p], d[1][p]);
+                struct edge e = at_edge(&l, l.d[0][p], l.d[1][p]);
                 double a[2];
                 for (int k = FRONT; k <= BACK; k++)
                     a[k] = e.back[k] / (least * e.range_m[k] * e.range_m[k]);
@@ -95,18 +92,15 @@ static void a_mixed_pixel_leans_to_what_is_bright(void **state)
 {
     (void)state;
     struct lit l = {.near_m = 20.0, .far_m = 20.3, .rho = {0.1, 0.8}};
-    double d[3][16];
     uint32_t mixed = 0;
     open_lit(&l, plates(l.near_m, l.far_m, 1), &ACROSS, 0.0);
     beam_rig_mode(&l.rig, BEAM_ADAPTIVE, 4);
     for (uint32_t line = 0; line < ACROSS.lines; line++) {
-        const struct line_block *b = &l.rig.block;
-        beam_rig_directions(&l.rig, line, d[0], d[1], d[2]);
-        beam_rig_line(&l.rig, line);
+        const struct line_block *b = lit_line(&l, line);
         assert_int_equal(b->n_points, ACROSS.pulses);
         for (uint32_t p = 0; p < ACROSS.pulses; p++) {
-            struct edge e = at_edge(&l, d[0][p], d[1][p]);
-            double sum = e.back[FRONT] + e.back[BACK], want = e.range_m[FRONT] + 0.3 / d[1][p] * e.back[BACK] / sum;
+            struct edge e = at_edge(&l, l.d[0][p], l.d[1][p]);
+            double sum = e.back[FRONT] + e.back[BACK], want = e.range_m[FRONT] + 0.3 / l.d[1][p] * e.back[BACK] / sum;
             near_energy(linear(b, p), sum, 0.8, PARTS_OFF);
             /* the weights are off by a part in 1,000 of the footprint, eight times as bright as the darker plate */
             assert_true(fabs(1e-6 * b->a[p] - want) < 0.3 * 8e-3 + 1e-5);
@@ -126,20 +120,17 @@ static void an_echo_drops_out_by_itself(void **state)
     (void)state;
     const double least = 0.09 / 400.0;
     struct lit l = {.near_m = 20.0, .far_m = 23.0, .rho = {0.3, 0.5}};
-    double d[3][16];
     uint32_t count[3] = {0};
     struct cast_counters before, after;
     open_lit(&l, plates(l.near_m, l.far_m, 1), &ACROSS, least);
     beam_rig_mode(&l.rig, BEAM_ADAPTIVE, 4);
     for (uint32_t line = 0; line < ACROSS.lines; line++) {
-        const struct line_block *b = &l.rig.block;
         uint32_t faint = 0, unsure = 0;
-        beam_rig_directions(&l.rig, line, d[0], d[1], d[2]);
         caster_get_counters(l.rig.caster, &before);
-        beam_rig_line(&l.rig, line);
+        const struct line_block *b = lit_line(&l, line);
         caster_get_counters(l.rig.caster, &after);
         for (uint32_t p = 0, i = 0; p < ACROSS.pulses; p++) {
-            struct edge e = at_edge(&l, d[0][p], d[1][p]);
+            struct edge e = at_edge(&l, l.d[0][p], l.d[1][p]);
             uint32_t n = b->echo[i] >> 4, first = i, want = 0;
             i += n == 0 ? 1 : n;
             for (uint32_t k = FRONT; k <= BACK; k++) {

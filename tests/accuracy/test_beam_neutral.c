@@ -47,7 +47,7 @@ static void nothing_asked_for_changes_nothing(void **state)
                                            .quat = {cos(0.1), 0.0, 0.0, sin(0.1)}}}}; /* the last mode's head moves */
     uint64_t several = 0, none = 0;
     struct beam_rig rig;
-    open_rig(&rig, railing(), &view);
+    made_beam_rig(&rig, railing(), &view);
     rig.setup.range_max_m = 22.0;
     rig.setup.noise_on = 1;
     rig.setup.range_sigma_m = 0.003;
@@ -88,7 +88,7 @@ static void selection_keeps_the_noise(void **state)
     const struct beam_view view = {-20.0, 20.0, -45.0, 45.0, 4, 3000};
     uint64_t several = 0;
     struct beam_rig rig;
-    open_rig(&rig, railing(), &view);
+    made_beam_rig(&rig, railing(), &view);
     rig.setup.noise_on = 1;
     rig.setup.range_sigma_m = 0.003;
     rig.setup.noise_key = rng_key(7, RNG_RANGE);

@@ -9,7 +9,6 @@ static void a_footprint_on_the_border_of_glass(void **state)
     (void)state;
     struct lit l = {.near_m = 20.0, .far_m = 23.0, .rho = {0.1, 0.5}};
     static const enum beam_mode modes[] = {BEAM_ADAPTIVE, BEAM_RINGS};
-    double d[3][16];
     open_lit(&l, plates(l.near_m, l.far_m, 1), &ACROSS, 0.0);
     l.table.surface[FRONT].glass = 0.8;
     l.table.has_optics = 1;
@@ -19,16 +18,14 @@ static void a_footprint_on_the_border_of_glass(void **state)
         l.detect.signal = m < 2 ? &l.signal : NULL;
         beam_rig_mode(&l.rig, modes[m % 2], BEAM_MAX_RINGS);
         for (uint32_t line = 0; line < ACROSS.lines; line++) {
-            const struct line_block *b = &l.rig.block;
-            beam_rig_directions(&l.rig, line, d[0], d[1], d[2]);
-            beam_rig_line(&l.rig, line);
+            const struct line_block *b = lit_line(&l, line);
             for (uint32_t p = 0, i = 0; p < ACROSS.pulses; p++) {
-                struct edge e = at_edge(&l, d[0][p], d[1][p]);
+                struct edge e = at_edge(&l, l.d[0][p], l.d[1][p]);
                 uint32_t n = b->echo[i] >> 4, first = i;
                 i += n;
                 if (fabs(e.front - 0.01) > 0.002) assert_int_equal(n, e.front > 0.01 ? 2 : 1);
                 assert_int_equal(b->label[i - 1], BACK);
-                double wall = (1.0 - e.front + 0.64 * e.front) * 0.5 * d[1][p];
+                double wall = (1.0 - e.front + 0.64 * e.front) * 0.5 * l.d[1][p];
                 several += n == 2;
                 pure += e.front > 0.999;
                 if (m >= 2) continue;
@@ -60,7 +57,6 @@ static void surfaces_mix_within_a_plane(void **state)
 {
     (void)state;
     static const double gap_m[] = {0.0, 1e-7};
-    double d[3][16];
     for (int free_edge = 0; free_edge < 2; free_edge++)
         for (int same = 0; same < 2; same++) {
             struct lit l = {.near_m = 20.0, .far_m = 20.0 + gap_m[free_edge], .rho = {0.1, same ? 0.1 : 0.8}};
@@ -70,12 +66,10 @@ static void surfaces_mix_within_a_plane(void **state)
             outline_kinds(&l);
             beam_rig_mode(&l.rig, BEAM_ADAPTIVE, 4);
             for (uint32_t line = 0; line < ACROSS.lines; line++) {
-                const struct line_block *b = &l.rig.block;
-                beam_rig_directions(&l.rig, line, d[0], d[1], d[2]);
-                beam_rig_line(&l.rig, line);
+                const struct line_block *b = lit_line(&l, line);
                 assert_int_equal(b->n_points, ACROSS.pulses);
                 for (uint32_t p = 0; p < ACROSS.pulses; p++) {
-                    struct edge e = at_edge(&l, d[0][p], d[1][p]);
+                    struct edge e = at_edge(&l, l.d[0][p], l.d[1][p]);
                     near_energy(linear(b, p), e.back[FRONT] + e.back[BACK], 0.8, PARTS_OFF);
                     mixed += e.front > 0.05 && e.front < 0.95;
                 }
@@ -96,8 +90,6 @@ static struct scene *mirror_and_two_walls(void)
     static const uint16_t label[6] = {FRONT, FRONT, BACK, BACK, BACK, BACK};
     static const struct scene_surface surface[2] = {{.object = "front"}, {.object = "back"}};
     static const double y[] = {20.0, 23.0, -12.0};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 12; v++) {
         int right = v % 4 == 1 || v % 4 == 2;
         vertex[v][0] = right ? (v < 4 ? 0.0 : 5.0) : -5.0;
@@ -107,16 +99,13 @@ static struct scene *mirror_and_two_walls(void)
     for (uint32_t t = 0; t < 6; t++)
         for (uint32_t v = 0; v < 3; v++)
             triangle[t][v] = t / 2 * 4 + (v == 0 ? 0 : v + t % 2);
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6,
-                                                 label, surface, 2},
-                          &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(
+        &(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6, label, surface, 2});
 }
 
 /* All light of a footprint that lies on surfaces comes back. Pulse 0 of line 30 goes along an axis of the scene, to the
  * digit. Some of its sub-rays have a component of about -1e-22, which must not harm those that are packed with them
- * (core/bvh/refine.c). */
+ * (embree_direction in core/embree.h). */
 static void no_light_is_lost(void **state)
 {
     (void)state;
@@ -140,7 +129,6 @@ static void a_footprint_on_the_border_of_a_mirror(void **state)
 {
     (void)state;
     struct lit l = {.near_m = 20.0, .far_m = 23.0, .rho = {0.0, 0.5}};
-    double d[3][16];
     uint32_t several = 0, pure = 0;
     open_lit(&l, mirror_and_two_walls(), &ACROSS, 0.0);
     l.table.surface[FRONT].mirror = 0.8;
@@ -148,17 +136,15 @@ static void a_footprint_on_the_border_of_a_mirror(void **state)
     l.detect.depth = 2;
     beam_rig_mode(&l.rig, BEAM_ADAPTIVE, BEAM_MAX_RINGS);
     for (uint32_t line = 0; line < ACROSS.lines; line++) {
-        const struct line_block *b = &l.rig.block;
-        beam_rig_directions(&l.rig, line, d[0], d[1], d[2]);
-        beam_rig_line(&l.rig, line);
+        const struct line_block *b = lit_line(&l, line);
         for (uint32_t p = 0, i = 0; p < ACROSS.pulses; p++) {
-            struct edge e = at_edge(&l, d[0][p], d[1][p]);
+            struct edge e = at_edge(&l, l.d[0][p], l.d[1][p]);
             uint32_t n = b->echo[i] >> 4;
             for (uint32_t end = i + n; i < end; i++) {
                 int ghost = b->label[i] == 2 + BACK;
                 assert_true(ghost || b->label[i] == BACK);
-                near_energy(linear(b, i), ghost ? 0.64 * e.front * 0.5 * d[1][p] : e.back[BACK], 0.5, RINGS_OFF);
-                assert_true(fabs(1e-6 * b->a[i] - (ghost ? 52.0 : 23.0) / d[1][p]) < 5e-4);
+                near_energy(linear(b, i), ghost ? 0.64 * e.front * 0.5 * l.d[1][p] : e.back[BACK], 0.5, RINGS_OFF);
+                assert_true(fabs(1e-6 * b->a[i] - (ghost ? 52.0 : 23.0) / l.d[1][p]) < 5e-4);
             }
             several += n == 2;
             pure += n == 1 && b->label[i - 1] == 2 + BACK;

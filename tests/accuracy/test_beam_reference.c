@@ -1,16 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* The beam against 1,000 sub-rays a pulse. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 #include "tests/common/generate.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
@@ -19,13 +16,6 @@
 #else
 #define SHARE ((uint32_t)thorough(1, 5))
 #endif
-
-static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
-{
-    static const double station_m[3] = {0.0, 0.0, 0.0};
-    struct sh_err err;
-    if (beam_rig_open(rig, scene, station_m, view, &err) != 0) fail_msg("%s", err.text);
-}
 
 /* Bars that 1,000 sub-rays are needed for, where a footprint can reach one. */
 struct bars {
@@ -165,7 +155,7 @@ static void test_wires_are_seen(void **state)
     struct beam_rig rig;
     struct sh_err err;
     if (generate_bars(bar, n, 150.0, &scene, &err) != 0) fail_msg("%s", err.text);
-    open_rig(&rig, scene, &view);
+    made_beam_rig(&rig, scene, &view);
     double *d = malloc(3 * view.pulses * sizeof *d);
     for (uint32_t l = 0; l < view.lines; l += SHARE) {
         beam_rig_directions(&rig, l, d, d + view.pulses, d + 2 * view.pulses);
@@ -214,7 +204,7 @@ static void test_wires_against_rings(void **state)
     struct sh_err err;
     struct cast_counters before, after;
     if (generate_bars(bars.at, bars.n, 150.0, &scene, &err) != 0) fail_msg("%s", err.text);
-    open_rig(&rig, scene, &view);
+    made_beam_rig(&rig, scene, &view);
     against_reference(&rig, &view, SHARE, &bars, &adaptive, &rings);
     print_tally("wires, adaptive", &adaptive);
     print_tally("wires, 61 sub-rays", &rings);
@@ -240,7 +230,7 @@ static void test_foliage(void **state)
     struct beam_rig rig;
     struct sh_err err;
     if (generate_foliage(crown, 2, 60.0, 1, &scene, &err) != 0) fail_msg("%s", err.text);
-    open_rig(&rig, scene, &view);
+    made_beam_rig(&rig, scene, &view);
     caster_get_counters(rig.caster, &before);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < view.lines; l++)

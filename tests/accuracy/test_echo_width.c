@@ -167,7 +167,6 @@ static void slanted_behind_glass_and_in_motion(void **state)
         struct lit l = {.near_m = 20.0, .far_m = 20.0, .rho = {0.2, 0.5}};
         struct face face;
         struct sh_err err;
-        struct bvh *body = NULL;
         double d[3][4], mean, variance;
         struct scene *wall =
             slanted(range_m, slant, 0.7, (const double[]){-9.0, 9.0}, (const double[]){-9.0, 9.0}, &face);
@@ -175,16 +174,15 @@ static void slanted_behind_glass_and_in_motion(void **state)
         static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
         static const uint16_t label[4] = {BACK, BACK, FRONT, FRONT};
         static const struct scene_surface surface[2] = {{.object = "pane"}, {.object = "wall"}};
-        struct scene *both;
         for (int v = 0; v < 8; v++) { /* the pane beside the beam, or in it */
             double side = v % 4 == 1 || v % 4 == 2 ? 1.0 : -1.0, up = v % 4 >= 2 ? 1.0 : -1.0;
             const double pane[3] = {side + (moving ? 8.0 : 0.0), 20.0, up};
             memcpy(vertex[v], v < 4 ? wall->vertex_m[v] : pane, sizeof vertex[v]);
         }
-        if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex + (moving ? 4 : 0), moving ? 4 : 8,
-                                                     triangle, moving ? 2 : 4, moving ? label + 2 : label, surface, 2},
-                              &both, &err) != 0)
-            fail_msg("%s", err.text);
+        struct bvh *body = moving ? made_bvh(wall) : NULL;
+        struct scene *both =
+            made_scene(&(struct scene_arrays){(const double(*)[3])vertex + (moving ? 4 : 0), moving ? 4 : 8, triangle,
+                                              moving ? 2 : 4, moving ? label + 2 : label, surface, 2});
         open_lit(&l, both, &AHEAD, 1e-9);
         beam_init(&l.rig.beam.beam, 0.007, 0.35e-3, 0.4e-9);
         if (line_block_alloc_attributes(&l.rig.block, &err) != 0) fail_msg("%s", err.text);
@@ -194,7 +192,6 @@ static void slanted_behind_glass_and_in_motion(void **state)
         l.rig.setup.pulse_m = l.detect.separation_m = l.rig.beam.beam.resolution_m;
         if (moving) {
             struct cast_mover *m = &l.rig.setup.mover[0];
-            if (bvh_create(wall, 1, NULL, &body, &err) != 0) fail_msg("%s", err.text);
             *m = (struct cast_mover){.bvh = body, .centre_m = {0.0, range_m, 0.0}, .radius_m = 20.0};
             pose_heading(0.0, m->rotation);
             l.rig.setup.n_movers = 1;

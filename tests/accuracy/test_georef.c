@@ -2,16 +2,12 @@
 /* Georeferencing at 200 places all over the Earth. Exact figures are compared with definitions in long double
  * (tests/common/geodesy.h), and every order's error with its bound. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <cmocka.h>
 
 #include "core/plan.h"
 #include "tests/accuracy/stations.h"
+#include "tests/common/cases.h"
 #include "tests/common/geodesy.h"
 
 static struct georef *make(int i, enum georef_crs crs)

@@ -3,20 +3,16 @@
  * 20,000 points each with THOROUGH=1 and 5,000 else, compared with GeographicLib point by point. The test also compares
  * the cost. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include <cmocka.h>
 
 #include "core/geoframe.h"
 #include "core/locate.h"
 #include "core/plan.h"
 #include "tests/accuracy/stations.h"
+#include "tests/common/cases.h"
 #include "tests/common/geodesy.h"
 #include "tests/common/thorough.h"
 

@@ -4,20 +4,17 @@
  * itself. All else is compared with a run with exact planes, the deepest way through glass, and georeferencing point by
  * point. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/site/plan_rows.h"
 #include "tests/common/aimed.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 
 /* SH_SANITIZE: sanitizers are for the code, not for the count. */
@@ -263,20 +260,6 @@ static void test_glass(void **state)
     check_plan("config/glass.yaml", 0, 1);
 }
 
-/* Half of the view is at 20 m, the other half deeper by a step. */
-static struct scene *step_edge(double step_m)
-{
-    const double y = 20 + step_m;
-    const double vertex[8][3] = {{-5, 20, -5}, {0, 20, -5}, {0, 20, 5}, {-5, 20, 5},
-                                 {-5, y, -5},  {5, y, -5},  {5, y, 5},  {-5, y, 5}};
-    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
-}
-
 /* Returns where just 1 % of the energy is on the edge's far side, in radii from the centre. */
 static double threshold(const struct beam *beam)
 {
@@ -296,13 +279,13 @@ static double threshold(const struct beam *beam)
 static void test_figures(void **state)
 {
     (void)state;
-    static const double station_m[3] = {0.0, 0.0, 0.0}, range_m = 20.0, pan_deg = 0.5;
+    static const double range_m = 20.0, pan_deg = 0.5;
     const struct beam_view view = {-1.0, 1.0, -0.5, 0.5, 1000, 1000};
     struct beam_rig rig;
     struct sh_err err;
     struct plan_sample *sample;
     struct plan_option single, adaptive, rings;
-    assert_int_equal(beam_rig_open(&rig, step_edge(1.0), station_m, &view, &err), SH_OK);
+    made_beam_rig(&rig, made_door(1.0), &view);
     const struct beam *beam = &rig.beam.beam;
     double strip = threshold(beam) * beam_radius(beam, range_m) / range_m, share = strip / (pan_deg * M_PI / 180.0);
     struct plan_place place = {
@@ -333,7 +316,7 @@ static void test_figures(void **state)
 static void test_small_steps(void **state)
 {
     (void)state;
-    static const double station_m[3] = {0.0, 0.0, 0.0}, range_m = 20.0, pan_deg = 0.5, step_m = 0.004;
+    static const double range_m = 20.0, pan_deg = 0.5, step_m = 0.004;
     enum { PARTS = 1000, DRAWN = 32768 };
     const struct beam_view view = {-1.0, 1.0, -0.5, 0.5, 1000, 1000};
     struct beam_rig rig;
@@ -341,7 +324,7 @@ static void test_small_steps(void **state)
     struct plan_sample *sample;
     struct plan_option single;
     double sum2 = 0.0, sum4 = 0.0, energy, moment;
-    assert_int_equal(beam_rig_open(&rig, step_edge(step_m), station_m, &view, &err), SH_OK);
+    made_beam_rig(&rig, made_door(step_m), &view);
     const struct beam *beam = &rig.beam.beam;
     for (int i = 0; i < PARTS; i++) {
         beam_half(beam, (i + 0.5) / PARTS, &energy, &moment);

@@ -3,19 +3,16 @@
  */
 #include <math.h>
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 #include "core/cast.h"
 #include "tests/common/hits.h"
 #include "tests/common/generate.h"
 #include "core/rng.h"
+#include "tests/common/made.h"
 #include "tests/common/reference.h"
 #include "tests/common/sight_beside.h"
 #include "tests/common/thorough.h"
@@ -152,10 +149,9 @@ static void scan(const struct scene *scene, const double station_m[3], uint32_t 
 {
     struct tally sum = {.nearest_m = INFINITY};
     struct sh_err err;
-    struct bvh *bvh;
     struct job *job[THREADS];
     pthread_t thread[THREADS];
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(scene);
     struct reference *reference = reference_create((const double(*)[3])scene->vertex_m,
                                                    (const uint32_t(*)[3])scene->triangle, scene->n_triangles);
     assert_non_null(reference);
@@ -282,8 +278,6 @@ static struct scene *make_room(const double offset_m[3])
     double vertex[6 * (CELLS + 1) * (CELLS + 1)][3];
     uint32_t triangle[12 * CELLS * CELLS][3], nv = 0, nt = 0;
     const double size_m[3] = {8.2, 6.3, 2.9};
-    struct scene *scene;
-    struct sh_err err;
     for (int side = 0; side < 6; side++) {
         int across = side % 3, a = (across + 1) % 3, b = (across + 2) % 3;
         uint32_t base = nv, row = CELLS + 1;
@@ -299,11 +293,8 @@ static struct scene *make_room(const double offset_m[3])
             nt += 2;
         }
     }
-    assert_int_equal(scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, nv,
-                                                              (const uint32_t(*)[3])triangle, nt, NULL, NULL, 0},
-                                       &scene, &err),
-                     SH_OK);
-    return scene;
+    return made_scene(
+        &(struct scene_arrays){(const double(*)[3])vertex, nv, (const uint32_t(*)[3])triangle, nt, NULL, NULL, 0});
 }
 
 static void test_room(void **state)

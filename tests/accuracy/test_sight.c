@@ -4,13 +4,9 @@
  * SIGHT_SCENES: how many scenes (default 400, THOROUGH=1: 1000). SIGHT_FIRST: the number of the first (0). SIGHT_RAYS:
  * rays from each station (1024). make test-sight: 50,000 scenes. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/rng.h"
 #include "core/vec3.h"

@@ -4,15 +4,12 @@
  *
  * SIGHT_RAYS: rays of each kind in each scene (default 1000; 125000: a million in all). */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "tests/common/generate.h"
+#include "tests/common/made.h"
 #include "tests/common/odd_rays.h"
 #include "tests/common/reference.h"
 #include "tests/common/sight_beside.h"
@@ -86,14 +83,13 @@ static void look_at(const struct scene *scene, const double station_m[3], const 
 {
     static struct look look;
     struct sh_err err;
-    struct bvh *bvh;
     struct sight_spec spec = {.rays = 1e6, .memory_bytes = 64 << 20};
     struct reference *reference = reference_create((const double(*)[3])scene->vertex_m,
                                                    (const uint32_t(*)[3])scene->triangle, scene->n_triangles);
     assert_non_null(reference);
     look.reference = reference;
     memcpy(spec.station_m, station_m, sizeof spec.station_m);
-    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
+    struct bvh *bvh = made_bvh(scene);
     spec.bvh = bvh;
     assert_int_equal(sight_beside_create(&spec, &look.beside, &err), SH_OK);
     struct odd_rays odd = {.scene = scene, .cells = look.beside.info.cells, .random = 99};

@@ -65,19 +65,19 @@ static void angles(void)
 }
 static void even(void)
 {
-    kernel_sweep(&steps, &sweep, rotation, &d);
+    kernel_sweep(&steps, &sweep, rotation, &d, NULL);
 }
 static void even_read(void)
 {
-    kernel_sweep_read(&steps, &sweep, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
+    kernel_sweep(&steps, &sweep, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
 }
 static void one_by_one(void)
 {
-    kernel_directions(&turns, rotation, &d);
+    kernel_directions(&turns, rotation, &d, NULL);
 }
 static void one_by_one_read(void)
 {
-    kernel_directions_read(&turns, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
+    kernel_directions(&turns, rotation, &d, &(struct kernel_reading){&setup, mat3_unit, e});
 }
 static void limits(void)
 {

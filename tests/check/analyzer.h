@@ -23,7 +23,7 @@
 
 #ifdef IN_SCENE
 #include "core/ply.h"
-#include "core/scene/build.h"
+#include "core/scene/build_say.h"
 
 #ifndef DEFINES_build_fail
 #define build_fail(b, code, err, ...) ((void)(build_fail)((b), (code), (err), __VA_ARGS__), (code))

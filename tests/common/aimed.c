@@ -9,6 +9,6 @@ void aimed_directions(const struct schedule_run *run, const double rotation[9], 
 {
     double *mirror = malloc(2 * run->n * sizeof *mirror), *pan = mirror + run->n;
     (run->firing != NULL ? kernel_angles_table : kernel_angles)(run, 0, run->n, mirror, pan);
-    kernel_directions(&(struct kernel_turns){run->n, mirror, pan}, rotation, d);
+    kernel_directions(&(struct kernel_turns){run->n, mirror, pan}, rotation, d, NULL);
     free(mirror);
 }

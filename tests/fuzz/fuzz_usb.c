@@ -85,16 +85,15 @@ static void serve(struct host *host, unsigned how)
     const struct usb_session_row *row =
         &host->head.personality->session[how % (unsigned)host->head.personality->n_sessions];
     uint8_t bytes[1500];
-    uint32_t epoch = 0;
     memset(bytes, 'x', sizeof bytes);
-    const size_t waits = usb_device_can_read(host->head.device, row->out, &epoch);
+    const size_t waits = usb_device_can_read(host->head.device, row->out, NULL);
     const size_t n = usb_device_read(host->head.device, row->out, bytes, sizeof bytes);
     fuzz_must(n <= sizeof bytes && (n > 0 || waits == 0), "what waits is read");
     const size_t len = 1 + how * 7 % sizeof bytes;
     const size_t wrote = usb_device_write(host->head.device, row->in, bytes, len);
     fuzz_must(wrote <= len, "no more is written than given");
     if (how & 1) usb_device_next_epoch(host->head.device, row->out);
-    if (how & 2) usb_device_drop(host->head.device, row->out, epoch);
+    if (how & 2) usb_device_drop(host->head.device, row->out);
     scanhead_usb_update(&host->head);
     scanhead_usb_cut(&host->head);
     if (how & 4) scanhead_usb_ended(&host->head, (int)(how % (unsigned)host->head.personality->n_sessions));

@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "drivers/usb/head_device.h"
-#include "drivers/usb/usbip_conn.h"
+#include "drivers/usb/usbip_private.h"
 #include "tests/fuzz/rig.h"
 
 enum { PIECE = 4096 };
@@ -18,6 +18,8 @@ static int go_on(void *ctx)
     (void)ctx;
     return 1;
 }
+
+static const struct usb_owner owner = {.go_on = go_on};
 
 static void serve(struct scanhead_usb *head)
 {
@@ -45,9 +47,9 @@ static void talk(struct usbip_conn *conn, int peer, struct scanhead_usb *head, s
         const uint8_t *bytes = fuzz_take(in, PIECE, &n);
         if (send(peer, bytes, n, MSG_DONTWAIT | MSG_NOSIGNAL) != (ssize_t)n) return;
         for (int turn = 0; turn < 4 && !conn->broken; turn++) {
-            usbip_conn_read(conn, go_on, NULL);
+            usbip_conn_read(conn, &owner);
             serve(head);
-            usbip_conn_answer_slow(conn, go_on, NULL);
+            usbip_conn_answer_slow(conn, &owner);
             if (!conn->broken) usbip_conn_write(conn);
             drain(peer);
         }

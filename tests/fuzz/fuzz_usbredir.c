@@ -23,6 +23,13 @@ static int go_on(void *ctx)
     return 1;
 }
 
+static void ignore(void *ctx, const char *text)
+{
+    (void)ctx, (void)text;
+}
+
+static const struct usb_owner owner = {go_on, ignore, ignore, NULL};
+
 static int connect_to(const char *path)
 {
     struct sockaddr_un at = {.sun_family = AF_UNIX};
@@ -38,7 +45,7 @@ static void turn(const struct usb_backend_ops *ops, void *backend, struct scanhe
     uint8_t bytes[600];
     const int n = ops->prepare(backend, fds);
     poll(fds, (nfds_t)n, 0);
-    ops->handle(backend, fds, n, go_on, NULL);
+    ops->handle(backend, fds, n, &owner);
     for (int i = 0; i < head->personality->n_sessions; i++) {
         const struct usb_session_row *row = &head->personality->session[i];
         const size_t got = usb_device_read(head->device, row->out, bytes, sizeof bytes);

@@ -182,6 +182,7 @@ export async function testInstrument(browser) {
     }
     await choose(page, '#limit-high', '-1000');
     is((await page.eval('document.querySelector("#limit-says").textContent')).includes('lower'), 'limits the wrong way round are refused');
+    equal(await page.eval('document.querySelector("#limit-high").getAttribute("aria-invalid")'), 'true', 'and marked');
     await choose(page, '#limits', '0');
     const legend = await page.until('typeof scanhead.view.legend().from === "number" && scanhead.view.legend()');
     is(legend.from <= min[2] && legend.to >= max[2] - 1e-6, `all points: ${legend.from} to ${legend.to}`);

@@ -100,7 +100,9 @@ export async function testTools(browser, url, points) {
     near(Math.hypot(x - max_at[0], y - max_at[1], z - max_at[2]), 0, 2e-6, 'the point of the page less that of the head, as floats');
     const seen = await place(page, max_at), middle = await page.eval('[scanhead.view.camera.width / 2, scanhead.view.camera.height / 2]');
     near(Math.hypot(...seen.map((v, k) => v - middle[k])), 0, 1, 'pixels from the middle');
-    is((await page.eval(`document.querySelector('#point').textContent`)).includes('Range'), 'its figures are shown');
+    const card = await page.until(`(({hidden, textContent}) => !hidden && textContent)(document.querySelector('#point'))`);
+    const largest = await page.eval(`document.querySelector('#figure-dev-max').textContent`);
+    is(card.includes('Range') && card.includes(`Deviation${largest}`), `its figures are shown, with ${largest}: ${card}`);
     await page.eval(`Object.assign(scanhead.view.camera, ${JSON.stringify(before)}), scanhead.view.pointed.mark(null), scanhead.view.cameraMoved()`);
   });
 
@@ -119,6 +121,14 @@ export async function testTools(browser, url, points) {
     await page.until(`Math.abs(scanhead.view.camera.section.from_m - ${from + 0.05}) < 1e-9`, 'its bottom is 5 cm higher');
     near(Number(await page.eval('document.querySelector("#section-from").value')), from + 0.05, 5e-4, 'the field has it');
     await page.until(`Math.abs(document.querySelector("#handle-bottom").getAttribute("aria-valuenow") - ${from + 0.05}) < 1e-3`, 'the handle says it');
+    await page.fill('#section-from', -0.5);
+    const field = await page.where('#section-from');
+    for (const clickCount of [1, 2]) {
+      for (const [type, buttons] of [['mousePressed', 1], ['mouseReleased', 0]]) await page.mouse(type, field, buttons, {clickCount});
+    }
+    await page.send('Input.insertText', {text: '-0.1'});
+    await page.key('Enter');
+    near(await page.eval('scanhead.view.camera.section.from_m'), -0.1, 1e-9, 'a double click takes the sign, too');
     await page.click('#section-off');
     equal(await page.eval('scanhead.view.camera.section'), null, 'switched off');
     await page.key('Escape');

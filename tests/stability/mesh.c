@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/rng.h"
+#include "tests/common/made.h"
 #include "tests/stability/table.h"
 
 static void *grown(void *array, uint32_t *capacity, uint32_t need, size_t size)
@@ -197,14 +198,9 @@ void mesh_any_rotation(double r[9])
 struct scene *mesh_scene(const struct mesh *mesh)
 {
     struct scene_surface surface[MESH_LABELS] = {{.object = ""}};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])mesh->vertex, mesh->n_vertices,
-                                                 (const uint32_t(*)[3])mesh->triangle, mesh->n_triangles, mesh->label,
-                                                 surface, MESH_LABELS},
-                          &scene, &err) != SH_OK)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])mesh->vertex, mesh->n_vertices,
+                                             (const uint32_t(*)[3])mesh->triangle, mesh->n_triangles, mesh->label,
+                                             surface, MESH_LABELS});
 }
 
 void mesh_free(struct mesh *mesh)

@@ -6,11 +6,7 @@
 #ifndef TESTS_STABILITY_TABLE_H
 #define TESTS_STABILITY_TABLE_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
+#include "tests/common/cases.h"
 
 /* Prints the column heads; call it once per program. */
 void table_head(const char *title);

@@ -13,7 +13,7 @@
 #include "core/bvh.h"
 #include "core/rng.h"
 #include "core/vec3.h"
-#include "tests/common/cases.h"
+#include "tests/common/made.h"
 #include "tests/common/odd_judge.h"
 #include "tests/common/odd_rays.h"
 #include "tests/common/odd_scenes.h"
@@ -132,14 +132,12 @@ static void one_scene(uint64_t number, struct tally tally[PLACES])
     struct sh_err err;
     struct odd_scene odd;
     struct scene *scene;
-    struct bvh *bvh;
-    struct bvh_work *work;
     uint64_t random = rng_mix(number + 0x417) | 1;
     odd_scene_make(number, 5 + (uint32_t)case_between(&random, 0, 55), &odd);
     if (number % 3 == 2) move_to_utm(&odd);
     if (odd_scene_build(&odd, number / 2 % 2, &scene, &err) != SH_OK) return; /* all without area */
-    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
-    assert_int_equal(bvh_work_create(&work, &err), SH_OK);
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
     struct reference *reference = reference_create((const double(*)[3])scene->vertex_m,
                                                    (const uint32_t(*)[3])scene->triangle, scene->n_triangles);
     assert_non_null(reference);

@@ -7,6 +7,7 @@
 
 #include "tests/common/generate.h"
 #include "tests/common/beam_reference.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 #include "tests/stability/table.h"
 
@@ -50,9 +51,8 @@ static void wrong_counts(struct beam_rig *rig, const struct beam_view *view, dou
 static void row(const char *regime, struct scene *scene, const struct beam_view *view)
 {
     struct beam_rig rig;
-    struct sh_err err;
     double percent[2];
-    if (beam_rig_open(&rig, scene, STATION_M, view, &err) != 0) fail_msg("%s", err.text);
+    made_beam_rig(&rig, scene, view);
     wrong_counts(&rig, view, percent);
     table_row(regime, "37 sub-rays", percent[0], percent[1], 3.0, "%");
     beam_rig_close(&rig);

@@ -9,16 +9,11 @@
 
 #include "tests/common/beam_reference.h"
 #include "tests/common/hits.h"
+#include "tests/common/made.h"
 #include "tests/stability/table.h"
 
 enum { NAIVE_RINGS = 3, NAIVE_ROOM = 64 };
 static const double STATION_M[3] = {0.0, 0.0, 0.0}, BIN_M = 0.5 * 299792458.0 * 0.25e-9;
-
-static void open_rig(struct beam_rig *rig, struct scene *scene, const struct beam_view *view)
-{
-    struct sh_err err;
-    if (beam_rig_open(rig, scene, STATION_M, view, &err) != 0) fail_msg("%s", err.text);
-}
 
 /* Sorts 37 sub-rays into bins of 0.25 ns. Returns the energy-weighted mean of the bins up to limit_m after the
  * first. */
@@ -56,11 +51,7 @@ static struct scene *ground(double height_m)
     const double far_m = 3000.0, z = -height_m;
     const double vertex[4][3] = {{-far_m, -far_m, z}, {far_m, -far_m, z}, {far_m, far_m, z}, {-far_m, far_m, z}};
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0});
 }
 
 struct off {
@@ -78,7 +69,7 @@ static struct off off_on_ground(double height_m, double incidence_deg)
     struct beam_rig rig;
     struct cast_counters counters;
     struct off off = {0};
-    open_rig(&rig, ground(height_m), &view);
+    made_beam_rig(&rig, ground(height_m), &view);
     beam_rings(NAIVE_RINGS, &pattern);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < view.lines; l++) {
@@ -119,25 +110,6 @@ static void one_ray_stands_for_the_ground(void **state)
 
 static const double DOOR_M = 20.0;
 
-/* The right half of the view is deeper by step_m. */
-static struct scene *door(double step_m)
-{
-    double vertex[8][3];
-    static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    struct scene *scene;
-    struct sh_err err;
-    for (int v = 0; v < 8; v++) {
-        int back = v / 4, right = v % 4 == 1 || v % 4 == 2;
-        vertex[v][0] = right ? (back ? 5.0 : 0.0) : -5.0;
-        vertex[v][1] = DOOR_M + back * step_m;
-        vertex[v][2] = v % 4 >= 2 ? 5.0 : -5.0;
-    }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, triangle, 4, NULL, NULL, 0}, &scene,
-                          &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
-}
-
 /* Returns the energy of the Gaussian footprint beyond a line h from its centre (in radii), as a sum over small
  * cells. */
 static double energy_beyond(double h)
@@ -168,7 +140,7 @@ static void look_at_edge(double step_m, struct edge *e)
     const struct beam_view view = {0.0, 0.001, -0.008, 0.008, EDGE_PULSES, 1};
     static struct beam_pattern pattern;
     struct beam_rig rig;
-    open_rig(&rig, door(step_m), &view);
+    made_beam_rig(&rig, made_door(step_m), &view);
     beam_rings(NAIVE_RINGS, &pattern);
     beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
     for (uint32_t l = 0; l < EDGE_PULSES; l++) {

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/surface.h"
+#include "tests/common/made.h"
 #include "tests/stability/rig.h"
 
 enum { PULSES = RIG_LINE_PULSES };
@@ -22,8 +23,6 @@ static struct scene *make_window(double away_m, double incidence_rad, const doub
     static const uint16_t label[6] = {0, 0, 0, 0, 1, 1};
     static const struct scene_surface surface[2] = {{.object = "pane"}, {.object = "wall"}};
     double vertex[12][3];
-    struct scene *scene;
-    struct sh_err err;
     for (int p = 0; p < 3; p++)
         for (int v = 0; v < 4; v++) {
             double across = v == 1 || v == 2 ? half_m : -half_m;
@@ -31,10 +30,7 @@ static struct scene *make_window(double away_m, double incidence_rad, const doub
             vertex[4 * p + v][1] = at[1] + away_m + behind[p] * c - across * s;
             vertex[4 * p + v][2] = at[2] + (v >= 2 ? half_m : -half_m);
         }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, triangle, 6, label, surface, 2},
-                          &scene, &err) != SH_OK)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 12, triangle, 6, label, surface, 2});
 }
 
 /* Writes the true ranges of the three surfaces along pulse i. */
@@ -57,14 +53,14 @@ static uint32_t wrong_of_ours(const struct scene *scene, double away_m, double i
     struct schedule_segment segment;
     struct schedule_line line;
     struct schedule_run run;
-    struct bvh *bvh;
     struct caster *caster;
     struct line_block block;
     struct surface_table table;
     struct sh_err err;
     uint32_t wrong = 0;
     rig_line_ahead(&segment, &line, &run);
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
+    struct bvh *bvh = made_bvh(scene);
+    if (caster_create(&caster, &err) != SH_OK ||
         line_block_alloc(&block, PULSES * (1 + CAST_MAX_DEPTH), &err) != SH_OK ||
         surface_table_alloc(2, &table, &err) != SH_OK)
         fail_msg("%s", err.text);

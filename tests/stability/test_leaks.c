@@ -11,6 +11,7 @@
 
 #include "tests/common/hits.h"
 #include "tests/common/generate.h"
+#include "tests/common/made.h"
 #include "tests/common/sight_beside.h"
 #include "core/rng.h"
 #include "tests/common/thorough.h"
@@ -124,9 +125,8 @@ static struct leaks run(const struct cage *cage, enum aim aim, uint64_t n)
     struct sh_err err;
     struct job *job[THREADS];
     pthread_t thread[THREADS];
-    struct bvh *bvh;
     struct scene *scene = mesh_scene(&cage->mesh);
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(scene);
     struct naive *robust = naive_create(scene, cage->station_m, 1, 1),
                  *fast = naive_create(scene, cage->station_m, 0, 1);
     assert_true(robust != NULL && fast != NULL);

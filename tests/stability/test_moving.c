@@ -6,6 +6,7 @@
 
 #include "core/cast.h"
 #include "core/pose.h"
+#include "core/vec3.h"
 #include "tests/stability/rig.h"
 
 enum { LINES = 100, LINE_PULSES = 3000, KNOTS = 102 };
@@ -25,11 +26,6 @@ static void place(const struct pose *pose, const double socs[3], double range_m,
     pose_rotate(pose->quat, socs, out);
     for (int i = 0; i < 3; i++)
         out[i] = pose->position_m[i] + range_m * out[i];
-}
-
-static double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
 }
 
 struct ride {
@@ -57,15 +53,15 @@ static void look_at_line(const struct cast_setup *setup, const struct schedule_s
         struct reference_hit hit = reference_cast(reference, truth.position_m, dir);
         place(&truth, socs, (double)hit.range_m, want);
         place(&truth, socs, range_m, got);
-        ride->ours_m = fmax(ride->ours_m, distance(want, got));
+        ride->ours_m = fmax(ride->ours_m, vec3_distance(want, got));
         int64_t line_ns = line->begin_ns, tick_ns = t_ns - t_ns % 1000000;
         const struct pose_knot *l = &setup->knot[line_ns / knot_ns], *t = &setup->knot[tick_ns / knot_ns];
         pose_between(&l->pose, &l[1].pose, (double)(line_ns - l->t_ns) / (double)knot_ns, &of_line);
         pose_between(&t->pose, &t[1].pose, (double)(tick_ns - t->t_ns) / (double)knot_ns, &of_tick);
         place(&of_line, socs, range_m, got);
-        ride->line_m = fmax(ride->line_m, distance(want, got));
+        ride->line_m = fmax(ride->line_m, vec3_distance(want, got));
         place(&of_tick, socs, range_m, got);
-        ride->tick_m = fmax(ride->tick_m, distance(want, got));
+        ride->tick_m = fmax(ride->tick_m, vec3_distance(want, got));
     }
 }
 
@@ -148,9 +144,9 @@ static void test_between_samples(void **state)
         int i = (int)(t / 0.1);
         car_at(t, &want);
         trajectory_at(tr, t, &got, &frame);
-        cubic_m = fmax(cubic_m, distance(want.position_m, got.position_m));
+        cubic_m = fmax(cubic_m, vec3_distance(want.position_m, got.position_m));
         pose_between(&s[i].pose, &s[i + 1].pose, (t - s[i].t_s) / 0.1, &got);
-        chord_m = fmax(chord_m, distance(want.position_m, got.position_m));
+        chord_m = fmax(chord_m, vec3_distance(want.position_m, got.position_m));
     }
     trajectory_free(tr);
     table_row("trajectory of 10 Hz, the same car", "straight between samples", chord_m, cubic_m,

@@ -9,7 +9,7 @@
 
 #include "core/bvh.h"
 #include "core/vec3.h"
-#include "tests/common/cases.h"
+#include "tests/common/made.h"
 #include "tests/stability/mesh.h"
 
 enum { RAYS = BVH_CHUNK, PACKET = 16 };
@@ -26,16 +26,13 @@ static struct bvh *ball_on_ground(double ground_m, struct scene **scene)
 {
     static const double centre[3] = {0.0, 0.0, 0.0};
     struct mesh mesh = {0};
-    struct bvh *bvh;
-    struct sh_err err;
     mesh_sphere(&mesh, centre, BALL_M, 0.0, 4, 0);
     if (ground_m > 0.0)
         mesh_sheet(&mesh, (const double[3]){-0.7 * ground_m, -0.7 * ground_m, -2.0},
                    (const double[3]){2.0 * ground_m, 0.0, 0.0}, (const double[3]){0.0, 2.0 * ground_m, 0.0}, 1, 1, 1);
     *scene = mesh_scene(&mesh);
     mesh_free(&mesh);
-    assert_int_equal(bvh_create(*scene, 1, NULL, &bvh, &err), SH_OK);
-    return bvh;
+    return made_bvh(*scene);
 }
 
 /* Casts lines across the ball, from so far away. With `moves` each ray begins a millimetre beside the one before. */
@@ -43,10 +40,8 @@ static struct cost cost_of(const struct bvh *bvh, double from_m, int moves)
 {
     static double x[RAYS], y[RAYS], z[RAYS], px[RAYS], py[RAYS], pz[RAYS], range_m[RAYS];
     static uint32_t triangle[RAYS];
-    struct bvh_work *work;
-    struct sh_err err;
     struct cost cost = {.hits = 0};
-    assert_int_equal(bvh_work_create(&work, &err), SH_OK);
+    struct bvh_work *work = made_bvh_work();
     for (int i = 0; i < RAYS; i++) {
         const double aim[3] = {(i % 32 - 15.5) * 0.05, 0.0, (i / 32 - 15.5) * 0.05};
         const double at[3] = {moves ? 1e-3 * i : 0.0, -from_m, 0.4};
@@ -118,8 +113,6 @@ static void vertices_of_nothing_do_not_move_the_origin(void **state)
 {
     (void)state;
     struct mesh mesh = {0};
-    struct bvh *bvh;
-    struct sh_err err;
     double origin_m[3];
     mesh_sphere(&mesh, (const double[3]){0.0, 0.0, 0.0}, BALL_M, 0.0, 2, 0);
     mesh_sheet(&mesh, (const double[3]){-1e5, -1e4, -2.0}, (const double[3]){2e4, 0.0, 0.0},
@@ -128,7 +121,7 @@ static void vertices_of_nothing_do_not_move_the_origin(void **state)
         mesh_vertex(&mesh, 1e9, 1e9, 1e9);
     struct scene *scene = mesh_scene(&mesh);
     mesh_free(&mesh);
-    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
+    struct bvh *bvh = made_bvh(scene);
     bvh_origin(bvh, origin_m);
     for (int i = 0; i < 3; i++)
         assert_true(fabs(origin_m[i]) < 1e3);

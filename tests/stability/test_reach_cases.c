@@ -5,11 +5,8 @@
  * A cast whose exactness holds about one origin only has a cliff in each of them. In a house within 1.2 km of ground, a
  * second station 400 m away took 200,000 times as long for a ray. A ball of 960 triangles that moves took 15,000 times
  * as long. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <cmocka.h>
 
+#include "tests/common/cases.h"
 #include "tests/common/reach_cases.h"
 
 enum {

@@ -8,6 +8,7 @@
 
 #include "core/rng.h"
 #include "core/surface.h"
+#include "tests/common/made.h"
 #include "tests/stability/rig.h"
 
 static const double PULSE_S = 4e-9, LIGHT_M_S = 299792458.0;
@@ -20,8 +21,6 @@ static struct scene *planes(const double *away_m, uint32_t n)
     uint32_t triangle[2 * MOST][3];
     uint16_t label[2 * MOST];
     static const struct scene_surface surface[MOST] = {{.object = "first"}, {.object = "second"}};
-    struct scene *scene;
-    struct sh_err err;
     for (uint32_t p = 0; p < n; p++) {
         for (uint32_t v = 0; v < 4; v++) {
             double half_m = 2.0 + 0.02 * away_m[p];
@@ -36,11 +35,8 @@ static struct scene *planes(const double *away_m, uint32_t n)
             label[2 * p + t] = (uint16_t)p;
         }
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4 * n, (const uint32_t(*)[3])triangle,
-                                                 2 * n, label, surface, n},
-                          &scene, &err) != SH_OK)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 4 * n, (const uint32_t(*)[3])triangle, 2 * n,
+                                             label, surface, n});
 }
 
 struct shot {
@@ -56,12 +52,12 @@ static void shoot(struct scene *scene, const struct surface_table *table, const 
     struct schedule_segment segment;
     struct schedule_line line;
     struct schedule_run run;
-    struct bvh *bvh;
     struct caster *caster;
     struct sh_err err;
     struct cast_detect detect = *asked;
     rig_line_ahead(&segment, &line, &run);
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
+    struct bvh *bvh = made_bvh(scene);
+    if (caster_create(&caster, &err) != SH_OK ||
         line_block_alloc(&out->block, RIG_LINE_PULSES * (1 + CAST_MAX_DEPTH), &err) != SH_OK)
         fail_msg("%s", err.text);
     for (uint32_t i = 0; i < RIG_LINE_PULSES; i++)

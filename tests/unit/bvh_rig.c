@@ -7,17 +7,5 @@ struct scene *scene_of(const double (*vertex)[3], uint32_t n_vertices, const uin
                        const uint16_t *label)
 {
     static const struct scene_surface named[2] = {{.object = "small"}, {.object = "large"}};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, n_vertices, triangle, n, label, named, 2}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
-}
-
-struct bvh *bvh_of(const struct scene *scene)
-{
-    struct bvh *bvh;
-    struct sh_err err;
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
-    return bvh;
+    return made_scene(&(struct scene_arrays){vertex, n_vertices, triangle, n, label, named, 2});
 }

@@ -1,17 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of the BVH alone: a few triangles about ORIGIN, and a BVH. */
+/* For tests of the BVH alone: a few triangles about ORIGIN. */
 #ifndef TESTS_UNIT_BVH_RIG_H
 #define TESTS_UNIT_BVH_RIG_H
 
-#include "core/bvh.h"
-#include "tests/common/cases.h"
+#include "tests/common/made.h"
 
 extern const double ORIGIN[3]; /* prcs, m */
 
 /* Makes a scene with surfaces 0 and 1. With label NULL all triangles are of surface 0. */
 struct scene *scene_of(const double (*vertex)[3], uint32_t n_vertices, const uint32_t (*triangle)[3], uint32_t n,
                        const uint16_t *label);
-
-struct bvh *bvh_of(const struct scene *scene);
 
 #endif

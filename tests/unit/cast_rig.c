@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/cast_rig.h"
 
+#include "tests/common/made.h"
+
 struct scene *box_scene(const double lo[3], const double hi[3])
 {
     static const uint32_t face[6][4] = {{0, 2, 6, 4}, {1, 5, 7, 3}, {0, 4, 5, 1},
@@ -9,8 +11,6 @@ struct scene *box_scene(const double lo[3], const double hi[3])
     uint32_t triangle[12][3];
     uint16_t label[12];
     struct scene_surface surface[6] = {{.object = ""}};
-    struct scene *scene;
-    struct sh_err err;
     for (int v = 0; v < 8; v++)
         for (int i = 0; i < 3; i++)
             vertex[v][i] = v >> i & 1 ? hi[i] : lo[i];
@@ -24,11 +24,8 @@ struct scene *box_scene(const double lo[3], const double hi[3])
         snprintf(surface[f].object, sizeof surface[f].object, "wall-%d", f);
         strcpy(surface[f].material, "plain");
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 8, (const uint32_t(*)[3])triangle, 12,
-                                                 label, surface, 6},
-                          &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(
+        &(struct scene_arrays){(const double(*)[3])vertex, 8, (const uint32_t(*)[3])triangle, 12, label, surface, 6});
 }
 
 long double box_range(const double lo[3], const double hi[3], const double o[3], const long double d[3], int *wall)

@@ -3,17 +3,12 @@
 #ifndef TESTS_UNIT_GEOREF_RIG_H
 #define TESTS_UNIT_GEOREF_RIG_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
-
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "core/georef.h"
+#include "tests/common/cases.h"
 
 #define PI 3.14159265358979323846
 /* WGS 84, NIMA TR8350.2: a and 1/f define it, and the rest follows. */

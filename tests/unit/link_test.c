@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/link_test.h"
 
+#include <arpa/inet.h>
+#include <errno.h>
+#include <netinet/in.h>
 #include <poll.h>
+#include <sys/socket.h>
 
 static int gave_up; /* a wait of this program was in vain */
 
@@ -158,6 +162,30 @@ char *test_dir(void)
     snprintf(dir, sizeof dir, "/tmp/test_link.XXXXXX");
     assert_non_null(mkdtemp(dir));
     return dir;
+}
+
+int bench_port(const struct bench *bench)
+{
+    char name[300];
+    bench->ops->endpoint(bench->link, name, sizeof name);
+    return atoi(strrchr(name, ':') + 1);
+}
+
+int dial(int port)
+{
+    const struct sockaddr_in at = {
+        .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK), .sin_port = htons((uint16_t)port)};
+    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (connect(fd, (const struct sockaddr *)&at, sizeof at) == 0) return fd;
+    assert_int_equal(errno, ECONNREFUSED);
+    close(fd);
+    return -1;
+}
+
+void bench_expect_notice(struct bench *bench, const char *part)
+{
+    const struct link_event event = bench_expect(bench, LINK_NOTICE, 0);
+    if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
 }
 
 void expect_refused(const struct link_spec *spec, int code, const char *part)

@@ -63,6 +63,15 @@ void fd_drain(int fd, size_t len);
 
 char *test_dir(void);
 
+/* Returns the port that the link's endpoint names. */
+int bench_port(const struct bench *bench);
+
+/* Opens a client of a port of this machine; -1: it was refused. */
+int dial(int port);
+
+/* The next event must be a notice with this text in it. */
+void bench_expect_notice(struct bench *bench, const char *part);
+
 /* Opening the link must fail with this code, and with an error of one line that contains `part`. */
 void expect_refused(const struct link_spec *spec, int code, const char *part);
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/optics_rig.h"
 
+#include "tests/common/made.h"
+
 const double STATION[3] = {0.5, 0.25, 0.125};
 const double LO[3] = {-4, -5, -2}, HI[3] = {6, 5, 3};
 
@@ -57,8 +59,6 @@ struct scene *sheets(const double y[3], const uint16_t label[3])
     static const struct scene_surface surface[3] = {{.object = "window", .material = "glass"},
                                                     {.object = "wall", .material = "brick"},
                                                     {.object = "mirror", .material = "silver"}};
-    struct scene *scene;
-    struct sh_err err;
     for (uint32_t p = 0; p < 3; p++) {
         for (uint32_t v = 0; v < 4; v++) {
             vertex[4 * p + v][0] = v == 1 || v == 2 ? 30.0 : -30.0;
@@ -70,11 +70,8 @@ struct scene *sheets(const double y[3], const uint16_t label[3])
                 triangle[2 * p + t][v] = 4 * p + (v == 0 ? 0 : v + t);
         labels[2 * p] = labels[2 * p + 1] = label[p];
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6,
-                                                 labels, surface, 3},
-                          &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(
+        &(struct scene_arrays){(const double(*)[3])vertex, 12, (const uint32_t(*)[3])triangle, 6, labels, surface, 3});
 }
 
 struct scene *window(void)

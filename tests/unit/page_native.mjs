@@ -311,6 +311,16 @@ test('another sequence: its points have no place before its own descriptor and a
   equal(again.decoder.stats.unplaced_shots, 3, 'after a repeated descriptor without its anchor');
 });
 
+test('points without a pose are not placed, and are not counted as shots without echo', () => {
+  const [descriptor, anchor, points] = [1, 2, 3].map((type) => Buffer.from(samples.find(({bytes}) => bytes[1] === type).bytes));
+  const still = readAll([Buffer.concat([descriptor, anchor, points])]).decoder.stats;
+  anchor[28 + 12] = 1; // moving
+  const moving = readAll([Buffer.concat([descriptor, signed(anchor), points])]).decoder.stats;
+  equal(moving.empty, still.empty, 'shots without echo');
+  equal(moving.unplaced_points, moving.points - still.empty, 'unplaced');
+  equal(moving.unplaced_shots, 2, 'pulses of these');
+});
+
 // ---- replies
 
 test('the hash of points: pulse numbers of more than 32 bits go on', () => {

@@ -6,6 +6,7 @@ import {FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBel
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
 import {SCALES} from '../../drivers/link/web/view_ramps.js';
 import {Keeper} from '../../drivers/link/web/keeper.js';
+import {Wire} from '../../drivers/link/web/wire.js';
 import {Parser} from '../../drivers/link/web/native_parser.js';
 import {crc32c} from '../../drivers/link/web/crc32c.js';
 import {nearest} from '../../drivers/link/web/view_pick.js';
@@ -392,6 +393,27 @@ test('a recording begins with what its points need, and has every frame from the
   reader.push(bytes);
   same(got, [[1, 3, 0, 'new'], [2, 3, 0, 'anchor'], [3, 0, 6, 'points'], [4, 0, 7, 'line']], 'frames'); // 3: REPEAT, LOCAL
   same([reader.stats.bad_bytes, reader.stats.lost_frames], [0, 0], 'bad bytes and lost frames');
+});
+
+test('a recording has nothing of the head before, where another one has come at its address', async () => {
+  const {WebSocket} = globalThis, things = [];
+  let socket = null;
+  globalThis.WebSocket = class {
+    constructor() { socket = this; }
+    close() {}
+  };
+  const wire = new Wire((message) => things.push(...message.things)), say = (bytes) => socket.onmessage({data: bytes.buffer});
+  wire.take({connect: 'ws://head/ws'});
+  [frameOf(1, 0, 0, 'before'), frameOf(2, 0, 1, 'its anchor')].forEach(say);
+  wire.take({connect: 'ws://head/ws'});
+  [frameOf(1, 3, 0, 'now'), frameOf(3, 0, 1, 'points')].forEach(say);
+  wire.take({keep: true});
+  wire.take({ack: true});
+  wire.take({keep: false});
+  wire.take({close: true});
+  globalThis.WebSocket = WebSocket;
+  const [, blob] = things.find(([name]) => name === 'kept'), text = await blob.text();
+  same([text.includes('now'), /before|anchor/.test(text)], [true, false], 'the heads in it');
 });
 
 test('levels of detail: equal shares; the budget follows the time', () => {

@@ -3,11 +3,6 @@
 
 const double DEG = M_PI / 180.0;
 
-double distance(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 int find_path(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
               struct pose_path *out, struct sh_err *err)
 {

@@ -13,8 +13,6 @@
 
 extern const double DEG;
 
-double distance(const double a[3], const double b[3]);
-
 /* Finds the knots with the rules that the program uses. */
 int find_path(const struct trajectory *tr, double start_s, double end_s, const struct pose *mount,
               struct pose_path *out, struct sh_err *err);

@@ -19,10 +19,15 @@ int remove_folder(void **state)
     return rmdir(folder);
 }
 
-const char *write_file(const char *name, const void *data, size_t len)
+const char *path_in(const char *name)
 {
     snprintf(path, sizeof path, "%s/%s", folder, name);
-    FILE *f = fopen(path, "wb");
+    return path;
+}
+
+const char *write_file(const char *name, const void *data, size_t len)
+{
+    FILE *f = fopen(path_in(name), "wb");
     assert_non_null(f);
     assert_int_equal(fwrite(data, 1, len, f), len);
     assert_int_equal(fclose(f), 0);

@@ -25,7 +25,8 @@ int make_folder(void **state);
 
 int remove_folder(void **state);
 
-/* The path is good until the next call. */
+/* Paths are good until the next call. */
+const char *path_in(const char *name);
 const char *write_file(const char *name, const void *data, size_t len);
 
 const char *write_text(const char *name, const char *text);

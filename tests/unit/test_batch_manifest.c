@@ -259,22 +259,26 @@ static void test_job_texts(void **state)
 /* Each input counts by its contents: the mesh, the file that it names, and the files that that one names. */
 static void test_inputs(void **state)
 {
-    static const char *const inputs[] = {"m.obj", "first.mtl", "a.png", "faults.yaml", "head.yaml"};
+    static const char *const inputs[] = {"m.obj",     "first.mtl", "a.png",    "faults.yaml",
+                                         "head.yaml", "trees.csv", "ride.csv", "pulse.csv"};
     struct config *cfg = calloc(1, sizeof *cfg);
     struct batch_provenance before, after;
     struct sh_err err;
     (void)state;
     assert_non_null(cfg);
+    for (size_t i = 3; i < sizeof inputs / sizeof inputs[0]; i++)
+        write_file(inputs[i], "w", "x");
     write_file("config.yaml", "w", "x\n");
     write_file("m.obj", "w", "mtllib first.mtl\nv 0 0 0\n");
     write_file("first.mtl", "w", "newmtl one\nmap_Kd a.png\n");
     write_file("a.png", "w", "x");
-    write_file("faults.yaml", "w", "x");
-    write_file("head.yaml", "w", "x");
     snprintf(cfg->file, sizeof cfg->file, "%s", path_of("config.yaml"));
     snprintf(cfg->scenario_file, sizeof cfg->scenario_file, "%s", path_of("faults.yaml"));
     snprintf(cfg->profile_file, sizeof cfg->profile_file, "%s", path_of("head.yaml"));
     snprintf(cfg->scene.mesh[0].file, sizeof cfg->scene.mesh[0].file, "%s", path_of("m.obj"));
+    snprintf(cfg->scene.mesh[0].copies, sizeof cfg->scene.mesh[0].copies, "%s", path_of("trees.csv"));
+    snprintf(cfg->platform.file, sizeof cfg->platform.file, "%s", path_of("ride.csv"));
+    snprintf(cfg->waveform.pulse_file, sizeof cfg->waveform.pulse_file, "%s", path_of("pulse.csv"));
     cfg->scene.n_meshes = 1;
     for (size_t i = 0; i < sizeof inputs / sizeof inputs[0]; i++) {
         struct batch_cache cache = {0};

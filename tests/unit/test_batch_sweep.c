@@ -56,6 +56,16 @@ static void test_ranges(void **state)
     /* 0.1 + 2 * 0.1 isn't 0.3 in binary, nor is (0.3 - 0.1) / 0.1 two */
     assert_string_equal(values("a=0.1:0.3:0.1"), "(a=0.1)(a=0.2)(a=0.3)");
     assert_string_equal(values("a=-1e3:1e3:1e3"), "(a=-1000)(a=0)(a=1000)");
+    /* -0.3 + 3 * 0.1 is 5.6e-17, and near 0 the error of 1000.3 is large */
+    assert_string_equal(values("a=-0.3:0.1:0.1"), "(a=-0.3)(a=-0.2)(a=-0.1)(a=0)(a=0.1)");
+    assert_string_equal(values("a=-1000.3:1000:1000.4"), "(a=-1000.3)(a=0.1)");
+    /* every digit counts: northings to the micrometre, seeds, seconds since 1970 */
+    assert_string_equal(values("a=1000000000001:1000000000003:1"),
+                        "(a=1000000000001)(a=1000000000002)(a=1000000000003)");
+    assert_string_equal(values("a=5812345.678901:5812346:1"), "(a=5812345.678901)");
+    assert_string_equal(values("a=0:0:1"), "(a=0)");
+    assert_string_equal(values("a=1e-9:2e-9:1e-9"), "(a=1e-09)(a=2e-09)");
+    assert_string_equal(values("a=1e300:2e300:1e300"), "(a=1e+300)(a=2e+300)");
     assert_int_equal(values("a=1:2:0")[0], '!');
     assert_int_equal(values("a=2:1:1")[0], '!');
     assert_non_null(strstr(values("a=0:10000:1"), "at most 10000"));

@@ -2,14 +2,11 @@
 /* From the returns of a pulse to echoes, and figures of a beam. The truth is the definitions of core/footprint.h, in
  * numbers that can be worked out by hand. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <cmocka.h>
 
 #include "core/footprint.h"
 #include "core/rng.h"
 #include "core/vec3.h"
+#include "tests/common/cases.h"
 
 enum { MOST = 16 };
 

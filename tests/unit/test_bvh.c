@@ -115,15 +115,13 @@ static void a_small_sheet_at_a_large_one(void **state)
     (void)state;
     static const double gaps_m[] = {1e-6, 1e-4, 3e-4};
     static const struct sheets sheets[] = {{30.0, 1.0}, {0.5, 70.0}, {0.4, 110.0}, {0.4, 1000.1}, {0.39, 1001.9}};
-    struct bvh_work *work;
-    struct sh_err err;
-    assert_int_equal(bvh_work_create(&work, &err), 0);
+    struct bvh_work *work = made_bvh_work();
     for (size_t n = 0; n < sizeof sheets / sizeof sheets[0]; n++)
         for (size_t k = 0; k < 4 * sizeof gaps_m / sizeof gaps_m[0]; k++) {
             const double gap_m = gaps_m[k / 4] * (sheets[n].times > 500.0 ? 300.0 : 1.0);
             const int behind = k & 1, large_first = k >> 1 & 1, want = behind ? LARGE : SMALL;
             struct scene *scene = small_and_large(&sheets[n], (behind ? 1.0 : -1.0) * gap_m, large_first);
-            struct bvh *bvh = bvh_of(scene);
+            struct bvh *bvh = made_bvh(scene);
             assert_int_equal(shoot(bvh, work, want, 9.0 + sheets[n].slope * 0.32), RAYS);
             bvh_free(bvh);
             scene_free(scene);
@@ -140,13 +138,11 @@ static void what_a_ray_begins_on_is_not_met(void **state)
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {3, 4, 5}};
     static const double before_m[] = {0.0, 4e-7, -4e-7, 1e-6}, way_m[] = {1.0, 1.0, 1.0, 1e-6};
     double p[6][3];
-    struct bvh_work *work;
-    struct sh_err err;
     for (int i = 0; i < 6; i++)
         vec3_add(v[i], ORIGIN, p[i]);
     struct scene *scene = scene_of((const double(*)[3])p, 6, triangle, 2, NULL);
-    struct bvh *bvh = bvh_of(scene);
-    assert_int_equal(bvh_work_create(&work, &err), 0);
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
     for (int k = 0; k < 8; k++) {
         const int back = k & 1;
         const double at[3] = {ORIGIN[0] + 0.1, ORIGIN[1] + 9.0 + (back ? 1.0 : -1.0) * before_m[k / 2], ORIGIN[2]};
@@ -177,12 +173,10 @@ static void sheets_that_cross_at_a_slant(void **state)
 {
     (void)state;
     static const double slope[] = {1.0, 30.0, 1000.0, 20000.0};
-    struct bvh_work *work;
-    struct sh_err err;
-    assert_int_equal(bvh_work_create(&work, &err), 0);
+    struct bvh_work *work = made_bvh_work();
     for (int s = 0; s < 4; s++) {
         struct scene *scene = crossing(slope[s]);
-        struct bvh *bvh = bvh_of(scene);
+        struct bvh *bvh = made_bvh(scene);
         assert_int_equal(wrong_of_crossing(bvh, work, slope[s]), 0);
         bvh_free(bvh);
         scene_free(scene);
@@ -211,9 +205,7 @@ static void a_sheet_along_the_ray_is_not_met(void **state)
     static const uint32_t triangle[1][3] = {{0, 1, 2}};
     static struct fan fan;
     uint64_t random = 77;
-    struct bvh_work *work;
-    struct sh_err err;
-    assert_int_equal(bvh_work_create(&work, &err), 0);
+    struct bvh_work *work = made_bvh_work();
     for (int n = 0; n < 8; n++) {
         double u[3], v[3], p[3][3];
         any_axes(&random, u, v);
@@ -224,7 +216,7 @@ static void a_sheet_along_the_ray_is_not_met(void **state)
             set_ray(&fan, i, c * u[0] + s * v[0], c * u[1] + s * v[1], c * u[2] + s * v[2]);
         }
         struct scene *scene = scene_of((const double(*)[3])p, 3, triangle, 1, NULL);
-        struct bvh *bvh = bvh_of(scene);
+        struct bvh *bvh = made_bvh(scene);
         cast_fan(bvh, work, &fan);
         for (uint32_t i = 0; i < RAYS; i++)
             assert_true(isnan(fan.range_m[i]));
@@ -245,8 +237,6 @@ static void nobody_meets_what_he_stands_on(void **state)
     static struct fan fan;
     double p[3][3];
     uint64_t random = 78;
-    struct bvh_work *work;
-    struct sh_err err;
     for (int i = 0; i < 3; i++)
         vec3_add(v[i], ORIGIN, p[i]);
     for (uint32_t i = 0; i < RAYS; i++) {
@@ -257,8 +247,8 @@ static void nobody_meets_what_he_stands_on(void **state)
         set_ray(&fan, i, case_unit(&random) - 0.5, i & 1 ? 1.0 : -1.0, case_unit(&random) - 0.5);
     }
     struct scene *scene = scene_of((const double(*)[3])p, 3, triangle, 1, NULL);
-    struct bvh *bvh = bvh_of(scene);
-    assert_int_equal(bvh_work_create(&work, &err), 0);
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
     bvh_hits(work, bvh,
              &(struct bvh_rays){.n = RAYS,
                                 .from.own = {x, y, z},
@@ -299,8 +289,6 @@ static struct scene *plates(void)
 {
     static double v[3 * PLATES + 3][3];
     static uint32_t t[PLATES + 1][3];
-    struct scene *scene;
-    struct sh_err err;
     static const double corner[3][2] = {{-0.03, 0.05}, {0.05, -0.03}, {0.05, 0.05}};
     static const double wall[3][2] = {{-50.0, -50.0}, {50.0, -50.0}, {-50.0, 50.0}};
     for (uint32_t i = 0; i < 3 * (PLATES + 1); i++) {
@@ -310,11 +298,8 @@ static struct scene *plates(void)
         v[i][2] = plate == PLATES ? wall[i % 3][1] : corner[i % 3][1];
         t[plate][i % 3] = i;
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, 3 * PLATES + 3, (const uint32_t(*)[3])t,
-                                                 PLATES + 1, NULL, NULL, 0},
-                          &scene, &err) != SH_OK)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){(const double(*)[3])v, 3 * PLATES + 3, (const uint32_t(*)[3])t, PLATES + 1,
+                                             NULL, NULL, 0});
 }
 
 /* Rays come from the scene, and from far away. 1e-9 m: 2^-53 of 30 km is 3e-12 m. */
@@ -324,11 +309,8 @@ static void no_number_of_plates_hides_a_wall(void **state)
     static const double back_m[] = {0.0, 300.0, 30000.0};
     static const double along_x[3] = {1.0, 0.0, 0.0};
     struct scene *scene = plates();
-    struct bvh_work *work = NULL;
-    struct bvh *bvh = NULL;
-    struct sh_err err;
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || bvh_work_create(&work, &err) != SH_OK)
-        fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
     for (size_t i = 0; i < sizeof back_m / sizeof *back_m; i++) {
         const double here[3] = {-back_m[i], 0, 0};
         assert_true(fabs(bvh_ray(work, bvh, here, along_x) - 20.0 - back_m[i]) < 1e-9);

@@ -7,7 +7,7 @@
 
 #include "core/bvh.h"
 #include "core/vec3.h"
-#include "tests/common/cases.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 
 enum { SIDE = 100, RAYS = SIDE * SIDE };
@@ -36,13 +36,9 @@ static uint32_t seconds(double side_m, double far_m, double slope, const uint32_
                                  {0.1 * side_m, far_m + 0.1 * slope * side_m, 0.9 * side_m}};
     const uint32_t face[2][3] = {{0, 1, 2}, {second[0], second[1], second[2]}};
     const struct scene_arrays arrays = {vertex, 3, face, 2, label, surface, 4096};
-    struct scene *scene;
-    struct bvh *bvh;
-    struct bvh_work *work;
-    struct sh_err err;
-    if (scene_from_arrays(&arrays, &scene, &err) != SH_OK || bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK ||
-        bvh_work_create(&work, &err) != SH_OK)
-        fail_msg("%s", err.text);
+    struct scene *scene = made_scene(&arrays);
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
     aim(far_m);
     bvh_hits(
         work, bvh,
@@ -127,13 +123,9 @@ static void one_stack(uint64_t *random, uint32_t packet, uint32_t *ties)
     stack_up(random, vertex, face);
     const struct scene_arrays arrays = {
         (const double(*)[3])vertex, 3 * STACK, (const uint32_t(*)[3])face, STACK, label, surface, 1};
-    struct scene *scene;
-    struct bvh *bvh;
-    struct bvh_work *work;
-    struct sh_err err;
-    if (scene_from_arrays(&arrays, &scene, &err) != SH_OK || bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK ||
-        bvh_work_create(&work, &err) != SH_OK)
-        fail_msg("%s", err.text);
+    struct scene *scene = made_scene(&arrays);
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
     bvh_set_packet(bvh, packet);
     aim(10.0);
     bvh_hits(

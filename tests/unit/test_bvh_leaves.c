@@ -25,8 +25,6 @@ static struct scene *torn(const struct scene *s)
 {
     double(*v)[3] = malloc((size_t)s->n_triangles * 3 * sizeof *v);
     uint32_t(*t)[3] = malloc((size_t)s->n_triangles * sizeof *t);
-    struct scene *scene;
-    struct sh_err err = {0};
     assert_non_null(v);
     assert_non_null(t);
     for (uint32_t i = 0; i < 3 * s->n_triangles; i++) {
@@ -37,7 +35,7 @@ static struct scene *torn(const struct scene *s)
                                         .n_vertices = 3 * s->n_triangles,
                                         .triangle = (const uint32_t(*)[3])t,
                                         .n_triangles = s->n_triangles};
-    if (scene_from_arrays(&arrays, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    struct scene *scene = made_scene(&arrays);
     free(v);
     free(t);
     return scene;
@@ -161,9 +159,7 @@ static void test_pairing_stops(void **state)
 enum { RAYS = 1000 };
 static void cast(const struct bvh *bvh, const double d[3][RAYS], double *range_m, uint32_t *triangle)
 {
-    struct bvh_work *work;
-    struct sh_err err = {0};
-    assert_int_equal(bvh_work_create(&work, &err), SH_OK);
+    struct bvh_work *work = made_bvh_work();
     const struct bvh_rays rays = {.n = RAYS,
                                   .from.at_m = {3e5, 5e6, 4.0},
                                   .dir = {d[0], d[1], d[2]},
@@ -191,9 +187,7 @@ static void test_memory_of_a_large_surface(void **state)
         d[2][i] = sin(up);
     }
     for (int k = 0; k < 2; k++) {
-        struct bvh *bvh;
-        struct sh_err err = {0};
-        assert_int_equal(bvh_create(scene[k], 1, NULL, &bvh, &err), SH_OK);
+        struct bvh *bvh = made_bvh(scene[k]);
         bvh_get_info(bvh, &info);
         if (k == 0) assert_in_range(info.bytes / scene[k]->n_triangles, 68, 104);
         cast(bvh, (const double(*)[RAYS])d, range_m[k], triangle[k]);

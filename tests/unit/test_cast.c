@@ -4,6 +4,7 @@
 
 #include "core/cast/kernels_points.h"
 #include "tests/common/hits.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/cast_rig.h"
 
@@ -89,12 +90,9 @@ static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
             for (int i = 0; i < 3; i++)
                 vertex[c][i] =
                     off * axis[i] + 3000.0 / length * ((c == 1 || c == 2 ? 1 : -1) * u[i] + (c >= 2 ? 1 : -1) * v[i]);
-        struct scene *scene;
-        struct sh_err err;
         static const double origin[3] = {0};
-        if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0}, &scene,
-                              &err) != 0)
-            fail_msg("%s", err.text);
+        struct scene *scene =
+            made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 4, triangle, 2, NULL, NULL, 0});
         struct cast_rig *rig = cast_rig_open(scene, origin);
         double d[3], range;
         uint32_t hit;
@@ -277,10 +275,7 @@ static void limits_block_or_swallow_the_echo(void **state)
         int hit;
     } limit[] = {{0, 10, 1},    {1.001, 10, 0}, {0.999, 10, 1}, {0.9999999999999998, 1.0000000000000002, 1},
                  {0, 0.999, 0}, {2, 6, 0},      {0, 1.001, 1}}; /* the fourth: level but for the mirror's last bit */
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
+    struct scene *scene = made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, NULL, NULL, 0});
     struct cast_rig *rig = cast_rig_open(scene, origin);
     struct schedule_line line;
     rig->spec.pan_udeg_s = 0;
@@ -352,11 +347,7 @@ static struct scene *tetrahedron(const double vertex[4][3])
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
     static const uint16_t label[4] = {0};
     const struct scene_surface surface = {.object = "tetrahedron", .material = "plain"};
-    struct scene *scene;
-    struct sh_err err;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 4, label, &surface, 1}, &scene, &err) != 0)
-        fail_msg("%s", err.text);
-    return scene;
+    return made_scene(&(struct scene_arrays){vertex, 4, triangle, 4, label, &surface, 1});
 }
 
 /* Returns the range from corner 0 along d to the opposite face, by the ray's shares of the three edges that leave the

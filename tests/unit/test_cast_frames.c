@@ -2,6 +2,7 @@
 /* Casting: the meaning of the counts on the wire. Angles, senses of rotation, encoders, positions, and frames far from
  * the origin. */
 #include "tests/common/hits.h"
+#include "tests/common/made.h"
 #include "tests/unit/cast_rig.h"
 
 static const double LO[3] = {-20, -17.5, -15}, HI[3] = {20, 22.5, 12.5}, HERE[3] = {2.5, 1.25, 0};
@@ -324,7 +325,6 @@ static void rounded_coordinates_cost_no_more_than_their_rounding(void **state)
 static struct scene *room_and_far_triangle(void)
 {
     struct scene *room = box_scene(LO, HI), *both;
-    struct sh_err err;
     double vertex[11][3];
     uint32_t triangle[13][3];
     uint16_t label[13] = {0};
@@ -337,10 +337,8 @@ static struct scene *room_and_far_triangle(void)
             vertex[8 + i][k] = HERE[k] + (k == 0 ? -1200.0 : k == 1 ? 1400.0 : 100.0) + (i == k);
         triangle[12][i] = 8 + i;
     }
-    if (scene_from_arrays(&(struct scene_arrays){(const double(*)[3])vertex, 11, (const uint32_t(*)[3])triangle, 13,
-                                                 label, room->surface, room->n_surfaces},
-                          &both, &err) != 0)
-        fail_msg("%s", err.text);
+    both = made_scene(&(struct scene_arrays){(const double(*)[3])vertex, 11, (const uint32_t(*)[3])triangle, 13, label,
+                                             room->surface, room->n_surfaces});
     scene_free(room);
     return both;
 }
@@ -353,10 +351,10 @@ static void a_station_far_from_the_bvh_s_origin_is_as_exact(void **state)
     static uint32_t triangle[RAYS];
     struct scene *scene = room_and_far_triangle();
     struct sh_err err;
-    struct bvh *bvh = NULL;
     struct caster *caster = NULL;
     any_rays(3);
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != 0 || caster_create(&caster, &err) != 0) fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(scene);
+    if (caster_create(&caster, &err) != 0) fail_msg("%s", err.text);
     hits_from(caster, bvh, HERE, 1000.0, RAYS, ray[0], ray[1], ray[2], range, triangle);
     for (int i = 0; i < RAYS; i++) {
         const long double d[3] = {ray[0][i], ray[1][i], ray[2][i]};

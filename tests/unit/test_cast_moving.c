@@ -4,6 +4,7 @@
 #include "tests/unit/cast_rig.h"
 
 #include "core/pose.h"
+#include "tests/common/made.h"
 
 static const double LO[3] = {-4.0, -6.0, -1.5}, HI[3] = {5.0, 7.0, 2.5};
 static const double CENTRE[3] = {0.0, 0.0, 0.0};
@@ -219,9 +220,7 @@ static void test_moving_body(void **state)
     struct pose_knot knot[2] = {{.t_ns = 0}, {.t_ns = 100000000}};
     struct cast_rig *rig = open_room((struct pose_knot[KNOTS]){{0}});
     struct scene *body = box_scene(lo, hi);
-    struct bvh *bvh;
-    struct sh_err err;
-    if (bvh_create(body, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(body);
     for (int i = 0; i < 2; i++)
         knot[i].pose = (struct pose){.position_m = {0.0, 1.0 * i, 0.0}, .quat = {1, 0, 0, 0}};
     rig->setup.knot = knot;
@@ -271,9 +270,7 @@ static void test_inside_a_body_s_sphere(void **state)
     struct cast_rig *rig = open_room((struct pose_knot[KNOTS]){{0}});
     struct scene *body = box_scene(lo, hi);
     struct schedule_line line;
-    struct bvh *bvh;
-    struct sh_err err;
-    if (bvh_create(body, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(body);
     rig->setup.n_movers = 1;
     rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {0.0, 1.0, 0.0}, .radius_m = 2.5};
     pose_heading(0.0, rig->setup.mover[0].rotation);
@@ -312,9 +309,7 @@ static void test_nearer_of_wall_and_body(void **state)
                                       {.t_ns = 3000000, .pose = {.position_m = {-40, 0, 0}, .quat = {1, 0, 0, 0}}}};
     static const double wall_lo[3] = {-90.0, 1.0, -9.0}, wall_hi[3] = {90.0, 2.0, 9.0};
     struct scene *body = box_scene(lo, hi);
-    struct bvh *bvh;
-    struct sh_err err;
-    if (bvh_create(body, 1, NULL, &bvh, &err) != 0) fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(body);
     for (int walls = 0; walls < 2; walls++) {
         struct cast_rig *rig = walls ? cast_rig_open(box_scene(wall_lo, wall_hi), CENTRE)
                                      : cast_rig_open(box_scene(far_lo, far_hi), CENTRE);

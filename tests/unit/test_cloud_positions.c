@@ -1,51 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* Points of software that is not ours: PCD as the Point Cloud Library documents it, and text. The expected bytes follow
  * the library's page "The PCD file format", and for LZF the format of liblzf: both are packed here by hand. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <cmocka.h>
-
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 #include "core/studio/cloud.h"
-
-static char path[] = "/tmp/scanhead-positions-XXXXXX";
-
-static int make(void **state)
-{
-    (void)state;
-    const int fd = mkstemp(path);
-    return fd < 0 || close(fd) != 0;
-}
-
-static int drop(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
-
-static char warning[256];
-
-static void keep_warning(void *ctx, const char *text)
-{
-    (void)ctx;
-    snprintf(warning, sizeof warning, "%s", text);
-}
+#include "tests/unit/scene_files.h"
 
 static int try(const void *data, size_t len, struct cloud *cloud, struct sh_err *err)
 {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(data, 1, len, file), len);
-    assert_int_equal(fclose(file), 0);
     const struct sh_report report = {.warn = keep_warning};
-    warning[0] = '\0';
-    return cloud_read_positions(path, &report, cloud, err);
+    warnings[0] = '\0';
+    const int rc = cloud_read_positions(write_file("points", data, len), &report, cloud, err);
+    unlink(path);
+    return rc;
 }
 
 static void expect(const void *data, size_t len, size_t n, const double (*xyz)[3], int is_text)
@@ -75,25 +42,23 @@ static const double TWO[2][3] = {{1.5, -2.25, 3.125}, {-0.5, 8.0, 0.0}};
 static void test_text(void **state)
 {
     (void)state;
-    static const struct {
-        const char *text;
-    } same[] = {
-        {"1.5 -2.25 3.125\n-0.5 8 0\n"},
-        {"1.5,-2.25,3.125,77\r\n-0.5,8.0,0,78"},
-        {"1.5;-2.25;3.125\n\n-0.5;8;0\n"},
-        {"\t1.5\t-2.25\t3.125\n# a remark\n-0.5\t8\t0\n"},
-        {"x,y,z\n1.5,-2.25,3.125\n-0.5,8,0\n"},
-        {"t,Z,intensity,X,Y\n9,3.125,1,1.5,-2.25\n10,0,1,-0.5,8\n"},
-        {"# x y z\n1.5 -2.25 3.125\n-0.5 8 0\n"},
-        {"#t x y z\n7 1.5 -2.25 3.125\n7 -0.5 8 0\n"},
-        {"t,label,x,y,z,i\n1,,1.5,-2.25,3.125,9\n1,wall north,-0.5,8,0,\n"},
-        {"label x y z\nwall 1.5 -2.25 3.125\nfloor -0.5 8 0\n"},
-        {"1,5;-2,25;3,125\n-0,5 ; 8 ; 0\n"},
-        {"x;y;z\n1,5;-2,25;3,125\n-0,5;8;0;\n"},
-        {"connected to 127.0.0.1\n2 scans\n1.5 -2.25 3.125\n-0.5 8 0\nbye\n"},
+    static const char *const same[] = {
+        "1.5 -2.25 3.125\n-0.5 8 0\n",
+        "1.5,-2.25,3.125,77\r\n-0.5,8.0,0,78",
+        "1.5;-2.25;3.125\n\n-0.5;8;0\n",
+        "\t1.5\t-2.25\t3.125\n# a remark\n-0.5\t8\t0\n",
+        "x,y,z\n1.5,-2.25,3.125\n-0.5,8,0\n",
+        "t,Z,intensity,X,Y\n9,3.125,1,1.5,-2.25\n10,0,1,-0.5,8\n",
+        "# x y z\n1.5 -2.25 3.125\n-0.5 8 0\n",
+        "#t x y z\n7 1.5 -2.25 3.125\n7 -0.5 8 0\n",
+        "t,label,x,y,z,i\n1,,1.5,-2.25,3.125,9\n1,wall north,-0.5,8,0,\n",
+        "label x y z\nwall 1.5 -2.25 3.125\nfloor -0.5 8 0\n",
+        "1,5;-2,25;3,125\n-0,5 ; 8 ; 0\n",
+        "x;y;z\n1,5;-2,25;3,125\n-0,5;8;0;\n",
+        "connected to 127.0.0.1\n2 scans\n1.5 -2.25 3.125\n-0.5 8 0\nbye\n",
     };
     for (size_t i = 0; i < sizeof same / sizeof same[0]; i++)
-        expect(same[i].text, strlen(same[i].text), 2, TWO, 1);
+        expect(same[i], strlen(same[i]), 2, TWO, 1);
     const double empty[1][3] = {{NAN, NAN, NAN}};
     expect("nan nan nan\n", 12, 1, empty, 1);
     expect_error("", 0, "no line of it is a point");
@@ -176,21 +141,21 @@ static void test_pcd_counts(void **state)
                               "1.5 -2.25 3.125\n-0.5 8 0\n";
     char text[512];
     expect(old, sizeof old - 1, 2, TWO, 1);
-    assert_string_equal(warning, "");
+    assert_string_equal(warnings, "");
     size_t len = put_header(text, XYZ, 2, "ascii");
     len += (size_t)sprintf(text + len, "1.5 -2.25 3.125\n-0.5 8 0\n \n\n");
     expect(text, len, 2, TWO, 1);
-    assert_string_equal(warning, "");
+    assert_string_equal(warnings, "");
     len += (size_t)sprintf(text + len, "1 2 3\n");
     expect(text, len, 2, TWO, 1);
-    assert_non_null(strstr(warning, "goes on after the 2 points"));
+    assert_non_null(strstr(warnings, "goes on after the 2 points"));
     len = put_header(text, XYZ, 2, "binary");
     for (int i = 0; i < 6; i++, len += 4)
         memcpy(text + len, &(float){(float)TWO[i / 3][i % 3]}, 4);
     expect(text, len, 2, TWO, 0);
-    assert_string_equal(warning, "");
+    assert_string_equal(warnings, "");
     expect(text, len + 1, 2, TWO, 0);
-    assert_non_null(strstr(warning, "goes on after the 2 points"));
+    assert_non_null(strstr(warnings, "goes on after the 2 points"));
     static const char NO_COUNT[] = "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA ascii\n1 2 3\n";
     expect_error(NO_COUNT, sizeof NO_COUNT - 1, "no line POINTS");
 }
@@ -226,5 +191,5 @@ int main(void)
         cmocka_unit_test(test_pcd_counts),
         cmocka_unit_test(test_pcd_that_is_wrong),
     };
-    return cmocka_run_group_tests(tests, make, drop);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

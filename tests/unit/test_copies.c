@@ -6,6 +6,7 @@
 #include "core/pose.h"
 #include "core/scene_copies.h"
 #include "core/vec3.h"
+#include "tests/common/made.h"
 #include "tests/unit/scene_files.h"
 
 enum { RAYS = 4096, PLACES = 40 };
@@ -85,8 +86,6 @@ static float steep[2][RAYS];
 /* With from_own each ray begins elsewhere, some of them within a copy. */
 static void cast(const struct pair *p, const double middle_m[3], int from_own, uint32_t packet)
 {
-    struct bvh_work *work;
-    struct sh_err err;
     const double at[3] = {middle_m[0] + next(-20, 20), middle_m[1] + next(-20, 20), middle_m[2] + next(0.5, 5)};
     for (int i = 0; i < RAYS; i++) {
         double d[3] = {next(-1, 1), next(-1, 1), next(-0.3, 0.3)};
@@ -96,7 +95,7 @@ static void cast(const struct pair *p, const double middle_m[3], int from_own, u
         dx[i] = d[0], dy[i] = d[1], dz[i] = d[2];
         x[i] = middle_m[0] + next(-35, 35), y[i] = middle_m[1] + next(-35, 35), z[i] = middle_m[2] + next(0.1, 6);
     }
-    assert_int_equal(bvh_work_create(&work, &err), SH_OK);
+    struct bvh_work *work = made_bvh_work();
     for (int k = 0; k < 2; k++) {
         if (packet != 0) bvh_set_packet(p->bvh[k], packet);
         struct bvh_rays rays = {.n = RAYS,

@@ -1,15 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Named coordinate reference systems by PROJ, compared with GeographicLib's UTM and with published places. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/angle.h"
 #include "core/crs.h"
+#include "tests/common/cases.h"
 
 static struct sh_err err;
 

@@ -7,7 +7,7 @@
 #include <png.h>
 
 #include "core/cast.h"
-#include "tests/common/cases.h"
+#include "tests/common/made.h"
 
 enum { SQUARES = 8, TEXELS = 4, RAYS = 20000, LAYERS = 40 };
 
@@ -131,11 +131,10 @@ static void aim(double slope, double reach_m)
 
 static void cast_all(const struct scene *scene, uint32_t packet)
 {
-    struct bvh *bvh;
     struct caster *caster;
     struct sh_err err;
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK)
-        fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(scene);
+    if (caster_create(&caster, &err) != SH_OK) fail_msg("%s", err.text);
     if (packet != 0) bvh_set_packet(bvh, packet);
     for (uint32_t at = 0; at < rays.n; at += BVH_CHUNK) {
         const struct bvh_rays part = {.n = rays.n - at < BVH_CHUNK ? rays.n - at : BVH_CHUNK,
@@ -339,7 +338,6 @@ static void wrap_modes_and_opacity_maps_of_obj_count(void **state)
     scene_free(scene);
 }
 
-/* The path is one on the machine that the mesh comes from. */
 /* The image is scaled to twice a side, and shifted by three eighths: that equals a board with such coordinates. */
 static void scale_and_offset_of_obj_count(void **state)
 {
@@ -360,6 +358,7 @@ static void scale_and_offset_of_obj_count(void **state)
     scene_free(scene);
 }
 
+/* The path is one on the machine that the mesh comes from. */
 static void an_image_beside_the_mesh_is_found(void **state)
 {
     (void)state;
@@ -397,15 +396,12 @@ static void one_ray_passes_through_holes(void **state)
 {
     (void)state;
     static const double y[3] = {0, 1, 0}, hole[3] = {-1.75, 0, -1.75}, solid[3] = {-1.25, 0, -1.75};
-    struct sh_err err;
-    struct bvh *bvh;
-    struct bvh_work *work;
     begin_obj();
     quad("wall", 20, 9, 0);
     quad("board", 10, 2, 0);
     struct scene *scene = end_obj(0, 1);
-    assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
-    assert_int_equal(bvh_work_create(&work, &err), SH_OK);
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
     assert_true(fabs(bvh_ray(work, bvh, hole, y) - 20.0) < 1e-9);
     assert_true(fabs(bvh_ray(work, bvh, solid, y) - 10.0) < 1e-9);
     bvh_work_free(work);

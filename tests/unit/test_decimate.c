@@ -6,6 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 #include <cmocka.h>
 
 #include "core/studio/decimate.h"
@@ -84,55 +85,49 @@ static void check_whole(const struct decimated *m)
     free(used);
 }
 
-/* The cells of a cube, with cells of its edge, are at its corners: nothing changes. With the limit above its 12
- * triangles it isn't touched at all. */
+/* With the limit above its triangles a mesh isn't touched. */
 static void cube_stays(void **state)
 {
     (void)state;
     const struct decimate_mesh cube = {CUBE, 8, CUBE_FACE, 12};
     struct decimated m;
     struct sh_err err;
-    assert_int_equal(decimate_by_cell(&cube, 1.0, NULL, &m, &err), SH_OK);
-    assert_true(m.n_vertices == 8 && m.n_triangles == 12 && m.cell_m == 1.0);
-    for (uint32_t t = 0; t < 12; t++)
-        for (int k = 0; k < 3; k++)
-            assert_memory_equal(m.vertex_m[m.triangle[t][k]], CUBE[CUBE_FACE[t][k]], sizeof CUBE[0]);
-    decimated_free(&m);
     assert_int_equal(decimate(&cube, DECIMATE_LEAST, NULL, &m, &err), SH_OK);
     assert_true(m.n_vertices == 8 && m.n_triangles == 12 && m.cell_m == 0.0);
+    assert_memory_equal(m.vertex_m, CUBE, sizeof CUBE);
     assert_memory_equal(m.triangle, CUBE_FACE, sizeof CUBE_FACE);
     decimated_free(&m);
 }
 
-/* 64 x 64 quads on 1 m, cells of 1/4 m centred on 0, 1/4 ... 1: 5 x 5 cells. Cell j along an axis has the vertices i
- * with floor(4 i / 64 + 1/2) = j: 0..7, 8..23, 24..39, 40..55, 56..64, with the means 3.5, 15.5, 31.5, 47.5 and 60 of
- * 64. Triangles that cross no border vanish. Those at the crossing of two borders give each of the 4 x 4 squares
- * between clusters its two. All quads have their diagonal the same way, so no others come. */
+/* 64 x 64 quads on 1 m. The first guess for 100 triangles is a cell of sqrt(3 / 100) m, so 6 steps and cells centred on
+ * 0, 1/6 ... 1: 7 x 7. Cell j along an axis has the vertices i with floor(6 i / 64 + 1/2) = j: 0..5, 6..15, 16..26,
+ * 27..37, 38..47, 48..58 and 59..64. Triangles that cross no border vanish. Those at the crossing of two borders give
+ * each of the 6 x 6 squares between clusters its two. All quads have their diagonal the same way, so no others come. */
 static void plane_has_counts_by_hand(void **state)
 {
     (void)state;
-    static const double mean[5] = {3.5 / 64, 15.5 / 64, 31.5 / 64, 47.5 / 64, 60.0 / 64};
+    static const double mean[7] = {2.5 / 64, 10.5 / 64, 21.0 / 64, 32.0 / 64, 42.5 / 64, 53.0 / 64, 61.5 / 64};
     struct sheet s;
     struct decimated m;
     struct sh_err err;
     double low[3], high[3];
     make_sheet(&s, 64, 1.0, 0.0);
-    assert_int_equal(decimate_by_cell(&s.mesh, 0.25, NULL, &m, &err), SH_OK);
-    assert_int_equal(m.n_vertices, 25);
-    assert_int_equal(m.n_triangles, 32);
+    assert_int_equal(decimate(&s.mesh, 100, NULL, &m, &err), SH_OK);
+    assert_int_equal(m.n_vertices, 49);
+    assert_int_equal(m.n_triangles, 72);
     check_whole(&m);
-    int seen[5][5] = {{0}};
-    for (uint32_t v = 0; v < 25; v++) {
-        const int i = (int)floor(4.0 * m.vertex_m[v][0] + 0.5), k = (int)floor(4.0 * m.vertex_m[v][1] + 0.5);
+    int seen[7][7] = {{0}};
+    for (uint32_t v = 0; v < 49; v++) {
+        const int i = (int)floor(6.0 * m.vertex_m[v][0] + 0.5), k = (int)floor(6.0 * m.vertex_m[v][1] + 0.5);
         seen[i][k]++;
-        /* sums of up to 289 multiples of 1/64 are exact */
+        /* sums of up to 121 multiples of 1/64 are exact */
         assert_true(m.vertex_m[v][0] == mean[i] && m.vertex_m[v][1] == mean[k] && m.vertex_m[v][2] == 0.0);
     }
-    for (int i = 0; i < 25; i++)
-        assert_int_equal(seen[i / 5][i % 5], 1);
+    for (int i = 0; i < 49; i++)
+        assert_int_equal(seen[i / 7][i % 7], 1);
     bounds_of(&m, low, high);
     for (int i = 0; i < 2; i++)
-        assert_true(low[i] >= 0.0 && low[i] <= 0.125 && high[i] <= 1.0 && high[i] >= 0.875);
+        assert_true(low[i] >= 0.0 && low[i] <= 1.0 / 12 && high[i] <= 1.0 && high[i] >= 11.0 / 12);
     decimated_free(&m);
     free_sheet(&s);
 }
@@ -165,28 +160,36 @@ static void limit_holds(void **state)
     free_sheet(&s);
 }
 
-/* Two sheets nearer than a cell become one. One of the triangles between the same cells is left, whichever way they
- * face. */
+/* Two sheets nearer than a cell become one: of two triangles between the same cells one is left, whichever way they face.
+ * A triangle up to z = 1 makes cells that high. The first guess has too few triangles; the second one is of 7 steps. */
 static void doubles_become_one(void **state)
 {
     (void)state;
-    static const double vertex[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0.01}, {1, 0, 0.01}, {0, 1, 0.01}};
-    static const uint32_t face[4][3] = {{0, 1, 2}, {3, 5, 4}, {0, 3, 1}, {1, 3, 4}};
-    const struct decimate_mesh thin = {vertex, 6, face, 4};
+    enum { N = 11 * 11, FACES = 200 };
+    static double vertex[2 * N + 1][3];
+    static uint32_t face[2 * FACES + 1][3];
+    struct sheet s;
     struct decimated m;
     struct sh_err err;
-    assert_int_equal(decimate_by_cell(&thin, 0.5, NULL, &m, &err), SH_OK);
-    /* z has ceil(0.01 / 0.5) = 1 step, so two layers of cells: nothing is lost. Shorter than half a cell it would be. */
-    assert_int_equal(m.n_triangles, 4);
+    make_sheet(&s, 10, 1.0, 0.0);
+    memcpy(vertex, s.vertex_m, N * sizeof *vertex);
+    memcpy(face, s.triangle, FACES * sizeof *face);
+    for (int i = 0; i < N; i++)
+        for (int k = 0; k < 3; k++)
+            vertex[N + i][k] = vertex[i][k] + (k == 2 ? 0.001 : 0.0);
+    for (int i = 0; i < FACES; i++)
+        for (int k = 0; k < 3; k++)
+            face[FACES + i][k] = N + face[i][2 - k];
+    vertex[2 * N][2] = 1.0;
+    memcpy(face[2 * FACES], (const uint32_t[3]){0, 10, 2 * N}, sizeof *face);
+    const struct decimate_mesh both = {(const double(*)[3])vertex, 2 * N + 1, (const uint32_t(*)[3])face,
+                                       2 * FACES + 1};
+    assert_int_equal(decimate(&both, 100, NULL, &m, &err), SH_OK);
+    assert_int_equal(m.n_triangles, 2 * 7 * 7 + 1);
+    assert_int_equal(m.n_vertices, 8 * 8 + 1);
+    check_whole(&m);
     decimated_free(&m);
-    static const double tall[7][3] = {{0, 0, 0},    {1, 0, 0},    {0, 1, 0}, {0, 0, 0.01},
-                                      {1, 0, 0.01}, {0, 1, 0.01}, {0, 0, 1}};
-    static const uint32_t more[5][3] = {{0, 1, 2}, {3, 5, 4}, {0, 3, 1}, {1, 3, 4}, {0, 1, 6}};
-    const struct decimate_mesh both = {tall, 7, more, 5};
-    assert_int_equal(decimate_by_cell(&both, 0.5, NULL, &m, &err), SH_OK);
-    assert_int_equal(m.n_triangles, 2); /* the sheet, and the triangle up to z = 1 */
-    assert_int_equal(m.n_vertices, 4);
-    decimated_free(&m);
+    free_sheet(&s);
 }
 
 static int stop_now(void *ctx)
@@ -200,17 +203,15 @@ static void refuses(void **state)
     (void)state;
     const struct decimate_mesh cube = {CUBE, 8, CUBE_FACE, 12}, none = {CUBE, 0, CUBE_FACE, 0};
     const struct sh_report stops = {.stop = stop_now};
+    struct sheet s;
     struct decimated m;
     struct sh_err err;
     assert_int_equal(decimate(&cube, DECIMATE_LEAST - 1, NULL, &m, &err), SH_EINPUT);
-    assert_int_equal(decimate_by_cell(&cube, 0.0, NULL, &m, &err), SH_EINPUT);
-    assert_int_equal(decimate_by_cell(&cube, (double)NAN, NULL, &m, &err), SH_EINPUT);
-    assert_int_equal(decimate_by_cell(&cube, 1.0, &stops, &m, &err), SH_ESTOPPED);
+    make_sheet(&s, 8, 1.0, 0.0);
+    assert_int_equal(decimate(&s.mesh, DECIMATE_LEAST, &stops, &m, &err), SH_ESTOPPED);
     assert_true(m.n_triangles == 0 && m.vertex_m == NULL);
+    free_sheet(&s);
     assert_int_equal(decimate(&none, DECIMATE_LEAST, NULL, &m, &err), SH_OK);
-    assert_int_equal(m.n_triangles, 0);
-    decimated_free(&m);
-    assert_int_equal(decimate_by_cell(&none, 1.0, NULL, &m, &err), SH_OK);
     assert_int_equal(m.n_triangles, 0);
     decimated_free(&m);
 }

@@ -340,6 +340,24 @@ static void range_noise_has_a_floor(void **state)
     assert_true(fabs(drawn) > 0.01);
 }
 
+/* Echoes of noise alone have a signal of nearly 0. Their ranges stay within 7 sigmas (no number drawn is larger) of the
+ * noise at the least signal, which is Y's divided by DETECT_LEAST_AMPLITUDE. */
+static void noise_alone_has_a_range(void **state)
+{
+    (void)state;
+    enum { N = 4 };
+    static const uint64_t key[N] = {5, 6, 7, 8};
+    const struct detect_signal_spec spec = spec_of(0.0, 0.0);
+    struct detect_signal signal;
+    double range_m[N] = {100.0, 100.0, 100.0, 100.0}, amplitude[N] = {0.0, 1e-200, 1e-9, 0.09};
+    set_up(&spec, &signal);
+    const double at_y = detect_amplitude(&signal, spec.sigma_at_m, spec.sigma_reflectance);
+    detect_range_noise(&signal,
+                       &(struct detect_echoes){.n = N, .key = key, .range_m = range_m, .amplitude = amplitude});
+    for (int i = 0; i < N; i++)
+        assert_true(fabs(range_m[i] - 100.0) < 7.0 * spec.sigma_m * at_y / DETECT_LEAST_AMPLITUDE);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -351,6 +369,7 @@ int main(void)
         cmocka_unit_test(dark_colours_are_straight),
         cmocka_unit_test(extinction_by_visibility),
         cmocka_unit_test(range_noise_has_a_floor),
+        cmocka_unit_test(noise_alone_has_a_range),
         cmocka_unit_test(reaches_that_contradict_are_refused),
         cmocka_unit_test(zones_fold),
         cmocka_unit_test(the_ball_is_full),

@@ -54,11 +54,45 @@ static void errors_are_held_back_by_session(void **state)
     rig_close(rig);
 }
 
+static void keep_warning(void *ctx, const char *text)
+{
+    strcpy(ctx, text); /* sh_warn has 512 bytes */
+}
+
+/* A journal has commands that had an effect. Where the head refuses some, the session is another one, and that is said
+ * once, with the first of them. */
+static void a_replay_says_what_it_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *lines, *says; /* says NULL: nothing */
+    } cases[] = {{"300 300000000 1 HEAD:LINES 50\n", NULL},
+                 {"300 300000000 1 HEAD:LINES 50\n301 301000000 1 HEAD:LINES 99999\n302 302000000 2 BLAH\n",
+                  ":3: HEAD:LINES 99999: ERR -222"},
+                 {"300 300000000 1 SITE:POSE 1, 0,0,-1.9,0,0,0\n", /* only planning shows that it can't stand there */
+                  ":2: SITE:POSE 1, 0,0,-1.9,0,0,0: ERR -221"}};
+    static const char *const sets[] = {"stations[0].tripod.leg_m=2.5", "stations[0].tripod.head_above_m=0.2"};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char warned[512] = "";
+        const struct sh_report report = {.ctx = warned, .warn = keep_warning};
+        FILE *f = fopen(journal_path, "w");
+        assert_non_null(f);
+        fprintf(f, "# scanhead journal 1\n%s", cases[i].lines);
+        assert_int_equal(fclose(f), 0);
+        struct rig *rig = rig_open(&(struct device_options){.replay = journal_path, .report = &report}, sets, 2);
+        rig_go_to(rig, 400);
+        rig_close(rig);
+        if (cases[i].says == NULL ? warned[0] != '\0' : strstr(warned, cases[i].says) == NULL) fail_msg("%s", warned);
+        if (i == 1) assert_non_null(strstr(warned, "of 3 replayed commands the head refused 2"));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_last_events_are_said_however_many),
         cmocka_unit_test(errors_are_held_back_by_session),
+        cmocka_unit_test(a_replay_says_what_it_refused),
     };
     return cmocka_run_group_tests_name("device errors", tests, make_folder, remove_folder);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Faults of the head's states, power, time and counters, as the device carries them out, tick by tick. */
+#include "firmware_sim/device/scanner_clock.h"
 #include "tests/unit/device_rig.h"
 
 enum { TICK_NS = 1000000, BOOT_TICKS = 200 };
@@ -87,6 +88,32 @@ static void ends_a_run_that_cannot_scan(void **state)
     rig_close(rig);
 }
 
+/* Without a scan its duration counts from the first self-test that failed, also in the paces that wait. A scan that
+ * begins all the same has its whole duration. */
+static void ends_a_run_after_its_duration(void **state)
+{
+    (void)state;
+    static const struct device_options options = {.start = 1, .duration_s = 0.4};
+    struct rig *rig =
+        open_with("  - {kind: self_test}\n  - {kind: power_cycle, for_ms: 1, from_s: 0.3}\n", &options, NULL, 0);
+    rig_go_to(rig, BOOT_TICKS + 1);
+    assert_false(device_is_idle(rig->device));
+    for (int i = 0; i < 1000 && rig_claim(rig); i++)
+        continue;
+    assert_in_range(rig->next, BOOT_TICKS + 400, BOOT_TICKS + 402); /* the end, and what is still to be said */
+    rig_close(rig);
+
+    rig = open_with("  - {kind: self_test}\n", &options, NULL, 0);
+    rig_go_to(rig, 500);
+    rig_tell(rig, "*RST", 500);
+    rig_tell(rig, "SCAN:START", 500);
+    const uint64_t start = rig_wait(rig, NATIVE_EV_SCAN_START, 100)->b / TICK_NS;
+    while (rig_claim(rig))
+        continue;
+    assert_in_range(rig->next, start + 400, start + 402);
+    rig_close(rig);
+}
+
 /* In this tick the head sends nothing. */
 static void assert_silent(struct rig *rig)
 {
@@ -120,6 +147,11 @@ static void loses_power(void **state)
     assert_true(result.reply[0] == '\0' && result.error == 0 && result.effect == COMMAND_NONE);
     device_command(rig->device, 1, "FAULt:ADD {kind: laser_off}", 1001, &result);
     assert_true(result.error != 0 && strcmp(rig_state(rig, 1001), "off") == 0);
+    assert_non_null(strstr(result.reply, "the head has no power"));
+    device_command(rig->device, 1, "FAULt:CLEar 1", 1001, &result);
+    assert_non_null(strstr(result.reply, "the head has no power"));
+    assert_string_equal(rig_tell(rig, "FAULt:LIST?", 1001), "1 power_cycle"); /* a query is answered */
+    assert_string_equal(rig_tell(rig, "FAULt:INJected? 1", 1001), "1");
     while (rig->next < 1500) {
         assert_true(rig_claim(rig));
         assert_silent(rig);
@@ -252,7 +284,7 @@ static void tells_a_wrong_time(void **state)
     }
     assert_int_equal(n, 5);
     assert_string_equal(rig_tell(rig, "TIME:UTC?", 6000), "2026-06-30T11:59:60.700300000Z");
-    assert_true(device_utc_ns(rig->device, 5100300000) == device_utc_ns(rig->device, 6350399999));
+    assert_true(device_date_ns(rig->device, 5100300000) == device_date_ns(rig->device, 6350399999));
     rig_close(rig);
 }
 
@@ -385,6 +417,7 @@ int main(void)
         cmocka_unit_test(boots_slowly),
         cmocka_unit_test(fails_the_self_test),
         cmocka_unit_test(ends_a_run_that_cannot_scan),
+        cmocka_unit_test(ends_a_run_after_its_duration),
         cmocka_unit_test(loses_power),
         cmocka_unit_test(ends_without_power),
         cmocka_unit_test(loses_power_as_it_comes),

@@ -2,6 +2,7 @@
 /* The place of the head: on a trajectory, after its end, and on a platform whose poses come live. */
 #include <math.h>
 
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 #include "tests/unit/device_rig.h"
 
@@ -22,6 +23,25 @@ static void a_pose_far_ahead_keeps_no_other_out(void **state)
     rig_close(rig);
     rig = rig_open(NULL, steps, 2);
     assert_int_equal(device_pose(rig->device, INT64_C(900000000000000), pose), 0);
+    rig_close(rig);
+}
+
+/* The first pulse of a tick may be 15 periods old, and a tick has up to 256 poses. The rate that is said to be allowed
+ * is. */
+static void a_live_head_is_not_too_slow(void **state)
+{
+    (void)state;
+    static const char *const live[] = {"platform.kind=live"};
+    const struct device_options none = {0};
+    struct rig *rig = rig_open(NULL, live, 1);
+    struct device *device;
+    struct sh_err err;
+    rig->cfg->profile.prr_min_uhz = 63000000;
+    assert_int_equal(device_create(rig->site, &none, &device, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "to be at least 64"));
+    rig->cfg->profile.prr_min_uhz = 64000000;
+    need(device_create(rig->site, &none, &device, &err), &err);
+    device_free(device);
     rig_close(rig);
 }
 
@@ -204,6 +224,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_tick_of_lock_step_has_all_its_pulses),
         cmocka_unit_test(a_pose_far_ahead_keeps_no_other_out),
+        cmocka_unit_test(a_live_head_is_not_too_slow),
         cmocka_unit_test(a_platform_stands_where_the_scan_ended),
         cmocka_unit_test(a_path_ends_with_its_last_pose),
         cmocka_unit_test(a_live_platform_goes_on_for_a_while),

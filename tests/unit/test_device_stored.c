@@ -2,6 +2,8 @@
 /* Settings that the head keeps without power: HEAD:STORe, power cycles, *RST, a new start, a replayed journal. */
 #include "tests/unit/device_rig.h"
 
+#include <math.h>
+
 #include "firmware_sim/config/config.h"
 
 static char settings_path[96];
@@ -215,13 +217,14 @@ static void a_replayed_journal_needs_no_file(void **state)
     free(again);
 }
 
-/* Before the first scan the descriptor has the settings of power-up, also where a command has just made these. */
+/* Before the first scan the descriptor has the settings of power-up, also where a command has just made these. A range
+ * needs a site that is planned for it. */
 static void readers_before_a_scan_are_told_them(void **state)
 {
     (void)state;
     unlink(settings_path);
     struct settings_file *file = open_settings();
-    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 40\n"), SH_OK);
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 40\nHEAD:RANGe:MAX 5.5\n"), SH_OK);
     for (int replay = 0; replay < 2; replay++) {
         struct device_options options = {.journal = journal_path};
         if (replay) options = (struct device_options){.replay = journal_path};
@@ -229,10 +232,13 @@ static void readers_before_a_scan_are_told_them(void **state)
         struct rig *rig = rig_open(&options, NULL, 0);
         rig_go_to(rig, 1001); /* it is repeated each second */
         assert_true(rig->work.describe && rig->work.descriptor.lines_uhz == 40000000);
+        assert_true(fabs(rig->work.descriptor.range_max_m - 5.5) < 1e-9); /* ranges are whole nm */
         if (!replay) rig_tell(rig, "HEAD:LINES 70", 1000);
+        if (!replay) rig_tell(rig, "HEAD:RANG:MAX 6.5", 1000);
         if (!replay) rig_tell(rig, "HEAD:STORE", 1000);
         rig_go_to(rig, 2001);
         assert_true(rig->work.describe && rig->work.descriptor.lines_uhz == 70000000);
+        assert_true(fabs(rig->work.descriptor.range_max_m - 6.5) < 1e-9);
         rig_close(rig);
     }
     close_settings(file);

@@ -1,15 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* These tests compare the distance to the scene with brute force in 113-bit arithmetic by another algorithm. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
-#include <cmocka.h>
 
 #include "core/distance.h"
+#include "core/vec3.h"
+#include "tests/common/made.h"
 #include "tests/common/thorough.h"
 
 #ifdef __SIZEOF_FLOAT128__
@@ -84,33 +81,24 @@ static double brute_force(const struct scene *s, const double p[3], uint32_t *ne
     return best;
 }
 
-static double apart(const double a[3], const double b[3])
-{
-    return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
-}
-
 /* Returns the farthest corner of one triangle: the rounding of its distance is relative to that. */
 static double farthest_corner(const struct scene *s, uint32_t triangle, const double p[3])
 {
     double d = 0;
     for (int i = 0; i < 3; i++)
-        d = fmax(d, apart(p, s->vertex_m[s->triangle[triangle][i]]));
+        d = fmax(d, vec3_distance(p, s->vertex_m[s->triangle[triangle][i]]));
     return d;
 }
 
 static struct scene *make_scene(double (*v)[3], uint32_t n_triangles)
 {
-    struct scene *scene;
-    struct sh_err err;
     uint32_t(*t)[3] = malloc(n_triangles * sizeof *t);
     for (uint32_t i = 0; i < n_triangles; i++)
         for (uint32_t c = 0; c < 3; c++)
             t[i][c] = i * 3 + c;
-    int rc = scene_from_arrays(&(struct scene_arrays){(const double(*)[3])v, n_triangles * 3, (const uint32_t(*)[3])t,
-                                                      n_triangles, NULL, NULL, 0},
-                               &scene, &err);
+    struct scene *scene = made_scene(&(struct scene_arrays){(const double(*)[3])v, n_triangles * 3,
+                                                            (const uint32_t(*)[3])t, n_triangles, NULL, NULL, 0});
     free(t);
-    if (rc != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(scene->n_triangles, n_triangles);
     return scene;
 }
@@ -137,8 +125,8 @@ static void check_query(const struct distance *index, const struct scene *s, con
                  bound);
     double largest = fmax(fmax(fabs(p[0]), fabs(p[1])), fabs(p[2])) + size;
     /* the point itself is rounded to its coordinates' last place, on three axes */
-    if (fabs(apart(p, hit.point_m) - expected) > bound + 2 * largest * 0x1p-53)
-        fail_msg("the point is %g off", apart(p, hit.point_m) - expected);
+    if (fabs(vec3_distance(p, hit.point_m) - expected) > bound + 2 * largest * 0x1p-53)
+        fail_msg("the point is %g off", vec3_distance(p, hit.point_m) - expected);
     if (expected > 0) {
         assert_int_equal(distance_query(index, p, expected + bound, &hit), 1);
         if (expected > bound) assert_int_equal(distance_query(index, p, expected - bound, &hit), 0);

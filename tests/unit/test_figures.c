@@ -3,7 +3,6 @@
 #include <math.h>
 
 #include "core/studio/figures.h"
-#include "core/rng.h"
 #include "tests/unit/scene_files.h"
 
 static uint32_t group_of(void *ctx, size_t i)
@@ -50,32 +49,6 @@ static void groups_have_their_own_figures(void **state)
     near_to(f[1].along_mean_m, 0.004);
     assert_true(isnan(f[1].z_rms) && isnan(f[1].expected_rms_m));
     assert_true(f[2].points == 0 && isnan(f[2].mean_m) && isnan(f[2].p95_m) && isnan(f[2].max_m));
-}
-
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Percentiles are compared with a sorted copy: rank ceil(0.95 n), also with many equal values. */
-static void percentiles_are_the_nearest_rank(void **state)
-{
-    (void)state;
-    enum { MOST = 300 };
-    static uint32_t all[MOST];
-    for (size_t n = 1; n <= MOST; n++) {
-        double v[MOST], sorted[MOST];
-        for (size_t i = 0; i < n; i++)
-            v[i] = sorted[i] = (double)(rng_u64(n, i) % (n % 3 == 0 ? 4 : 1000));
-        qsort(sorted, n, sizeof *sorted, ascending);
-        const struct figures_in in = {n, v, NULL};
-        struct figures f;
-        struct sh_err err;
-        assert_int_equal(figures_by(&in, 1, group_of, all, &f, &err), SH_OK);
-        const size_t rank = (95 * n + 99) / 100;
-        if (f.p95_m != sorted[rank - 1]) fail_msg("of %zu: %g, not %g", n, f.p95_m, sorted[rank - 1]);
-    }
 }
 
 static void nice_numbers_are_1_2_5(void **state)
@@ -207,7 +180,6 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(groups_have_their_own_figures),
-        cmocka_unit_test(percentiles_are_the_nearest_rank),
         cmocka_unit_test(nice_numbers_are_1_2_5),
         cmocka_unit_test(histograms_count_each_value_once),
         cmocka_unit_test_setup_teardown(density_is_points_by_area, make_folder, remove_folder),

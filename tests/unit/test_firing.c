@@ -1,15 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Schedules with a firing table, against a data sheet: firing times as fractions in 128-bit integers. */
-#include "tests/common/cases.h"
+#include "tests/unit/schedule_rig.h"
 
 #include <math.h>
 #include <string.h>
-
-#include "core/schedule.h"
-
-__extension__ typedef unsigned __int128 u128;
-
-#define HZ INT64_C(1000000)
 
 static const int64_t HOUR_NS = INT64_C(3600000000000), DAY_NS = 24 * INT64_C(3600000000000);
 
@@ -131,19 +125,6 @@ static void turns_take_all_pulses(void **state)
         next = line.pulse_end;
     }
     assert_true(within > 500); /* most begin within a sequence */
-}
-
-/* Takes the segment's lines up to pulse k: each pulse once, in order. */
-static void take_lines(const struct schedule_segment *seg, uint64_t *next, uint64_t *cast, uint64_t k)
-{
-    while (*next < k) {
-        struct schedule_line line;
-        schedule_get_line(seg, schedule_line_of(seg, *next), &line);
-        assert_true(line.pulse0 <= *next && *next < line.pulse_end);
-        const uint64_t end = line.pulse_end < k ? line.pulse_end : k;
-        *cast += end - *next;
-        *next = end;
-    }
 }
 
 /* Rates of turns change anywhere, also within a sequence. Firing times and the firing's number go on, the azimuth

@@ -91,11 +91,12 @@ static int count_act(void *ctx)
 
 static void handle(struct rig *rig)
 {
+    const struct usb_owner owner = {.go_on = count_act, .ctx = rig};
     struct pollfd fds[USB_BACKEND_MAX_FDS];
     int n = rig->ops->prepare(rig->ffs, fds);
     assert_true(poll(fds, (nfds_t)n, 0) >= 0);
     rig->acts = 0;
-    assert_int_equal(rig->ops->handle(rig->ffs, fds, n, count_act, rig), SH_OK);
+    assert_int_equal(rig->ops->handle(rig->ffs, fds, n, &owner), SH_OK);
 }
 
 /* Runs until it has nothing to do. Then poll(2) waits, and the processor rests. */

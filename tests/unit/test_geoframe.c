@@ -2,16 +2,12 @@
 /* How a scene lies on the Earth. Stations of one scene agree, directions and scale are right, and traps give
  * warnings. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/geoframe.h"
 #include "core/locate.h"
 #include "core/mat3.h"
+#include "tests/common/cases.h"
 
 /* WGS 84 (NIMA TR8350.2) */
 #define A_M 6378137.0

@@ -142,6 +142,12 @@ static void test_scale(void **state)
     double scale[3];
     assert_int_equal(georef_scale(georef, 1e-6, 100e3, scale, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "do not fit into 31 bits"));
+    for (int i = 0; i < 40; i++) { /* the scale that the text names is taken */
+        double reach_m = 3e3 * (1 + 0.137 * i), least_m = 0;
+        assert_int_equal(georef_scale(georef, 1e-7, reach_m, scale, &err), SH_EINPUT);
+        assert_int_equal(sscanf(strstr(err.text, "at least "), "at least %lg m", &least_m), 1);
+        if (georef_scale(georef, least_m, reach_m, scale, &err) != SH_OK) fail_msg("%s", err.text);
+    }
     assert_int_equal(georef_scale(georef, 1e-4, 100e3, scale, &err), SH_OK);
     assert_true(scale[0] == 1e-4 && scale[1] == 1e-4 && scale[2] == 1e-4);
     georef_free(georef);

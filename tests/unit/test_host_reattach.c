@@ -73,6 +73,30 @@ static void test_identity_before(void **state)
     scanhead_close(sh);
 }
 
+/* Each session of the head counts from 0 the frames that it left out for this reader. */
+static void test_reader_lost(void **state)
+{
+    (void)state;
+    int door;
+    struct scanhead_frame f;
+    struct scanhead_stats stats;
+    struct scanhead *sh = open_tcp(&door);
+    for (uint64_t session = 1; session <= 3; session++) {
+        const int head = accept(door, NULL, NULL);
+        put_event(head, NATIVE_EV_READER_LOST, 1, 1, 1, NATIVE_LOCAL);
+        put_event(head, NATIVE_EV_READER_LOST, session, session, 1 + session, NATIVE_LOCAL);
+        close(head);
+        expect_frame(sh, SCANHEAD_EVENT, &f);
+        expect_frame(sh, SCANHEAD_EVENT, &f);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_ECLOSED);
+        assert_int_equal(scanhead_reattach(sh, WAIT_MS), 0);
+    }
+    scanhead_get_stats(sh, &stats);
+    assert_int_equal(stats.reader_lost, 2 + 3 + 4);
+    close(door);
+    scanhead_close(sh);
+}
+
 static void test_reattach(void **state)
 {
     (void)state;
@@ -144,6 +168,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_given_up_before),
         cmocka_unit_test(test_identity_before),
+        cmocka_unit_test(test_reader_lost),
         cmocka_unit_test(test_reattach),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

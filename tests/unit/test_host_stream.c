@@ -58,6 +58,93 @@ static void test_version_and_types(void **state)
     scanhead_close(sh);
 }
 
+/* The head starts again, or another recording follows. Until its descriptor and anchor have come, its points have no
+ * place, and the clock that it had before does not count. */
+static void test_restart(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_point point[3];
+    double gps_s;
+    struct line_block block = make_block(3, 200);
+    for (int again = 0; again < 2; again++) {
+        put_descriptor(head, 0, 1, again ? NATIVE_REPEAT : 0);
+        expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+        put_anchor(head, again ? NATIVE_REPEAT : 0);
+        expect_frame(sh, SCANHEAD_ANCHOR, &f);
+        put_event(head, NATIVE_EV_TIME, 0, 1, 1000000000, 0);
+        expect_frame(sh, SCANHEAD_EVENT, &f);
+        put_points(head, 3, 100);
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
+        assert_int_equal(scanhead_gps_time(sh, 0, &gps_s), 0);
+        const size_t len = native_encode_points(out, sizeof out, &block, 500);
+        native_finish_frame(out, 0);
+        put_all(head, out, len);
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        assert_int_equal(scanhead_points(sh, &f, 0, point, 3), SCANHEAD_ESTATE);
+        assert_int_equal(scanhead_gps_time(sh, 0, &gps_s), SCANHEAD_ESTATE);
+        block.pulse0++; /* the same frame again would count as repeated */
+    }
+    close(head);
+    scanhead_close(sh);
+}
+
+/* Another sequence begins with the frames of before: its descriptor is dropped as repeated, and holds all the same. */
+static void test_alike(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_point point[3];
+    struct native_descriptor d = make_descriptor(0, 1);
+    struct native_anchor anchor = make_anchor();
+    put_descriptor(head, 0, 1, 0);
+    expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+    put_anchor(head, 0);
+    expect_frame(sh, SCANHEAD_ANCHOR, &f);
+    put_points(head, 3, 500);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    size_t len = native_encode_descriptor(out, sizeof out, &d, 1, 0);
+    native_finish_frame(out, 0);
+    put_all(head, out, len);
+    anchor.station++;
+    len = native_encode_anchor(out, sizeof out, &anchor, 1, 0);
+    native_finish_frame(out, 1);
+    put_all(head, out, len);
+    expect_frame(sh, SCANHEAD_ANCHOR, &f);
+    put_points(head, 3, 100);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
+    close(head);
+    scanhead_close(sh);
+}
+
+/* Numbers may begin anywhere: what came before the first one holds. */
+static void test_any_start(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_point point[3];
+    const struct line_block block = make_block(3, 100);
+    put_descriptor(head, 0, 1, NATIVE_LOCAL);
+    expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+    put_anchor(head, NATIVE_LOCAL);
+    expect_frame(sh, SCANHEAD_ANCHOR, &f);
+    const size_t len = native_encode_points(out, sizeof out, &block, 500);
+    native_finish_frame(out, 1u << 31 | 5);
+    put_all(head, out, len);
+    expect_frame(sh, SCANHEAD_POINTS, &f);
+    assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
+    close(head);
+    scanhead_close(sh);
+}
+
 static void hash_frame(struct sha256_ctx *ctx, const uint8_t *frame, size_t len)
 {
     sha256_update(ctx, 1, frame + 1);
@@ -113,9 +200,8 @@ static void test_hash(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stats),
-        cmocka_unit_test(test_version_and_types),
-        cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_stats), cmocka_unit_test(test_version_and_types), cmocka_unit_test(test_restart),
+        cmocka_unit_test(test_alike), cmocka_unit_test(test_any_start),         cmocka_unit_test(test_hash),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

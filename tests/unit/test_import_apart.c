@@ -15,6 +15,7 @@
 
 #include "core/assimp_lib.h"
 #include "core/import/import_apart.h"
+#include "core/scene/build_load.h"
 #include "tests/common/collada.h"
 #include "tests/unit/scene_files.h"
 

@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 
 #include "core/import/import_result.h"
+#include "core/scene/build_load.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/scene_files.h"
 
@@ -99,7 +100,7 @@ static void check_scene(const struct scene *s)
 {
     for (uint32_t i = 0; i < s->n_vertices; i++)
         for (int k = 0; k < 3; k++)
-            assert_true(fabs(s->vertex_m[i][k]) <= BUILD_MAX_COORDINATE_M);
+            assert_true(fabs(s->vertex_m[i][k]) <= SCENE_MAX_COORDINATE_M);
     for (uint32_t i = 0; i < s->n_triangles; i++) {
         assert_true(s->label[i] < s->n_surfaces);
         for (int c = 0; c < 3; c++)

@@ -51,10 +51,6 @@ static void an_ideal_instrument_is_one(void **state)
     assert_true(fabs(pan - 0.3) < 1e-15 && fabs(elevation - 0.1) < 1e-15 && shot.mirror == 0.1 && shot.pan == 0.3);
 }
 
-/* Spherical triangles. Collimation c: the beam lies on a circle at c from the one across the mirror's axis: tan(pan
- * error) = tan c / cos m, sin(elevation) = cos c sin m. Trunnion t: the circle itself is tilted: tan(pan error) = sin t
- * tan m, sin(elevation) = cos t sin m. To first order they are Muralikrishnan's c / sin V and -t / tan V, V from the
- * zenith. */
 /* Each error alone makes a head that is not ideal. A phase without eccentricity is no error. */
 static void each_error_alone_is_one(void **state)
 {
@@ -79,6 +75,10 @@ static void each_error_alone_is_one(void **state)
     assert_true(instrument_is_ideal(&none));
 }
 
+/* Spherical triangles. Collimation c: the beam lies on a circle at c from the one across the mirror's axis: tan(pan
+ * error) = tan c / cos m, sin(elevation) = cos c sin m. Trunnion t: the circle itself is tilted: tan(pan error) = sin t
+ * tan m, sin(elevation) = cos t sin m. To first order they are Muralikrishnan's c / sin V and -t / tan V, V from the
+ * zenith. */
 static void tilts_follow_spherical_trigonometry(void **state)
 {
     (void)state;

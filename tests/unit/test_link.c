@@ -2,10 +2,13 @@
 /* The links null, file and fd, and the table of all links. The other links have programs of their own. */
 #include "tests/unit/link_test.h"
 
+#include <errno.h>
 #include <fcntl.h>
+#include <stdlib.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <termios.h>
 
 static void test_table(void **state)
 {
@@ -115,6 +118,29 @@ static void test_file_full(void **state)
     bench_close(&bench);
 }
 
+/* A device that takes nothing more, such as a serial port whose other end says so, must not hold up the link. */
+static void test_file_device(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_FILE};
+    struct termios mode;
+    const int other_end = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+    assert_int_equal(unlockpt(other_end), 0);
+    assert_int_equal(tcgetattr(other_end, &mode), 0);
+    cfmakeraw(&mode);
+    assert_int_equal(tcsetattr(other_end, TCSANOW, &mode), 0);
+    assert_int_equal(ptsname_r(other_end, spec.path, sizeof spec.path), 0);
+    struct bench bench = bench_open(&spec);
+    bench_expect(&bench, LINK_OPENED, 0);
+    fd_drain(other_end, bench_fill(&bench, 0));
+    bench_expect(&bench, LINK_WRITABLE, 1);
+    close(other_end);
+    assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_EIO);
+    assert_string_equal(bench_expect(&bench, LINK_CLOSED, 1).peer, strerror(EIO));
+    assert_int_equal(bench_poll(&bench, 1, 0), 0);
+    bench_close(&bench);
+}
+
 static void test_fd(void **state)
 {
     (void)state;
@@ -171,9 +197,10 @@ static void test_fd(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_table), cmocka_unit_test(test_null),          cmocka_unit_test(test_wake),
-        cmocka_unit_test(test_file),  cmocka_unit_test(test_file_refusals), cmocka_unit_test(test_file_full),
-        cmocka_unit_test(test_fd),
+        cmocka_unit_test(test_table),         cmocka_unit_test(test_null),
+        cmocka_unit_test(test_wake),          cmocka_unit_test(test_file),
+        cmocka_unit_test(test_file_refusals), cmocka_unit_test(test_file_full),
+        cmocka_unit_test(test_file_device),   cmocka_unit_test(test_fd),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,29 +9,11 @@
 #include <sys/stat.h>
 
 #include "tests/unit/pty_rig.h"
+#include "tests/unit/web_rig.h"
 
 static int cut(struct bench *bench, enum link_fault what, int session)
 {
     return bench->ops->fault(bench->link, what, session, 0, 0.0);
-}
-
-static int port_of(const struct bench *bench)
-{
-    char name[300];
-    bench->ops->endpoint(bench->link, name, sizeof name);
-    return atoi(strrchr(name, ':') + 1);
-}
-
-/* Opens a client of a port of this machine; -1: it was refused. */
-static int dial(int port)
-{
-    struct sockaddr_in at = {
-        .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK), .sin_port = htons((uint16_t)port)};
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (connect(fd, (struct sockaddr *)&at, sizeof at) == 0) return fd;
-    assert_int_equal(errno, ECONNREFUSED);
-    close(fd);
-    return -1;
 }
 
 /* The connection must end with a reset. */
@@ -73,9 +55,9 @@ static void test_tcp_disconnect(void **state)
     const struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
     struct bench bench = bench_open(&spec);
     char text[8];
-    int a = dial(port_of(&bench));
+    int a = dial(bench_port(&bench));
     assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
-    int b = dial(port_of(&bench));
+    int b = dial(bench_port(&bench));
     assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 1);
     bench_write_all(&bench, 0, "abc", 3);
     fd_read_all(a, text, 3);
@@ -89,7 +71,7 @@ static void test_tcp_disconnect(void **state)
     bench_write_all(&bench, 1, "def", 3);
     fd_read_all(b, text, 3);
     assert_memory_equal(text, "def", 3);
-    a = dial(port_of(&bench));
+    a = dial(bench_port(&bench));
     assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
     assert_int_equal(cut(&bench, LINK_FAULT_REFUSE, 0), SH_OK);
     expect_reset(a);
@@ -120,7 +102,7 @@ static void check_unplugged_port(struct bench *bench, int n_sessions, int port)
     close(other);
     assert_int_equal(cut(bench, LINK_FAULT_PLUG, 0), SH_OK);
     assert_int_equal(cut(bench, LINK_FAULT_PLUG, 0), SH_OK);
-    assert_int_equal(port_of(bench), port);
+    assert_int_equal(bench_port(bench), port);
 }
 
 static void test_tcp_unplug(void **state)
@@ -128,7 +110,7 @@ static void test_tcp_unplug(void **state)
     (void)state;
     const struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
     struct bench bench = bench_open(&spec);
-    const int port = port_of(&bench);
+    const int port = bench_port(&bench);
     for (int round = 0; round < 2; round++) {
         int a = dial(port), b;
         bench_expect(&bench, LINK_OPENED, 0);
@@ -144,42 +126,17 @@ static void test_tcp_unplug(void **state)
     bench_close(&bench); /* unplugged as it is */
 }
 
-/* Opens a WebSocket, and reads the link's answer to it. */
-static int upgrade(struct bench *bench, int port)
-{
-    char text[300], answer[1000];
-    size_t n = 0;
-    int fd = dial(port);
-    snprintf(text, sizeof text,
-             "GET /ws HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-             "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
-             port);
-    assert_int_equal(write(fd, text, strlen(text)), strlen(text));
-    for (const int64_t end_ms = now_ms() + DEADLINE_MS; strstr(answer, "\r\n\r\n") == NULL || n == 0;) {
-        ssize_t got = recv(fd, answer + n, sizeof answer - 1 - n, MSG_DONTWAIT);
-        if (got > 0) n += (size_t)got;
-        answer[n] = '\0';
-        if (got < 0) bench_poll(bench, 0, 1);
-        assert_true(now_ms() < end_ms && got != 0);
-    }
-    assert_memory_equal(answer, "HTTP/1.1 101", 12);
-    return fd;
-}
-
 /* There is no close frame, and nothing of a message that is on its way. */
 static void test_web(void **state)
 {
     (void)state;
-    const struct link_spec spec = {.type = LINK_WEB, .max_sessions = 2};
-    struct bench bench = bench_open(&spec);
-    char name[128];
-    int port;
-    bench.ops->endpoint(bench.link, name, sizeof name);
-    assert_int_equal(sscanf(name, "http://127.0.0.1:%d/", &port), 1);
+    char place[64];
+    struct bench bench = web_open(place);
+    const int port = bench_port(&bench);
     for (int round = 0; round < 2; round++) {
-        int a = upgrade(&bench, port);
+        int a = web_upgrade(&bench, place, "/ws", "");
         assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
-        int b = upgrade(&bench, port);
+        int b = web_upgrade(&bench, place, "/ws", "");
         assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 1);
         assert_int_equal(bench.ops->write(bench.link, 0, "hello", 5), 5);
         assert_int_equal(cut(&bench, round == 0 ? LINK_FAULT_DISCONNECT : LINK_FAULT_REFUSE, 0), SH_OK);
@@ -203,7 +160,7 @@ static void test_web(void **state)
         assert_true(is_calm(&bench, 3));
         assert_int_equal(cut(&bench, LINK_FAULT_PLUG, 0), SH_OK);
     }
-    close(upgrade(&bench, port));
+    close(web_upgrade(&bench, place, "/ws", ""));
     bench_expect(&bench, LINK_OPENED, 0);
     bench_close(&bench);
 }

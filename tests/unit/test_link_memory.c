@@ -341,8 +341,8 @@ static void wait_full(struct loop *loop)
     }
 }
 
-/* Each line has two ticks of more bytes than a turn takes, a shorter one that is lent, and 97 empty ones, which the same
- * turn may take. The queue is long, and ticks that are 300 apart, three lines, have the same slot. */
+/* Each line has two ticks of more bytes than a turn takes, a shorter one that is lent, and 97 empty ones, which the
+ * same turn may take. The queue is long, and ticks that are 300 apart, three lines, have the same slot. */
 static void a_lent_tick_stays_while_its_client_reads(void **state)
 {
     (void)state;

@@ -14,6 +14,7 @@ static void (*between_looks)(void);  /* called once, after poll has looked at al
 
 static int comes_early; /* a client opens the terminal just before it is watched for the first time */
 static int is_full;     /* the system has no more watches */
+static int has_no_pair; /* nor terminals */
 
 static void call_once(void (**what)(void))
 {
@@ -28,6 +29,12 @@ int inotify_add_watch(int fd, const char *path, uint32_t mask)
     comes_early = 0;
     errno = ENOSPC;
     return is_full ? -1 : (int)syscall(SYS_inotify_add_watch, fd, path, mask);
+}
+
+int posix_openpt(int flags)
+{
+    errno = ENOSPC;
+    return has_no_pair ? -1 : open("/dev/ptmx", flags);
 }
 
 int inotify_rm_watch(int fd, int watch)
@@ -184,6 +191,21 @@ static void test_cut_off_unwatched(void **state)
     bench_close(&bench);
 }
 
+/* The system has no other terminal for a client that is to be cut off. It keeps its own, and its session. */
+static void test_cut_off_without_another_terminal(void **state)
+{
+    (void)state;
+    begin();
+    has_no_pair = 1;
+    assert_int_equal(fault(LINK_FAULT_DISCONNECT), SH_ESTATE);
+    has_no_pair = 0;
+    exchange(&bench, 0, visitor);
+    leave();
+    bench_expect(&bench, LINK_CLOSED, 0);
+    expect_served(client_open(&bench));
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -193,6 +215,7 @@ int main(void)
         cmocka_unit_test(test_came_with_the_symlink),
         cmocka_unit_test(test_plugged_in_unwatched),
         cmocka_unit_test(test_cut_off_unwatched),
+        cmocka_unit_test(test_cut_off_without_another_terminal),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

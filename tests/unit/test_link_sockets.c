@@ -18,23 +18,13 @@
 
 enum { MAX_FD = 1024, NOTICED_S = 60 };
 
-static int connect_to(const struct bench *bench)
+static int connect_to(const struct bench *bench, const char *path)
 {
-    char name[300];
-    bench->ops->endpoint(bench->link, name, sizeof name);
-    const char *path = strchr(name, '/');
-    if (path != NULL && path[1] != '/') { /* no http:// */
-        struct sockaddr_un local = {.sun_family = AF_UNIX};
-        snprintf(local.sun_path, sizeof local.sun_path, "%s", path);
-        int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-        assert_int_equal(connect(fd, (struct sockaddr *)&local, sizeof local), 0);
-        return fd;
-    }
-    struct sockaddr_in at = {.sin_family = AF_INET,
-                             .sin_addr.s_addr = htonl(INADDR_LOOPBACK),
-                             .sin_port = htons((uint16_t)atoi(strrchr(name, ':') + 1))};
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
+    if (path[0] == '\0') return dial(bench_port(bench));
+    struct sockaddr_un local = {.sun_family = AF_UNIX};
+    snprintf(local.sun_path, sizeof local.sun_path, "%s", path);
+    int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(connect(fd, (struct sockaddr *)&local, sizeof local), 0);
     return fd;
 }
 
@@ -65,7 +55,7 @@ static int option(int fd, int level, int name)
 static void check(const struct link_spec *spec, int impatient)
 {
     struct bench bench = bench_open(spec);
-    int fd = connect_to(&bench), end = -1;
+    int fd = connect_to(&bench, spec->path), end = -1;
     for (const int64_t end_ms = now_ms() + DEADLINE_MS; end < 0; end = other_end(fd)) {
         assert_true(now_ms() < end_ms);
         bench.n_queue = 0;
@@ -94,7 +84,7 @@ static void starve(const struct link_spec *spec)
     int fd[CLIENTS], hog[HOGS], n_hogs = 0;
     bench_poll(&bench, 0, 0); /* which takes what it needs for itself */
     for (int i = 0; i < CLIENTS; i++)
-        fd[i] = connect_to(&bench);
+        fd[i] = connect_to(&bench, spec->path);
     assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
     few = (struct rlimit){.rlim_cur = (rlim_t)fd[CLIENTS - 1] + 8, .rlim_max = before.rlim_max};
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
@@ -120,6 +110,12 @@ static void starve(const struct link_spec *spec)
         assert_int_equal(recv(fd[i], &byte, 1, MSG_DONTWAIT), 0);
         close(fd[i]);
     }
+    fd[0] = connect_to(&bench, spec->path); /* the next one is accepted */
+    bench.n_queue = 0;
+    bench_poll(&bench, 0, 0);
+    for (int i = 0; i < bench.n_queue; i++)
+        assert_int_not_equal(bench.queue[i].kind, LINK_REFUSED);
+    close(fd[0]);
     bench_close(&bench);
 }
 
@@ -143,22 +139,15 @@ static void test_usbredir(void **state)
 {
     (void)state;
 #ifdef HAVE_USBREDIR
-    const struct link_spec spec = {.type = LINK_USB, .backend = USB_BACKEND_USBREDIR, .vid = 1};
+    struct link_spec spec = {.type = LINK_USB, .backend = USB_BACKEND_USBREDIR, .vid = 1};
     check(&spec, 0);
+    starve(&spec);
+    snprintf(spec.path, sizeof spec.path, "/tmp/scanhead-test-%d.usbredir", (int)getpid());
     starve(&spec);
 #else
     print_message("# needs libusbredirparser-dev\n");
     skip();
 #endif
-}
-
-static void test_path(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_USB, .backend = USB_BACKEND_USBIP, .vid = 1};
-    snprintf(spec.path, sizeof spec.path, "/tmp/scanhead-test-%d.usbip", (int)getpid());
-    starve(&spec);
-    unlink(spec.path);
 }
 
 enum { IN_VAIN = 100 };
@@ -238,13 +227,13 @@ static void test_brief(void **state)
     for (int brief = 0; brief < 2; brief++) {
         struct bench bench = bench_open(&(struct link_spec){.type = LINK_TCP, .max_sessions = 2, .brief = brief});
         char bytes[2];
-        int first = connect_to(&bench), fd[2] = {-1, -1};
+        int first = dial(bench_port(&bench)), fd[2] = {-1, -1};
         bench_expect(&bench, LINK_OPENED, 0);
-        fd[0] = connect_to(&bench);
+        fd[0] = dial(bench_port(&bench));
         bench_expect(&bench, LINK_OPENED, 0);
         assert_int_equal(send(first, "GE", 2, MSG_NOSIGNAL), 2); /* so that the other one is silent */
         bench_read_all(&bench, 0, bytes, 2);
-        fd[1] = connect_to(&bench);
+        fd[1] = dial(bench_port(&bench));
         if (brief) {
             assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
             assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 1);
@@ -262,9 +251,8 @@ static void test_brief(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tcp),   cmocka_unit_test(test_usbip), cmocka_unit_test(test_usbredir),
-        cmocka_unit_test(test_path),  cmocka_unit_test(test_web),   cmocka_unit_test(test_two_doors),
-        cmocka_unit_test(test_brief),
+        cmocka_unit_test(test_tcp), cmocka_unit_test(test_usbip),     cmocka_unit_test(test_usbredir),
+        cmocka_unit_test(test_web), cmocka_unit_test(test_two_doors), cmocka_unit_test(test_brief),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,47 +2,29 @@
 /* The link tcp: sessions come, end in each way, fill up, and are refused. */
 #include "tests/unit/link_test.h"
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
-
-static int tcp_port(const struct bench *bench)
-{
-    char text[96];
-    int port = 0;
-    bench->ops->endpoint(bench->link, text, sizeof text);
-    assert_int_equal(sscanf(text, "tcp:127.0.0.1:%d", &port), 1);
-    assert_in_range(port, 1, 65535);
-    return port;
-}
-
-static int tcp_client(int port)
-{
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
-    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
-    return fd;
-}
 
 static void test_tcp_sessions(void **state)
 {
     (void)state;
     struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
     struct bench bench = bench_open(&spec);
-    const int port = tcp_port(&bench);
-    int a = tcp_client(port);
+    const int port = bench_port(&bench);
+    char text[96], want[96];
+    bench.ops->endpoint(bench.link, text, sizeof text);
+    snprintf(want, sizeof want, "tcp:127.0.0.1:%d", port);
+    assert_string_equal(text, want);
+    int a = dial(port);
     assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
-    int b = tcp_client(port);
+    int b = dial(port);
     struct link_event event = bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(event.session, 1);
     assert_int_equal(strncmp(event.peer, "127.0.0.1:", 10), 0);
     exchange(&bench, 0, a);
     exchange(&bench, 1, b);
-    int c = tcp_client(port);
+    int c = dial(port);
     bench_expect(&bench, LINK_REFUSED, 0);
     char byte;
     assert_int_equal(fd_read(c, &byte, 1), 0); /* told, not left waiting */
@@ -53,7 +35,7 @@ static void test_tcp_sessions(void **state)
     assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 3).session, 0);
     assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), SH_ECLOSED);
-    a = tcp_client(port);
+    a = dial(port);
     assert_int_equal(bench_expect(&bench, LINK_OPENED, 0).session, 0);
     exchange(&bench, 0, a);
     assert_int_equal(bench.ops->write(bench.link, 7, "x", 1), SH_ECLOSED);
@@ -70,7 +52,7 @@ static void test_tcp_endings(void **state)
     struct bench bench = bench_open(&spec);
     char byte;
     /* It is half closed, with a byte still to read. */
-    int fd = tcp_client(tcp_port(&bench));
+    int fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(fd, "q", 1), 1);
     assert_int_equal(shutdown(fd, SHUT_WR), 0);
@@ -87,11 +69,11 @@ static void test_tcp_endings(void **state)
     assert_int_equal(fd_read(fd, &byte, 1), 0);
     close(fd);
     /* Another client comes before that has been read: the session is not free yet, but will be. */
-    fd = tcp_client(tcp_port(&bench));
+    fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(fd, "q", 1), 1);
     close(fd);
-    fd = tcp_client(tcp_port(&bench));
+    fd = dial(bench_port(&bench));
     bench_poll(&bench, 0, DEADLINE_MS);
     bench_read_all(&bench, 0, &byte, 1);
     bench_expect(&bench, LINK_SHUT, 0);
@@ -104,7 +86,7 @@ static void test_tcp_endings(void **state)
     assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
     bench_expect(&bench, LINK_CLOSED, 0);
     /* It is reset, while frames are on their way. */
-    fd = tcp_client(tcp_port(&bench));
+    fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     bench_fill(&bench, 0);
     const struct linger reset = {.l_onoff = 1, .l_linger = 0};
@@ -112,7 +94,7 @@ static void test_tcp_endings(void **state)
     close(fd);
     bench_expect(&bench, LINK_CLOSED, 1);
     /* write notices it before poll does. */
-    fd = tcp_client(tcp_port(&bench));
+    fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
     close(fd);
@@ -134,7 +116,7 @@ static void test_tcp_last_words(void **state)
     struct bench bench = bench_open(&spec);
     const struct linger reset = {.l_onoff = 1, .l_linger = 0};
     char words[4];
-    int fd = tcp_client(tcp_port(&bench));
+    int fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(fd, "STOP", 4), 4);
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
@@ -148,14 +130,32 @@ static void test_tcp_last_words(void **state)
     bench_close(&bench);
 }
 
+/* The link is closed before it has read a client's last bytes. The client gets all that was written to it, and its
+ * end. */
+static void test_tcp_close(void **state)
+{
+    (void)state;
+    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
+    struct bench bench = bench_open(&spec);
+    char byte;
+    int fd = dial(bench_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    const size_t held = bench_fill(&bench, 0);
+    assert_int_equal(write(fd, "STOP", 4), 4);
+    bench_close(&bench);
+    fd_drain(fd, held);
+    assert_int_equal(fd_read(fd, &byte, 1), 0);
+    close(fd);
+}
+
 static void test_tcp_full(void **state)
 {
     (void)state;
     struct link_spec spec = {.type = LINK_TCP, .max_sessions = 2};
     struct bench bench = bench_open(&spec);
-    int lazy = tcp_client(tcp_port(&bench));
+    int lazy = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
-    int other = tcp_client(tcp_port(&bench));
+    int other = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     size_t held = bench_fill(&bench, 0);
     exchange(&bench, 1, other); /* one lazy reader does not hold up another */
@@ -172,7 +172,7 @@ static void test_tcp_kill(void **state)
     (void)state;
     struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
     struct bench bench = bench_open(&spec);
-    int fd = tcp_client(tcp_port(&bench));
+    int fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     pid_t child = fork();
     if (child == 0) {
@@ -200,34 +200,6 @@ static void test_tcp_kill(void **state)
     bench_close(&bench);
 }
 
-/* Without a free descriptor the client is turned away and poll waits again. */
-static void test_tcp_descriptors(void **state)
-{
-    (void)state;
-    struct link_spec spec = {.type = LINK_TCP, .max_sessions = 4};
-    struct bench bench = bench_open(&spec);
-    int fd = tcp_client(tcp_port(&bench)), hog[64], n = 0;
-    struct rlimit before, few;
-    getrlimit(RLIMIT_NOFILE, &before);
-    few = (struct rlimit){.rlim_cur = (rlim_t)fd + 8, .rlim_max = before.rlim_max};
-    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
-    while (n < 64 && (hog[n] = dup(fd)) >= 0)
-        n++;
-    bench_expect(&bench, LINK_REFUSED, 0);
-    assert_int_equal(bench_poll(&bench, 0, 0), 0);
-    while (n > 0)
-        close(hog[--n]);
-    setrlimit(RLIMIT_NOFILE, &before);
-    char byte;
-    assert_int_equal(fd_read(fd, &byte, 1), 0);
-    close(fd);
-    fd = tcp_client(tcp_port(&bench));
-    bench_expect(&bench, LINK_OPENED, 0);
-    exchange(&bench, 0, fd);
-    close(fd);
-    bench_close(&bench);
-}
-
 /* Events that do not fit into the caller's array come with the next call. */
 static void test_tcp_small_array(void **state)
 {
@@ -237,7 +209,7 @@ static void test_tcp_small_array(void **state)
     struct link_event event;
     int fd[3], seen[6] = {0};
     for (int i = 0; i < 3; i++)
-        fd[i] = tcp_client(tcp_port(&bench));
+        fd[i] = dial(bench_port(&bench));
     for (int i = 0; i < 3; i++) {
         assert_int_equal(bench.ops->poll(bench.link, -1, 0, DEADLINE_MS, &event, 1), 1);
         seen[event.kind]++;
@@ -263,7 +235,7 @@ static void test_tcp_refusals(void **state)
     struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
     struct bench bench = bench_open(&spec);
     char want[64];
-    spec.port = tcp_port(&bench);
+    spec.port = bench_port(&bench);
     snprintf(want, sizeof want, "tcp:127.0.0.1:%d: cannot listen: Address already in use", spec.port);
     expect_refused(&spec, SH_EINPUT, want);
     bench_close(&bench);
@@ -308,9 +280,9 @@ int main(void)
         cmocka_unit_test(test_tcp_sessions),
         cmocka_unit_test(test_tcp_endings),
         cmocka_unit_test(test_tcp_last_words),
+        cmocka_unit_test(test_tcp_close),
         cmocka_unit_test(test_tcp_full),
         cmocka_unit_test(test_tcp_kill),
-        cmocka_unit_test(test_tcp_descriptors),
         cmocka_unit_test(test_tcp_small_array),
         cmocka_unit_test(test_tcp_refusals),
         cmocka_unit_test(test_tcp_privileged_port),

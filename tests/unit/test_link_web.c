@@ -131,23 +131,6 @@ static void take_descriptors(struct rlimit *before)
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &none), 0);
 }
 
-/* Without a descriptor for it, a connection is closed, so that it does not wake the link for ever. */
-static void test_no_descriptors(void **state)
-{
-    (void)state;
-    char place[64], byte;
-    struct bench bench = web_open(place);
-    struct rlimit before;
-    bench_poll(&bench, 0, 0); /* which takes what it needs for itself */
-    int fd = web_dial(place);
-    take_descriptors(&before);
-    size_t n = web_listen_to(&bench, fd, &byte, 1);
-    assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
-    assert_int_equal(n, 0);
-    close(fd);
-    bench_close(&bench);
-}
-
 /* Two clients find no descriptor before the owner hears of either. Each is reported by its own name. */
 static void test_refused_names(void **state)
 {
@@ -378,12 +361,17 @@ static void test_bad_messages(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_headers),          cmocka_unit_test(test_requests),
-        cmocka_unit_test(test_who_asks),         cmocka_unit_test(test_session),
-        cmocka_unit_test(test_one_request_each), cmocka_unit_test(test_half_request),
-        cmocka_unit_test(test_no_descriptors),   cmocka_unit_test(test_goodbye),
-        cmocka_unit_test(test_refused_names),    cmocka_unit_test(test_descriptors_run_out),
-        cmocka_unit_test(test_turned_down),      cmocka_unit_test(test_bad_messages),
+        cmocka_unit_test(test_headers),
+        cmocka_unit_test(test_requests),
+        cmocka_unit_test(test_who_asks),
+        cmocka_unit_test(test_session),
+        cmocka_unit_test(test_one_request_each),
+        cmocka_unit_test(test_half_request),
+        cmocka_unit_test(test_goodbye),
+        cmocka_unit_test(test_refused_names),
+        cmocka_unit_test(test_descriptors_run_out),
+        cmocka_unit_test(test_turned_down),
+        cmocka_unit_test(test_bad_messages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

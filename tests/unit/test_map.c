@@ -1,37 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /* The scan map, read back through libpng's simplified interface. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
-
 #include <fcntl.h>
 #include <math.h>
 #include <png.h>
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "core/studio/map.h"
+#include "tests/unit/scene_files.h"
 
 struct picture {
     uint32_t width, height;
     uint8_t *rgb;
 };
-
-static char dir[] = "/tmp/test_map.XXXXXX";
-
-static const char *in_dir(const char *name)
-{
-    static char path[128];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    return path;
-}
 
 static struct map *make(double x0, double y0, double x1, double y1, double pixel_m)
 {
@@ -44,15 +26,15 @@ static struct map *make(double x0, double y0, double x1, double y1, double pixel
 
 static struct picture draw(const struct map *map)
 {
-    const char *path = in_dir("map.png");
+    const char *file = path_in("map.png");
     struct sh_err err = {0, ""};
-    if (map_write_png(map, path, &err) != SH_OK) fail_msg("%s", err.text);
+    if (map_write_png(map, file, &err) != SH_OK) fail_msg("%s", err.text);
     png_image image = {.version = PNG_IMAGE_VERSION};
-    assert_true(png_image_begin_read_from_file(&image, path));
+    assert_true(png_image_begin_read_from_file(&image, file));
     image.format = PNG_FORMAT_RGB;
     struct picture picture = {image.width, image.height, malloc(PNG_IMAGE_SIZE(image))};
     assert_true(png_image_finish_read(&image, NULL, picture.rgb, 0, NULL));
-    unlink(path);
+    unlink(file);
     return picture;
 }
 
@@ -261,6 +243,25 @@ static void test_counts(void **state)
     map_free(map);
 }
 
+/* One line more than a map has of its kind is counted, and the other kind has its own limit. */
+static void test_lines_left_out(void **state)
+{
+    (void)state;
+    static const double a[2] = {0, 0}, b[2] = {1, 1};
+    struct map *map = make(0, 0, 1, 1, 0.1);
+    struct map_counts counts;
+    struct sh_err err = {0, ""};
+    for (int kind = 0; kind < MAP_LINES; kind++)
+        for (int i = 0; i < MAP_MAX_LINES + 1 + kind; i++)
+            assert_int_equal(map_add_line(map, kind, a, b, &err), SH_OK);
+    map_get_counts(map, &counts);
+    for (int kind = 0; kind < MAP_LINES; kind++) {
+        assert_int_equal(counts.lines[kind], MAP_MAX_LINES);
+        assert_int_equal(counts.lines_left_out[kind], 1 + kind);
+    }
+    map_free(map);
+}
+
 static void test_refusals(void **state)
 {
     (void)state;
@@ -297,14 +298,14 @@ static void test_refusals(void **state)
     }
 }
 
-static void expect_no_write(const struct map *map, const char *path, int code)
+static void expect_no_write(const struct map *map, const char *file, int code)
 {
     struct sh_err err = {0, ""};
     char part[160];
-    assert_int_equal(map_write_png(map, path, &err), code);
-    assert_non_null(strstr(err.text, path));
+    assert_int_equal(map_write_png(map, file, &err), code);
+    assert_non_null(strstr(err.text, file));
     assert_null(strchr(err.text, '\n'));
-    snprintf(part, sizeof part, "%s.part", path);
+    snprintf(part, sizeof part, "%s.part", file);
     assert_int_equal(access(part, F_OK), -1); /* nothing lies about */
 }
 
@@ -313,12 +314,12 @@ static void test_bad_path(void **state)
     (void)state;
     struct map *map = make(0, 0, 1, 1, 0.01);
     char text[8] = "";
-    expect_no_write(map, in_dir("no/such/map.png"), SH_EINPUT);
-    assert_int_equal(mkdir(in_dir("taken.png"), 0700), 0);
-    expect_no_write(map, in_dir("taken.png"), SH_EINPUT);
-    assert_int_equal(rmdir(in_dir("taken.png")), 0);
+    expect_no_write(map, path_in("no/such/map.png"), SH_EINPUT);
+    assert_int_equal(mkdir(path_in("taken.png"), 0700), 0);
+    expect_no_write(map, path_in("taken.png"), SH_EINPUT);
+    assert_int_equal(rmdir(path_in("taken.png")), 0);
     /* On a full disk the earlier file stays whole. */
-    int fd = open(in_dir("old.png"), O_CREAT | O_WRONLY, 0600);
+    int fd = open(path_in("old.png"), O_CREAT | O_WRONLY, 0600);
     assert_int_equal(write(fd, "old", 3), 3);
     close(fd);
     struct rlimit before, small;
@@ -326,26 +327,14 @@ static void test_bad_path(void **state)
     small = (struct rlimit){100, before.rlim_max};
     signal(SIGXFSZ, SIG_IGN);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
-    expect_no_write(map, in_dir("old.png"), SH_EIO);
+    expect_no_write(map, path_in("old.png"), SH_EIO);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
-    fd = open(in_dir("old.png"), O_RDONLY);
+    fd = open(path_in("old.png"), O_RDONLY);
     assert_int_equal(read(fd, text, sizeof text), 3);
     assert_string_equal(text, "old");
     close(fd);
-    unlink(in_dir("old.png"));
+    unlink(path_in("old.png"));
     map_free(map);
-}
-
-static int make_dir(void **state)
-{
-    (void)state;
-    return mkdtemp(dir) != NULL ? 0 : -1;
-}
-
-static int remove_dir(void **state)
-{
-    (void)state;
-    return rmdir(dir);
 }
 
 int main(void)
@@ -353,7 +342,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_size),     cmocka_unit_test(test_place),     cmocka_unit_test(test_structure),
         cmocka_unit_test(test_station),  cmocka_unit_test(test_scale_bar), cmocka_unit_test(test_counts),
-        cmocka_unit_test(test_refusals), cmocka_unit_test(test_bad_path),
+        cmocka_unit_test(test_refusals), cmocka_unit_test(test_bad_path),  cmocka_unit_test(test_lines_left_out),
     };
-    return cmocka_run_group_tests(tests, make_dir, remove_dir);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

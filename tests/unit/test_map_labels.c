@@ -1,30 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Names on the map, and the map as SVG. A small reader of XML reads it back, and libpng its image. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <setjmp.h>
-#include <cmocka.h>
-
 #include <ctype.h>
 #include <math.h>
 #include <png.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 #include "core/studio/map.h"
 #include "core/studio/picture.h"
-
-static char dir[] = "/tmp/test_map_labels.XXXXXX";
-
-static const char *in_dir(const char *name)
-{
-    static char path[128];
-    snprintf(path, sizeof path, "%s/%s", dir, name);
-    return path;
-}
+#include "tests/unit/scene_files.h"
 
 static struct map *make(double side_m)
 {
@@ -211,14 +193,14 @@ static void look(void *ctx, const struct element *e)
     f->n_red++;
 }
 
-static char *read_file(const char *path)
+static char *read_text(const char *file)
 {
-    FILE *in = fopen(path, "rb");
+    FILE *in = fopen(file, "rb");
     assert_non_null(in);
     char *text = calloc(1, 1 << 20);
     const size_t n = fread(text, 1, (1 << 20) - 1, in);
     fclose(in);
-    unlink(path);
+    unlink(file);
     assert_int_equal(strlen(text), n);
     return text;
 }
@@ -273,8 +255,8 @@ static void test_svg(void **state)
     add(map, 10, 50, NAN, "a<b>&\"c\" \xc3\xa4\xe2\x82\xac", "z 1.00 m");
     add(map, 30, 15, 1, "line\nend \xff\xed\xa0\x80", ""); /* a control, and bytes that are not UTF-8 */
     map_get_layout(map, &at);
-    if (map_write_svg(map, in_dir("map.svg"), &err) != SH_OK) fail_msg("%s", err.text);
-    char *xml = read_file(in_dir("map.svg"));
+    if (map_write_svg(map, path_in("map.svg"), &err) != SH_OK) fail_msg("%s", err.text);
+    char *xml = read_text(path_in("map.svg"));
     walk(xml, look, &found);
     assert_int_equal(found.images, 1);
     assert_int_equal(found.stations, 2);
@@ -340,18 +322,6 @@ static void test_font(void **state)
     assert_true(ink_of("\xc3", &width) == box && ink_of("\x80", &width) == box); /* broken UTF-8 */
 }
 
-static int make_dir(void **state)
-{
-    (void)state;
-    return mkdtemp(dir) != NULL ? 0 : -1;
-}
-
-static int remove_dir(void **state)
-{
-    (void)state;
-    return rmdir(dir);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -360,5 +330,5 @@ int main(void)
         cmocka_unit_test(test_svg),
         cmocka_unit_test(test_font),
     };
-    return cmocka_run_group_tests(tests, make_dir, remove_dir);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -38,36 +38,30 @@ static struct mesh sheet(void)
                          .n_parts = 2};
 }
 
-static const char *at(const char *name)
-{
-    snprintf(path, sizeof path, "%s/%s", folder, name);
-    return path;
-}
-
 static void drop(const char *name)
 {
-    assert_int_equal(unlink(at(name)), 0);
+    assert_int_equal(unlink(path_in(name)), 0);
 }
 
 static void write_ok(const char *name, const struct mesh *mesh)
 {
-    if (mesh_write(at(name), mesh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
+    if (mesh_write(path_in(name), mesh, NULL, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
 /* A refused mesh leaves no file. */
 static void write_refused(const char *name, const struct mesh *mesh, const char *expected)
 {
     char part[160];
-    snprintf(part, sizeof part, "%s.part", at(name));
-    assert_int_equal(mesh_write(at(name), mesh, NULL, &err), SH_EINPUT);
+    snprintf(part, sizeof part, "%s.part", path_in(name));
+    assert_int_equal(mesh_write(path_in(name), mesh, NULL, &err), SH_EINPUT);
     if (strstr(err.text, expected) == NULL || strchr(err.text, '\n') != NULL) fail_msg("%s", err.text);
-    assert_int_equal(access(at(name), F_OK), -1);
+    assert_int_equal(access(path_in(name), F_OK), -1);
     assert_int_equal(access(part, F_OK), -1);
 }
 
 static char *read_text(const char *name, size_t *len)
 {
-    FILE *in = fopen(at(name), "rb");
+    FILE *in = fopen(path_in(name), "rb");
     assert_non_null(in);
     char *text = calloc(1, 1 << 16);
     assert_non_null(text);
@@ -81,7 +75,7 @@ static void write_image(const char *name)
     const uint8_t grey[3] = {9, 9, 9};
     struct picture image;
     assert_int_equal(picture_make(&image, 2, 2, grey, &err), SH_OK);
-    assert_int_equal(picture_write_png(&image, "test", at(name), &err), SH_OK);
+    assert_int_equal(picture_write_png(&image, "test", path_in(name), &err), SH_OK);
     picture_free(&image);
 }
 
@@ -106,7 +100,7 @@ static void read_back(const char *name, enum scene_up up, int has_parts)
 {
     struct scene *s;
     unsigned found[N_FACES] = {0};
-    const struct scene_mesh_spec spec = {.file = at(name), .scale = 1, .up = up, .textures = has_parts};
+    const struct scene_mesh_spec spec = {.file = path_in(name), .scale = 1, .up = up, .textures = has_parts};
     if (load_spec(&spec, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(s->n_triangles, N_FACES);
     for (uint32_t i = 0; i < s->n_triangles; i++)
@@ -234,7 +228,7 @@ static void long_file(void **state)
             many[i][k] = i + 0.25 * k;
     const struct mesh mesh = {.n_vertices = MANY, .xyz_m = (const double(*)[3])many};
     write_ok("long.ply", &mesh);
-    const int fd = open(at("long.ply"), O_RDONLY);
+    const int fd = open(path_in("long.ply"), O_RDONLY);
     assert_int_equal(fstat(fd, &st), 0);
     assert_true(st.st_size > (off_t)MANY * ROW && st.st_size < (off_t)MANY * ROW + 1000);
     for (int i = 0; i < MANY; i += AT_ONCE) {
@@ -312,16 +306,16 @@ static void whole_or_not_at_all(void **state)
     size_t len;
     for (size_t i = 0; i < 3; i++) {
         write_text(name[i], "before");
-        assert_int_equal(mesh_write(at(name[i]), &mesh, &report, &err), SH_ESTOPPED);
+        assert_int_equal(mesh_write(path_in(name[i]), &mesh, &report, &err), SH_ESTOPPED);
         char *text = read_text(name[i], &len);
         assert_string_equal(text, "before");
         free(text);
         drop(name[i]);
     }
-    assert_int_equal(symlink("nowhere", at("a.bin")), 0);
-    assert_int_equal(mesh_write(at("a.gltf"), &mesh, NULL, &err), SH_EINPUT);
+    assert_int_equal(symlink("nowhere", path_in("a.bin")), 0);
+    assert_int_equal(mesh_write(path_in("a.gltf"), &mesh, NULL, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "a.bin: is a symbolic link"));
-    assert_int_equal(access(at("a.gltf"), F_OK), -1);
+    assert_int_equal(access(path_in("a.gltf"), F_OK), -1);
     drop("a.bin");
 }
 

@@ -4,6 +4,7 @@
 
 #include "core/colour.h"
 #include "core/surface.h"
+#include "tests/common/made.h"
 
 /* The wall ahead is a mirror. The room continues in it as its own image, and each ray as if there were no mirror. */
 static void a_mirror_shows_the_room_behind_it(void **state)
@@ -61,6 +62,18 @@ static void facing_mirrors_end_at_the_depth(void **state)
     close_optics(&o);
 }
 
+/* A pane before a wall, and a signal for it. */
+static void open_window(struct optics *o, struct detect_signal *signal)
+{
+    struct sh_err err;
+    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1};
+    assert_int_equal(detect_signal_set_up(&spec, signal, &err), SH_OK);
+    open_optics(o, window());
+    o->table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o->table.surface[1] = (struct surface){.reflectance = 0.6};
+    o->table.has_optics = 1;
+}
+
 /* There are three echoes: both sides of the pane, and the wall, whose light passes four sides. Only the middle of the
  * line has them. When fewer are asked for, the weakest is left out: the pane's far side, then its near one. */
 static void a_pane_and_what_is_behind_it(void **state)
@@ -69,13 +82,7 @@ static void a_pane_and_what_is_behind_it(void **state)
     struct optics o;
     struct schedule_line line;
     struct detect_signal signal;
-    struct sh_err err;
-    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1};
-    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
-    open_optics(&o, window());
-    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
-    o.table.surface[1] = (struct surface){.reflectance = 0.6};
-    o.table.has_optics = 1;
+    open_window(&o, &signal);
     for (int with_signal = 0; with_signal < 2; with_signal++)
         for (uint32_t most = 1; most <= 3; most++) {
             o.detect.signal = with_signal ? &signal : NULL;
@@ -112,13 +119,7 @@ static void what_is_too_near_is_one_echo(void **state)
     struct optics o;
     struct schedule_line line;
     struct detect_signal signal;
-    struct sh_err err;
-    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1};
-    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
-    open_optics(&o, window());
-    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
-    o.table.surface[1] = (struct surface){.reflectance = 0.6};
-    o.table.has_optics = 1;
+    open_window(&o, &signal);
     o.detect.signal = &signal;
     schedule_get_line(&o.rig->segment, 0, &line);
     o.detect.separation_m = 0.001;
@@ -295,8 +296,6 @@ static void a_mirror_that_moves(void **state)
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     static const uint16_t label[2] = {6, 6};
     struct optics o;
-    struct scene *body;
-    struct bvh *bvh;
     struct sh_err err;
     struct schedule_line line;
     struct scene_surface named[7] = {{.object = ""}};
@@ -308,9 +307,8 @@ static void a_mirror_that_moves(void **state)
         o.table.surface[i].reflectance = 0.5;
     o.table.surface[6].mirror = 1.0;
     o.detect.ghost_label = 7;
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, label, named, 7}, &body, &err) != 0 ||
-        bvh_create(body, 1, NULL, &bvh, &err) != 0)
-        fail_msg("%s", err.text);
+    struct scene *body = made_scene(&(struct scene_arrays){vertex, 4, triangle, 2, label, named, 7});
+    struct bvh *bvh = made_bvh(body);
     struct cast_mover *m = &o.rig->setup.mover[0];
     *m = (struct cast_mover){.bvh = bvh, .centre_m = {0, 2, 0}, .radius_m = 1.5};
     pose_heading(atan(1.0), m->rotation); /* clockwise: the mirror's plane is then y - 3 = -x */

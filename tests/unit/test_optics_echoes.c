@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Echoes behind glass, in mirrors and on bodies: ghosts, sent echoes, and the hits among them. */
+#include "tests/common/made.h"
 #include "tests/unit/optics_rig.h"
 
 /* A mirror is ahead, a pane behind the head, and a wall behind that. Pane and wall, seen in the mirror, are both
@@ -135,16 +136,12 @@ static void which_side_of_a_body_is_met(void **state)
     static const double vertex[4][3] = {{-1, 3, -1}, {1, 3, -1}, {1, 3, 1}, {-1, 3, 1}};
     static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
     struct optics o;
-    struct scene *body;
-    struct bvh *bvh;
-    struct sh_err err;
     struct schedule_line line;
     struct schedule_run run;
     struct cast_hit hit[1 + CAST_MAX_DEPTH];
     open_optics(&o, box_scene(LO, HI));
-    if (scene_from_arrays(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0}, &body, &err) != 0 ||
-        bvh_create(body, 1, NULL, &bvh, &err) != 0)
-        fail_msg("%s", err.text);
+    struct scene *body = made_scene(&(struct scene_arrays){vertex, 4, triangle, 2, NULL, NULL, 0});
+    struct bvh *bvh = made_bvh(body);
     o.rig->spec.pan_udeg_s = 0;
     schedule_start(&o.rig->segment, &o.rig->spec);
     schedule_get_line(&o.rig->segment, 0, &line);

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Pulses near outlines, by geometry alone. A pulse whose footprint reaches an edge is found, in any direction, and
  * among any other pulses. */
-#include "tests/common/cases.h"
 #include "tests/common/thorough.h"
 
 #include <math.h>
@@ -9,6 +8,7 @@
 #include <string.h>
 
 #include "core/footprint.h"
+#include "tests/common/made.h"
 
 static const double STATION[3] = {0.0, 0.0, 0.0};
 
@@ -17,10 +17,9 @@ static struct beam_outlines *outlines_of(const double corner[3][3], const struct
 {
     static const uint32_t triangle[1][3] = {{0, 1, 2}};
     struct beam_outlines *outlines;
-    struct scene *scene;
     struct sh_err err;
     const struct scene_arrays arrays = {corner, 3, triangle, 1, NULL, NULL, 0};
-    if (scene_from_arrays(&arrays, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    struct scene *scene = made_scene(&arrays);
     const struct beam_outlines_spec spec = {scene, STATION, beam, 1000.0, NULL, NULL};
     if (beam_outlines_create(&spec, NULL, &outlines, &err) != SH_OK) fail_msg("%s", err.text);
     scene_free(scene);

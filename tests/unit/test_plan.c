@@ -1,15 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The choice among several options, and the plan's row about it. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
-#include <cmocka.h>
 
 #include "core/plan.h"
 #include "core/plan/cost.h"
+#include "tests/common/cases.h"
 
 static const struct plan_tolerance TOLERANCE = {1e-3, 1e-2};
 

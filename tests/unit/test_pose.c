@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* core/pose: trajectories and their knots. */
+#include "core/vec3.h"
 #include "tests/unit/pose_rig.h"
 
 static struct trajectory *make(const struct pose_sample *samples, size_t n)
@@ -145,13 +146,13 @@ static void test_constant_turn(void **state)
         struct pose got, want, a, b, straight;
         trajectory_at(tr, t, &got, &frame);
         on_circle(t, &want);
-        worst = fmax(worst, distance(got.position_m, want.position_m));
+        worst = fmax(worst, vec3_distance(got.position_m, want.position_m));
         assert_true(pose_angle_between(got.quat, want.quat) < 1e-14); /* slerp has a constant rate */
         double i = floor(t / STEP_S);
         on_circle(i * STEP_S, &a);
         on_circle((i + 1) * STEP_S, &b);
         pose_between(&a, &b, t / STEP_S - i, &straight);
-        chord = fmax(chord, distance(straight.position_m, want.position_m));
+        chord = fmax(chord, vec3_distance(straight.position_m, want.position_m));
     }
     print_message("# circle of 10 m, 10 m/s, 10 Hz: cubic off by %.3f mm (bound %.3f), chords by %.1f mm\n",
                   1e3 * worst, 1e3 * bound, 1e3 * chord);
@@ -177,7 +178,7 @@ static void test_ends(void **state)
         struct pose got;
         double frame;
         trajectory_at(tr, t, &got, &frame);
-        assert_true(distance(got.position_m, want) < 1e-14); /* some roundings of 3 m */
+        assert_true(vec3_distance(got.position_m, want) < 1e-14); /* some roundings of 3 m */
     }
     struct pose before, after;
     double frame;
@@ -210,7 +211,7 @@ static void test_knots(void **state)
             trajectory_at(tr, 0.25 + 1e-9 * (double)t, &body, &frame);
             pose_mount(&body, &mount, &head);
             pose_between(&knot[i].pose, &knot[i + 1].pose, (double)(t - knot[i].t_ns) / (double)gap, &between);
-            worst = fmax(worst, distance(head.position_m, between.position_m));
+            worst = fmax(worst, vec3_distance(head.position_m, between.position_m));
             turned = fmax(turned, pose_angle_between(head.quat, between.quat));
         }
     }
@@ -238,7 +239,8 @@ static void test_knots_to_an_end(void **state)
     assert_true(m > 2 && m < whole.n && part.knot[m - 1].t_ns == 984500000 && part.knot[m - 2].t_ns < 984500000);
     assert_memory_equal(whole.knot, part.knot, (m - 1) * sizeof *part.knot);
     trajectory_at(tr, 1.2345, &last, &frame);
-    assert_true(distance(last.position_m, part.knot[m - 1].pose.position_m) < 1e-12 && frame == part.knot[m - 1].frame);
+    assert_true(vec3_distance(last.position_m, part.knot[m - 1].pose.position_m) < 1e-12 &&
+                frame == part.knot[m - 1].frame);
     free(part.knot);
     assert_int_equal(find_path(tr, 0.25, 0.25, &mount, &part, &err), SH_OK);
     assert_true(part.n == 1 && part.knot[0].t_ns == 0);

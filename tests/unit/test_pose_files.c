@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "core/geoframe.h"
+#include "core/vec3.h"
 #include "tests/unit/pose_rig.h"
 
 static char path[] = "/tmp/scanhead-pose-XXXXXX";
@@ -73,6 +74,17 @@ static void test_csv_upright(void **state)
     trajectory_free(tr);
 }
 
+/* A quaternion may be as long, and as short, as the text of test_csv_errors says. */
+static void test_csv_lengths(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct trajectory *tr;
+    write_file("t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,0.9995,0,0,0\n1,0,0,0,1.0005,0,0,0\n");
+    if (trajectory_read_csv(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    trajectory_free(tr);
+}
+
 #define NAMES "t_s,x_m,y_m,z_m,heading_deg\n"
 
 static void test_csv_errors(void **state)
@@ -99,7 +111,7 @@ static void test_csv_errors(void **state)
         {NAMES "0,1,2,3,4\n1e300,1,2,3,4\n", "line 3", "t_s 1e+300; allowed -4e+09 to 4e+09"},
         {NAMES "-1e18,1,2,3,4\n0,1,2,3,4\n", "line 2", "t_s -1e+18; allowed"},
         {"\xef\xbb" NAMES, "line 1", "is unknown"}, /* no whole byte order mark */
-        {"t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,1,1,0,0\n", "line 2", "quaternion"},
+        {"t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,1,1,0,0\n", "line 2", "1.41421; allowed 0.9995 to 1.0005"},
         {"t_s,x_m,y_m,z_m,heading_deg,pitch_deg\n0,0,0,0,0,91\n", "line 2", "pitch_deg"},
     };
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
@@ -162,8 +174,8 @@ static void test_waypoints(void **state)
     trajectory_at(tr, 0.0, &before, &frame);
     for (double t = 0.01; t <= 9.0; t += 0.01) {
         trajectory_at(tr, t, &p, &frame);
-        assert_true(pose_angle_between(before.quat, p.quat) < 0.01);   /* 45 degrees in 4 s, at most 1 rad/s anywhere */
-        assert_true(distance(before.position_m, p.position_m) < 0.15); /* at most three times the mean speed */
+        assert_true(pose_angle_between(before.quat, p.quat) < 0.01); /* 45 degrees in 4 s, at most 1 rad/s anywhere */
+        assert_true(vec3_distance(before.position_m, p.position_m) < 0.15); /* at most three times the mean speed */
         before = p;
     }
     trajectory_free(tr);
@@ -287,6 +299,7 @@ int main(void)
         cmocka_unit_test(test_csv),
         cmocka_unit_test(test_csv_errors),
         cmocka_unit_test(test_csv_upright),
+        cmocka_unit_test(test_csv_lengths),
         cmocka_unit_test(test_waypoints),
         cmocka_unit_test(test_slow_waypoints),
         cmocka_unit_test(test_level_waypoints),

@@ -133,6 +133,35 @@ static void test_moving_scale(void **state)
     assert_int_equal(rig_int32(at + 8), 40);
 }
 
+/* These formats hold metres. Without a scan no file replaces one that is there, and none is left behind. */
+static void test_refused(void **state)
+{
+    (void)state;
+    static const struct rig_point p = {0, 0, 0, 0, 1, 1, 1};
+    static const char *const names[] = {"a.e57", "a.ptx", "a.obj", "a.glb"};
+    struct native_anchor a = place(10, 10, 1);
+    rig_begin();
+    put_scan(1, &a, &p, 1);
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        struct sh_err err = {0};
+        size_t len;
+        const char *path = rig_path(names[i]);
+        char part[160];
+        snprintf(part, sizeof part, "%s.part", path);
+        FILE *old = fopen(path, "wb");
+        fputs("old", old);
+        fclose(old);
+        assert_int_equal(rig_record(path, (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err), SH_EFORMAT);
+        assert_non_null(strstr(err.text, "this format holds metres, and output.crs is geodetic"));
+        assert_string_equal(rig_notes, "");
+        uint8_t *file = rig_read(path, &len);
+        assert_int_equal(len, 3);
+        free(file);
+        assert_int_equal(access(part, F_OK), -1);
+        unlink(path);
+    }
+}
+
 static int tear_down(void **state)
 {
     free(las);
@@ -142,10 +171,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ply_digits),
-        cmocka_unit_test(test_antimeridian),
-        cmocka_unit_test(test_scan_angle),
-        cmocka_unit_test(test_moving_scale),
+        cmocka_unit_test(test_ply_digits),   cmocka_unit_test(test_antimeridian), cmocka_unit_test(test_scan_angle),
+        cmocka_unit_test(test_moving_scale), cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -28,6 +28,9 @@ enum deed {
     ENDS,      /* the scan, with the same counts */
     IDLE,      /* is asked its state, and says so */
     SCANNING,  /* likewise */
+    SLOWS,     /* likewise, after a scan */
+    ASKED,     /* likewise, and says nothing */
+    STARTS,    /* a scan, as it is told */
     FAR,       /* a scan begins, and a time goes back by all that 64 bits hold */
     UNPLUGGED, /* and plugged in again */
     UNASKED    /* for longer than a recorder waits for pulses */
@@ -39,6 +42,7 @@ struct head {
     const char *wrong;
     int fd;
     uint32_t seq;
+    int listens;                  /* the recorder; else it starts the scan itself, and ends with it */
     _Atomic uint32_t sent, taken; /* frames */
     _Atomic int over;
 };
@@ -95,15 +99,16 @@ static void send_far(void)
     send_frame(frame, native_encode_telemetry(frame, sizeof frame, &t, INT64_MIN, 0));
 }
 
-static void answer(const char *state)
+static void answer(const char *question, const char *state)
 {
     char line[64];
     size_t n = 0;
     while (n < sizeof line - 1 && read(head.fd, line + n, 1) == 1 && line[n] != '\n')
         n++;
     line[n] = '\0';
-    if (strcmp(line, "HEAD:STAT?") != 0) head.wrong = "asked something else";
-    if (send(head.fd, state, strlen(state), MSG_NOSIGNAL) <= 0) head.wrong = "an answer was not taken";
+    if (strcmp(line, question) != 0) head.wrong = "asked something else";
+    if (send(head.fd, state, strlen(state), MSG_NOSIGNAL) != (ssize_t)strlen(state))
+        head.wrong = "an answer was not taken";
 }
 
 static void *play(void *arg)
@@ -112,8 +117,11 @@ static void *play(void *arg)
     head.fd = accept(head.listener, NULL, NULL);
     for (const enum deed *deed = head.script; *deed != END && head.wrong == NULL; deed++) {
         if (*deed == PULSES) send_pulse();
-        if (*deed == IDLE) answer("idle\r\n");
-        if (*deed == SCANNING) answer("scanning\r\n");
+        if (*deed == IDLE) answer("HEAD:STAT?", "idle\r\n");
+        if (*deed == SCANNING) answer("HEAD:STAT?", "scanning\r\n");
+        if (*deed == SLOWS) answer("HEAD:STAT?", "spin-down\r\n");
+        if (*deed == ASKED) answer("HEAD:STAT?", "");
+        if (*deed == STARTS) answer("SCAN:STAR", "OK\r\n");
         if (*deed == LOSES) {
             head.seq += 5;
             send_telemetry(HEAD_SCANNING);
@@ -129,7 +137,7 @@ static void *play(void *arg)
         }
     }
     atomic_store(&head.over, 1);
-    send_telemetry(HEAD_SCANNING); /* so that the recorder need not wait to see that it is over */
+    if (head.listens) send_telemetry(HEAD_SCANNING); /* so that the recorder need not wait to see that it is over */
     return NULL;
 }
 
@@ -158,11 +166,11 @@ static void keep_fraction(void *ctx, const char *what, double fraction)
     last_fraction = fraction;
 }
 
-static void record_with(const enum deed *script, double replug_s, struct recording_result *result)
+static void record_with(const enum deed *script, double replug_s, int listens, struct recording_result *result)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
     socklen_t len = sizeof at;
-    head = (struct head){.script = script, .listener = socket(AF_INET, SOCK_STREAM, 0)};
+    head = (struct head){.script = script, .listens = listens, .listener = socket(AF_INET, SOCK_STREAM, 0)};
     assert_int_equal(bind(head.listener, (struct sockaddr *)&at, sizeof at), 0);
     assert_int_equal(listen(head.listener, 1), 0);
     assert_int_equal(getsockname(head.listener, (struct sockaddr *)&at, &len), 0);
@@ -173,14 +181,14 @@ static void record_with(const enum deed *script, double replug_s, struct recordi
     pthread_t thread;
     assert_int_equal(pthread_create(&thread, NULL, play, NULL), 0);
     const struct sh_report report = {.progress = keep_fraction};
-    const struct recording_options options = {.listen = 1,
+    const struct recording_options options = {.listen = listens,
                                               .frames = -1,
                                               .replug_s = replug_s,
                                               .progress = 1,
                                               .source_bytes = 1000000,
                                               .report = &report,
                                               .frame = take_frame,
-                                              .interrupted = is_over};
+                                              .interrupted = listens ? is_over : NULL};
     last_fraction = -1;
     struct sh_err err = {0, ""};
     int rc = recording_run(sh, &options, result, &err);
@@ -195,7 +203,17 @@ static void record_with(const enum deed *script, double replug_s, struct recordi
 
 static void record(const enum deed *script, struct recording_result *result)
 {
-    record_with(script, 20, result);
+    record_with(script, 20, 1, result);
+}
+
+static void check_counts(const struct recording_counts *counts, uint64_t pulses)
+{
+    assert_int_equal(counts->scans, 1);
+    assert_int_equal(counts->fired, 100);
+    assert_int_equal(counts->cast, 60);
+    assert_int_equal(counts->lost, 7);
+    assert_int_equal(counts->pulses, pulses);
+    assert_int_equal(counts->missing, 60 - 7 - pulses);
 }
 
 static void test_unplugged_within_a_scan(void **state)
@@ -222,24 +240,26 @@ static void test_unplugged_after_a_lost_end(void **state)
     assert_true(last_fraction > 0 && last_fraction < 0.01);
 }
 
+/* The recorder waits for the mirror to come to rest after an earlier scan. */
+static void test_unplugged_between_scans(void **state)
+{
+    (void)state;
+    static const enum deed script[] = {SLOWS, ASKED, UNPLUGGED, SLOWS, IDLE, STARTS, PULSES, ENDS, END};
+    struct recording_result result;
+    record_with(script, 20, 0, &result);
+    assert_int_equal(result.replugs, 1);
+    assert_int_equal(result.broken_scans, 0);
+    check_counts(&result.counts, 1);
+}
+
 /* A source that is only listened to may be a pipe. */
 static void test_nothing_is_asked_of_a_source(void **state)
 {
     (void)state;
     static const enum deed script[] = {PULSES, LOSES, UNASKED, END};
     struct recording_result result;
-    record_with(script, 0, &result);
+    record_with(script, 0, 1, &result);
     assert_int_equal(result.counts.pulses, 1);
-}
-
-static void check_counts(const struct recording_counts *counts, uint64_t pulses)
-{
-    assert_int_equal(counts->scans, 1);
-    assert_int_equal(counts->fired, 100);
-    assert_int_equal(counts->cast, 60);
-    assert_int_equal(counts->lost, 7);
-    assert_int_equal(counts->pulses, pulses);
-    assert_int_equal(counts->missing, 60 - 7 - pulses);
 }
 
 /* A recorder that lost a scan's end has its counts from the next telemetry. When the head is unplugged then, no scan is
@@ -323,6 +343,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_unplugged_within_a_scan),
         cmocka_unit_test(test_unplugged_after_a_lost_end),
+        cmocka_unit_test(test_unplugged_between_scans),
         cmocka_unit_test(test_nothing_is_asked_of_a_source),
         cmocka_unit_test(test_telemetry_after_a_lost_end),
         cmocka_unit_test(test_joined_within_a_scan),

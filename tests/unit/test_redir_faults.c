@@ -12,12 +12,6 @@ static int fault(struct bench *bench, enum link_fault what, uint32_t n, double f
     return bench->ops->fault(bench->link, what, STREAM, n, for_ms);
 }
 
-static void open_stream(struct guest *g)
-{
-    assert_int_equal(guest_control(g, 0x41, 0x22, 1, 2, 0, NULL)->status, usb_redir_success);
-    assert_int_equal(bench_expect(g->bench, LINK_OPENED, 0).session, STREAM);
-}
-
 static void turn_until(struct guest *g, const int *count, int value)
 {
     for (const int64_t end_ms = now_ms() + DEADLINE_MS; *count < value; guest_turn(g, 0))
@@ -34,7 +28,7 @@ static void test_unplug(void **state)
     struct guest *g = guest_new(&bench);
     for (int round = 0; round < 3; round++) {
         guest_configure(g);
-        open_stream(g);
+        guest_open_stream(g);
         guest_bulk(g, 10, STREAM_IN, 512, NULL);
         guest_turn(g, 0);
         bench_expect(&bench, LINK_WRITABLE, 1u << STREAM);
@@ -95,7 +89,7 @@ static void test_stall(void **state)
     struct bench bench = redir_bench(1);
     struct guest *g = guest_new(&bench);
     guest_configure(g);
-    open_stream(g);
+    guest_open_stream(g);
     guest_bulk(g, 10, STREAM_IN, 512, NULL);
     guest_turn(g, 0);
     bench_expect(&bench, LINK_WRITABLE, 1u << STREAM);

@@ -28,12 +28,18 @@ static void put(FILE *f, uint8_t *frame, size_t len)
     assert_int_equal(fwrite(frame, 1, len, f), len);
 }
 
-static void put_descriptor(FILE *f)
+static void put_head(FILE *f, const char *idn)
 {
     uint8_t frame[1024];
     struct native_descriptor d = {.prr_uhz = UINT64_C(1000000000000), .range_scale_m = 1, .scan = 1};
     d.mirror_counts_per_turn = d.pan_counts_per_turn = 1000;
+    snprintf(d.idn, sizeof d.idn, "%s", idn);
     put(f, frame, native_encode_descriptor(frame, sizeof frame, &d, 0, 0));
+}
+
+static void put_descriptor(FILE *f)
+{
+    put_head(f, "");
 }
 
 static void put_event(FILE *f, enum native_event_code code, int64_t t_ns)
@@ -318,6 +324,25 @@ static void a_command_seeks_paces_and_loops(void **state)
     free(cfg);
 }
 
+/* A recording may have any bytes as the head's name: a line end, or 0xd5, which begins a frame. */
+static void its_name_is_a_line(void **state)
+{
+    (void)state;
+    struct config *cfg = config_new();
+    struct replay *r;
+    struct sh_err err;
+    FILE *f = begin_file();
+    put_head(f, "Maker,Mo\r\ndel,\xd5,1");
+    put_event(f, NATIVE_EV_CONTROL, 0);
+    assert_int_equal(fclose(f), 0);
+    const struct replay_options options = {.path = path, .speed = 1};
+    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_string_equal(said(r, "*IDN?"), "Maker,Mo~~del,~,1");
+    assert_string_equal(cfg->profile.model, "Mo~~del");
+    replay_free(r);
+    free(cfg);
+}
+
 static void what_a_replay_refuses(void **state)
 {
     (void)state;
@@ -409,8 +434,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_go_out_with_what_follows), cmocka_unit_test(it_begins_anew_as_it_began),
         cmocka_unit_test(frames_go_out_in_their_ticks),    cmocka_unit_test(each_time_has_its_numbers),
-        cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(a_command_seeks_paces_and_loops),
-        cmocka_unit_test(what_a_replay_refuses),           cmocka_unit_test(a_state_holds_from_its_tick_on),
+        cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(its_name_is_a_line),
+        cmocka_unit_test(a_command_seeks_paces_and_loops), cmocka_unit_test(what_a_replay_refuses),
+        cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "core/scene_objects.h"
+#include "core/vec3.h"
 #include "tests/unit/scene_files.h"
 
 /* The box has 2 x 3 x 4 m, and its top follows separately. It has 52 m2 and 24 m3. */
@@ -32,7 +33,7 @@ static int take(void *ctx, const double a[3], const double b[3], struct sh_err *
     (void)ctx;
     (void)err;
     n_taken++;
-    length_m += sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]));
+    length_m += vec3_distance(a, b);
     return SH_OK;
 }
 

@@ -42,7 +42,8 @@ static void obj_is_read(void **state)
     assert_string_equal(s->surface[1].material, "brick wall");
     assert_string_equal(s->surface[2].material, "tin");
     assert_int_equal(s->counts.not_triangles, 3);
-    assert_int_equal(n_warnings, 1);
+    assert_int_equal(n_warnings, 2);
+    assert_non_null(strstr(warnings, "line 2: the material library 'C:\\dir\\' is missing"));
     assert_non_null(strstr(warnings, "3 points and lines left out"));
     scene_free(s);
 }
@@ -157,6 +158,17 @@ static void obj_random_numbers_are_exact(void **state)
         if (s->vertex_m[i][0] != expected[i]) fail_msg("number %d is not exact", i);
     scene_free(s);
     free(text);
+}
+
+/* More decimals than any writer makes, and a power that takes them back: this is 1. */
+static void obj_long_numbers_are_exact(void **state)
+{
+    (void)state;
+    char text[1200];
+    sprintf(text, "v 0.%01000d1e1001 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", 0);
+    struct scene *s = load_text("long.obj", text);
+    assert_true(s->vertex_m[0][0] == 1.0);
+    scene_free(s);
 }
 
 /* Writes a PLY with every scalar type: a quad and a triangle, double coordinates at UTM. */
@@ -324,6 +336,7 @@ int main(void)
         cmocka_unit_test(obj_without_names),
         cmocka_unit_test(obj_numbers_are_exact),
         cmocka_unit_test(obj_random_numbers_are_exact),
+        cmocka_unit_test(obj_long_numbers_are_exact),
         cmocka_unit_test(obj_is_read_exactly),
         cmocka_unit_test(ply_is_read_exactly),
         cmocka_unit_test(ply_in_float_warns),

@@ -130,13 +130,21 @@ static void missing_things_are_named(void **state)
     (void)state;
     expect_warning("a.obj", "# x\nmtllib nowhere.mtl\n" QUADS,
                    "a.obj, line 2: the material library 'nowhere.mtl' is missing");
+    const struct scene_mesh_spec plain = {.file = path, .scale = 1}; /* glass is known from the library, too */
+    struct sh_err err;
+    struct scene *s;
+    put("a.obj", "mtllib nowhere.mtl\n" QUADS);
+    load_spec(&plain, 1e-3, &s, &err);
+    assert_non_null(strstr(warnings, "a.obj, line 1: the material library 'nowhere.mtl' is missing"));
+    scene_free(s);
+    remove_made();
     put("r.mtl", "newmtl red\nKd 1 0 0\n");
     expect_warning("a.obj", "mtllib r.mtl g.mtl\n" QUADS, "a.obj, line 1: the material library 'g.mtl' is missing");
     put("r.mtl", "newmtl red\nKd 1 0 0\nnewmtl Green\nKd 0 1 0\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
                    "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
     put("r.mtl", "newmtl red\nKd 255 0 0\nnewmtl green\nKd 0.2\nKd xyz 1 1\n");
-    struct scene *s = take("a.obj", "mtllib r.mtl\n" QUADS);
+    s = take("a.obj", "mtllib r.mtl\n" QUADS);
     assert_int_equal(colour_of(s, 0), -1);
     assert_int_equal(colour_of(s, 1), 0x333); /* one number is a grey */
     assert_int_equal(n_warnings, 1);

@@ -1,34 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* These tests compare the schedule with a model of their own: each pulse's time, place and angle as one fraction in
  * 128-bit integers. */
-#include "tests/common/cases.h"
+#include "tests/unit/schedule_rig.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
 
-#include "core/schedule.h"
-
-__extension__ typedef __int128 i128;
-__extension__ typedef unsigned __int128 u128;
-
-#define HZ  INT64_C(1000000)
-#define DEG INT64_C(1000000)
 static const int64_t PRR_FAST = 2200000 * HZ;
-
-static struct schedule_spec plain(void)
-{
-    return (struct schedule_spec){.prr_uhz = 300000 * HZ,
-                                  .lines_uhz = 100 * HZ,
-                                  .pan_udeg_s = 18 * DEG,
-                                  .fov_min_udeg = -40 * DEG,
-                                  .sweep_udeg = 240 * DEG,
-                                  .line_start_udeg = -40 * DEG,
-                                  .line_stop_udeg = 60 * DEG,
-                                  .pan_start_udeg = 0,
-                                  .pan_stop_udeg = 180 * DEG,
-                                  .frames = 1};
-}
 
 /* floor(a / b) and ceil(a / b) for b > 0. */
 static i128 floor_of(i128 a, i128 b)
@@ -63,7 +42,7 @@ enum { N_RATES = sizeof RATES_UHZ / sizeof *RATES_UHZ };
 
 static void start_at(struct schedule_segment *seg, int64_t prr_uhz)
 {
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(1);
     spec.prr_uhz = prr_uhz;
     spec.lines_uhz = prr_uhz < spec.lines_uhz ? prr_uhz : spec.lines_uhz;
     spec.frames = 0;
@@ -194,7 +173,7 @@ static void lines_share_the_pulses_out(void **state)
     (void)state;
     uint64_t seed = 3;
     for (int i = 0; i < 2000; i++) {
-        struct schedule_spec spec = plain();
+        struct schedule_spec spec = plain_schedule(1);
         struct schedule_segment seg;
         struct schedule_line line;
         spec.prr_uhz = i % 4 == 0 ? RATES_UHZ[i / 4 % N_RATES] : case_between(&seed, HZ, PRR_FAST);
@@ -212,7 +191,7 @@ static void every_pulse_is_cast_or_blind_as_its_angle_says(void **state)
     (void)state;
     uint64_t seed = 4;
     for (int i = 0; i < 300; i++) {
-        struct schedule_spec spec = plain();
+        struct schedule_spec spec = plain_schedule(1);
         struct schedule_segment seg;
         struct schedule_line line;
         spec.prr_uhz = case_between(&seed, 1000, 5000) * HZ + (i % 2 ? case_between(&seed, 0, HZ) : 0);
@@ -235,7 +214,7 @@ static void every_pulse_is_cast_or_blind_as_its_angle_says(void **state)
 static void both_ends_of_the_window_are_cast(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(1);
     struct schedule_segment seg;
     struct schedule_line line;
     spec.prr_uhz = 1000 * HZ;
@@ -266,7 +245,7 @@ static void both_ends_of_the_window_are_cast(void **state)
 static void one_pulse_a_line_is_a_line(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(1);
     struct schedule_segment seg;
     struct schedule_line line;
     spec.prr_uhz = spec.lines_uhz = 1000 * HZ;
@@ -285,7 +264,7 @@ static void cuts_share_the_pulses_out(void **state)
     (void)state;
     uint64_t seed = 5;
     for (int i = 0; i < 200; i++) {
-        struct schedule_spec spec = plain();
+        struct schedule_spec spec = plain_schedule(1);
         struct schedule_segment seg;
         spec.prr_uhz = case_between(&seed, 1000 * HZ, PRR_FAST);
         spec.lines_uhz = case_between(&seed, HZ, 1000 * HZ);
@@ -314,7 +293,7 @@ static void a_frame_has_the_lines_that_its_sweep_needs(void **state)
     (void)state;
     uint64_t seed = 6;
     for (int i = 0; i < 2000; i++) {
-        struct schedule_spec spec = plain();
+        struct schedule_spec spec = plain_schedule(1);
         struct schedule_segment seg;
         struct schedule_line line;
         spec.prr_uhz = case_between(&seed, 1000 * HZ, PRR_FAST);
@@ -345,7 +324,7 @@ static void a_pan_at_rest_makes_frames_of_one_line(void **state)
 {
     (void)state;
     for (int still = 0; still < 2; still++) {
-        struct schedule_spec spec = plain();
+        struct schedule_spec spec = plain_schedule(1);
         struct schedule_segment seg;
         struct schedule_line line;
         spec.frames = 3;
@@ -368,7 +347,7 @@ static void a_pan_at_rest_makes_frames_of_one_line(void **state)
 static void without_frames_there_is_no_end(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(1);
     struct schedule_segment seg;
     spec.frames = 0;
     schedule_start(&seg, &spec);
@@ -379,7 +358,7 @@ static void without_frames_there_is_no_end(void **state)
 static void an_end_beyond_all_numbers_is_never_reached(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(1);
     struct schedule_segment seg;
     spec.prr_uhz = PRR_FAST;
     spec.pan_udeg_s = 1;
@@ -397,7 +376,7 @@ static void mirror_and_pan_turn_as_the_rates_say(void **state)
     (void)state;
     uint64_t seed = 7;
     for (int i = 0; i < 20000; i++) {
-        struct schedule_spec spec = plain();
+        struct schedule_spec spec = plain_schedule(1);
         struct schedule_segment seg;
         spec.prr_uhz = case_between(&seed, 1000 * HZ, PRR_FAST);
         spec.lines_uhz = case_between(&seed, HZ, 240 * HZ);

@@ -1,35 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Settings that change in the middle of a scan. Nothing is lost or doubled, and time, mirror and pan continue from
  * where they were. */
-#include "tests/common/cases.h"
+#include "tests/unit/schedule_rig.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/schedule.h"
-
-__extension__ typedef __int128 i128;
-__extension__ typedef unsigned __int128 u128;
-
-#define HZ  INT64_C(1000000)
-#define DEG INT64_C(1000000)
 static const long double FINE = 16777216.0L; /* steps of the pan per micro-degree */
-
-static struct schedule_spec plain(void)
-{
-    return (struct schedule_spec){.prr_uhz = 300000 * HZ,
-                                  .lines_uhz = 100 * HZ,
-                                  .pan_udeg_s = 18 * DEG,
-                                  .fov_min_udeg = -40 * DEG,
-                                  .sweep_udeg = 240 * DEG,
-                                  .line_start_udeg = -40 * DEG,
-                                  .line_stop_udeg = 60 * DEG,
-                                  .pan_start_udeg = 0,
-                                  .pan_stop_udeg = 180 * DEG,
-                                  .frames = 0};
-}
 
 static struct schedule_spec any_spec(uint64_t *seed, struct schedule_spec s)
 {
@@ -107,7 +86,7 @@ static void nothing_jumps_when_everything_changes(void **state)
     (void)state;
     uint64_t seed = 1;
     for (int scan = 0; scan < 500; scan++) {
-        struct schedule_spec spec = any_spec(&seed, plain());
+        struct schedule_spec spec = any_spec(&seed, plain_schedule(0));
         struct schedule_segment seg, next;
         schedule_start(&seg, &spec);
         for (int change = 0; change < 40; change++) {
@@ -134,7 +113,7 @@ static void lines_stay_whole_through_changes(void **state)
     (void)state;
     uint64_t seed = 2;
     for (int scan = 0; scan < 100; scan++) {
-        struct schedule_spec spec = any_spec(&seed, plain());
+        struct schedule_spec spec = any_spec(&seed, plain_schedule(0));
         struct schedule_segment seg;
         spec.prr_uhz = case_between(&seed, 1000, 20000) * HZ;
         schedule_start(&seg, &spec);
@@ -175,7 +154,7 @@ static void a_change_of_nothing_changes_nothing(void **state)
     (void)state;
     uint64_t seed = 3;
     for (int i = 0; i < 20000; i++) {
-        struct schedule_spec spec = any_spec(&seed, plain());
+        struct schedule_spec spec = any_spec(&seed, plain_schedule(0));
         struct schedule_segment seg, next;
         spec.frames = 2;
         if (i % 2) { /* a whole number of lines fits the sweep exactly */
@@ -204,7 +183,7 @@ static void a_change_of_nothing_changes_nothing(void **state)
 static void a_stop_that_is_behind_ends_the_frame_with_its_line(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(0);
     struct schedule_segment seg;
     struct schedule_line line;
     spec.frames = 2;
@@ -223,7 +202,7 @@ static void a_stop_that_is_behind_ends_the_frame_with_its_line(void **state)
 static void frames_fewer_than_done_end_with_the_one_at_hand(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(0);
     struct schedule_segment seg;
     struct schedule_line line;
     spec.frames = 5;
@@ -241,7 +220,7 @@ static void frames_may_be_set_to_those_done(void **state)
     (void)state;
     static const uint32_t frames[] = {2, 3, 4}, ends_after[] = {3, 3, 4};
     for (int i = 0; i < 3; i++) {
-        struct schedule_spec spec = plain();
+        struct schedule_spec spec = plain_schedule(0);
         struct schedule_segment seg;
         schedule_start(&seg, &spec);
         spec.frames = frames[i];
@@ -254,7 +233,7 @@ static void frames_may_be_set_to_those_done(void **state)
 static void a_pan_that_stops_ends_its_frame_and_keeps_its_angle(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(0);
     struct schedule_segment seg;
     struct schedule_line line;
     schedule_start(&seg, &spec);
@@ -343,7 +322,7 @@ static void whatever_is_allowed_is_consistent(void **state)
 static void no_part_of_a_nanosecond_is_lost(void **state)
 {
     (void)state;
-    struct schedule_spec spec = plain();
+    struct schedule_spec spec = plain_schedule(0);
     struct schedule_segment seg;
     uint64_t elevenths = 0; /* of 5000 / 11 ns */
     spec.prr_uhz = 2200000 * HZ;

@@ -3,6 +3,7 @@
 #include "tests/unit/cast_rig.h"
 
 #include "core/sight.h"
+#include "tests/common/made.h"
 
 static const double LO[3] = {-4.0, -6.0, -1.5}, HI[3] = {5.0, 7.0, 2.5}, STATION[3] = {0.31, -0.42, 0.17};
 enum { DIRECTIONS = 400 };
@@ -46,9 +47,7 @@ static void rays_that_are_there_are_known(void **state)
 {
     (void)state;
     struct scene *scene = box_scene(LO, HI);
-    struct bvh *bvh;
-    struct sh_err err;
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(scene);
     for (int i = 0; i < DIRECTIONS; i++) {
         const double z = (2.0 * i + 1.0) / DIRECTIONS - 1.0, r = sqrt(1.0 - z * z), turn = i * 2.399963229728653;
         double ray[3] = {r * cos(turn), r * sin(turn), z};

@@ -112,7 +112,8 @@ static void test_counts(void **state)
             fail_msg("%g m, %s: \"%s\"", cases[i].range_max_m, cases[i].output, warned);
     }
     assert_non_null(strstr(err.text, "output.scale_m: 1e-06: ranges up to 4394.9 m do not fit into 32 bits"));
-    assert_non_null(strstr(err.text, "from 1.02e-06 m on"));
+    assert_non_null(strstr(err.text, "from 1.03e-06 m on")); /* 4394.9 m / (2^32 - 1) is 1.0233e-6 */
+    assert_true(scale_of(4294.9, "layout: polar, scale_m: 1.03e-6", "ball: {radius_m: 100}", 0) > 0);
 }
 
 /* The instrument reads ranges 100 ppm longer: 0.2 m of 2147.4 m, 0.4 m of 4294.9 m. Nothing else is set. */

@@ -11,20 +11,30 @@
 /* The way is 2 m/s along x in 1.2 s from 5 s on, looking north. */
 static const char PATH[] = "t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n5,0,0,2,0,0,0\n6.2,2.4,0,2,0,0,0\n";
 
-static struct site *load(const char *platform)
+static int try_path(const char *path, const char *tripod, const char *platform, struct site **site)
 {
     char text[512];
-    struct site *site;
     write_in("room.obj", "v -50 -50 0\nv 50 -50 0\nv 50 50 0\nv -50 50 0\nf 1 2 3 4\n");
-    write_in("path.csv", PATH);
+    write_in("path.csv", path);
     snprintf(text, sizeof text,
              "head: {profile: full-sweep}\nscene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
-             "stations: [{position_m: [0, 0, 2]}]\nplatform: {kind: stops, file: path.csv, %s}\n",
-             platform);
+             "stations: [{position_m: [0, 0, 2]%s}]\nplatform: {kind: stops, file: path.csv, %s}\n",
+             tripod, platform);
     write_in("test.yaml", text);
-    if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK || site_load(cfg, &report, &site, &err) != SH_OK)
-        fail_msg("%s", err.text);
+    const int rc = config_load(config_path, NULL, 0, cfg, &err);
+    return rc == SH_OK ? site_load(cfg, &report, site, &err) : rc;
+}
+
+static struct site *load_path(const char *path, const char *platform)
+{
+    struct site *site;
+    if (try_path(path, "", platform, &site) != SH_OK) fail_msg("%s", err.text);
     return site;
+}
+
+static struct site *load(const char *platform)
+{
+    return load_path(PATH, platform);
 }
 
 /* 0.1 s divides 1.2 s, 0.3 s and 0.9 s, but not to the last bit. The stop at the end counts. It lies at the end of the
@@ -52,6 +62,31 @@ static void the_last_stop_is_at_the_end(void **state)
     }
 }
 
+/* 0.1 s and 0.2 s are 0.3 s, but not to the last bit: the sum is larger. The path's own length is allowed as its
+ * end. */
+static void a_part_may_end_with_the_path(void **state)
+{
+    (void)state;
+    static const char path[] = "t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n0.1,0,0,2,0,0,0\n0.3,2.4,0,2,0,0,0\n";
+    struct site *site = load_path(path, "step_s: 0.1, end_s: 0.2");
+    assert_int_equal(site->n_stations, 3);
+    site_free(site);
+    site = load_path(path, "step_s: 0.1, start_s: 0.2, end_s: 0.2");
+    assert_true(fabs(site->station[0].at.position_m[0] - 2.4) < 1e-9);
+    site_free(site);
+}
+
+/* The head comes down to 0.5 m at its third stop. The tripod is a key of the one station. */
+static void a_tripod_is_too_high_at_a_stop(void **state)
+{
+    (void)state;
+    struct site *site;
+    static const char path[] = "t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n0,0,0,2,0,0,0\n2,0,0,0.5,0,0,0\n";
+    assert_int_equal(try_path(path, ", tripod: {leg_m: 2, head_above_m: 0.6}", "step_s: 1", &site), SH_EINPUT);
+    if (strstr(err.text, "stations[0] (stop-3): tripod.head_above_m: 0.6 m, but the head is 0.5 m") == NULL)
+        fail_msg("%s", err.text);
+}
+
 /* The mount turns the head on the body: heading, pitch and roll each by itself, and its arm with it. */
 static void the_mount_turns_the_head(void **state)
 {
@@ -72,6 +107,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(the_last_stop_is_at_the_end, site_rig_setup, site_rig_teardown),
+        cmocka_unit_test_setup_teardown(a_part_may_end_with_the_path, site_rig_setup, site_rig_teardown),
+        cmocka_unit_test_setup_teardown(a_tripod_is_too_high_at_a_stop, site_rig_setup, site_rig_teardown),
         cmocka_unit_test_setup_teardown(the_mount_turns_the_head, site_rig_setup, site_rig_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -2,17 +2,11 @@
 /* A sphere by its angle: rings within limits of elevation, a sector of azimuths, a circle. Each pulse's line, angles
  * and whether it is cast follow from counting steps in whole numbers. Expected values use nothing of core/schedule. */
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
-#include "core/schedule.h"
+#include "tests/unit/schedule_rig.h"
 
-#define DEG INT64_C(1000000)
 static const int64_t TURN = 360 * DEG;
 
 struct window {

@@ -1,15 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Schedules of heads that fire in steps, rings and lists, counted by hand. */
-#include "tests/common/cases.h"
+#include "tests/unit/schedule_rig.h"
 
 #include <math.h>
 #include <string.h>
-
-#include "core/schedule.h"
-
-__extension__ typedef unsigned __int128 u128;
-
-#define HZ INT64_C(1000000)
 
 /* ---- planar heads */
 
@@ -81,19 +75,6 @@ static void a_window_is_whole_steps(void **state)
     schedule_start(&seg, &spec);
     schedule_get_line(&seg, 0, &line);
     assert_int_equal(line.cast_end - line.cast0, 811);
-}
-
-/* Takes the segment's lines up to pulse k: each pulse once, in order. */
-static void take_lines(const struct schedule_segment *seg, uint64_t *next, uint64_t *pulses, uint64_t k)
-{
-    while (*next < k) {
-        struct schedule_line line;
-        schedule_get_line(seg, schedule_line_of(seg, *next), &line);
-        assert_true(line.pulse0 <= *next && *next < line.pulse_end);
-        const uint64_t end = line.pulse_end < k ? line.pulse_end : k;
-        *pulses += end - *next;
-        *next = end;
-    }
 }
 
 /* The rate changes in the middle of a turn, and the steps go on. */

@@ -7,7 +7,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/kernels_aim.h"
 #include "core/cast/kernels_sweep.h"
 #include "core/cast/kernels_times.h"
 #include "core/mat3.h"
@@ -79,8 +78,8 @@ static void they_are_closer_to_the_schedule_than_one_by_one(void **state)
         struct kernel_pulses sweep;
         angles_of(&run, &sweep);
         assert_true(kernel_sweep_steps(&steps, &run));
-        kernel_sweep(&steps, &sweep, mat3_unit, &(struct vec3_out){whole.x, whole.y, whole.z});
-        kernel_directions(&sweep.turns, mat3_unit, &(struct vec3_out){one.x, one.y, one.z});
+        kernel_sweep(&steps, &sweep, mat3_unit, &(struct vec3_out){whole.x, whole.y, whole.z}, NULL);
+        kernel_directions(&sweep.turns, mat3_unit, &(struct vec3_out){one.x, one.y, one.z}, NULL);
         for (uint32_t i = 0; i < N; i++) {
             long double d[3];
             expect_direction(
@@ -111,9 +110,9 @@ static void encoders_read_whole_counts(void **state)
         struct kernel_pulses sweep;
         angles_of(&run, &sweep);
         assert_true(kernel_sweep_steps(&steps, &run));
-        kernel_sweep_read(&steps, &sweep, mat3_unit, &(struct vec3_out){cut.x, cut.y, cut.z},
-                          &(struct kernel_reading){&setup, mat3_unit, {whole.x, whole.y, whole.z}});
-        kernel_sweep(&steps, &sweep, mat3_unit, &(struct vec3_out){one.x, one.y, one.z});
+        kernel_sweep(&steps, &sweep, mat3_unit, &(struct vec3_out){cut.x, cut.y, cut.z},
+                     &(struct kernel_reading){&setup, mat3_unit, {whole.x, whole.y, whole.z}});
+        kernel_sweep(&steps, &sweep, mat3_unit, &(struct vec3_out){one.x, one.y, one.z}, NULL);
         assert_memory_equal(cut.x, one.x, sizeof cut.x);
         assert_memory_equal(cut.z, one.z, sizeof cut.z);
         for (uint32_t i = 0; i < N; i++) {
@@ -142,8 +141,8 @@ static void check_cut(const struct schedule_run *run, const struct cast_setup *s
         part.first = 0;
     }
     assert_true(kernel_sweep_steps(&steps, part.run));
-    kernel_sweep_read(&steps, &part, mat3_unit, &(struct vec3_out){cut.x, cut.y, cut.z},
-                      &(struct kernel_reading){setup, mat3_unit, {cut.ex, cut.ey, cut.ez}});
+    kernel_sweep(&steps, &part, mat3_unit, &(struct vec3_out){cut.x, cut.y, cut.z},
+                 &(struct kernel_reading){setup, mat3_unit, {cut.ex, cut.ey, cut.ez}});
     const size_t bytes = n * sizeof cut.x[0];
     if (memcmp(cut.x, whole.x + from, bytes) != 0 || memcmp(cut.y, whole.y + from, bytes) != 0 ||
         memcmp(cut.z, whole.z + from, bytes) != 0 || memcmp(cut.ex, whole.ex + from, bytes) != 0 ||
@@ -162,8 +161,8 @@ static void cuts_change_nothing(void **state)
         struct kernel_steps steps = {0};
         angles_of(&run, &sweep);
         assert_true(kernel_sweep_steps(&steps, &run));
-        kernel_sweep_read(&steps, &sweep, mat3_unit, &(struct vec3_out){whole.x, whole.y, whole.z},
-                          &(struct kernel_reading){&setup, mat3_unit, {whole.ex, whole.ey, whole.ez}});
+        kernel_sweep(&steps, &sweep, mat3_unit, &(struct vec3_out){whole.x, whole.y, whole.z},
+                     &(struct kernel_reading){&setup, mat3_unit, {whole.ex, whole.ey, whole.ez}});
         for (int j = 0; j < 40; j++) {
             uint32_t from = (uint32_t)case_between(&seed, 0, N - 1);
             uint32_t n = (uint32_t)case_between(&seed, 1,

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Reflectance from a mesh's texture: a board of dark and light squares, whose places are known. */
-#include "tests/common/cases.h"
 
 #include <math.h>
 #include <png.h>
@@ -10,6 +9,7 @@
 
 #include "core/cast.h"
 #include "core/surface.h"
+#include "tests/common/made.h"
 
 enum { SQUARES = 8, TEXELS = 16 }; /* a side; texels of a square, a side */
 static const double AWAY_M = 10.0, SIDE_M = 4.0;
@@ -118,7 +118,6 @@ static struct seen compare(const struct scene *scene, const struct surface_table
                                        .pan_stop_udeg = 10000000};
     struct schedule_segment segment;
     struct detect_signal signal;
-    struct bvh *bvh;
     struct caster *caster;
     struct line_block block;
     struct seen seen = {0};
@@ -126,8 +125,9 @@ static struct seen compare(const struct scene *scene, const struct surface_table
     const struct detect_signal_spec sheet = {
         .n_reaches = 1, .reach = {{0.9, 900.0}}, .threshold_snr = 8.0, .sharp = 1, .seed = 1};
     schedule_start(&segment, &spec);
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
-        line_block_alloc(&block, 1000, &err) != SH_OK || detect_signal_set_up(&sheet, &signal, &err) != SH_OK)
+    struct bvh *bvh = made_bvh(scene);
+    if (caster_create(&caster, &err) != SH_OK || line_block_alloc(&block, 1000, &err) != SH_OK ||
+        detect_signal_set_up(&sheet, &signal, &err) != SH_OK)
         fail_msg("%s", err.text);
     const struct cast_detect detect = {.surfaces = table, .signal = &signal, .max_echoes = 1};
     struct cast_setup setup = {.bvh = bvh,
@@ -233,13 +233,10 @@ static void squares_move_with_the_mesh(void **state)
     static const uint32_t triangle[1][3] = {{0, 1, 2}};
     struct scene *board = load("board.obj", 1), *still;
     struct surface_table table;
-    struct bvh *bvh;
-    struct sh_err err;
-    assert_int_equal(scene_from_arrays(&(struct scene_arrays){wall, 3, triangle, 1, NULL, NULL, 0}, &still, &err),
-                     SH_OK);
+    still = made_scene(&(struct scene_arrays){wall, 3, triangle, 1, NULL, NULL, 0});
     for (uint32_t i = 0; i < board->n_triangles; i++)
         board->label[i] = 1;
-    assert_int_equal(bvh_create(board, 1, NULL, &bvh, &err), SH_OK);
+    struct bvh *bvh = made_bvh(board);
     fill_table(&table, board, &board->surface[0], 2, 1);
     const struct cast_mover mover = {.bvh = bvh,
                                      .centre_m = {0.0, AWAY_M, 0.0},

@@ -12,6 +12,7 @@
 #include "core/cast.h"
 #include "core/colour.h"
 #include "core/surface.h"
+#include "tests/common/made.h"
 
 enum { LINES = 96, ROOM = 1000 };
 static const double AWAY_M = 10.0;
@@ -104,15 +105,15 @@ static struct seen scan(const struct view *view)
     static const double at[3] = {0.0, 0.0, 0.0};
     struct seen seen = {0};
     struct schedule_segment segment;
-    struct bvh *bvh;
     struct caster *caster;
     struct line_block block;
     struct beam_outlines *outlines = NULL;
     struct sh_err err;
     const uint32_t each = view->detect != NULL ? 3 : 1;
     begin(&segment);
-    if (bvh_create(view->scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK ||
-        line_block_alloc(&block, each * ROOM, &err) != SH_OK || line_block_alloc_colours(&block, &err) != SH_OK)
+    struct bvh *bvh = made_bvh(view->scene);
+    if (caster_create(&caster, &err) != SH_OK || line_block_alloc(&block, each * ROOM, &err) != SH_OK ||
+        line_block_alloc_colours(&block, &err) != SH_OK)
         fail_msg("%s", err.text);
     const struct cast_colour colour = {.scale.mode = COLOUR_TEXTURE, .surfaces = view->colours};
     struct cast_setup setup = {.bvh = bvh,
@@ -271,13 +272,10 @@ static void a_mesh_takes_its_image_along(void **state)
     static const uint32_t triangle[1][3] = {{0, 1, 2}};
     struct scene *board = chart_load_board("chart.png", "", 10.0, ""), *still;
     struct surface_colours colours;
-    struct bvh *bvh;
-    struct sh_err err;
-    assert_int_equal(scene_from_arrays(&(struct scene_arrays){wall, 3, triangle, 1, NULL, NULL, 0}, &still, &err),
-                     SH_OK);
+    still = made_scene(&(struct scene_arrays){wall, 3, triangle, 1, NULL, NULL, 0});
     for (uint32_t i = 0; i < board->n_triangles; i++)
         board->label[i] = 1;
-    assert_int_equal(bvh_create(board, 1, NULL, &bvh, &err), SH_OK);
+    struct bvh *bvh = made_bvh(board);
     fill(&colours, board, 2, 1);
     const struct cast_mover mover = {.bvh = bvh,
                                      .centre_m = {0.0, AWAY_M, 0.0},

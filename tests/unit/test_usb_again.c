@@ -16,7 +16,7 @@ static struct client configured(struct bench *bench)
 {
     struct client c;
     client_import(&c, bench);
-    assert_int_equal(client_control(&c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
+    client_configure(&c);
     return c;
 }
 

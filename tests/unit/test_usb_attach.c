@@ -35,16 +35,9 @@ static struct client host_of(struct bench *bench)
     vhci.fd = -1;
     assert_true(c.fd >= 0);
     assert_int_equal(client_control(&c, &r, 0x80, 6, 0x0100, 0, 18, NULL), 0);
-    assert_int_equal(client_control(&c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
-    assert_int_equal(client_control(&c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
-    assert_int_equal(bench_expect(bench, LINK_OPENED, 0).session, 1);
+    client_configure(&c);
+    client_open_stream(&c);
     return c;
-}
-
-static void expect_notice(struct bench *bench, const char *part)
-{
-    const struct link_event event = bench_expect(bench, LINK_NOTICE, 0);
-    if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
 }
 
 static struct bench open_attached(int retry_ms)
@@ -73,9 +66,9 @@ static void test_usbip(void **state)
         vhci.refuses = 2 * round;
         close(c.fd); /* as `usbip detach` does */
         assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
-        expect_notice(&bench, "detached");
-        if (round > 0) expect_notice(&bench, "no such module"); /* once, however often it is tried */
-        expect_notice(&bench, "plugged in again");
+        bench_expect_notice(&bench, "detached");
+        if (round > 0) bench_expect_notice(&bench, "no such module"); /* once, however often it is tried */
+        bench_expect_notice(&bench, "plugged in again");
         assert_int_equal(vhci.refuses, 0);
     }
     close(vhci.fd);
@@ -106,10 +99,10 @@ static void test_unplugged_meanwhile(void **state)
     const int attempts = vhci.attempts;
     close(c.fd);
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
-    expect_notice(&bench, "detached");
+    bench_expect_notice(&bench, "detached");
     assert_int_equal(bench.ops->fault(bench.link, LINK_FAULT_UNPLUG, 0, 0, 0.0), 0);
     assert_int_equal(bench.ops->fault(bench.link, LINK_FAULT_PLUG, 0, 0, 0.0), 0);
-    expect_notice(&bench, "plugged in again");
+    bench_expect_notice(&bench, "plugged in again");
     assert_int_equal(vhci.attempts, attempts + 1);
     close(host_of(&bench).fd);
     bench_close(&bench);
@@ -124,7 +117,7 @@ static void test_pace(void **state)
     struct client c = host_of(&bench);
     close(c.fd);
     assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
-    expect_notice(&bench, "detached");
+    bench_expect_notice(&bench, "detached");
     for (int i = 0; i < 3; i++)
         assert_int_equal(bench_poll(&bench, 3, 1), 0);
     assert_int_equal(vhci.attempts, attempts);

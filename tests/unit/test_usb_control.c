@@ -31,7 +31,6 @@ static const struct request_case {
     {"endpoint 0 IN status", 0x82, 0, 0, 0x80, 2, ADR | CFG, ANY, 2},
     {"endpoint status", 0x82, 0, 0, 0x82, 2, CFG, ANY, 2},
     {"endpoint status, other direction", 0x82, 0, 0, 0x02, 2, NO, ANY, 0},
-    {"endpoint status, other alt setting", 0x82, 0, 0, 0x81, 2, NO, ANY, 0},
     {"endpoint status, reserved bits", 0x82, 0, 0, 0xf2, 2, NO, ANY, 0},
     {"endpoint status, high byte", 0x82, 0, 0, 0x182, 2, NO, ANY, 0},
     {"status of other recipient", 0x83, 0, 0, 0, 2, NO, ANY, 0},
@@ -91,10 +90,10 @@ static const struct request_case {
     {"get interface, none such", 0x81, 10, 0, 2, 1, NO, ANY, 0},
     {"get interface, value", 0x81, 10, 1, 0, 1, NO, ANY, 0},
     {"get interface, length", 0x81, 10, 0, 0, 2, NO, ANY, 0},
-    {"set interface", 0x01, 11, 1, 0, 0, CFG, ANY, 0},
-    {"set interface, no such alt", 0x01, 11, 2, 0, 0, NO, ANY, 0},
+    {"set interface", 0x01, 11, 0, 0, 0, CFG, ANY, 0},
+    {"set interface, no such alt", 0x01, 11, 1, 0, 0, NO, ANY, 0},
     {"set interface, none such", 0x01, 11, 0, 2, 0, NO, ANY, 0},
-    {"set interface, length", 0x01, 11, 1, 0, 1, NO, ANY, 0},
+    {"set interface, length", 0x01, 11, 0, 0, 1, NO, ANY, 0},
     {"synch frame", 0x82, 12, 0, 0x82, 2, NO, ANY, 0},
     {"exit latencies", 0x00, 0x30, 0, 0, 6, ADR | CFG, SS, 0},
     {"exit latencies, length", 0x00, 0x30, 0, 0, 5, NO, ANY, 0},
@@ -128,7 +127,7 @@ static void test_requests(void **state)
         for (int at = 0; at < 3; at++)
             for (int rate = 0; rate < 3; rate++) {
                 const struct request_case *c = &cases[i];
-                struct host *host = host_in_state(&alt_model, at, rate);
+                struct host *host = host_in_state(&two_model, at, rate);
                 const int want = (c->states >> at & 1u) != 0 && (c->rates >> rate & 1u) != 0 ? c->n : USB_STALL;
                 int got =
                     host_control(host, c->type, c->request, c->value, c->index, c->length, c->type & 0x80 ? NULL : out);
@@ -141,7 +140,7 @@ static void test_requests(void **state)
 static void test_effects(void **state)
 {
     (void)state;
-    struct host *host = host_new(&alt_model, USB_RATE_SUPER, USB_RATE_SUPER);
+    struct host *host = host_new(&two_model, USB_RATE_SUPER, USB_RATE_SUPER);
     host_configure(host);
     assert_true(host->active[0] && host->active[1]);
     assert_int_equal(host_control(host, 0x80, 8, 0, 0, 1, NULL), 1);
@@ -153,21 +152,19 @@ static void test_effects(void **state)
     host_control(host, 0x00, 1, 48, 0, 0, NULL);
     host_control(host, 0x80, 0, 0, 0, 2, NULL);
     assert_int_equal(le_get16(host_in), 1 | 8); /* U2 is left */
-    assert_int_equal(host_control(host, 0x01, 11, 1, 0, 0, NULL), 0);
-    assert_int_equal(host_control(host, 0x81, 10, 0, 0, 1, NULL), 1);
-    assert_int_equal(host_in[0], 1);
-    host_control(host, 0x02, 3, 0, 0x81, 0, NULL);
-    assert_int_equal(host_control(host, 0x82, 0, 0, 0x81, 2, NULL), 2);
+    host_control(host, 0x02, 3, 0, 0x82, 0, NULL);
+    assert_int_equal(host_control(host, 0x82, 0, 0, 0x82, 2, NULL), 2);
     assert_int_equal(le_get16(host_in), 1);
-    host_control(host, 0x82, 0, 0, 0x82, 2, NULL);
-    assert_int_equal(le_get16(host_in), 0); /* the other one is not halted */
-    /* A new configuration resets everything. */
-    host_control(host, 0x00, 9, 1, 0, 0, NULL);
-    host_control(host, 0x81, 10, 0, 0, 1, NULL);
-    assert_int_equal(host_in[0], 0);
-    host_control(host, 0x01, 11, 1, 0, 0, NULL);
-    host_control(host, 0x82, 0, 0, 0x81, 2, NULL);
-    assert_int_equal(le_get16(host_in), 0);
+    /* Its interface is set, which resets its endpoints, and so does a new configuration. */
+    for (unsigned configures = 0; configures < 2; configures++) {
+        host_control(host, 0x02, 3, 0, 0x82, 0, NULL);
+        assert_int_equal(host_control(host, configures ? 0 : 1, configures ? 9 : 11, configures, !configures, 0, NULL),
+                         0);
+        assert_int_equal(host_control(host, 0x81, 10, 0, 1, 1, NULL), 1);
+        assert_int_equal(host_in[0], 0);
+        host_control(host, 0x82, 0, 0, 0x82, 2, NULL);
+        assert_int_equal(le_get16(host_in), 0);
+    }
     usb_device_reset(host->device, USB_RATE_HIGH);
     assert_true(!host->active[0] && !host->active[1]);
     assert_int_equal(host_control(host, 0x80, 8, 0, 0, 1, NULL), USB_STALL); /* default state */
@@ -221,7 +218,7 @@ static void test_all(void **state)
 static void test_data_stage(void **state)
 {
     (void)state;
-    struct host *host = host_in_state(&alt_model, 2, USB_RATE_HIGH);
+    struct host *host = host_in_state(&two_model, 2, USB_RATE_HIGH);
     struct usb_ctrlrequest setup = {.bRequestType = 0x40, .bRequest = 0x66};
     uint8_t data[8] = {0};
     le_put16(&setup.wLength, 8);

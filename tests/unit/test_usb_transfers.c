@@ -150,7 +150,7 @@ static void test_cancel(void **state)
         host_submit(host, 4, 0x81, NULL, 512);
         assert_int_equal(usb_device_write(host->device, 0x81, pattern, 1400), 1400);
         for (uint64_t id = 1; id <= 4; id++)
-            if (id != (uint64_t)which) host_expect(host, id, USB_OK, id == 4 || (which == 4 && id == 3) ? 376 : 512);
+            if (id != (uint64_t)which) host_expect(host, id, USB_OK, id == 4 ? 376 : 512);
         assert_int_equal(usb_device_cancel(host->device, 4), 0); /* too late */
         assert_int_equal(host->n_done, 0);
     }
@@ -173,28 +173,37 @@ static void test_cancel(void **state)
     host_free(host);
 }
 
+/* An endpoint is halted by its host, or by an injected fault, until the host clears it. */
 static void test_halt(void **state)
 {
     (void)state;
-    struct host *host = configured(USB_RATE_HIGH);
-    host_submit(host, 1, 0x81, NULL, 512);
-    host_submit(host, 2, 0x81, NULL, 512);
-    host_submit(host, 3, 0x02, pattern, 10);
-    assert_int_equal(host_control(host, 0x02, USB_REQ_SET_FEATURE, 0, 0x81, 0, NULL), 0);
-    host_expect(host, 1, USB_STALLED, 0);
-    host_expect(host, 2, USB_STALLED, 0);
-    assert_int_equal(host->n_done, 0); /* OUT is not concerned */
-    host_submit(host, 4, 0x81, NULL, 512);
-    host_expect(host, 4, USB_STALLED, 0);
-    assert_int_equal(usb_device_write(host->device, 0x81, pattern, 10), 0);
-    assert_int_equal(host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, 0, 0x81, 0, NULL), 0);
-    host_submit(host, 5, 0x81, NULL, 512);
-    assert_int_equal(usb_device_write(host->device, 0x81, pattern, 10), 10);
-    host_expect(host, 5, USB_OK, 10);
-    assert_int_equal(host_control(host, 0x02, USB_REQ_SET_FEATURE, 0, 0x02, 0, NULL), 0);
-    host_expect(host, 3, USB_STALLED, 0);
-    assert_int_equal(host_control(host, 0x82, USB_REQ_GET_STATUS, 0, 0x02, 2, NULL), 2);
-    assert_int_equal(host_in[0], 1);
+    struct host *host = host_new(&pair_model, USB_RATE_SUPER, USB_RATE_HIGH);
+    assert_false(usb_device_halt(host->device, 0x81)); /* not configured */
+    host_configure(host);
+    for (int by_fault = 0; by_fault < 2; by_fault++) {
+        host_submit(host, 1, 0x81, NULL, 512);
+        host_submit(host, 2, 0x81, NULL, 512);
+        host_submit(host, 3, 0x02, pattern, 10);
+        if (by_fault)
+            assert_true(usb_device_halt(host->device, 0x81));
+        else
+            assert_int_equal(host_control(host, 0x02, USB_REQ_SET_FEATURE, 0, 0x81, 0, NULL), 0);
+        host_expect(host, 1, USB_STALLED, 0);
+        host_expect(host, 2, USB_STALLED, 0);
+        assert_int_equal(host->n_done, 0); /* OUT is not concerned */
+        host_submit(host, 4, 0x81, NULL, 512);
+        host_expect(host, 4, USB_STALLED, 0);
+        assert_int_equal(usb_device_write(host->device, 0x81, pattern, 10), 0);
+        assert_int_equal(host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, 0, 0x81, 0, NULL), 0);
+        host_submit(host, 5, 0x81, NULL, 512);
+        assert_int_equal(usb_device_write(host->device, 0x81, pattern, 10), 10);
+        host_expect(host, 5, USB_OK, 10);
+        assert_int_equal(host_control(host, 0x02, USB_REQ_SET_FEATURE, 0, 0x02, 0, NULL), 0);
+        host_expect(host, 3, USB_STALLED, 0);
+        assert_int_equal(host_control(host, 0x82, USB_REQ_GET_STATUS, 0, 0x02, 2, NULL), 2);
+        assert_int_equal(host_in[0], 1);
+        host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, 0, 0x02, 0, NULL);
+    }
     /* A clear on one that is not halted is allowed, and pending ones stay. */
     host_submit(host, 6, 0x81, NULL, 512);
     assert_int_equal(host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, 0, 0x81, 0, NULL), 0);
@@ -207,19 +216,19 @@ static void test_halt(void **state)
 static void test_gone(void **state)
 {
     (void)state;
-    struct host *host = host_new(&alt_model, USB_RATE_SUPER, USB_RATE_HIGH);
+    struct host *host = host_new(&two_model, USB_RATE_SUPER, USB_RATE_HIGH);
     host_submit(host, 1, 0x82, NULL, 512); /* not configured yet */
     host_expect(host, 1, USB_GONE, 0);
     host_configure(host);
-    host_submit(host, 2, 0x81, NULL, 512); /* in the other alternate setting */
+    host_submit(host, 2, 0x81, NULL, 512); /* no such endpoint */
     host_expect(host, 2, USB_GONE, 0);
-    assert_int_equal(host_control(host, 1, USB_REQ_SET_INTERFACE, 1, 0, 0, NULL), 0);
-    host_submit(host, 3, 0x81, NULL, 512);
-    host_submit(host, 4, 0x82, NULL, 512);
-    assert_int_equal(host_control(host, 1, USB_REQ_SET_INTERFACE, 1, 0, 0, NULL), 0); /* the same again */
-    host_expect(host, 3, USB_GONE, 0);
+    host_submit(host, 3, 0x82, NULL, 512);
+    assert_int_equal(host_control(host, 1, USB_REQ_SET_INTERFACE, 0, 0, 0, NULL), 0);
     assert_int_equal(host->n_done, 0); /* the other interface is not touched */
-    for (int i = 0; i < 5; i++) {      /* back-to-back resets */
+    assert_int_equal(host_control(host, 1, USB_REQ_SET_INTERFACE, 0, 1, 0, NULL), 0);
+    host_expect(host, 3, USB_GONE, 0);
+    host_submit(host, 4, 0x82, NULL, 512);
+    for (int i = 0; i < 5; i++) { /* back-to-back resets */
         usb_device_reset(host->device, USB_RATE_FULL);
         if (i == 0) host_expect(host, 4, USB_GONE, 0);
         assert_int_equal(host->n_done, 0);
@@ -254,7 +263,7 @@ static void test_epochs(void **state)
     host_submit(host, 3, 0x02, "x", 1);
     usb_device_next_epoch(host->device, 0x02);
     host_submit(host, 4, 0x02, "y", 1);
-    assert_int_equal(usb_device_drop(host->device, 0x02, usb_device_epoch(host->device, 0x02)), 4);
+    usb_device_drop(host->device, 0x02);
     host_expect(host, 2, USB_OK, 3);
     host_expect(host, 3, USB_OK, 1);
     assert_int_equal(usb_device_read(host->device, 0x02, back, 100), 1);

@@ -48,7 +48,7 @@ static const struct {
 static void begin(struct client *c, struct bench *bench)
 {
     char text[8];
-    assert_int_equal(client_control(c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
+    client_configure(c);
     client_submit(c, 0, 2, NULL, "\002sRI0\003", 6);
     assert_int_equal(bench_expect(bench, LINK_OPENED, 0).session, 0);
     bench_read_all(bench, 0, text, 6);

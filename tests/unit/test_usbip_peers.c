@@ -20,7 +20,7 @@ static void list_devices(struct client *c)
 
 static int connect_silent(struct bench *bench)
 {
-    int fd = client_connect(bench);
+    int fd = dial(bench_port(bench));
     bench_poll(bench, 0, 0);
     return fd;
 }
@@ -38,7 +38,7 @@ static void test_silent(void **state)
     client_import(&host, &bench);
     for (int i = SILENT; i < 2 * SILENT; i++)
         silent[i] = connect_silent(&bench);
-    other.fd = client_connect(&bench);
+    other.fd = dial(bench_port(&bench));
     list_devices(&other);
     assert_int_equal(client_control(&host, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* the owner keeps the device */
     list_devices(&other);
@@ -90,13 +90,13 @@ static void test_oldest(void **state)
 static void put_submit(uint8_t *at, uint32_t seqnum, int in, uint32_t ep, uint32_t len, const uint8_t *setup)
 {
     memset(at, 0, HEADER);
-    put_be32(at, 1);
-    put_be32(at + 4, seqnum);
-    put_be32(at + 8, DEVID);
-    put_be32(at + 12, (uint32_t)in);
-    put_be32(at + 16, ep);
-    put_be32(at + 24, len);
-    put_be32(at + 32, 0xffffffff);
+    be_put32(at, 1);
+    be_put32(at + 4, seqnum);
+    be_put32(at + 8, DEVID);
+    be_put32(at + 12, (uint32_t)in);
+    be_put32(at + 16, ep);
+    be_put32(at + 24, len);
+    be_put32(at + 32, 0xffffffff);
     if (setup != NULL) memcpy(at + 40, setup, 8);
 }
 
@@ -171,7 +171,7 @@ static void test_turns(void **state)
     }
     assert_true(turns >= REQUESTS / 500); /* all of it is there from the first turn on */
     for (uint32_t i = 0; i < REQUESTS; i++)
-        assert_int_equal(get_be32(back + i * (HEADER + 2) + 4), i + 1);
+        assert_int_equal(be_get32(back + i * (HEADER + 2) + 4), i + 1);
     close(c.fd);
     bench_close(&bench);
 }
@@ -194,13 +194,13 @@ static size_t session(size_t piece, uint8_t *got, size_t room)
     memcpy(at += HEADER, "*RST\n", 5); /* waits: there is no session */
     at += 5;
     put_submit(at, 6, 0, 0, 0, NULL);
-    put_be32(at, 2); /* unlink */
-    put_be32(at + 20, 4);
+    be_put32(at, 2); /* unlink */
+    be_put32(at + 20, 4);
     at += HEADER;
     assert_int_equal(at - said, sizeof said);
 
     struct bench bench = usbip_bench("N");
-    struct client c = {.bench = &bench, .fd = client_connect(&bench)};
+    struct client c = {.bench = &bench, .fd = dial(bench_port(&bench))};
     for (size_t i = 0; i < sizeof said; i += piece) {
         client_write(&c, said + i, piece < sizeof said - i ? piece : sizeof said - i);
         bench_poll(&bench, 0, 0);
@@ -219,8 +219,8 @@ static void test_segments(void **state)
     static const size_t pieces[] = {1, 7, 47, 48, 49, 100};
     uint8_t whole[1024], cut[1024];
     const size_t n = session(1 << 20, whole, sizeof whole);
-    assert_int_equal(get_be32(whole + n - HEADER), 4); /* the last is the unlink's */
-    assert_int_equal((int)get_be32(whole + n - HEADER + 20), -104);
+    assert_int_equal(be_get32(whole + n - HEADER), 4); /* the last is the unlink's */
+    assert_int_equal((int)be_get32(whole + n - HEADER + 20), -104);
     for (size_t i = 0; i < sizeof pieces / sizeof pieces[0]; i++) {
         assert_int_equal(session(pieces[i], cut, sizeof cut), n);
         assert_memory_equal(cut, whole, n);
@@ -234,15 +234,14 @@ static void test_short_not_ok(void **state)
     struct bench bench = usbip_bench("N");
     struct client c;
     client_import(&c, &bench);
-    assert_int_equal(client_control(&c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
-    assert_int_equal(client_control(&c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
-    bench_expect(&bench, LINK_OPENED, 0);
+    client_configure(&c);
+    client_open_stream(&c);
     for (int strict = 0; strict < 2; strict++) {
         static const char data[512] = "abc";
         for (uint32_t len = 3; len <= 512; len += 509) {
             uint8_t head[HEADER];
             put_submit(head, ++c.seqnum, 1, 3, 512, NULL);
-            put_be32(head + 20, (uint32_t)strict);
+            be_put32(head + 20, (uint32_t)strict);
             client_write(&c, head, sizeof head);
             bench_expect(&bench, LINK_WRITABLE, 2);
             bench_write_all(&bench, 1, data, len);
@@ -269,9 +268,8 @@ static void test_bytes_pending(void **state)
     struct client c;
     uint8_t byte;
     client_import(&c, &bench);
-    assert_int_equal(client_control(&c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
-    assert_int_equal(client_control(&c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
-    bench_expect(&bench, LINK_OPENED, 0);
+    client_configure(&c);
+    client_open_stream(&c);
     for (size_t i = 0; i < sizeof lens / sizeof lens[0]; i++)
         client_submit(&c, 1, 3, NULL, NULL, lens[i]);
     assert_int_equal(client_control(&c, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* these are given back */

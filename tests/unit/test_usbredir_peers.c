@@ -188,33 +188,27 @@ static struct guest *accept_device(struct bench *bench, int listener)
     }
 }
 
-static void expect_notice(struct bench *bench, const char *part)
-{
-    const struct link_event event = bench_expect(bench, LINK_NOTICE, 0);
-    if (strstr(event.peer, part) == NULL) fail_msg("\"%s\" has no \"%s\"", event.peer, part);
-}
-
 static void check_reconnects(const struct link_spec *spec, int listener, const struct sockaddr *at, socklen_t len)
 {
     struct bench bench = bench_open(spec);
     struct guest *g = accept_device(&bench, listener);
     guest_configure(g);
     guest_free(g);
-    expect_notice(&bench, "detached");
+    bench_expect_notice(&bench, "detached");
     g = accept_device(&bench, listener); /* it comes by itself */
     guest_configure(g);
-    expect_notice(&bench, "plugged in again");
+    bench_expect_notice(&bench, "plugged in again");
     close(listener); /* nobody answers: it says so once, and tries again */
     if (at->sa_family == AF_UNIX) unlink(((const struct sockaddr_un *)at)->sun_path);
     guest_free(g);
-    expect_notice(&bench, "detached");
-    expect_notice(&bench, "will try again");
+    bench_expect_notice(&bench, "detached");
+    bench_expect_notice(&bench, "will try again");
     for (int i = 0; i < 3; i++)
         bench_poll(&bench, 0, 2);
     assert_int_equal(bench.n_queue, 0);
     listener = listen_on(at, len);
     g = accept_device(&bench, listener);
-    expect_notice(&bench, "plugged in again");
+    bench_expect_notice(&bench, "plugged in again");
     guest_configure(g);
     guest_free(g);
     bench_close(&bench);

@@ -1,35 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* The process of somebody else's client: placeholders of its command, its end, and what it leaves running. */
-#include <stdarg.h>
-#include <stddef.h>
-#include <setjmp.h>
-#include <cmocka.h>
-
 #include <signal.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include "firmware_sim/app/studio/verdict/client.h"
-
-static char folder[] = "/tmp/scanhead-client-XXXXXX";
-static char log_path[64];
-
-static int make(void **state)
-{
-    (void)state;
-    if (mkdtemp(folder) == NULL) return 1;
-    snprintf(log_path, sizeof log_path, "%s/log", folder);
-    return 0;
-}
+#include "tests/unit/scene_files.h"
 
 static int drop(void **state)
 {
-    (void)state;
-    unlink(log_path);
-    return rmdir(folder);
+    unlink(path_in("log"));
+    return remove_folder(state);
 }
 
 static void test_placeholders(void **state)
@@ -55,7 +35,7 @@ static void test_placeholders(void **state)
 static void begin(struct client *client, const char *line)
 {
     struct sh_err err;
-    if (client_start(client, line, log_path, NULL, &err) != SH_OK) fail_msg("%s", err.text);
+    if (client_start(client, line, path_in("log"), NULL, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
 static void test_ends(void **state)
@@ -79,7 +59,7 @@ static void wait_for(const char *line)
 {
     char text[16] = "";
     while (strcmp(text, line) != 0) {
-        FILE *file = fopen(log_path, "r");
+        FILE *file = fopen(path_in("log"), "r");
         assert_non_null(file);
         if (fgets(text, sizeof text, file) == NULL) text[0] = '\0';
         fclose(file);
@@ -91,7 +71,7 @@ static pid_t wait_for_number(void)
     int number = 0;
     char end = 0;
     while (end != '\n') {
-        FILE *file = fopen(log_path, "r");
+        FILE *file = fopen(path_in("log"), "r");
         assert_non_null(file);
         if (fscanf(file, "%d%c", &number, &end) != 2) end = 0;
         fclose(file);
@@ -156,5 +136,5 @@ int main(void)
         cmocka_unit_test(test_what_the_shell_leaves), cmocka_unit_test(test_what_leaves_the_group),
         cmocka_unit_test(test_its_input_stays_open),
     };
-    return cmocka_run_group_tests(tests, make, drop);
+    return cmocka_run_group_tests(tests, make_folder, drop);
 }

@@ -8,6 +8,7 @@
 #include "core/colour.h"
 #include "core/scene_copies.h"
 #include "core/surface.h"
+#include "tests/common/made.h"
 #include "tests/unit/scene_files.h"
 
 static struct scene *take(const char *name, const char *text, int textures)
@@ -235,12 +236,11 @@ static void cast_line(const struct scene *scene, const struct cast_setup *setup,
     struct schedule_line line;
     struct schedule_run run;
     struct caster *caster = NULL;
-    struct bvh *bvh;
     struct sh_err err;
     struct cast_setup with = *setup;
     schedule_start(&segment, &spec);
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || caster_create(&caster, &err) != SH_OK)
-        fail_msg("%s", err.text);
+    struct bvh *bvh = made_bvh(scene);
+    if (caster_create(&caster, &err) != SH_OK) fail_msg("%s", err.text);
     with.bvh = bvh;
     schedule_get_line(&segment, 0, &line);
     schedule_get_run(&segment, &line, line.cast0, (uint32_t)(line.cast_end - line.cast0), &run);

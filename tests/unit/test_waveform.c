@@ -2,6 +2,7 @@
 /* Signals of waveforms are compared with closed forms and sums of their own: energy, the pulse's shape, the spread
  * of returns. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "tests/unit/waveform_rig.h"
@@ -337,12 +338,52 @@ static void the_coarsest_sampling_is_taken(void **state)
     waveform_free(waveform_rig_open(&spec));
 }
 
+/* Reads the figures behind `name` in the text with which spec is refused: one, or two with "to" between them. */
+static void told(const struct waveform_spec *spec, const char *name, double figure[2])
+{
+    struct waveform *w = NULL;
+    struct sh_err err = {.code = 0};
+    assert_int_equal(waveform_create(spec, &w, &err), SH_EINPUT);
+    const char *at = strstr(err.text, name);
+    if (at == NULL || sscanf(at + strlen(name), "%lg to %lg", &figure[0], &figure[1]) < 1) fail_msg("%s", err.text);
+}
+
+/* Whatever limit a text names is taken, though it is rounded there. */
+static void named_limits_are_taken(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 40; i++) {
+        struct waveform_spec spec = waveform_rig_spec();
+        double figure[2];
+        spec.width_s = 1e-9 * (1.0 + 0.61 * i);
+        spec.bandwidth_hz = i % 2 ? 150e6 : 0.0;
+        spec.sample_s = 4.0 * spec.width_s;
+        told(&spec, "so at most ", figure);
+        spec.sample_s = 1e-9 * figure[0];
+        waveform_free(waveform_rig_open(&spec));
+        spec = waveform_rig_spec();
+        spec.sample_s = 1e-9 * (0.4 + 0.013 * i);
+        spec.far_m = 0.001;
+        told(&spec, "0.001 m: ", figure);
+        for (int k = 0; k < 2; k++) {
+            spec.far_m = figure[k];
+            waveform_free(waveform_rig_open(&spec));
+        }
+    }
+    /* Times in ns add up to 2048 samples of 0.7 ns. In s their sum is larger by a rounding error. */
+    struct waveform_spec spec = waveform_rig_spec();
+    spec.sample_s = 0.7 / 1e9;
+    spec.before_s = 0.28 / 1e9;
+    spec.after_s = 1433.32 / 1e9;
+    waveform_free(waveform_rig_open(&spec));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_have_the_energy),       cmocka_unit_test(shapes_are_the_closed_forms),
-        cmocka_unit_test(the_centroid_is_the_range),     cmocka_unit_test(spreads_are_the_closed_forms),
-        cmocka_unit_test(no_extent_is_a_point),          cmocka_unit_test(limits_are_told),
-        cmocka_unit_test(the_coarsest_sampling_is_taken)};
+        cmocka_unit_test(samples_have_the_energy),        cmocka_unit_test(shapes_are_the_closed_forms),
+        cmocka_unit_test(the_centroid_is_the_range),      cmocka_unit_test(spreads_are_the_closed_forms),
+        cmocka_unit_test(no_extent_is_a_point),           cmocka_unit_test(limits_are_told),
+        cmocka_unit_test(the_coarsest_sampling_is_taken), cmocka_unit_test(named_limits_are_taken)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

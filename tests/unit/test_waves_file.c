@@ -83,7 +83,43 @@ static void test_without(void **state)
     struct bytes b = record("a.waves.csv");
     assert_string_equal((const char *)b.data, TITLE);
     assert_non_null(strstr(rig_notes, "1 waveforms left out whose points were lost"));
+    assert_null(strstr(rig_notes, "the head sends none"));
     free(b.data);
+}
+
+/* The anchor of a scan is lost: until it is repeated, no file may count the scan's windows as those of the scan before,
+ * or as a kind that it has no place for. */
+static void test_lost_anchor(void **state)
+{
+    (void)state;
+    static const struct rig_point p = {5000, 0, 0, 0, 1, 1, 1};
+    static const struct rig_window w = {0, 30, 3, {0, 0, 0}};
+    static const char *const names[] = {"a.waves.csv", "a.las"};
+    for (size_t i = 0; i < 2; i++) {
+        struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
+        rig_begin();
+        for (uint32_t scan = 1; scan <= 2; scan++) {
+            rig_wave_descriptor(0, scan, 4);
+            rig_points(0, 0, 0, &p, 1);
+            rig_waves(0, 0, &d, &w, 1);
+            a.station = 6 + scan;
+            rig_anchor(&a);
+            rig_points(0, 0, 5, &p, 1);
+            rig_waves(0, 5, &d, &w, 1);
+        }
+        struct bytes b = record(names[i]);
+        assert_non_null(strstr(rig_notes, i == 0 ? "2 waveforms left out whose points were lost"
+                                                 : "1 waveforms left out whose points were lost"));
+        assert_null(strstr(rig_notes, "has no place for them, allowed"));
+        if (i == 0) {
+            const char *row = strchr((const char *)b.data, '\n') + 1;
+            assert_int_equal(strncmp(row, "1,7,5,0.005", 11), 0);
+            row = strchr(row, '\n') + 1;
+            assert_int_equal(strncmp(row, "2,8,5,0.005", 11), 0);
+            assert_null(strchr(strchr(row, '\n') + 1, '\n'));
+        }
+        free(b.data);
+    }
 }
 
 static void test_repair(void **state)
@@ -117,10 +153,8 @@ static void test_repair(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rows),
-        cmocka_unit_test(test_none),
-        cmocka_unit_test(test_without),
-        cmocka_unit_test(test_repair),
+        cmocka_unit_test(test_rows),        cmocka_unit_test(test_none),   cmocka_unit_test(test_without),
+        cmocka_unit_test(test_lost_anchor), cmocka_unit_test(test_repair),
     };
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

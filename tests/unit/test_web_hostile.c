@@ -41,6 +41,9 @@ static int send_raw(struct bench *bench, const char *place, const char *text, si
 }
 
 #define HOST "Host: @\r\n"
+#define UPGRADE                                                                  \
+    "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n" \
+    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
 #define CASE(text, status)             \
     {                                  \
         text, sizeof(text) - 1, status \
@@ -64,6 +67,7 @@ static const struct {
     CASE("GET / HTTP/1.1\r\n" HOST " folded\r\n\r\n", 400),
     CASE("GET / HTTP/1.1\r\nHost : @\r\n\r\n", 400),
     CASE("GET / HTTP/1.1\r\n" HOST HOST "\r\n", 400),
+    CASE("GET / HTTP/1.1\r\n" HOST "Origin: http://elsewhere.example\r\nOrigin: http://@\r\n\r\n", 400),
     CASE("GET / HTTP/1.1\r\n\r\n", 400),
     CASE("GET /\r\n", 400), /* HTTP/0.9 */
     CASE("GET foo HTTP/1.1\r\n" HOST "\r\n", 400),
@@ -89,6 +93,8 @@ static const struct {
          426),
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n\r\n",
          400),
+    CASE("HEAD /ws HTTP/1.1\r\n" HOST UPGRADE "\r\n", 426),
+    CASE("GET /ws HTTP/1.0\r\n" HOST UPGRADE "\r\n", 426),
 };
 
 static void test_requests(void **state)

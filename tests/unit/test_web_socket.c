@@ -134,12 +134,81 @@ static void test_early_frames(void **state)
     bench_close(&bench);
 }
 
+/* A client sends commands and closes at once. They are read before its end, also where the owner has not heard of its
+ * session by then, or has something to write. Half a message is not. */
+static void test_last_words(void **state)
+{
+    (void)state;
+    static const char words[] = "\x81\x84" MASK "STOP\x01\x84" MASK "HALF", end[] = "\x88\x82" MASK "\x03\xe8";
+    for (int early = 0; early < 2; early++)
+        for (int closes = 0; closes < 2; closes++) {
+            char place[64], bytes[500], text[16];
+            struct bench bench = web_open(place);
+            int fd = early ? web_dial(place) : web_upgrade(&bench, place, "/ws", "");
+            if (!early) bench_expect(&bench, LINK_OPENED, 0);
+            size_t n = early ? (size_t)snprintf(bytes, sizeof bytes,
+                                                "GET /ws HTTP/1.1\r\nHost: %s\r\nUpgrade: websocket\r\n"
+                                                "Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+                                                "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
+                                                place)
+                             : 0;
+            memcpy(bytes + n, words, sizeof words - 1);
+            n += sizeof words - 1;
+            memcpy(bytes + n, end, sizeof end - 1);
+            if (closes) n += sizeof end - 1;
+            assert_int_equal(send(fd, bytes, n, MSG_NOSIGNAL), n);
+            assert_int_equal(shutdown(fd, SHUT_WR), 0);
+            if (early) bench_expect(&bench, LINK_OPENED, 0);
+            bench_expect(&bench, LINK_READABLE, 1); /* with a writable session poll reports before it works */
+            assert_true(bench.ops->write(bench.link, 0, "\xd5", 1) >= 0);
+            ssize_t got = bench.ops->read(bench.link, 0, text, sizeof text);
+            assert_in_range(got, 5, 9);
+            assert_memory_equal(text, "STOP\nHALF", (size_t)got);
+            bench_expect(&bench, LINK_CLOSED, 0);
+            assert_int_equal(bench.ops->write(bench.link, 0, "\xd5", 1), SH_ECLOSED);
+            close(fd);
+            bench_close(&bench);
+        }
+}
+
+/* The events of clients that are turned away leave room for those of sessions. */
+static void test_crowd(void **state)
+{
+    (void)state;
+    enum { CROWD = 100, LAST = WEB_SESSIONS - 1 };
+    int fd[WEB_SESSIONS + CROWD], n_refused = 0;
+    char place[64];
+    struct bench bench = web_open(place);
+    for (int i = 0; i < WEB_SESSIONS; i++) {
+        fd[i] = web_upgrade(&bench, place, "/ws", "");
+        bench_expect(&bench, LINK_OPENED, 0);
+        web_send_frame(fd[i], 0x81, "STOP", 4);
+    }
+    while (bench_expect(&bench, LINK_READABLE, 0).session != LAST)
+        continue;
+    for (int i = 0; i < CROWD; i++)
+        fd[WEB_SESSIONS + i] = web_dial(place);
+    for (int turn = 0; n_refused < CROWD / 2; turn++) {
+        struct link_event event[LINK_MAX_EVENTS];
+        int is_heard = 0;
+        assert_in_range(turn, 0, CROWD);
+        const int n = bench.ops->poll(bench.link, -1, UINT32_MAX, 0, event, LINK_MAX_EVENTS);
+        for (int i = 0; i < n; i++) {
+            n_refused += event[i].kind == LINK_REFUSED;
+            is_heard |= event[i].kind == LINK_READABLE && event[i].session == LAST;
+        }
+        assert_true(is_heard);
+    }
+    for (int i = 0; i < WEB_SESSIONS + CROWD; i++)
+        close(fd[i]);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ends),
-        cmocka_unit_test(test_pings),
-        cmocka_unit_test(test_early_frames),
+        cmocka_unit_test(test_ends),       cmocka_unit_test(test_pings), cmocka_unit_test(test_early_frames),
+        cmocka_unit_test(test_last_words), cmocka_unit_test(test_crowd),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

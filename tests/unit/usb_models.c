@@ -23,24 +23,16 @@ const struct usb_model pair_model = {.bcd_device = 0x0234,
                                      .interface = pair_interfaces,
                                      .n_functions = 1,
                                      .n_interfaces = 1,
-                                     .n_rows = 1,
                                      .ms_vendor_code = 0x42};
 
-/* Two interfaces. The first has nothing in its alternate setting 0, and a bulk pair and an interrupt in 1. */
-static const struct usb_endpoint_row alt_endpoints[] = {
-    {.address = 0x81, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}},
-    {.address = 0x01, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}},
-    {.address = 0x83, .type = USB_ENDPOINT_XFER_INT, .packet = {8, 8, 8}, .interval = {10, 7, 7}}};
-
+/* Two interfaces: one without endpoints, and one with a bulk endpoint. */
 static const struct usb_endpoint_row other_endpoints[] = {
     {.address = 0x82, .type = USB_ENDPOINT_XFER_BULK, .packet = {64, 512, 1024}}};
 
-static const struct usb_interface_row alt_interfaces[] = {
-    {.number = 0, .alt = 0, .class = 0xff},
-    {.number = 0, .alt = 1, .class = 0xff, .endpoint = alt_endpoints, .n_endpoints = 3},
-    {.number = 1, .alt = 0, .class = 0xff, .endpoint = other_endpoints, .n_endpoints = 1}};
+static const struct usb_interface_row two_interfaces[] = {
+    {.number = 0, .class = 0xff}, {.number = 1, .class = 0xff, .endpoint = other_endpoints, .n_endpoints = 1}};
 
-static const struct usb_function_row alt_functions[] = {{.first = 0, .count = 1}, {.first = 1, .count = 1}};
+static const struct usb_function_row two_functions[] = {{.first = 0, .count = 1}, {.first = 1, .count = 1}};
 
-const struct usb_model alt_model = {
-    .function = alt_functions, .interface = alt_interfaces, .n_functions = 2, .n_interfaces = 2, .n_rows = 3};
+const struct usb_model two_model = {
+    .function = two_functions, .interface = two_interfaces, .n_functions = 2, .n_interfaces = 2};

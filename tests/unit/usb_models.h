@@ -8,6 +8,6 @@
 extern const struct usb_interface_row pair_interfaces[];
 extern const struct usb_model pair_model;
 
-extern const struct usb_model alt_model;
+extern const struct usb_model two_model;
 
 #endif

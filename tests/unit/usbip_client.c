@@ -9,18 +9,6 @@ struct bench usbip_bench(const char *serial)
     return bench_open(&spec);
 }
 
-int client_connect(struct bench *bench)
-{
-    char name[300];
-    bench->ops->endpoint(bench->link, name, sizeof name);
-    assert_memory_equal(name, "usbip:127.0.0.1:", 16);
-    struct sockaddr_in at = {
-        .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK), .sin_port = htons((uint16_t)atoi(name + 16))};
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(connect(fd, (struct sockaddr *)&at, sizeof at), 0);
-    return fd;
-}
-
 int client_read(struct client *c, void *data, size_t len)
 {
     uint8_t *at = data;
@@ -44,30 +32,17 @@ void client_write(struct client *c, const void *data, size_t len)
     }
 }
 
-void put_be32(uint8_t *at, uint32_t v)
-{
-    v = htonl(v);
-    memcpy(at, &v, 4);
-}
-
-uint32_t get_be32(const uint8_t *at)
-{
-    uint32_t v;
-    memcpy(&v, at, 4);
-    return ntohl(v);
-}
-
 uint32_t client_submit(struct client *c, int in, uint32_t ep, const void *setup, const void *out, uint32_t len)
 {
     uint8_t h[HEADER] = {0};
-    put_be32(h, 1);
-    put_be32(h + 4, ++c->seqnum);
-    put_be32(h + 8, DEVID);
-    put_be32(h + 12, (uint32_t)in);
-    put_be32(h + 16, ep);
-    put_be32(h + 24, len);
-    put_be32(h + 32, 0xffffffff); /* packets: none, it is not isochronous */
-    put_be32(h + 36, 64);         /* interval: for interrupts */
+    be_put32(h, 1);
+    be_put32(h + 4, ++c->seqnum);
+    be_put32(h + 8, DEVID);
+    be_put32(h + 12, (uint32_t)in);
+    be_put32(h + 16, ep);
+    be_put32(h + 24, len);
+    be_put32(h + 32, 0xffffffff); /* packets: none, it is not isochronous */
+    be_put32(h + 36, 64);         /* interval: for interrupts */
     if (setup != NULL) memcpy(h + 40, setup, 8);
     client_write(c, h, sizeof h);
     if (!in && len > 0) client_write(c, out, len);
@@ -77,10 +52,10 @@ uint32_t client_submit(struct client *c, int in, uint32_t ep, const void *setup,
 uint32_t client_unlink(struct client *c, uint32_t victim)
 {
     uint8_t h[HEADER] = {0};
-    put_be32(h, 2);
-    put_be32(h + 4, ++c->seqnum);
-    put_be32(h + 8, DEVID);
-    put_be32(h + 20, victim);
+    be_put32(h, 2);
+    be_put32(h + 4, ++c->seqnum);
+    be_put32(h + 8, DEVID);
+    be_put32(h + 20, victim);
     client_write(c, h, sizeof h);
     return c->seqnum;
 }
@@ -89,10 +64,10 @@ int client_reply(struct client *c, struct reply *r, int in)
 {
     uint8_t h[HEADER];
     if (!client_read(c, h, sizeof h)) return 0;
-    r->command = get_be32(h);
-    r->seqnum = get_be32(h + 4);
-    r->status = (int)get_be32(h + 20);
-    r->actual = get_be32(h + 24);
+    r->command = be_get32(h);
+    r->seqnum = be_get32(h + 4);
+    r->status = (int)be_get32(h + 20);
+    r->actual = be_get32(h + 24);
     for (int i = 8; i < 20; i++)
         assert_int_equal(h[i], 0);
     if (r->command == 3 && in && r->actual > 0) {
@@ -105,7 +80,7 @@ int client_reply(struct client *c, struct reply *r, int in)
 void client_import(struct client *c, struct bench *bench)
 {
     uint8_t request[40] = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'}, back[320];
-    *c = (struct client){.bench = bench, .fd = client_connect(bench)};
+    *c = (struct client){.bench = bench, .fd = dial(bench_port(bench))};
     client_write(c, request, sizeof request);
     assert_true(client_read(c, back, 8));
     const uint8_t ok[8] = {0x01, 0x11, 0, 3, 0, 0, 0, 0};
@@ -127,4 +102,17 @@ int client_control(struct client *c, struct reply *r, unsigned type, unsigned re
     assert_int_equal(r->command, 3);
     assert_int_equal(r->seqnum, seqnum);
     return r->status;
+}
+
+void client_configure(struct client *c)
+{
+    static struct reply r;
+    assert_int_equal(client_control(c, &r, 0x00, 9, 1, 0, 0, NULL), 0);
+}
+
+void client_open_stream(struct client *c)
+{
+    static struct reply r;
+    assert_int_equal(client_control(c, &r, 0x41, 0x22, 1, 2, 0, NULL), 0);
+    assert_int_equal(bench_expect(c->bench, LINK_OPENED, 0).session, 1);
 }

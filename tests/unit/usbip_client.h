@@ -30,16 +30,10 @@ struct reply {
 
 struct bench usbip_bench(const char *serial);
 
-int client_connect(struct bench *bench);
-
 /* Reads all len bytes, while the link does its part. Returns 0 when the link hung up instead. */
 int client_read(struct client *c, void *data, size_t len);
 
 void client_write(struct client *c, const void *data, size_t len);
-
-void put_be32(uint8_t *at, uint32_t v);
-
-uint32_t get_be32(const uint8_t *at);
 
 uint32_t client_submit(struct client *c, int in, uint32_t ep, const void *setup, const void *out, uint32_t len);
 
@@ -53,5 +47,10 @@ void client_import(struct client *c, struct bench *bench);
 /* Makes a control transfer and returns its status. The received bytes are in r. */
 int client_control(struct client *c, struct reply *r, unsigned type, unsigned request, unsigned value, unsigned index,
                    unsigned length, const void *out);
+
+void client_configure(struct client *c);
+
+/* Begins the stream, and waits for its session. */
+void client_open_stream(struct client *c);
 
 #endif

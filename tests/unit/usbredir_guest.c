@@ -251,3 +251,9 @@ void guest_bulk(struct guest *g, uint64_t id, uint8_t endpoint, uint32_t length,
         .endpoint = endpoint, .length = (uint16_t)length, .length_high = (uint16_t)(length >> 16)};
     usbredirparser_send_bulk_packet(g->parser, id, &h, out, out != NULL ? (int)length : 0);
 }
+
+void guest_open_stream(struct guest *g)
+{
+    assert_int_equal(guest_control(g, 0x41, 0x22, 1, 2, 0, NULL)->status, usb_redir_success);
+    assert_int_equal(bench_expect(g->bench, LINK_OPENED, 0).session, 1);
+}

@@ -65,6 +65,9 @@ void guest_configure(struct guest *g);
 struct seen *guest_control(struct guest *g, unsigned type, unsigned request, unsigned value, unsigned index,
                            unsigned length, uint8_t *out);
 
+/* Begins the stream, and waits for its session. */
+void guest_open_stream(struct guest *g);
+
 void guest_bulk(struct guest *g, uint64_t id, uint8_t endpoint, uint32_t length, uint8_t *out);
 
 #endif

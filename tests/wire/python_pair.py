@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The Python client at one end of a socket pair, where the test is the head: wrong calls, replies that come late, frames
 that are hurt or missing. python_client.py runs these."""
+import contextlib
+import io
+import os
 import socket
 import struct
 import threading
@@ -31,7 +34,12 @@ def misuse(path):
     for source in ("tcp:127.0.0.1:65537", "tcp:127.0.0.1:0", "tcp:127.0.0.1:\xb2", "tcp:5025", "a\0b", "",
                    "tcp:" + 70 * "a" + ".b:1", "tty:" + path):
         refused(scanhead.open, source)
-    refused(scanhead.open("/").next_frame)
+    os.mkfifo(path + ".fifo")
+    for source in ("/", "/dev/zero", path + ".fifo"):
+        refused(scanhead.open, source)
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
+        assert scanhead.main([path, "*IDN?"]) == 1
+    assert "a recording takes no commands" in said.getvalue()
     for head in (scanhead.open(path), pair()[0]):
         head.close()
         head.close()
@@ -43,6 +51,7 @@ def misuse(path):
     for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
         late_replies(lines)
     late_answer()
+    half_a_frame()
     dropped_frames()
     whole_frame()
     print("refused")
@@ -78,6 +87,25 @@ def late_answer():
 
     threading.Thread(target=answer, daemon=True).start()
     assert head.query("HEAD:LINes?") == "2"
+
+
+def half_a_frame():
+    """The head was in the middle of a frame for the program before. The first answer is lost in the rest of it."""
+    head, theirs = pair()
+    head._unsettled = True  # as on a terminal
+    frame = framed(scanhead.EVENT, 0, 128, bytes(128))
+
+    def answer():
+        asked = 0
+        for line in theirs.makefile():
+            if line.strip() == "*IDN?":
+                asked += 1
+                theirs.sendall((frame[:60] if asked == 1 else frame) + b"a,b,c,d\r\n")
+            elif line.strip():
+                theirs.sendall(b"2\r\n")
+
+    threading.Thread(target=answer, daemon=True).start()
+    assert head.query("HEAD:LINes?", 60) == "2"
 
 
 def whole_frame():
@@ -118,8 +146,19 @@ def dropped_frames():
     scanhead._QUEUE_BYTES = most
 
 
+def alike():
+    """Another sequence begins with a frame of before, which is dropped as repeated. What was said there still holds."""
+    head, theirs = pair()
+    first, other = (framed(kind, 0, 0, b"", seq) for kind, seq in ((200, 6), (201, 5)))
+    theirs.sendall(first + first + other)
+    head.next_frame(5)
+    head.descriptor = {}
+    assert head.next_frame(5).seq == 5 and head.descriptor == {}
+
+
 def notices():
     """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
+    alike()
     said = []
     head, theirs = pair()
     head.on_notice = lambda n: said.append(tuple(n)[:4])
@@ -127,7 +166,10 @@ def notices():
     hurt = frames[5][:99] + b"?" + frames[5][100:]
     theirs.sendall(frames[0] + frames[2] + frames[2] + b"\0\1" + frames[1] + hurt + frames[6] +
                    framed(200, 0, 0, b"", 2**31 + 6))
-    assert [head.next_frame(5).seq for _ in range(4)] == [2**32 - 2, 0, 4, 2**31 + 6]
+    assert [head.next_frame(5).seq for _ in range(3)] == [2**32 - 2, 0, 4]
+    head.descriptor, head.anchor, head._gps = {}, {}, (0, 0)
+    assert head.next_frame(5).seq == 2**31 + 6
+    assert head.descriptor is None and not head.can_place() and head.gps_time_ns(0) is None
     size = len(hurt)
     assert said == [("gap", size, 2**32 - 1, 1), ("repeated", 2 * size, 0, 1), ("bad bytes", 3 * size, 0, 2),
                     ("late", 3 * size + 2, 2**32 - 1, 1), ("bad payload", 4 * size + 2, 3, size),

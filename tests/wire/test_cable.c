@@ -6,14 +6,14 @@
 #include "tests/wire/unit_faults.h"
 
 /* As FAULT_ROOM, for nine tenths of a second: some 1,000 ticks with frames. */
-static struct head start(struct wire *wire, const char *fault, const char *loop, const char *const *more)
+static struct head start(struct wire *wire, const char *fault, const char *loop)
 {
     char faults[200];
     struct room_config config = FAULT_ROOM;
     config.pan_stop_deg = 90;
     config.more = loop;
     snprintf(faults, sizeof faults, "faults: [{kind: cable, at: 60, %s}]\n", fault);
-    return fault_head_start(wire, &config, faults, more);
+    return fault_head_start(wire, &config, faults, NULL);
 }
 
 /* The truth has the cable at frame 60, and its end. text: of the first. */
@@ -37,7 +37,7 @@ static void check_truth(const struct wire *wire, int link, const char *text)
 static void goes_on(void **state)
 {
     struct wire *wire = *state;
-    struct head head = start(wire, "link: 1, count: 1, for_ms: 200", "loop: {queue_ms: 10000, late_ms: 10000}\n", NULL);
+    struct head head = start(wire, "link: 1, count: 1, for_ms: 200", "loop: {queue_ms: 10000, late_ms: 10000}\n");
     struct scanhead *sh = client_open(head_link(&head, 0));
     struct scanhead_frame frame;
     struct scanhead_stats stats;
@@ -60,7 +60,7 @@ static void goes_on(void **state)
 static void is_pulled_once_for_all(void **state)
 {
     struct wire *wire = *state;
-    struct head head = start(wire, "link: 1, for_ms: 200", "loop: {queue_ms: 10000, late_ms: 10000}\n", NULL);
+    struct head head = start(wire, "link: 1, for_ms: 200", "loop: {queue_ms: 10000, late_ms: 10000}\n");
     struct scanhead *sh[3];
     struct scanhead_frame frame;
     for (int i = 0; i < 3; i++) {
@@ -88,7 +88,7 @@ static int was_pulled(struct wire *wire)
 static void loses_what_the_queue_cant_hold(void **state)
 {
     struct wire *wire = *state;
-    struct head head = start(wire, "link: 1, count: 1, for_ms: 400", "loop: {queue_ms: 100, late_ms: 10000}\n", NULL);
+    struct head head = start(wire, "link: 1, count: 1, for_ms: 400", "loop: {queue_ms: 100, late_ms: 10000}\n");
     struct scanhead *sh = client_open(head_link(&head, 0));
     struct scanhead_frame frame;
     struct scanhead_stats stats;
@@ -118,7 +118,7 @@ static void read_to_cut(struct scanhead *sh)
 
 static void ends(struct wire *wire, int link, const char *fault, const char *text)
 {
-    struct head head = start(wire, fault, "loop: {queue_ms: 10000, late_ms: 10000}\n", NULL);
+    struct head head = start(wire, fault, "loop: {queue_ms: 10000, late_ms: 10000}\n");
     struct scanhead *sh = client_open(head_link(&head, link - 1));
     client_wait_state(sh, "idle");
     client_tell(sh, "SCAN:START");
@@ -145,8 +145,7 @@ static void hangs_up_a_terminal(void **state)
 static void ends_with_the_head(void **state)
 {
     struct wire *wire = *state;
-    struct head head = start(wire, "link: 1, count: 1, for_ms: 1e6", "loop: {queue_ms: 10000, late_ms: 10000}\n",
-                             (const char *const[]){NULL});
+    struct head head = start(wire, "link: 1, count: 1, for_ms: 1e6", "loop: {queue_ms: 10000, late_ms: 10000}\n");
     struct scanhead *sh = client_open(head_link(&head, 0)), *beside = client_open(head_link(&head, 1));
     struct scanhead_frame frame;
     client_wait_state(sh, "idle");

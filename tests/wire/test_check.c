@@ -1,22 +1,23 @@
 /* SPDX-License-Identifier: MIT */
 /* These are tests of the output of `scanhead check`: all errors of a configuration, the keys of a section, an example
- * that passes. And short options in getopt's forms. */
+ * that passes, links that a head would refuse. And short options in getopt's forms. */
 #include "tests/wire/room.h"
+#include "tests/wire/usage_rig.h"
+
+static void run(struct wire *wire, const char *line, int status)
+{
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, usage_words(wire, line), "out", "err", -1)), status);
+}
 
 /* A value may follow its letter at once: -oFILE. */
 static void test_short_forms(void **state)
 {
     struct wire *wire = *state;
-    char option[352], config[352];
     room_write(wire);
-    snprintf(config, sizeof config, "%s",
-             room_config_write(
-                 wire,
-                 &(struct room_config){
-                     .prr_hz = 20000, .lines_hz = 50, .pan_deg_s = 360, .pan_stop_deg = 36, .frames = 1, .links = ""}));
-    snprintf(option, sizeof option, "-o%s", wire_path(wire, "x.ply"));
-    const char *const args[] = {"record", option, config, "--quiet", NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    room_config_write(
+        wire, &(struct room_config){
+                  .prr_hz = 20000, .lines_hz = 50, .pan_deg_s = 360, .pan_stop_deg = 36, .frames = 1, .links = ""});
+    run(wire, "record -o@x.ply @config.yaml --quiet", 0);
     assert_int_equal(access(wire_path(wire, "x.ply"), R_OK), 0);
 }
 
@@ -31,8 +32,7 @@ static void test_all_faults(void **state)
     for (int i = 0; i < 19; i++)
         n += snprintf(text + n, sizeof text - (size_t)n, "  - {retro: -1}\n");
     snprintf(config, sizeof config, "%s", wire_write_text(wire, "config.yaml", text));
-    const char *const args[] = {"check", config, NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+    run(wire, "check @config.yaml", 2);
     char *told = wire_read(wire_path(wire, "err"), NULL), *rest = told;
     static const char *const keys[] = {":1: head.prr_hz: ", ":1: head.frame: unknown key, did you mean head.frames?",
                                        ":2: scene.meshes: ", ":3: stations[0].position_m: ", ":5: surfaces[0].retro: "};
@@ -68,14 +68,11 @@ static void check_memory(char *told)
 static void test_example(void **state)
 {
     struct wire *wire = *state;
-    char config[352];
     assert_int_equal(
         wire_wait(wire, wire_spawn(wire, (const char *const[]){"check", "--example", NULL}, "x.yaml", "err", -1)), 0);
-    snprintf(config, sizeof config, "%s", wire_path(wire, "x.yaml"));
-    const int status =
-        wire_wait(wire, wire_spawn(wire, (const char *const[]){"check", config, NULL}, "out", "err", -1));
+    run(wire, "check @x.yaml", 0);
     char *err = wire_read(wire_path(wire, "err"), NULL);
-    if (status != 0 || err[0] != '\0') fail_msg("status %d: %s", status, err);
+    assert_string_equal(err, "");
     free(err);
     check_memory(wire_read(wire_path(wire, "out"), NULL));
 }
@@ -110,13 +107,9 @@ static void write_boxes(struct wire *wire)
 static void test_objects(void **state)
 {
     struct wire *wire = *state;
-    char config[352], csv[352];
     write_boxes(wire);
-    snprintf(config, sizeof config, "%s", wire_path(wire, "boxes.yaml"));
-    snprintf(csv, sizeof csv, "%s", wire_path(wire, "all.csv"));
-    const char *const args[] = {"check", config, "--scene", "--scene-csv", csv, NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
-    char *out = wire_read(wire_path(wire, "out"), NULL), *all = wire_read(csv, NULL);
+    run(wire, "check @boxes.yaml --scene --scene-csv @all.csv", 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *all = wire_read(wire_path(wire, "all.csv"), NULL);
     int rows = 0;
     for (const char *p = out; (p = strstr(p, " closed none ")) != NULL; p++)
         rows++;
@@ -139,11 +132,8 @@ static void test_objects(void **state)
 static void test_objects_by_pipe(void **state)
 {
     struct wire *wire = *state;
-    char config[352];
     write_boxes(wire);
-    snprintf(config, sizeof config, "%s", wire_path(wire, "boxes.yaml"));
-    const char *const args[] = {"check", config, "--scene", "--scene-csv", "-", NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    run(wire, "check @boxes.yaml --scene --scene-csv -", 0);
     char *out = wire_read(wire_path(wire, "out"), NULL), *err = wire_read(wire_path(wire, "err"), NULL);
     int lines = 0;
     for (const char *p = out; (p = strchr(p, '\n')) != NULL; p++)
@@ -164,10 +154,7 @@ static void test_colours_in_part(void **state)
     wire_write_text(wire, "part.yaml",
                     "head: {profile: sphere, step_deg: 2}\noutput: {crs: local, colour: texture}\n"
                     "scene: {meshes: [{file: part.obj, up: z, scale: 1}]}\nstations: [{position_m: [5, 1, 1]}]\n");
-    char config[352];
-    snprintf(config, sizeof config, "%s", wire_path(wire, "part.yaml"));
-    const char *const args[] = {"check", config, NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    run(wire, "check @part.yaml", 0);
     char *err = wire_read(wire_path(wire, "err"), NULL);
     if (strstr(err, "have neither") != NULL ||
         strstr(err, "1 of 1 surfaces have colours at only some of their corners") == NULL)
@@ -184,7 +171,7 @@ static void test_transparent(void **state)
         "head: {profile: sphere, step_deg: 2}\noutput: {crs: local}\nstations: [{position_m: [5, 1, 1]}]\n"
         "scene: {meshes: [{file: pane.obj, up: z, scale: 1}]}\n";
     static const char line[] = "surfaces: [{material: \"a [1]\", glass: 0.7}, {material: \"b\", glass: 0.9}]";
-    char config[352], text[1024], *rules;
+    char text[1024], *rules;
     wire_write_text(wire, "pane.mtl", "newmtl a [1]\nKd 1 1 1\nTr 0.1\nd 0.3\nnewmtl b\nTr 1\nnewmtl c\nd 1\n");
     wire_write_text(wire, "pane.obj",
                     "mtllib pane.mtl\nv 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nusemtl a [1]\no x\nf 1 2 3\no y\nf 1 3 4\n"
@@ -195,10 +182,8 @@ static void test_transparent(void **state)
         if (at != NULL)
             snprintf(text + strlen(text), sizeof text - strlen(text), "%.*s\\\\%s\n", (int)(at - escaped), escaped, at);
         free(escaped);
-        snprintf(config, sizeof config, "%s", wire_write_text(wire, "pane.yaml", text));
-        const char *const args[] = {"check", config, "--scene", NULL};
-        if (wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)) != 0)
-            fail_msg("%s", wire_read(wire_path(wire, "err"), NULL));
+        wire_write_text(wire, "pane.yaml", text);
+        run(wire, "check @pane.yaml --scene", 0);
         char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL);
         rules = strstr(err, "3 surfaces are transparent in the file, but scanned as opaque;");
         assert_int_equal(rules != NULL, i == 0);
@@ -215,17 +200,67 @@ static void test_transparent(void **state)
 static void test_help_of_a_section(void **state)
 {
     struct wire *wire = *state;
-    static const char *const parts[] = {"plan", "scene.anchor", "head.prr_hz", "profile"};
+    static const char *const lines[] = {"check --help plan", "check --help scene.anchor", "check --help head.prr_hz",
+                                        "check --help profile"};
     static const char *const begins[] = {"plan\n", "scene.anchor\n", "head.prr_hz\n", "Head profile"};
     for (int i = 0; i < 4; i++) {
-        const char *const args[] = {"check", "--help", parts[i], NULL};
-        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+        run(wire, lines[i], 0);
         char *out = wire_read(wire_path(wire, "out"), NULL);
         assert_int_equal(strncmp(out, begins[i], strlen(begins[i])), 0);
         assert_true(strstr(out, "\nloop") == NULL && strstr(out, "usage:") == NULL);
         if (i == 3) assert_non_null(strstr(out, "allowed -180 to 360 deg; required with emitter: line\n"));
         free(out);
     }
+}
+
+/* Links that can be opened, but not together, or that can't carry 500,000 points of 20 bytes a second. `run` refuses
+ * them, and `check` says the same. */
+static void test_links_as_run(void **state)
+{
+    static const char *const says[] = {": cannot listen: Address already in use", ": the stream has 10.00 MB/s"};
+    struct wire *wire = *state;
+    int port;
+    close(wire_bind(SOCK_STREAM, &port)); /* it is free now */
+    room_write(wire);
+    for (int i = 0; i < 2; i++) {
+        char links[120] = "links: [{type: usb, port: 0, speed: full}]\n", *said[2], *from[2];
+        if (i == 0)
+            snprintf(links, sizeof links, "links: [{type: tcp, port: %d}, {type: tcp, port: %d}]\n", port, port);
+        const struct room_config c = {
+            .prr_hz = 500000, .lines_hz = 50, .pan_deg_s = 360, .pan_stop_deg = 36, .links = links};
+        room_config_write(wire, &c);
+        for (int k = 0; k < 2; k++) {
+            run(wire, k == 0 ? "check @config.yaml" : "run @config.yaml", 2);
+            said[k] = wire_read(wire_path(wire, "err"), NULL);
+            from[k] = strstr(said[k], says[i]);
+            if (from[k] == NULL) fail_msg("%s", said[k]);
+        }
+        assert_string_equal(from[0], from[1]);
+        free(said[0]);
+        free(said[1]);
+    }
+}
+
+/* A file of a link is shown, and stays as it is. It needs a folder. */
+static void test_file_stays(void **state)
+{
+    struct wire *wire = *state;
+    const struct room_config c = {.prr_hz = 20000,
+                                  .lines_hz = 50,
+                                  .pan_deg_s = 360,
+                                  .pan_stop_deg = 36,
+                                  .links = "links: [{type: file, path: kept}]\n"};
+    room_write(wire);
+    wire_write_text(wire, "kept", "keep me\n");
+    room_config_write(wire, &c);
+    run(wire, "check @config.yaml", 0);
+    char *out = wire_read(wire_path(wire, "out"), NULL), *kept = wire_read(wire_path(wire, "kept"), NULL);
+    if (strstr(out, "\nlink      file:") == NULL) fail_msg("%s", out);
+    assert_string_equal(kept, "keep me\n");
+    free(out);
+    free(kept);
+    wire_expect_usage(wire, usage_words(wire, "check @config.yaml --set links[0].path=none/x"),
+                      "links[0].path none/x: No such file or directory");
 }
 
 int main(void)
@@ -239,6 +274,8 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_transparent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_colours_in_part, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_links_as_run, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_file_stays, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

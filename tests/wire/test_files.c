@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Files that the program makes, where others may have put a link or a device. And a standard output that takes
- * nothing. */
+ * nothing, or a stream's file that does not take its end. */
+#include <sys/resource.h>
+
 #include "tests/wire/room.h"
 
 static const struct room_config SCAN = {.prr_hz = 20000,
@@ -155,6 +157,40 @@ static void test_full_output(void **state)
     expect(wire, wire_spawn(wire, stats, "out", "err", -1), 1, "/dev/full", "No space left");
 }
 
+/* With so many bytes allowed for a file. */
+static pid_t stream_to_file(struct wire *wire, const char *config, rlim_t bytes)
+{
+    struct rlimit before;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    const struct rlimit small = {bytes, before.rlim_max};
+    const char *const args[] = {"run", config, "--start", "--duration", "0.1", "--pace", "fast", "--quiet", NULL};
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+    const pid_t pid = wire_spawn(wire, args, "out", "err", -1);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    return pid;
+}
+
+/* The last bytes of a stream have no room, and are written when the run is over. */
+static void test_no_room_for_the_end(void **state)
+{
+    struct wire *wire = *state;
+    struct room_config stream = SCAN;
+    struct stat st;
+    char config[352];
+    stream.links = "links: [{type: file, path: stream.shs}]\n";
+    room_write(wire);
+    snprintf(config, sizeof config, "%s", room_config_write(wire, &stream));
+    assert_int_equal(wire_wait(wire, stream_to_file(wire, config, RLIM_INFINITY)), 0);
+    assert_int_equal(stat(wire_path(wire, "stream.shs"), &st), 0);
+    assert_true(st.st_size > 1000);
+    for (int cut = 1; cut < 400; cut += 57) {
+        assert_int_equal(wire_wait(wire, stream_to_file(wire, config, (rlim_t)st.st_size - (rlim_t)cut)), 1);
+        char *text = wire_read(wire_path(wire, "err"), NULL);
+        assert_non_null(strstr(text, "stream.shs: File too large; it is cut short"));
+        free(text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -163,6 +199,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_ready_on_output, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_map_on_a_fifo, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_full_output, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_room_for_the_end, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("files", tests, NULL, NULL);
 }

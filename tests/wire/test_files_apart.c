@@ -150,22 +150,6 @@ static const struct {
 
 /* ---- one command line */
 
-static char line_text[2048];
-
-static const char *const *words_of(struct wire *wire, const char *text)
-{
-    static const char *word[WIRE_MAX_ARGS];
-    size_t used = 0;
-    int n = 0;
-    for (const char *p = text; *p != '\0' && used + sizeof wire->dir + 1 < sizeof line_text; p++)
-        used += (size_t)(*p == '@' ? snprintf(line_text + used, sizeof line_text - used, "%s/", wire->dir)
-                                   : snprintf(line_text + used, sizeof line_text - used, "%c", *p));
-    for (char *next = strtok(line_text, " "); next != NULL && n < WIRE_MAX_ARGS - 1; next = strtok(NULL, " "))
-        word[n++] = next;
-    word[n] = NULL;
-    return word;
-}
-
 static void begin(struct wire *wire)
 {
     room_write(wire);
@@ -199,7 +183,7 @@ static void expect_refusal(struct wire *wire, const char *line, const char *file
     assert_int_equal(link(path, wire_path(wire, alias)), 0);
     snprintf(given, sizeof given, "scanhead: %s ", who);
     snprintf(read_as, sizeof read_as, " is also read as %s", other);
-    usage_expect(wire, line, words_of(wire, line), 2,
+    usage_expect(wire, line, usage_words(wire, line), 2,
                  (const char *const[]){given, read_as, "and would be overwritten; name another ", NULL});
     unlink(wire_path(wire, alias));
     char *after = wire_read(path, &len[1]);
@@ -232,14 +216,14 @@ static void test_pairs(void **state)
                 snprintf(line, sizeof line, "%s %s %s %s", COMMANDS[c].name, COMMANDS[c].operands, other->words,
                          out->words);
                 usage_expect(
-                    wire, line, words_of(wire, line), 2,
+                    wire, line, usage_words(wire, line), 2,
                     (const char *const[]){out->who, other->who, " writes the same file; name another one", NULL});
                 n++;
             }
         }
     for (size_t i = 0; i < sizeof DOUBLES / sizeof DOUBLES[0]; i++)
         usage_expect(
-            wire, DOUBLES[i].line, words_of(wire, DOUBLES[i].line), 2,
+            wire, DOUBLES[i].line, usage_words(wire, DOUBLES[i].line), 2,
             (const char *const[]){DOUBLES[i].who, DOUBLES[i].other, " writes the same file; name another one", NULL});
     for (size_t i = 0; i < sizeof LINES / sizeof LINES[0]; i++)
         expect_refusal(wire, LINES[i].line, LINES[i].file, LINES[i].alias, LINES[i].who, LINES[i].other);
@@ -322,7 +306,7 @@ static void test_two_heads_one_file(void **state)
     struct stat st, later;
     assert_int_equal(stat(wire_path(wire, "o"), &st), 0);
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
-        usage_expect(wire, lines[i], words_of(wire, lines[i]), 2, (const char *const[]){says, NULL});
+        usage_expect(wire, lines[i], usage_words(wire, lines[i]), 2, (const char *const[]){says, NULL});
     assert_int_equal(stat(wire_path(wire, "o"), &later), 0);
     assert_true(later.st_size >= st.st_size);
     head_end(&first, SIGINT);

@@ -6,23 +6,30 @@
 
 #include <sys/resource.h>
 
+enum { MOST_WORDS = 11 };
+
 static const char JOURNAL[] = "# scanhead journal 1\n0 0 1 *RST\n";
 
 /* ---- options. CONFIG stands for a good configuration, DIR for the folder. */
 
 static const struct {
-    const char *args[8];
+    const char *args[MOST_WORDS];
     const char *says[3];
 } OPTIONS[] = {
     {{"fly"}, {"unknown command fly;", "--help"}},
+    {{"fly\nhigh\033[31m"}, {"unknown command fly?high?[31m;"}},
+    {{"hlep"}, {"unknown command hlep, did you mean help?"}},
     {{"recrod", "CONFIG"}, {"unknown command recrod, did you mean record?"}},
     {{"run"}, {"one CONFIG"}},
     {{"run", "CONFIG", "CONFIG"},
      {"one CONFIG|FILE.shs|FILE.pcap is needed, and 2 are given", "config.yaml, ", "config.yaml; see"}},
+    {{"plan", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10"},
+     {"one CONFIG is needed, and 10 are given: 1, 2, ..."}},
     {{"run", "--", "CONFIG", "--start"}, {"one CONFIG|FILE.shs|FILE.pcap is needed, and 2 are given", "--start"}},
     {{"report", "CONFIG", "DIR/x.ply", "DIR/y.ply"}, {"y.ply is one too many"}},
     {{"plan", "DIR/scan.shs"}, {"scan.shs is a recorded stream", "scanhead record ", "scan.shs -o points.ply"}},
     {{"check", "DIR/SCAN.SHS"}, {"SCAN.SHS is a recorded stream"}},
+    {{"plan", "a\nroom.obj"}, {"a?room.obj is a mesh"}},
     {{"plan", "DIR/room.obj"}, {"room.obj is a mesh", "scanhead init ", "room.obj writes a configuration"}},
     {{"record", "DIR/room.ifc", "-o", "DIR/x.ply"}, {"room.ifc is a mesh, and SOURCE is a head", "scanhead init "}},
     {{"report", "DIR/x.ply", "CONFIG"}, {"x.ply is a mesh or a point cloud, and CONFIG is a configuration"}},
@@ -61,6 +68,12 @@ static const struct {
     {{"run", "CONFIG", "--frames", "many"}, {"head.frames", "0 to 1000000"}},
     {{"run", "CONFIG", "--ready-fd", "zero"}, {"--ready-fd zero", "1 to 65535"}},
     {{"run", "CONFIG", "--journal", "DIR/journal", "--ready-fd", "77"}, {"--ready-fd 77: not open for writing"}},
+    /* Nothing runs before: otherwise there were more messages. */
+    {{"run", "CONFIG", "--duration", "0.01", "--stats", "DIR/none/x"}, {"--stats ", "none/x: No such file"}},
+    {{"run", "CONFIG", "--duration", "0.01", "--stats", "DIR"}, {"--stats ", ": is a directory; allowed is a file"}},
+    {{"run", "CONFIG", "--duration", "0.01", "--stats", ""}, {"--stats : No such file"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--stats", "DIR/config.yaml/x"}, {"--stats ", "Not a directory"}},
+    {{"run", "none.yaml", "--from", "0"}, {"--from is for a recording of a head, but none.yaml is a configuration"}},
     {{"run", "CONFIG", "--set", "head.prr_hz"}, {"--set", "head.prr_hz"}},
     {{"run", "CONFIG", "--set", "head.prr_hz=fast"}, {"--set head.prr_hz", "not a number", "1000 to 2200000 Hz"}},
     {{"run", "CONFIG", "--set", "head.colour=red"}, {"--set", "head.colour"}},
@@ -100,6 +113,12 @@ static const struct {
     {{"record", "DIR/scan.pcapng", "-o", "DIR/x.ply", "--frames", "2"}, {"--frames: ", "has the scans that it has"}},
     {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--listen", "--frames", "2"},
      {"--frames: --listen sends no command"}},
+    {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--listen", "--station", "all"},
+     {"--station: --listen sends no command"}},
+    {{"record", "DIR/scan.shs", "-o", "DIR/x.ply", "--replug", "2"}, {"--wait, --replug: a recorded stream"}},
+    {{"record", "DIR/scan.shs", "-o", "DIR/x.ply", "--wait", "2"}, {"--wait, --replug: a recorded stream"}},
+    {{"record", "CONFIG", "-o", "DIR/x.ply", "--colour", "height", "--ply-columns", "xyz,range"},
+     {"--colour: no .ply", "--ply-columns has no colour"}},
     {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--send=a", "--send=b"}, {"--send", "allowed with --raw"}},
     {{"record", "CONFIG", "-o", "DIR/x.shs", "--colour", "label"}, {"--colour: no .ply, .las, .ptx, .e57, .obj"}},
     {{"map", "CONFIG"}, {"-o"}},
@@ -162,9 +181,9 @@ static void test_options(void **state)
     assert_int_equal(mkfifo(wire_path(wire, "fifo"), 0600), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);
     for (size_t i = 0; i < sizeof OPTIONS / sizeof OPTIONS[0]; i++) {
-        char word[8][352], what[128] = "";
-        const char *args[9] = {0};
-        for (int k = 0; k < 8 && OPTIONS[i].args[k] != NULL; k++) {
+        char word[MOST_WORDS][352], what[128] = "";
+        const char *args[MOST_WORDS + 1] = {0};
+        for (int k = 0; k < MOST_WORDS && OPTIONS[i].args[k] != NULL; k++) {
             args[k] = fill_in(wire, OPTIONS[i].args[k], word[k], sizeof word[k]);
             snprintf(what + strlen(what), sizeof what - strlen(what), "%s ", OPTIONS[i].args[k]);
         }

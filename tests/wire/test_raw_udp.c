@@ -326,7 +326,7 @@ static void test_usage(void **state)
         {ARGS("udp:127.0.0.1:5,6,5", "--raw", FILE_OF), 2, SAYS("port 5 is given twice")},
         {ARGS("udp:127.0.0.1:65536", "--raw", FILE_OF), 2, SAYS("udp:127.0.0.1:65536")},
         {ARGS("tcp:127.0.0.1:1,2", "--raw", FILE_OF), 2, SAYS("tcp:127.0.0.1:1,2")},
-        {ARGS("udp:192.0.2.1:0", "--raw", FILE_OF), 2, SAYS("udp:192.0.2.1:0", "this machine's addresses")},
+        {ARGS("udp:192.0.2.1:5", "--raw", FILE_OF), 2, SAYS("udp:192.0.2.1:5:", "this machine's addresses")},
         {ARGS("udp:no.such.host.invalid:1", "--raw", FILE_OF), 2, SAYS("no such address")},
         {ARGS("udp:239.1.2.3%none0:1", "--raw", FILE_OF), 2, SAYS("no interface none0")},
         {ARGS(taken, "--raw", FILE_OF), 2, SAYS(taken, "another program reads it")},

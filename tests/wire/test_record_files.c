@@ -257,6 +257,34 @@ static void test_end_within_scan(void **state)
     assert_int_equal(stats_uint(wire, "scans"), 0);
 }
 
+/* A stream's head is known only when its frames come. The first points have no place in a .ptx: earlier recordings stay,
+ * of the other format, too. */
+static void test_refused_by_one(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], stream[352], path[2][352];
+    room_write(wire);
+    snprintf(
+        config, sizeof config, "%s",
+        wire_write_text(wire, "beams.yaml",
+                        "head: {profile: velodyne-vlp16}\n"
+                        "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 0]}]\n"));
+    snprintf(stream, sizeof stream, "%s", wire_path(wire, "a.shs"));
+    snprintf(path[0], sizeof path[0], "%s", wire_write_text(wire, "a.las", "earlier"));
+    snprintf(path[1], sizeof path[1], "%s", wire_write_text(wire, "a.ptx", "earlier"));
+    const char *const args[] = {"record", config, "-o", stream, "--duration", "0.02", "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    for (int first = 0; first < 2; first++) {
+        const char *const again[] = {"record", stream, "-o", path[first], "-o", path[!first], "--quiet", NULL};
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, again, "out", "err", -1)), 1);
+        for (int i = 0; i < 2; i++) {
+            char *text = wire_read(path[i], NULL);
+            assert_string_equal(text, "earlier");
+            free(text);
+        }
+    }
+}
+
 /* Returns whether a grid has text. An empty one of 4 bytes is there from the first shot on, before the file is
  * completed. */
 static int has_grid(const struct wire *wire, const char *name)
@@ -343,6 +371,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_percent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lines_far_apart, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_within_scan, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_refused_by_one, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_signal_while_completing, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("record files", tests, NULL, NULL);

@@ -101,12 +101,24 @@ static void colours_that_points_do_not_say(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
+/* Nothing is looked up by a station's number before it is known to be one. */
+static void a_station_that_is_not_there(void **state)
+{
+    static const char *const fourth[] = {"--station", "4", "-o", "a.ply", NULL};
+    usage_complaints = 0;
+    expect_refused(*state, FAR, "0, 0, 0", fourth, "there is no station 4; allowed 1 to 3");
+    expect_refused(*state, LAST, "step_deg: 20", fourth, "there is no station 4; allowed 1 to 3");
+    expect_refused(*state, MOVING, "", fourth, "there is no station 4; allowed 1 to 1");
+    assert_int_equal(usage_complaints, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_scanner_whose_lines_are_all_one), cmocka_unit_test(a_station_too_far_for_floats),
-        cmocka_unit_test(coordinates_of_the_earth_as_float), cmocka_unit_test(a_station_beyond_the_numbers_of_las),
-        cmocka_unit_test(a_scan_of_too_many_points),         cmocka_unit_test(colours_that_points_do_not_say),
+        cmocka_unit_test(a_station_that_is_not_there),         cmocka_unit_test(a_scanner_whose_lines_are_all_one),
+        cmocka_unit_test(a_station_too_far_for_floats),        cmocka_unit_test(coordinates_of_the_earth_as_float),
+        cmocka_unit_test(a_station_beyond_the_numbers_of_las), cmocka_unit_test(a_scan_of_too_many_points),
+        cmocka_unit_test(colours_that_points_do_not_say),
     };
     return cmocka_run_group_tests(tests, wire_setup, wire_teardown);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Damaged recordings, files that are no recordings, and wrong options. */
+/* Damaged recordings, files that are no recordings, and hostile ones. */
 #include "tests/wire/replay_rig.h"
 
 #include "drivers/protocol/native_encode.h"
@@ -100,48 +100,34 @@ static void test_absurd_numbers(void **state)
     tape_free(&tape);
 }
 
-static void test_wrong_options(void **state)
+/* A stranger's recording can't write commands to the terminal, nor lines of its own. */
+static void test_hostile_name(void **state)
 {
     struct wire *wire = *state;
-    static const char *const wrong[][6] = {
-        {"--journal", "x"},
-        {"--replay-journal", "x"},
-        {"--frames", "3"},
-        {"--from", "2", "--to", "1"},
-        {"--from", "2", "--to", "2"},
-        {"--from", "-1"},
-        {"--from", "nan"},
-        {"--to", "inf"},
-        {"--speed", "0"},
-        {"--speed", "1e9"},
-        {"--speed", "2", "--pace", "fast"},
-        {"--speed", "2", "--pace", "step"},
-        {"--link", "foo"},
-        {"--link", ""},
-        {"--link", "type: udp, protocol: velodyne"},
-        {"--link", "tcp", "--config", "x.yaml"},
-        {"--set", "head.prr_hz=1"},
-        {"--scenario", "none"},
-        {"--scenario", "config/faults/brown-out.yaml"}, /* of the head */
-    };
+    struct native_descriptor d;
+    struct tape tape = {0};
     record(wire, "head.shs");
-    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
-        const char *args[12] = {"run", file, "--start", "--quiet"};
-        for (int k = 0; k < 6 && wrong[i][k] != NULL; k++)
-            args[4 + k] = wrong[i][k];
-        const int status = replay_call(wire, args);
-        char *text = wire_read(wire_path(wire, "err"), NULL);
-        if (status != 2 || strchr(text, '\n') == NULL || strchr(text, '\n')[1] != '\0')
-            fail_msg("%s %s: status %d, %s", wrong[i][0], wrong[i][1], status, text);
-        free(text);
+    tape_read(file, &tape);
+    for (uint32_t i = 0; i < tape.n; i++) {
+        uint8_t *frame = tape.bytes + tape.frame[i].at;
+        if (tape.frame[i].type != SCANHEAD_DESCRIPTOR) continue;
+        const size_t len = tape.frame[i].len - NATIVE_HEADER_LEN;
+        assert_int_equal(native_decode_descriptor(frame + NATIVE_HEADER_LEN, len, &d), 0);
+        memcpy(d.idn, "\n\033]2;", 5);
+        assert_int_equal(native_encode_descriptor(frame, tape.frame[i].len, &d, tape.frame[i].t_ns, 0),
+                         tape.frame[i].len);
+        native_finish_frame(frame, tape.frame[i].seq);
     }
-    static const char *const heads[][2] = {{"--speed", "2"},  {"--from", "1"},   {"--to", "1"},
-                                           {"--link", "tcp"}, {"--config", "x"}, {"--loop", NULL}};
-    for (size_t i = 0; i < sizeof heads / sizeof *heads; i++) {
-        const char *const args[] = {"run", "x.yaml", heads[i][0], heads[i][1], NULL};
-        assert_int_equal(replay_call(wire, args), 2);
-        replay_said(wire, "is for a recording");
-    }
+    const char *const args[] = {
+        "run", tape_write(wire, "hostile.shs", &tape), "--start", "--pace", "fast", "--link", "null", NULL};
+    assert_int_equal(replay_call(wire, args), 0);
+    char *text = wire_read(wire_path(wire, "err"), NULL), *line = strstr(text, "hostile.shs: ");
+    assert_null(strchr(text, '\033'));
+    assert_non_null(line);
+    line[strcspn(line, "\n")] = '\0';
+    assert_non_null(strstr(line, "]2;")); /* it is one line */
+    free(text);
+    tape_free(&tape);
 }
 
 int main(void)
@@ -150,7 +136,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_cut_and_bad_bytes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_recordings, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_absurd_numbers, wire_setup, wire_teardown),
-        cmocka_unit_test_setup_teardown(test_wrong_options, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_hostile_name, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

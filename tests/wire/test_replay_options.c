@@ -32,8 +32,11 @@ static void test_wrong_options(void **state)
         {"--link", "type: web, protocol: cola"},
         {"--link", "type: 'null', protocol: scip"},
         {"--link", "tcp", "--config", "x.yaml"},
+        {"--link", "pty", "--clients", "2"}, /* they can't be there together */
+        {"--link", "null", "--clients", "1"},
         {"--set", "head.prr_hz=1"},
         {"--scenario", "none"},
+        {"--scenario", "config/faults/brown-out.yaml"}, /* of the head */
     };
     record(wire);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {

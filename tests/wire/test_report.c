@@ -320,9 +320,11 @@ static void wrong_input_is_one_line(void **state)
                              "property double z\nend_header\nnan nan nan\n"));
     const char *const pdf[] = {"report", config, cloud, "--html", "page.pdf", NULL};
     const char *const nowhere[] = {"report", config, cloud, "--html", "/nowhere/page.html", NULL};
-    const char *const *const args[] = {pdf, nowhere};
-    static const char *const said[] = {"allowed is a name that ends in .html", "it has no points"};
-    for (int i = 0; i < 2; i++) {
+    const char *const empty[] = {"report", config, cloud, NULL};
+    const char *const *const args[] = {pdf, nowhere, empty};
+    static const char *const said[] = {"allowed is a name that ends in .html",
+                                       "--html /nowhere/page.html: No such file or directory", "it has no points"};
+    for (int i = 0; i < 3; i++) {
         assert_int_equal(run(wire, "out", args[i], (const char *const[]){"output.layout=polar", NULL}), 2);
         text = wire_read(wire_path(wire, "err"), NULL);
         if (strstr(text, said[i]) == NULL) fail_msg("%s", text);

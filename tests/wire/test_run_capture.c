@@ -139,6 +139,41 @@ static const char *make_capture(struct wire *wire, int is_tcp)
     return path;
 }
 
+/* With --loop the capture has no end: --start does not end it, either. There are two datagrams, 0.4 s apart, and a run
+ * that ends with its capture ends 1 s after it. The fifth comes at 1.6 s. */
+static void test_loop_has_no_end(void **state)
+{
+    enum { APART_US = 400000, WANTED = 5 };
+    struct wire *wire = *state;
+    const struct ethernet_end client = {.address = {10, 0, 0, 2}, .port = 40000},
+                              device = {.address = {10, 0, 0, 1}, .port = 2368};
+    uint8_t frame[ETHERNET_MAX_FRAME], got[8];
+    struct capture capture = {0};
+    char link[64];
+    int port;
+    capture_begin(&capture);
+    const uint32_t at = capture_interface(&capture, CAPTURE_ETHERNET);
+    capture_packet(&capture, at, frame, ethernet_put_udp(frame, &device, &client, "a", 1));
+    capture.n_packets += APART_US - 1; /* its clock: a packet is a microsecond */
+    capture_packet(&capture, at, frame, ethernet_put_udp(frame, &device, &client, "b", 1));
+    const char *path = wire_write(wire, "two.pcapng", capture.bytes, capture.len);
+    free(capture.bytes);
+    const int fd = open_receiver(&port);
+    snprintf(link, sizeof link, "type: udp, port: %d", port);
+    const char *const more[] = {"--quiet", "--start", "--loop", "--link", link, NULL};
+    struct head head = head_start(wire, path, more);
+    for (int i = 0; i < WANTED; i++) {
+        struct pollfd slot[2] = {{.fd = fd, .events = POLLIN}, {.fd = pidfd_open(head.pid, 0), .events = POLLIN}};
+        assert_int_equal(poll(slot, 2, SOON_MS), 1);
+        close(slot[1].fd);
+        if (slot[0].revents == 0) fail_msg("the run ended after %d datagrams", i);
+        assert_int_equal(recv(fd, got, sizeof got, 0), 1);
+        assert_int_equal(got[0], i % 2 == 0 ? 'a' : 'b');
+    }
+    close(fd);
+    head_end(&head, SIGTERM);
+}
+
 static void test_refused(void **state)
 {
     struct wire *wire = *state;
@@ -164,6 +199,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_tcp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_udp, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_loop_has_no_end, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -303,6 +303,32 @@ static void test_messages(void **state)
     free(text);
 }
 
+/* Nobody ever reads them, and there is no room in the pipe. The run ends all the same, with a warning as its last
+ * message: the recording's end is cut off. */
+static void test_last_message(void **state)
+{
+    struct wire *wire = *state;
+    struct fifo fifo;
+    char whole[352], links[400];
+    size_t len;
+    snprintf(whole, sizeof whole, "%s", wire_path(wire, "head.shs"));
+    snprintf(links, sizeof links, "links: [{type: file, path: '%s'}]\n", whole);
+    const char *const record[] = {
+        "run", write_config(wire, 100000, links), "--start", "--duration", "0.1", "--pace", "fast", "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, record, "out", "err", -1)), 0);
+    char *bytes = wire_read(whole, &len);
+    wire_write(wire, "head.shs", bytes, len - 20);
+    free(bytes);
+    fifo_make(wire, "stalled", &fifo);
+    const int fd = open(fifo.path, O_WRONLY | O_NONBLOCK);
+    while (write(fd, "x", 1) == 1) {
+    }
+    const char *const replay[] = {"run", whole, "--start", "--pace", "fast", "--quiet", "--link", "null", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, replay, "out", "stalled", -1)), 0);
+    close(fd);
+    close(fifo.fd);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -311,6 +337,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_fast_waits, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_messages, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_last_message, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("stalled_files", tests, NULL, NULL);
 }

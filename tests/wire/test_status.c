@@ -1,143 +1,112 @@
 /* SPDX-License-Identifier: MIT */
 /* One exit status for one kind of failure, with any command: the table of firmware_sim/app/README.md. */
 #include "tests/wire/room.h"
+#include "tests/wire/usage_rig.h"
 
-enum { DONE = 0, FAILED = 1, WRONG = 2, MAX_WORDS = 12 };
+enum { DONE = 0, FAILED = 1, WRONG = 2 };
 
-/* CONFIG is a good configuration, DIR the folder, and NOBODY an address where nobody listens. Words are separated by
- * blanks. */
+/* @ is the folder; config.yaml in it is a good configuration. At the port, %d, nobody listens. */
 static const struct {
     const char *line;
     int status;
 } CASES[] = {
     {"list", DONE},
-    {"check CONFIG", DONE},
-    {"plan CONFIG --json", DONE},
+    {"check @config.yaml", DONE},
+    {"plan @config.yaml --json", DONE},
     {"check --example", DONE},
-    {"record CONFIG -o DIR/scan.ply -o DIR/scan.shs --quiet", DONE},
-    {"record DIR/scan.shs -o DIR/again.ply --quiet", DONE},
-    {"report CONFIG DIR/scan.ply --tolerance-m 0.001", DONE},
-    {"run CONFIG --start --frames 1 --pace fast --quiet --journal DIR/journal", DONE},
-    {"run CONFIG --start --frames 1 --pace fast --quiet --replay-journal DIR/journal", DONE},
-    {"init DIR/room.obj -o DIR/new.yaml", DONE},
-    {"check DIR/new.yaml --help --set", DONE},
-    {"batch CONFIG --list --sweep noise.seed=1,2", DONE},
-    {"batch CONFIG --sweep noise.seed=1:0:1 --list", WRONG},
-    {"batch CONFIG --sweep head.prr_hz=fast --list", WRONG},
-    {"batch DIR/none.yaml --list", WRONG},
-    {"batch DIR/faulty.yaml --list", WRONG},
-    {"batch CONFIG --fly", WRONG},
-    {"batch CONFIG -o DIR/none/campaign", WRONG},
+    {"record @config.yaml -o @scan.ply -o @scan.shs --quiet", DONE},
+    {"record @scan.shs -o @again.ply --quiet", DONE},
+    {"report @config.yaml @scan.ply --tolerance-m 0.001", DONE},
+    {"run @config.yaml --start --frames 1 --pace fast --quiet --journal @journal", DONE},
+    {"run @config.yaml --start --frames 1 --pace fast --quiet --replay-journal @journal", DONE},
+    {"init @room.obj -o @new.yaml", DONE},
+    {"check @new.yaml --help --set", DONE},
+    {"batch @config.yaml --list --sweep noise.seed=1,2", DONE},
+    {"batch @config.yaml --sweep noise.seed=1:0:1 --list", WRONG},
+    {"batch @config.yaml --sweep head.prr_hz=fast --list", WRONG},
+    {"batch @none.yaml --list", WRONG},
+    {"batch @faulty.yaml --list", WRONG},
+    {"batch @config.yaml --fly", WRONG},
+    {"batch @config.yaml -o @none/campaign", WRONG},
 
     /* the command line */
     {"", WRONG},
     {"fly", WRONG},
-    {"run CONFIG --fly", WRONG},
-    {"record CONFIG -o DIR/x.ply --fly", WRONG},
-    {"plan CONFIG --fly", WRONG},
-    {"map CONFIG -o DIR/x.png --fly", WRONG},
-    {"report CONFIG DIR/scan.ply --fly", WRONG},
-    {"coverage CONFIG --fly", WRONG},
-    {"view DIR/scan.ply --fly", WRONG},
-    {"view DIR/scan.ply --port 65536", WRONG},
-    {"view DIR/scan.ply --address 300.1.1.1", WRONG},
-    {"check CONFIG --fly", WRONG},
+    {"run @config.yaml --fly", WRONG},
+    {"record @config.yaml -o @x.ply --fly", WRONG},
+    {"plan @config.yaml --fly", WRONG},
+    {"map @config.yaml -o @x.png --fly", WRONG},
+    {"report @config.yaml @scan.ply --fly", WRONG},
+    {"coverage @config.yaml --fly", WRONG},
+    {"view @scan.ply --fly", WRONG},
+    {"view @scan.ply --port 65536", WRONG},
+    {"view @scan.ply --address 300.1.1.1", WRONG},
+    {"check @config.yaml --fly", WRONG},
     {"list --fly", WRONG},
-    {"init DIR/room.obj --fly", WRONG},
+    {"init @room.obj --fly", WRONG},
     {"init", WRONG},
-    {"run CONFIG --duration 0", WRONG},
-    {"record CONFIG -o DIR/x.ply --duration 0", WRONG},
-    {"map CONFIG -o DIR/x.png --pixel-m 0", WRONG},
-    {"report CONFIG DIR/scan.ply --max-m 0", WRONG},
-    {"record CONFIG -o DIR/x.ending", WRONG},
-    {"record here:there -o DIR/x.ply", WRONG},
+    {"run @config.yaml --duration 0", WRONG},
+    {"record @config.yaml -o @x.ply --duration 0", WRONG},
+    {"map @config.yaml -o @x.png --pixel-m 0", WRONG},
+    {"report @config.yaml @scan.ply --max-m 0", WRONG},
+    {"record @config.yaml -o @x.ending", WRONG},
+    {"record here:there -o @x.ply", WRONG},
 
     /* the configuration: missing, no regular file, an error in it, an error in --set, a mesh that is missing */
-    {"run DIR/none.yaml", WRONG},
-    {"record DIR/none.yaml -o DIR/x.ply", WRONG},
-    {"plan DIR/none.yaml", WRONG},
-    {"map DIR/none.yaml -o DIR/x.png", WRONG},
-    {"report DIR/none.yaml DIR/scan.ply", WRONG},
-    {"coverage DIR/none.yaml", WRONG},
-    {"check DIR/none.yaml", WRONG},
-    {"run DIR/fifo.yaml", WRONG},
-    {"record DIR/fifo.yaml -o DIR/x.ply", WRONG},
-    {"run DIR/faulty.yaml", WRONG},
-    {"record DIR/faulty.yaml -o DIR/x.ply", WRONG},
-    {"plan DIR/faulty.yaml", WRONG},
-    {"map DIR/faulty.yaml -o DIR/x.png", WRONG},
-    {"report DIR/faulty.yaml DIR/scan.ply", WRONG},
-    {"check DIR/faulty.yaml", WRONG},
-    {"run CONFIG --set head.prr_hz=fast", WRONG},
-    {"record CONFIG -o DIR/x.ply --set head.prr_hz=fast", WRONG},
-    {"plan CONFIG --set scene.meshes[0].file=none.obj", WRONG},
-    {"map CONFIG -o DIR/x.png --set scene.meshes[0].file=none.obj", WRONG},
-    {"check CONFIG --set links[0].address=300.1.1.1", WRONG},
-    {"run CONFIG --set links[0].address=300.1.1.1", WRONG},
+    {"run @none.yaml", WRONG},
+    {"record @none.yaml -o @x.ply", WRONG},
+    {"plan @none.yaml", WRONG},
+    {"map @none.yaml -o @x.png", WRONG},
+    {"report @none.yaml @scan.ply", WRONG},
+    {"coverage @none.yaml", WRONG},
+    {"check @none.yaml", WRONG},
+    {"run @fifo.yaml", WRONG},
+    {"record @fifo.yaml -o @x.ply", WRONG},
+    {"run @faulty.yaml", WRONG},
+    {"record @faulty.yaml -o @x.ply", WRONG},
+    {"plan @faulty.yaml", WRONG},
+    {"map @faulty.yaml -o @x.png", WRONG},
+    {"report @faulty.yaml @scan.ply", WRONG},
+    {"check @faulty.yaml", WRONG},
+    {"run @config.yaml --set head.prr_hz=fast", WRONG},
+    {"record @config.yaml -o @x.ply --set head.prr_hz=fast", WRONG},
+    {"plan @config.yaml --set scene.meshes[0].file=none.obj", WRONG},
+    {"map @config.yaml -o @x.png --set scene.meshes[0].file=none.obj", WRONG},
+    {"check @config.yaml --set links[0].address=300.1.1.1", WRONG},
+    {"run @config.yaml --set links[0].address=300.1.1.1", WRONG},
 
     /* input files: missing, or of another kind */
-    {"init DIR/none.obj", WRONG},
-    {"init DIR/fifo.obj", WRONG},
-    {"report CONFIG DIR/none.ply", WRONG},
-    {"report CONFIG DIR/faulty.yaml", WRONG},
-    {"view DIR/none.ply", WRONG},
-    {"view DIR/none.shs", WRONG},
-    {"view DIR/fifo.shs", WRONG},
-    {"view DIR/faulty.yaml", WRONG},
-    {"record DIR/none.shs -o DIR/x.ply", WRONG},
-    {"record DIR/fifo.shs -o DIR/x.ply", WRONG},
-    {"run CONFIG --replay-journal DIR/none", WRONG},
-    {"run CONFIG --replay-journal DIR/scan.shs", WRONG},
-    {"run CONFIG --set platform.kind=trajectory --set platform.file=DIR/none.csv", WRONG},
-    {"check CONFIG --set platform.kind=trajectory --set platform.file=DIR/faulty.yaml", WRONG},
+    {"init @none.obj", WRONG},
+    {"init @fifo.obj", WRONG},
+    {"report @config.yaml @none.ply", WRONG},
+    {"report @config.yaml @faulty.yaml", WRONG},
+    {"view @none.ply", WRONG},
+    {"view @none.shs", WRONG},
+    {"view @fifo.shs", WRONG},
+    {"view @faulty.yaml", WRONG},
+    {"record @none.shs -o @x.ply", WRONG},
+    {"record @fifo.shs -o @x.ply", WRONG},
+    {"run @config.yaml --replay-journal @none", WRONG},
+    {"run @config.yaml --replay-journal @scan.shs", WRONG},
+    {"run @config.yaml --set platform.kind=trajectory --set platform.file=@none.csv", WRONG},
+    {"check @config.yaml --set platform.kind=trajectory --set platform.file=@faulty.yaml", WRONG},
 
     /* files to write whose path is wrong */
-    {"record CONFIG -o DIR/none/x.ply", WRONG},
-    {"record CONFIG -o DIR/x.ply --quiet --stats DIR/none/x", WRONG},
-    {"map CONFIG -o DIR/none/x.png", WRONG},
-    {"coverage CONFIG -o DIR/none/x.ply", WRONG},
-    {"init DIR/room.obj -o DIR/none/x.yaml", WRONG},
-    {"run CONFIG --duration 0.01 --pace fast --quiet --stats DIR/none/x", WRONG},
-    {"run CONFIG --duration 0.01 --pace fast --quiet --journal DIR/none/x", WRONG},
+    {"record @config.yaml -o @none/x.ply", WRONG},
+    {"record @config.yaml -o @x.ply --quiet --stats @none/x", WRONG},
+    {"map @config.yaml -o @none/x.png", WRONG},
+    {"coverage @config.yaml -o @none/x.ply", WRONG},
+    {"init @room.obj -o @none/x.yaml", WRONG},
+    {"run @config.yaml --duration 0.01 --pace fast --quiet --stats @none/x", WRONG},
+    {"run @config.yaml --duration 0.01 --pace fast --quiet --journal @none/x", WRONG},
 
     /* a head that is missing; a request without an answer */
-    {"record tcp:NOBODY -o DIR/x.ply", FAILED},
-    {"record tty:DIR/none -o DIR/x.ply", FAILED},
-    {"record usb:ffff:ffff -o DIR/x.ply", FAILED},
-    {"record DIR/cut.shs -o DIR/x.ply --quiet", FAILED},
-    {"report CONFIG DIR/scan.ply --tolerance-m 1e-12", FAILED},
+    {"record tcp:127.0.0.1:%d -o @x.ply", FAILED},
+    {"record tty:@none -o @x.ply", FAILED},
+    {"record usb:ffff:ffff -o @x.ply", FAILED},
+    {"record @cut.shs -o @x.ply --quiet", FAILED},
+    {"report @config.yaml @scan.ply --tolerance-m 1e-12", FAILED},
 };
-
-/* The word with its names replaced. */
-static void fill_in(const struct wire *wire, const char *nobody, const char *word, size_t n, char *buf, size_t len)
-{
-    char text[128];
-    snprintf(text, sizeof text, "%.*s", (int)n, word);
-    const char *dir = strstr(text, "DIR"), *peer = strstr(text, "NOBODY");
-    if (strcmp(text, "CONFIG") == 0)
-        snprintf(buf, len, "%s", wire_path(wire, "config.yaml"));
-    else if (dir != NULL)
-        snprintf(buf, len, "%.*s%s%s", (int)(dir - text), text, wire->dir, dir + 3);
-    else if (peer != NULL)
-        snprintf(buf, len, "%.*s%s", (int)(peer - text), text, nobody);
-    else
-        snprintf(buf, len, "%s", text);
-}
-
-static int run(struct wire *wire, const char *line, const char *nobody)
-{
-    char word[MAX_WORDS][352];
-    const char *args[MAX_WORDS + 1] = {0};
-    int n = 0;
-    for (const char *at = line; *at != '\0'; at += strspn(at, " ")) {
-        const size_t len = strcspn(at, " ");
-        fill_in(wire, nobody, at, len, word[n], sizeof word[n]);
-        args[n] = word[n];
-        n++;
-        at += len;
-    }
-    return wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-}
 
 /* Writes the first half of a recorded stream. */
 static void cut_stream(const struct wire *wire)
@@ -166,13 +135,14 @@ static void write_files(const struct wire *wire)
 static void test_every_command(void **state)
 {
     struct wire *wire = *state;
-    char nobody[32];
-    int wrong = 0, port, fd = wire_bind(SOCK_STREAM, &port);
-    snprintf(nobody, sizeof nobody, "127.0.0.1:%d", port);
+    int wrong = 0, port;
+    const int fd = wire_bind(SOCK_STREAM, &port);
     write_files(wire);
     for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
         if (strstr(CASES[i].line, "cut.shs") != NULL) cut_stream(wire);
-        const int status = run(wire, CASES[i].line, nobody);
+        char line[200];
+        snprintf(line, sizeof line, CASES[i].line, port);
+        const int status = wire_wait(wire, wire_spawn(wire, usage_words(wire, line), "out", "err", -1));
         if (status == CASES[i].status) continue;
         char *err = wire_read(wire_path(wire, "err"), NULL);
         print_message("# scanhead %s: status %d, not %d: %s", CASES[i].line, status, CASES[i].status, err);

@@ -228,29 +228,43 @@ static void test_files(void **state)
     free(text);
 }
 
-/* If the file contradicts the configuration there is one line with the allowed values. */
+/* If the file contradicts the configuration there is one line with the allowed values, of the key that was given. */
+static void check_wrong(struct wire *wire, const char *platform, const char *set, const char *says)
+{
+    struct room_config stops = base(platform);
+    char path[352];
+    snprintf(path, sizeof path, "%s", room_config_write(wire, &stops));
+    const char *const args[] = {"check", path, "--set", set, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
+    char *text = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(text, says) == NULL || strchr(text, '\n')[1] != 0) fail_msg("%s", text);
+    free(text);
+}
+
 static void test_wrong_parts(void **state)
 {
     struct wire *wire = *state;
+    static const char frames[] = "platform: {kind: stops, file: ride.csv, frames_per_s: 10, frame_step: 5}\n";
     static const struct {
-        const char *set, *says;
+        const char *platform, *set, *says;
     } wrong[] = {
-        {"platform.step_s=0.0001", "platform.step_s: 10001 stops in 1 s; allowed at most 4096"},
-        {"platform.end_s=3.5", "platform.end_s: 3.5 s is after the trajectory's end; allowed 1 to 3"},
-        {"head.station=6", "head.station: there is no stop 6; allowed 1 to 5"},
+        {STOPS, "platform.step_s=0.0001", "platform.step_s: 10001 stops in 1 s; allowed at most 4096"},
+        {STOPS, "platform.end_s=3.5", "platform.end_s: 3.5 s is after the trajectory's end; allowed 1 to 3"},
+        {STOPS, "head.station=6", "head.station: there is no stop 6; allowed 1 to 5"},
+        {frames, "platform.last_frame=31",
+         "platform.last_frame: 31 frames is after the trajectory's end; allowed 0 to 30"},
+        {frames, "platform.first_frame=40",
+         "platform.first_frame: 40 frames is after the trajectory's end; allowed 0 to 30"},
+        {frames, "platform.frame_step=0.001",
+         "platform.frame_step: 30001 stops in 30 frames; allowed at most 4096, steps"},
     };
-    struct room_config stops = base(STOPS);
     char path[352];
     room_write(wire);
     wire_write_text(wire, "ride.csv", RIDE);
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++)
+        check_wrong(wire, wrong[i].platform, wrong[i].set, wrong[i].says);
+    struct room_config stops = base(STOPS);
     snprintf(path, sizeof path, "%s", room_config_write(wire, &stops));
-    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
-        const char *const args[] = {"check", path, "--set", wrong[i].set, NULL};
-        assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 2);
-        char *text = wire_read(wire_path(wire, "err"), NULL);
-        if (strstr(text, wrong[i].says) == NULL || strchr(text, '\n')[1] != 0) fail_msg("%s", text);
-        free(text);
-    }
     const char *const args[] = {"check", path, NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
     char *text = wire_read(wire_path(wire, "out"), NULL);

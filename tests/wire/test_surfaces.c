@@ -82,7 +82,7 @@ static void a_recording_has_none(void **state)
     const char *const lines[][8] = {{"record", shs, "-o", ply, "--surfaces", csv, NULL},
                                     {"run", shs, "--surfaces", csv, NULL}};
     static const char *const says[] = {"--scenario, --truth and --surfaces need a CONFIG as SOURCE",
-                                       "--surfaces needs a head that computes"};
+                                       "--surfaces is for a configuration, but "};
     for (size_t i = 0; i < 2; i++) {
         assert_int_equal(wire_wait(wire, wire_spawn(wire, lines[i], "out", "err", -1)), 2);
         char *err = wire_read(wire_path(wire, "err"), NULL);

@@ -212,7 +212,8 @@ static void test_links(void **state)
         (const char *const[]){"check", config, "--set", "platform.kind=live", "--set", "platform.address=x y", NULL}, 2,
         (const char *const[]){"platform.address x y: no such address", NULL});
 
-    int port, fd = wire_bind(SOCK_STREAM, &port);
+    int port;
+    const int fd = wire_bind(SOCK_STREAM, &port);
     assert_int_equal(listen(fd, 1), 0);
     snprintf(link, sizeof link, "{type: tcp, port: %d}", port);
     /* The status is 2, as the remedy is another port in the configuration. */
@@ -229,23 +230,31 @@ static void test_system_failures(void **state)
 {
     struct wire *wire = *state;
     usage_complaints = 0;
-    char config[352], port[64];
+    char config[352], source[64];
     room_write(wire);
     snprintf(config, sizeof config, "%s", wire_write_text(wire, "config.yaml", USAGE_GOOD));
     usage_expect(wire, "statistics on a full disk",
                  (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats",
                                        "/dev/full", NULL},
                  1, (const char *const[]){"No space left", NULL});
-    usage_expect(wire, "statistics in no folder",
-                 (const char *const[]){"run", config, "--duration", "0.1", "--pace", "fast", "--quiet", "--stats",
-                                       "/none/x", NULL},
-                 2, (const char *const[]){"/none/x", "No such file", NULL});
-    int number, fd = wire_bind(SOCK_STREAM, &number); /* nobody listens there */
-    snprintf(port, sizeof port, "tcp:127.0.0.1:%d", number);
-    usage_expect(wire, "nobody listens", (const char *const[]){"record", port, "-o", wire_path(wire, "x.ply"), NULL}, 1,
-                 (const char *const[]){port, "Connection refused", NULL});
+    int port;
+    const int fd = wire_bind(SOCK_STREAM, &port);
+    snprintf(source, sizeof source, "tcp:127.0.0.1:%d", port);
+    usage_expect(wire, "nobody listens", (const char *const[]){"record", source, "-o", wire_path(wire, "x.ply"), NULL},
+                 1, (const char *const[]){source, "Connection refused", NULL});
     close(fd);
     assert_int_equal(usage_complaints, 0);
+    /* Both failures are reported, the second one as a warning. */
+    wire_write_text(wire, "drop.yaml", "faults: [{kind: drop, every: 10}]\n");
+    const char *const both[] = {
+        "run",     config,    "--start",   "--duration", "0.1",       "--pace",     "fast",
+        "--quiet", "--stats", "/dev/full", "--truth",    "/dev/full", "--scenario", wire_path(wire, "drop.yaml"),
+        NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, both, "out", "err", -1)), 1);
+    char *text = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(text, "scanhead: /dev/full: ") == NULL || strstr(text, "warning: truth: /dev/full: ") == NULL)
+        fail_msg("%s", text);
+    free(text);
 }
 
 /* The shell sets a limit that is too small for any command. That is an error, not a crash. */

@@ -75,7 +75,44 @@ static void test_across_azimuth_0(void **state)
                     "stations:\n  - {position_m: [0, 0, 0]}\n"
                     "links: [{type: usb, port: 0, speed: full}]\n");
     assert_int_equal(run(wire, &err), 2);
-    if (strstr(err, "the stream has 4.00 MB/s, the link carries 1.22 MB/s") == NULL) fail_msg("%s", err);
+    if (strstr(err, "the stream has 4.00 MB/s, the link carries 1.22 MB/s; lower head.lines_hz to 304\n") == NULL)
+        fail_msg("%s", err);
+    free(err);
+}
+
+/* A VLP-16 has one pulse rate: 16 in 55.296 us, 5.79 MB a second. Lowering it is no advice. */
+static void test_one_rate(void **state)
+{
+    struct wire *wire = *state;
+    char *err;
+    room_write(wire);
+    wire_write_text(wire, "config.yaml",
+                    "head: {profile: velodyne-vlp16}\nscene:\n  meshes:\n    - {file: room.obj, up: z, scale: 1}\n"
+                    "stations:\n  - {position_m: [0, 0, 0]}\nlinks: [{type: usb, port: 0, speed: full}]\n");
+    assert_int_equal(run(wire, &err), 2);
+    if (strstr(err, "the stream has 5.79 MB/s, the link carries 1.22 MB/s; no rate of the head is low enough; allowed "
+                    "is a faster link\n") == NULL)
+        fail_msg("%s", err);
+    free(err);
+}
+
+/* The allowed share of the speed has two digits, however small it is. 60 kHz are 1.2 MB/s, so 900 times that speed has
+ * 0.0011 times the allowed one. */
+static void test_fast_recording(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], file[352];
+    room_write(wire);
+    write_config(wire, "high", 60000);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(file, sizeof file, "%s", wire_path(wire, "a.shs"));
+    const char *const record[] = {"record", config, "--duration", "0.02", "-o", file, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, record, "out", "err", -1)), 0);
+    const char *const run_it[] = {"run",     file,  "--link",  "type: usb, port: 0, speed: full",
+                                  "--speed", "900", "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, run_it, "out", "err", -1)), 2);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    if (strstr(err, "allowed is 0.0011 times this speed") == NULL) fail_msg("%s", err);
     free(err);
 }
 
@@ -84,6 +121,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_capacity, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_across_azimuth_0, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_one_rate, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_fast_recording, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Heads that show themselves on USB as the device whose protocol they speak: ids, strings, interfaces, and a question
- * with its answer. A configured identity stays as it is. tests/guest has the kernel's drivers and libusb on the same * devices. */
+ * with its answer. A configured identity stays as it is. tests/guest has the kernel's drivers and libusb on the same
+ * devices. */
 #include "core/bytes.h"
 #include "drivers/protocol/crc32c.h"
 #include "drivers/protocol/native.h"

@@ -213,15 +213,15 @@ static void test_scenarios_in_turn(void **state)
 static void test_a_client_that_stays_away(void **state)
 {
     struct wire *wire = *state;
-    char config[352], json[352], names[256];
+    char config[352], names[256];
     write_files(wire);
     snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
-    snprintf(json, sizeof json, "%s", wire_path(wire, "json"));
     const char *const args[] = {
-        "soak",    config,       "--client", "exec sleep 600",    "--json", json,      "--client-folder",
+        "soak",    config,       "--client", "exec sleep 600",    "--json", "-",       "--client-folder",
         wire->dir, "--duration", "0.3",      "--reconnect-limit", "0.3",    "--quiet", NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 1);
-    char *text = wire_read(json, NULL);
+    char *text = wire_read(wire_path(wire, "out"), NULL);
+    assert_true(text[0] == '{' && strcmp(text + strlen(text) - 3, "\n}\n") == 0); /* nothing else is there */
     find_names(text, names, sizeof names);
     assert_string_equal(names, "connects");
     assert_int_equal(count_of(text, "no frame was left out"), 0); /* nor is a speed judged that nobody saw */
@@ -269,29 +269,29 @@ static void test_a_stop_in_the_second_scenario(void **state)
 
 static void test_wrong_usage(void **state)
 {
+    static const struct {
+        const char *args[7], *says;
+    } cases[] = {
+        {{"--junit", "x"}, "need --client"},
+        {{"--reconnect-limit", "3"}, "need --client"},
+        {{"--scenario", "a", "--scenario", "b"}, "need --client"},
+        {{"--client", "true", "--allow", "speed"}, "no such check"},
+        {{"--client", "true", "--pace", "fast"}, "allowed is realtime"},
+        {{"--client", "true", "--link", "2"}, "allowed 1 to 1"},
+        {{"--client", "true", "--set", "links=[]"}, "links: there are none; needed is one"},
+        {{"--client", "true", "--set", "links=[{type: 'null'}]"}, "allowed are tcp, pty"},
+        {{"--client", "true", "--set", "links=[{type: web}]"}, "allowed are tcp, pty, udp and usb"},
+        {{"--client", "true", "--truth", "t", "--scenario=flaky-usb", "--scenario=brown-out"}, "--truth is one file"},
+    };
     struct wire *wire = *state;
     char c[352];
     write_files(wire);
     snprintf(c, sizeof c, "%s", wire_path(wire, "config.yaml"));
-    wire_expect_usage(wire, (const char *const[]){"soak", c, "--junit", "x", NULL}, "need --client");
-    wire_expect_usage(wire, (const char *const[]){"soak", c, "--reconnect-limit", "3", NULL}, "need --client");
-    wire_expect_usage(wire, (const char *const[]){"soak", c, "--scenario", "a", "--scenario", "b", NULL},
-                      "need --client");
-    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--allow", "speed", NULL},
-                      "no such check");
-    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--pace", "fast", NULL},
-                      "allowed is realtime");
-    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--link", "2", NULL},
-                      "allowed 1 to 1");
-    wire_expect_usage(wire,
-                      (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: 'null'}]", NULL},
-                      "allowed are tcp, pty");
-    wire_expect_usage(wire, (const char *const[]){"soak", c, "--client", "true", "--set", "links=[{type: web}]", NULL},
-                      "allowed are tcp, pty, udp and usb");
-    wire_expect_usage(wire,
-                      (const char *const[]){"soak", c, "--client", "true", "--truth", "t", "--scenario", "flaky-usb",
-                                            "--scenario", "brown-out", NULL},
-                      "--truth is one file");
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const char *args[10] = {"soak", c};
+        memcpy(args + 2, cases[i].args, sizeof cases[i].args);
+        wire_expect_usage(wire, args, cases[i].says);
+    }
 }
 
 /* None of them runs the client, whose log would be there. */

@@ -58,3 +58,18 @@ void usage_expect(struct wire *wire, const char *what, const char *const *args, 
     free(err);
     free(out);
 }
+
+const char *const *usage_words(const struct wire *wire, const char *line)
+{
+    static const char *word[WIRE_MAX_ARGS];
+    static char text[2048];
+    size_t used = 0;
+    int n = 0;
+    for (const char *p = line; *p != '\0' && used + sizeof wire->dir + 1 < sizeof text; p++)
+        used += (size_t)(*p == '@' ? snprintf(text + used, sizeof text - used, "%s/", wire->dir)
+                                   : snprintf(text + used, sizeof text - used, "%c", *p));
+    for (char *next = strtok(text, " "); next != NULL && n < WIRE_MAX_ARGS - 1; next = strtok(NULL, " "))
+        word[n++] = next;
+    word[n] = NULL;
+    return word;
+}

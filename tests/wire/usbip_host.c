@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/wire/usbip_host.h"
 
+#include "core/bytes.h"
+
 enum { HEADER = 48, TO_DEVICE = 0, FROM_DEVICE = 1 };
 
 static void read_all(int fd, void *data, size_t len)
@@ -13,19 +15,6 @@ static void read_all(int fd, void *data, size_t len)
         at += n;
         len -= (size_t)n;
     }
-}
-
-static void put_be32(uint8_t *at, uint32_t v)
-{
-    v = htonl(v);
-    memcpy(at, &v, 4);
-}
-
-static uint32_t get_be32(const uint8_t *at)
-{
-    uint32_t v;
-    memcpy(&v, at, 4);
-    return ntohl(v);
 }
 
 struct usbip_host usbip_host_open_within(const struct head *head, int timeout_ms)
@@ -70,12 +59,12 @@ void usbip_host_close(struct usbip_host *host)
 static void start_transfer(struct usbip_host *host, unsigned endpoint, int in, const uint8_t *setup, uint32_t len)
 {
     uint8_t submit[HEADER] = {[3] = 1};
-    put_be32(submit + 4, ++host->seqnum);
+    be_put32(submit + 4, ++host->seqnum);
     memcpy(submit + 8, (const uint8_t[]){host->device[290], host->device[291], host->device[294], host->device[295]},
            4); /* bus and device */
-    put_be32(submit + 12, in ? FROM_DEVICE : TO_DEVICE);
-    put_be32(submit + 16, endpoint);
-    put_be32(submit + 24, len);
+    be_put32(submit + 12, in ? FROM_DEVICE : TO_DEVICE);
+    be_put32(submit + 16, endpoint);
+    be_put32(submit + 24, len);
     if (setup != NULL) memcpy(submit + 40, setup, 8);
     raw_send(host->fd, submit, sizeof submit);
 }
@@ -92,9 +81,9 @@ static int transfer(struct usbip_host *host, unsigned endpoint, int in, const ui
     start_transfer(host, endpoint, in, setup, len);
     if (!in && len > 0) raw_send(host->fd, data, len);
     read_all(host->fd, reply, sizeof reply);
-    assert_int_equal(get_be32(reply), 3);
-    assert_int_equal(get_be32(reply + 4), host->seqnum);
-    const int status = (int)get_be32(reply + 20), n = (int)get_be32(reply + 24);
+    assert_int_equal(be_get32(reply), 3);
+    assert_int_equal(be_get32(reply + 4), host->seqnum);
+    const int status = (int)be_get32(reply + 20), n = (int)be_get32(reply + 24);
     if (in) {
         assert_in_range(n, 0, len);
         read_all(host->fd, data, (size_t)n);

@@ -3,7 +3,9 @@
 #ifndef CORE_IMPORT_GEOTIFF_GEOTIFF_READ_H
 #define CORE_IMPORT_GEOTIFF_GEOTIFF_READ_H
 
-#include "core/scene/build.h"
+#include "core/err.h"
+
+struct scene_build;
 
 /* Fills b as a reader does, in the process that reads: easting, northing and height, in metres, z up. */
 int import_geotiff(struct scene_build *b, struct sh_err *err);

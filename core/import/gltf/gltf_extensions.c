@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/scene/build.h"
+
 /* A name that ends in * stands for all that begin so. */
 static const char *const known[] = {
     /* read */

@@ -6,7 +6,9 @@
 #include <jansson.h>
 #include <stdbool.h>
 
-#include "core/scene/build.h"
+#include "core/err.h"
+
+struct scene_build;
 
 /* Refuses unknown extensions that the file requires, and warns of other unknown ones. root's extensionsRequired and
  * extensionsUsed are lists, or are not there. *by_assimp: whether Assimp has to read the file. */

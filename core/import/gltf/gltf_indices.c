@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/import/gltf/gltf_at.h"
+#include "core/scene/build.h"
 #include "core/text.h"
 
 enum { MAX_DEPTH = 12 };
@@ -88,8 +89,8 @@ static const char *list_of(const char *key, const char *within)
 
 static bool is_entered(const char *key, const char *within)
 {
-    if (strcmp(within, "extensions") != 0) return !text_is_one_of(key, passed_over);
-    return text_is_one_of(key, entered) || strncmp(key, "KHR_materials_", 14) == 0;
+    if (strcmp(within, "extensions") != 0) return !text_is_one_of(text_span_of(key), passed_over);
+    return text_is_one_of(text_span_of(key), entered) || strncmp(key, "KHR_materials_", 14) == 0;
 }
 
 static void walk(struct search *s, const json_t *value, const char *key, const char *at, int depth);

@@ -5,7 +5,7 @@
 
 #include <jansson.h>
 
-#include "core/scene/build.h"
+struct scene_build;
 
 void gltf_say_indices(const struct scene_build *b, const json_t *root);
 

@@ -116,7 +116,7 @@ static int add_file(struct gltf *g, const char *uri, struct build_image *image, 
 {
     char *name = gltf_uri_name(uri);
     if (name == NULL) return build_fail(g->b, SH_ENOMEM, g->err, "no memory for a name");
-    image->name = (struct text_span){name, strlen(name)};
+    image->name = text_span_of(name);
     int rc = *name != '\0' ? build_texture(g->b, image, number, g->err) : SH_OK;
     free(name);
     return rc;
@@ -286,8 +286,7 @@ int gltf_look_open(struct gltf *g, const char *object, const json_t *primitive, 
     if (rc == SH_OK && number != GLTF_NONE) rc = gltf_object(g, "materials", number, &material);
     if (rc != SH_OK) return rc;
     const char *name = material != NULL ? json_string_value(json_array_get(g->names, number)) : "";
-    rc = build_label(g->b, (struct text_span){object, strlen(object)}, (struct text_span){name, strlen(name)},
-                     &look->label, g->err);
+    rc = build_label(g->b, text_span_of(object), text_span_of(name), &look->label, g->err);
     if (rc != SH_OK || material == NULL) return rc;
     const struct gltf_at own = gltf_at("materials[%u]", number);
     struct base base;

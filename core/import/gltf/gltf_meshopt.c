@@ -7,6 +7,7 @@
 
 #include <meshoptimizer.h>
 
+#include "core/scene/build_say.h"
 #include "core/text.h"
 
 /* meshoptimizer asserts the sizes that it gets, so they are checked before. */
@@ -40,11 +41,11 @@ static int check(struct scene_build *b, const struct gltf_packed *p, const char 
                                                                                          "NONE", "OCTAHEDRAL",
                                                                                          "QUATERNION", "EXPONENTIAL",
                                                                                          NULL};
-    if (!text_is_one_of(p->mode, modes))
+    if (!text_is_one_of(text_span_of(p->mode), modes))
         return build_fail(b, SH_EINPUT, err,
                           "%s: meshopt's mode %.40s is not known; known are ATTRIBUTES, TRIANGLES, INDICES", at,
                           p->mode);
-    if (!text_is_one_of(p->filter, filters))
+    if (!text_is_one_of(text_span_of(p->filter), filters))
         return build_fail(b, SH_EINPUT, err,
                           "%s: meshopt's filter %.40s is not known; known are OCTAHEDRAL, QUATERNION, EXPONENTIAL", at,
                           p->filter);

@@ -3,8 +3,10 @@
 #ifndef CORE_IMPORT_GLTF_GLTF_MESHOPT_H
 #define CORE_IMPORT_GLTF_GLTF_MESHOPT_H
 
+#include "core/err.h"
 #include "core/import/gltf/gltf_bytes.h"
-#include "core/scene/build.h"
+
+struct scene_build;
 
 /* The extension says this of a buffer view. */
 struct gltf_packed {

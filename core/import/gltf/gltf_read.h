@@ -3,7 +3,11 @@
 #ifndef CORE_IMPORT_GLTF_GLTF_READ_H
 #define CORE_IMPORT_GLTF_GLTF_READ_H
 
-#include "core/scene/build.h"
+#include <stdbool.h>
+
+#include "core/err.h"
+
+struct scene_build;
 
 /* Whether the file is one, by its ending. */
 bool gltf_is_name(const char *file);

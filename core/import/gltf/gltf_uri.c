@@ -6,6 +6,9 @@
 #include <string.h>
 #include <strings.h>
 
+#include "core/scene/build_say.h"
+#include "core/text.h"
+
 bool gltf_uri_is_data(const char *uri)
 {
     return strncasecmp(uri, "data:", 5) == 0;

@@ -5,8 +5,10 @@
 
 #include <stdbool.h>
 
+#include "core/err.h"
 #include "core/import/gltf/gltf_bytes.h"
-#include "core/scene/build.h"
+
+struct scene_build;
 
 /* Whether the URI contains its data. */
 bool gltf_uri_is_data(const char *uri);

@@ -38,7 +38,7 @@ size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id)
     return low;
 }
 
-static int no_memory(const struct ifc_index *x, struct sh_err *err)
+int ifc_no_memory(const struct ifc_index *x, struct sh_err *err)
 {
     return text_fail(&x->text, 0, SH_ENOMEM, err, "no memory for its records");
 }
@@ -49,7 +49,7 @@ static int read_all(struct ifc_index *x, struct sh_err *err)
     bool sorted = true;
     int rc;
     while ((rc = step_next(&x->text, &record, err)) == 1) {
-        if (!grow(&x->record, &x->room, x->n + 1, sizeof *x->record)) return no_memory(x, err);
+        if (!grow(&x->record, &x->room, x->n + 1, sizeof *x->record)) return ifc_no_memory(x, err);
         sorted = sorted && (x->n == 0 || x->record[x->n - 1].id < record.id);
         x->record[x->n++] = record;
     }

@@ -26,6 +26,9 @@ const struct step_record *ifc_index_find(const struct ifc_index *x, uint64_t id)
 /* "FILE, line N: TYPE #n: what": SH_EINPUT. */
 int ifc_index_fail(const struct ifc_index *x, const struct step_record *at, struct sh_err *err, const char *what);
 
+/* SH_ENOMEM. */
+int ifc_no_memory(const struct ifc_index *x, struct sh_err *err);
+
 /* Finds the next record number in a list of attributes, from *p on; texts are passed over. A # without digits gives 0.
  * False: there is none. */
 bool ifc_next_reference(const char **p, const char *end, uint64_t *id);

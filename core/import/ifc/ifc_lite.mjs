@@ -19,13 +19,12 @@ function failures_of(diagnostics) {
 
 function part_of(mesh) {
   const [x, y, z] = mesh.origin
-  const part = { index: mesh.indices, colour: [...mesh.color],
+  return { index: mesh.indices, colour: [...mesh.color],
     ...placed(mesh.positions, 3, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]) }
-  return part
 }
 
 // It takes one product at a time, so that a failure has its product.
-function run_job(api, pre, bytes, job) {
+function run_job(api, pre, job) {
   const rtc = pre.needsShift ? pre.rtcOffset : [0, 0, 0]
   const made = api.processGeometryBatchFromSource(pre.jobs.subarray(3 * job, 3 * job + 3), pre.unitScale, ...rtc,
     pre.needsShift, pre.voidKeys, pre.voidCounts, pre.voidValues, pre.styleIds, pre.styleColors,
@@ -59,7 +58,7 @@ try {
   const pre = api.buildPrePassOnce(bytes)
   api.setSourceBytes(bytes)
   begin()
-  for (let job = 0; job < pre.totalJobs; job++) run_job(api, pre, bytes, job)
+  for (let job = 0; job < pre.totalJobs; job++) run_job(api, pre, job)
   end()
 } catch (error) {
   fail(error)

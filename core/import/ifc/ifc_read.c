@@ -76,8 +76,7 @@ static int label_part(struct reading *r, const struct ifc_product *p, const stru
     const struct text_span type = body->type.n > 0 ? body->type : p->type;
     const struct ifc_style *style = ifc_style_by_colour(&r->records, p, part->colour);
     const char *material = style != NULL ? style->name : "<IFCDefault>";
-    int rc = build_label(r->b, (struct text_span){object, strlen(object)},
-                         (struct text_span){material, strlen(material)}, label, r->err);
+    int rc = build_label(r->b, text_span_of(object), text_span_of(material), label, r->err);
     if (rc != SH_OK) return rc;
     struct scene_surface *surface = &r->b->scene->surface[*label];
     scene_copy_name(surface->type, sizeof surface->type, type.p, type.n);

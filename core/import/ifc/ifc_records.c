@@ -19,21 +19,14 @@ const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint6
     return r->n_products > 0 ? bsearch(&id, r->product, r->n_products, sizeof *r->product, ifc_compare) : NULL;
 }
 
-static int no_memory(const struct ifc_records *r, struct sh_err *err)
-{
-    return text_fail(&r->index.text, 0, SH_ENOMEM, err, "no memory for its records");
-}
-
 /* Types without a surface: air, drawings, and connections. */
 static bool is_air(struct text_span type)
 {
     static const char *const air[] = {"IFCOPENINGELEMENT", "IFCOPENINGSTANDARDCASE", "IFCVOIDINGFEATURE",
                                       "IFCSPACE",          "IFCSPATIALZONE",         "IFCEXTERNALSPATIALELEMENT",
                                       "IFCGRID",           "IFCANNOTATION",          "IFCVIRTUALELEMENT",
-                                      "IFCPORT",           "IFCDISTRIBUTIONPORT"};
-    for (size_t i = 0; i < sizeof air / sizeof air[0]; i++)
-        if (text_is(type, air[i])) return true;
-    return false;
+                                      "IFCPORT",           "IFCDISTRIBUTIONPORT",    NULL};
+    return text_is_one_of(type, air);
 }
 
 /* IfcLocalPlacement(PlacementRelTo, RelativePlacement): follows PlacementRelTo up to a placement that is absolute, or
@@ -70,7 +63,8 @@ static int add_product(struct ifc_records *r, const struct step_record *record, 
     const struct step_record *to = ifc_index_find(&r->index, shape);
     if (to != NULL && !text_is(to->type, "IFCPRODUCTDEFINITIONSHAPE") && !text_is(to->type, "IFCPRODUCTREPRESENTATION"))
         return SH_OK;
-    if (!grow(&r->product, &r->room_products, r->n_products + 1, sizeof *r->product)) return no_memory(r, err);
+    if (!grow(&r->product, &r->room_products, r->n_products + 1, sizeof *r->product))
+        return ifc_no_memory(&r->index, err);
     struct ifc_product *p = &r->product[r->n_products++];
     *p = (struct ifc_product){.id = record->id,
                               .type = record->type,
@@ -78,7 +72,7 @@ static int add_product(struct ifc_records *r, const struct step_record *record, 
                               .name = ifc_text(arg[PRODUCT_NAME]),
                               .shape = shape,
                               .is_air = is_air(record->type)};
-    if (p->guid == NULL || p->name == NULL) return no_memory(r, err);
+    if (p->guid == NULL || p->name == NULL) return ifc_no_memory(&r->index, err);
     return check_placement(r, p, arg[PRODUCT_PLACEMENT], err);
 }
 
@@ -89,7 +83,7 @@ int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err
     if (rc != SH_OK) return rc;
     if (ifc_unit_find(&r->index, &r->unit_m, &r->no_unit) != SH_OK) r->unit_m = 1.0;
     r->mark = calloc(r->index.n + 1, sizeof *r->mark);
-    if (r->mark == NULL) return no_memory(r, err);
+    if (r->mark == NULL) return ifc_no_memory(&r->index, err);
     for (size_t i = 0; i < r->index.n && rc == SH_OK; i++)
         rc = add_product(r, &r->index.record[i], err);
     if (rc == SH_OK) rc = ifc_styles_collect(r, err);

@@ -261,7 +261,7 @@ static int read_number(struct reader *r, struct text_span arg, int which, double
 static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
 {
     char *name = ifc_text(crs->arg[CRS_NAME]);
-    if (name == NULL) return text_fail(&r->index.text, 0, SH_ENOMEM, r->err, "no memory for a name");
+    if (name == NULL) return ifc_no_memory(&r->index, r->err);
     const size_t n = strlen(name);
     if (n > 0 && n < sizeof map->crs) memcpy(map->crs, name, n + 1);
     free(name);

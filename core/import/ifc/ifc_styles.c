@@ -95,7 +95,7 @@ int ifc_styles_collect(struct ifc_records *r, struct sh_err *err)
         if (!step_reference(arg[0], &item)) item = 0;
         done = collect_from(r, item, &r->index.record[i], 0);
     }
-    if (!done) return text_fail(&r->index.text, 0, SH_ENOMEM, err, "no memory for its styles");
+    if (!done) return ifc_no_memory(&r->index, err);
     if (r->n_styles > 0) qsort(r->style, r->n_styles, sizeof *r->style, ifc_compare);
     return SH_OK;
 }

@@ -230,8 +230,8 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
 /* Types that IfcRelVoidsElement subtracts. */
 static bool is_opening(struct text_span type)
 {
-    return text_is(type, "IFCOPENINGELEMENT") || text_is(type, "IFCOPENINGSTANDARDCASE") ||
-           text_is(type, "IFCVOIDINGFEATURE");
+    static const char *const openings[] = {"IFCOPENINGELEMENT", "IFCOPENINGSTANDARDCASE", "IFCVOIDINGFEATURE", NULL};
+    return text_is_one_of(type, openings);
 }
 
 static void mark_lost_openings(struct walk *w)
@@ -253,5 +253,5 @@ int ifc_walk(struct ifc_records *r, struct sh_err *err)
     if (done) mark_lost_openings(&w);
     free(w.stack);
     free(w.voids);
-    return done ? SH_OK : text_fail(&r->index.text, 0, SH_ENOMEM, err, "no memory for its records");
+    return done ? SH_OK : ifc_no_memory(&r->index, err);
 }

@@ -123,10 +123,8 @@ static int check_fields(struct pcd *g, struct sh_err *err)
             return pcd_fail(g, err, "x, y and z are not TYPE F of SIZE 4 or 8 and COUNT 1, as is allowed");
     }
     if (axes != 7) return pcd_fail(g, err, "it has no fields x, y and z");
-    if (g->n > g->t.size || g->record_len == 0) /* a point takes a byte at least, also when it is compressed well */
-        return g->record_len == 0 || strcmp(g->data, "binary_compressed") != 0
-                   ? pcd_fail(g, err, "the file is cut off: it can't hold the points its header counts")
-                   : SH_OK;
+    if (g->n > g->t.size && strcmp(g->data, "binary_compressed") != 0) /* a point takes a byte at least */
+        return pcd_fail(g, err, "the file is cut off: it can't hold the points its header counts");
     return SH_OK;
 }
 

@@ -70,8 +70,8 @@ void map_free(struct map *map)
 {
     if (map == NULL) return;
     free(map->pixel);
-    free(map->edge);
-    free(map->field);
+    for (int kind = 0; kind < MAP_LINES; kind++)
+        free(map->line[kind]);
     free(map);
 }
 
@@ -119,33 +119,20 @@ int map_add_station(struct map *map, const struct map_station *station, struct s
     return SH_OK;
 }
 
-static void clamp_ends(const struct map *map, const double a[2], const double b[2], double line[2][2])
+int map_add_line(struct map *map, enum map_line kind, const double a[2], const double b[2], struct sh_err *err)
 {
-    for (int k = 0; k < 2; k++) {
-        line[0][k] = fmin(fmax(a[k], map->min_m[k]), map->max_m[k]);
-        line[1][k] = fmin(fmax(b[k], map->min_m[k]), map->max_m[k]);
-    }
-}
-
-int map_add_field(struct map *map, const double a[2], const double b[2], struct sh_err *err)
-{
-    if (map->n_fields == MAP_MAX_EDGES)
-        return sh_fail(err, SH_EINPUT, "map: more than %d lines of fields", (int)MAP_MAX_EDGES);
-    if (!grow(&map->field, &map->room_fields, map->n_fields + 1, sizeof *map->field))
-        return sh_fail(err, SH_ENOMEM, "map: no memory for %d lines of fields", (int)MAP_MAX_EDGES);
-    clamp_ends(map, a, b, map->field[map->n_fields++]);
-    return SH_OK;
-}
-
-int map_add_edge(struct map *map, const double a[2], const double b[2], struct sh_err *err)
-{
-    if (map->counts.edges == MAP_MAX_EDGES) {
-        map->counts.edges_left_out++;
+    uint64_t *n = &map->counts.lines[kind];
+    if (*n == MAP_MAX_LINES) {
+        map->counts.lines_left_out[kind]++;
         return SH_OK;
     }
-    if (!grow(&map->edge, &map->room_edges, map->counts.edges + 1, sizeof *map->edge))
-        return sh_fail(err, SH_ENOMEM, "map: no memory for %d edges", (int)MAP_MAX_EDGES);
-    clamp_ends(map, a, b, map->edge[map->counts.edges++]);
+    if (!grow(&map->line[kind], &map->room_lines[kind], *n + 1, sizeof *map->line[kind]))
+        return sh_fail(err, SH_ENOMEM, "map: no memory for %d lines", (int)MAP_MAX_LINES);
+    double(*ends)[2] = map->line[kind][(*n)++];
+    for (int k = 0; k < 2; k++) {
+        ends[0][k] = fmin(fmax(a[k], map->min_m[k]), map->max_m[k]);
+        ends[1][k] = fmin(fmax(b[k], map->min_m[k]), map->max_m[k]);
+    }
     return SH_OK;
 }
 

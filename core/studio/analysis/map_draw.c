@@ -127,30 +127,23 @@ void map_station_place(const struct map *map, uint32_t station, double place[2])
     map_draw_place_of(map, map->station[station].x_m, map->station[station].y_m, place);
 }
 
-static void draw_lines(const struct map *map, double (*const line)[2][2], uint64_t n, struct pen *pen,
-                       const uint8_t rgb[3])
+static void draw_lines(const struct map *map, enum map_line kind, struct pen *pen)
 {
-    for (uint64_t i = 0; i < n; i++) {
+    static const struct {
+        const char *class, *title;
+        const uint8_t *rgb;
+    } looks[MAP_LINES] = {[MAP_OPEN_EDGE] = {"edges", "open edges of the scene", red},
+                          [MAP_FIELD] = {"fields", "monitored fields", blue}};
+    if (map->counts.lines[kind] == 0) return;
+    pen->begin(pen->on, looks[kind].class, looks[kind].title);
+    for (uint64_t i = 0; i < map->counts.lines[kind]; i++) {
+        const double(*ends)[2] = map->line[kind][i];
         double from[2], to[2];
-        map_draw_place_of(map, line[i][0][0], line[i][0][1], from);
-        map_draw_place_of(map, line[i][1][0], line[i][1][1], to);
-        pen->line(pen->on, from, to, 2, rgb);
+        map_draw_place_of(map, ends[0][0], ends[0][1], from);
+        map_draw_place_of(map, ends[1][0], ends[1][1], to);
+        pen->line(pen->on, from, to, 2, looks[kind].rgb);
     }
     pen->end(pen->on);
-}
-
-static void draw_edges(const struct map *map, struct pen *pen)
-{
-    if (map->counts.edges == 0) return;
-    pen->begin(pen->on, "edges", "open edges of the scene");
-    draw_lines(map, map->edge, map->counts.edges, pen, red);
-}
-
-static void draw_fields(const struct map *map, struct pen *pen)
-{
-    if (map->n_fields == 0) return;
-    pen->begin(pen->on, "fields", "monitored fields");
-    draw_lines(map, map->field, map->n_fields, pen, blue);
 }
 
 static void draw_triangle_about(struct pen *pen, const double at[2], double size, const uint8_t rgb[3])
@@ -278,8 +271,8 @@ int map_draw_marks(const struct map *map, struct pen *pen, struct sh_err *err)
     map_get_layout(map, &at);
     const struct height_range range = find_heights(map);
     const long margin = at.left < 24 ? (long)at.left : 24, row = (long)(at.top + at.map_height) + 30;
-    draw_edges(map, pen);
-    draw_fields(map, pen);
+    draw_lines(map, MAP_OPEN_EDGE, pen);
+    draw_lines(map, MAP_FIELD, pen);
     draw_scale(map, margin, row, pen);
     if (range.high_m > range.low_m) draw_heights(range, margin + BAR_PX + 30, row, pen);
     draw_north((long)at.width - margin - 30, row, pen);

@@ -21,11 +21,8 @@ struct map {
     struct map_pixel *pixel; /* [height][width], the lowest y first */
     uint32_t n_stations;
     struct map_station station[MAP_MAX_STATIONS];
-    double (*edge)[2][2]; /* [counts.edges] ends, x and y */
-    size_t room_edges;
-    double (*field)[2][2]; /* [n_fields] the same, of monitored fields */
-    size_t room_fields;
-    uint64_t n_fields;
+    double (*line[MAP_LINES])[2][2]; /* [counts.lines] ends, x and y */
+    size_t room_lines[MAP_LINES];
     struct map_counts counts;
 };
 

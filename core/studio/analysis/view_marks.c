@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/studio/analysis/view_inside.h"
+#include "core/studio/figures.h"
 #include "core/angle.h"
 #include "core/colour.h"
 
@@ -97,13 +98,6 @@ uint32_t view_draw_stations(const struct view *view, struct picture *picture, co
     return left_out;
 }
 
-/* The smallest of 1, 2, 5 x 10^n that makes at most five steps. */
-static double round_step(double span)
-{
-    const double least = span / 5, decade = pow(10, floor(log10(least)));
-    return least <= decade ? decade : least <= 2 * decade ? 2 * decade : least <= 5 * decade ? 5 * decade : 10 * decade;
-}
-
 void view_draw_scale(struct picture *picture, const char *title, double low, double high,
                      const struct view_colours *colours)
 {
@@ -121,7 +115,7 @@ void view_draw_scale(struct picture *picture, const char *title, double low, dou
                      &text_type, ink, text);
         return;
     }
-    const double step = round_step(high - low);
+    const double step = figures_nice((high - low) / MAX_TICKS);
     const int digits = (int)fmin(9, fmax(0, -floor(log10(step) + 1e-9)));
     /* Ticks are multiples of the step: a sum of steps would stand still where they are below a double's last place. */
     const double first = ceil(low / step - 1e-9);

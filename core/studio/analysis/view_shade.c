@@ -10,15 +10,16 @@ enum { CLOSE_REACH = 3, SMOOTH_REACH = 3 };
 /* Depths that differ by more than that share of the depth are of two surfaces. */
 #define SAME_SURFACE 0.004f
 
+static const int compass[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+
 /* A place without a point that has points on at least six of eight sides takes the nearest of them. */
 static void close_hole(const struct view *view, int x, int y, float *depth_m, uint32_t *near)
 {
-    static const int side[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
     int sides = 0, least = CLOSE_REACH + 1;
     size_t found = 0;
     for (int s = 0; s < 8; s++)
         for (int k = 1; k <= CLOSE_REACH; k++) {
-            const int cx = x + k * side[s][0], cy = y + k * side[s][1];
+            const int cx = x + k * compass[s][0], cy = y + k * compass[s][1];
             if (cx < 0 || cy < 0 || cx >= (int)view->width || cy >= (int)view->height) break;
             const size_t at = (size_t)cy * view->width + (size_t)cx;
             if (!isfinite(view->place[at].order_m)) continue;
@@ -81,12 +82,11 @@ int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct 
  * depth, as the sky, is infinitely far and darkens none. */
 static float nearer(const struct view *view, const float *log_depth, int x, int y, int reach)
 {
-    static const int side[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
     const float own = log_depth[(size_t)y * view->width + (size_t)x];
     const int slant = (int)lrintf(0.7f * (float)reach);
     float sum = 0;
     for (int s = 0; s < 8; s++) {
-        const int by = s % 2 ? slant : reach, cx = x + by * side[s][0], cy = y + by * side[s][1];
+        const int by = s % 2 ? slant : reach, cx = x + by * compass[s][0], cy = y + by * compass[s][1];
         if (cx < 0 || cy < 0 || cx >= (int)view->width || cy >= (int)view->height) continue;
         const float other = log_depth[(size_t)cy * view->width + (size_t)cx];
         sum += fminf(0.06f, fmaxf(0, own - other));

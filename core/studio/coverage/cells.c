@@ -1,25 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /* The surface as cells: triangles are cut into pieces, and pieces become cells. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/studio/coverage/cut.h"
 #include "core/studio/coverage/inside.h"
+#include "core/studio/mesh/numbering.h"
 #include "core/grow.h"
 #include "core/huge_pages.h"
-#include "core/rng.h"
 #include "core/vec3.h"
 
-/* Pieces with the same key are one cell. */
-struct key {
-    int32_t cube[3];
-    uint32_t label_side;
-};
-
-/* The most memory that a piece takes, where each piece is a cell and a column of its own: entries, the cell's key,
- * places of the table, and the spare room of arrays that grow. */
-enum { PIECE_BYTES = 4 + 2 * (4 + sizeof(struct cell) + sizeof(struct key)) + sizeof(struct cell_met) + 16 };
+/* The most memory that a piece takes, where each piece is a cell and a column of its own: entries, the cell's key of 16
+ * bytes, places of the table, and the spare room of arrays that grow. */
+enum { PIECE_BYTES = 4 + 2 * (4 + sizeof(struct cell) + 16) + sizeof(struct cell_met) + 16 };
 enum { TRIANGLE_BYTES = 4 };
 static const double MAX_PIECES = 4e9; /* they are numbered in 32 bits */
 enum { REPORT_EVERY = 1 << 16 };
@@ -29,10 +24,8 @@ static const double ASIDE = 0.38196601125010515;
 
 struct build {
     struct coverage *c;
-    struct key *key; /* of each cell */
-    size_t key_room, cell_room;
-    uint32_t *table; /* 1 + cell, by the key's hash; 0: free */
-    uint64_t table_size;
+    struct numbering cells; /* by cube, label and side */
+    size_t cell_room;
     uint32_t at; /* piece */
     uint32_t label_side;
     double piece_m2;
@@ -100,11 +93,13 @@ static double mib_of(const struct coverage *c, double pieces)
 
 static int refuse(const struct coverage *c, double pieces, struct sh_err *err)
 {
+    char named[32]; /* the cell as the message has it: that one is tried */
     double cell_m = c->spec.cell_m;
     int tries = 0;
-    do
-        cell_m *= 1.5;
-    while (mib_of(c, count_pieces(c, cell_m)) > c->spec.memory_mib && ++tries < 100);
+    do {
+        snprintf(named, sizeof named, "%.2g", 1.5 * cell_m);
+        cell_m = strtod(named, NULL);
+    } while (mib_of(c, count_pieces(c, cell_m)) > c->spec.memory_mib && ++tries < 100);
     if (tries == 100)
         return sh_fail(err, SH_EINPUT,
                        "%u triangles need %.0f MiB for coverage even in the largest cells, and %.0f MiB are allowed",
@@ -112,64 +107,37 @@ static int refuse(const struct coverage *c, double pieces, struct sh_err *err)
     return sh_fail(
         err, SH_EINPUT,
         "cells of %g m cut the surface into %.3g pieces, which take up to %.0f MiB, and %.0f MiB are allowed; use a "
-        "cell of at least %.2g m",
-        c->spec.cell_m, pieces, mib_of(c, pieces), c->spec.memory_mib, cell_m);
+        "cell of at least %s m",
+        c->spec.cell_m, pieces, mib_of(c, pieces), c->spec.memory_mib, named);
 }
 
 /* ---- pieces become cells */
 
-static uint64_t hash_of(const struct key *k)
-{
-    uint64_t words[2];
-    memcpy(words, k, sizeof words);
-    return rng_mix(words[0] + 0x9e3779b97f4a7c15ULL * rng_mix(words[1]));
-}
-
-static int enlarge(struct build *b)
-{
-    const uint64_t size = b->table_size != 0 ? 2 * b->table_size : 1 << 12;
-    free(b->table);
-    b->table = calloc(size, sizeof *b->table);
-    b->table_size = size;
-    if (b->table == NULL) return 0;
-    for (uint32_t i = 0; i < b->c->n_cells; i++) {
-        uint64_t at = hash_of(&b->key[i]) & (size - 1);
-        while (b->table[at] != 0)
-            at = (at + 1) & (size - 1);
-        b->table[at] = i + 1;
-    }
-    return 1;
-}
-
-static uint32_t find_cell(struct build *b, const struct key *key)
+static uint32_t find_cell(struct build *b, const int32_t cube[3])
 {
     struct coverage *c = b->c;
-    const int has_room = 2 * ((uint64_t)c->n_cells + 1) <= b->table_size || enlarge(b);
-    if (!has_room || !grow(&b->key, &b->key_room, c->n_cells + 1, sizeof *b->key) ||
-        !grow(&c->cell, &b->cell_room, c->n_cells + 1, sizeof *c->cell)) {
+    const uint64_t key[2] = {(uint64_t)(uint32_t)cube[0] << 32 | (uint32_t)cube[1],
+                             (uint64_t)(uint32_t)cube[2] << 32 | b->label_side};
+    const uint32_t cell = numbering_of(&b->cells, key);
+    if (cell == NUMBERING_NONE || !grow(&c->cell, &b->cell_room, (size_t)cell + 1, sizeof *c->cell)) {
         b->rc = sh_fail(b->err, SH_ENOMEM, "no memory for the cells of coverage");
         return NO_CELL;
     }
-    uint64_t at = hash_of(key) & (b->table_size - 1);
-    for (; b->table[at] != 0; at = (at + 1) & (b->table_size - 1))
-        if (memcmp(&b->key[b->table[at] - 1], key, sizeof *key) == 0) return b->table[at] - 1;
-    b->table[at] = ++c->n_cells;
-    b->key[c->n_cells - 1] = *key;
-    c->cell[c->n_cells - 1] = (struct cell){.label = (uint16_t)(key->label_side >> 3)};
-    return c->n_cells - 1;
+    if (cell == c->n_cells) c->cell[c->n_cells++] = (struct cell){.label = (uint16_t)(b->label_side >> 3)};
+    return cell;
 }
 
 static void add_piece(struct build *b, const double corner[4][3], int n)
 {
-    struct key key = {.label_side = b->label_side};
+    int32_t cube[3];
     for (int i = 0; i < 3; i++) {
         double sum_m = 0.0;
         for (int k = 0; k < n; k++)
             sum_m += corner[k][i];
         const double centre_m = sum_m / n;
-        key.cube[i] = (int32_t)floor((centre_m - b->c->origin_m[i]) / b->c->spec.cell_m);
+        cube[i] = (int32_t)floor((centre_m - b->c->origin_m[i]) / b->c->spec.cell_m);
     }
-    const uint32_t cell = find_cell(b, &key);
+    const uint32_t cell = find_cell(b, cube);
     if (cell == NO_CELL) return;
     b->c->cell[cell].area_m2 += b->piece_m2;
     b->c->piece[b->at++] = cell;
@@ -208,8 +176,7 @@ static int build(struct coverage *c, const struct sh_report *report, struct sh_e
         if (t % 1024 == 0) b.rc = sh_check_stop(report, err);
         if (b.rc == SH_OK) cut_triangle(&b, t);
     }
-    free(b.key);
-    free(b.table);
+    numbering_free(&b.cells);
     if (b.rc != SH_OK) return b.rc;
     c->met = calloc(c->n_cells, sizeof *c->met);
     return c->met != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the cells of coverage");
@@ -224,7 +191,7 @@ static int cells_set_up(struct coverage *c, struct sh_err *err)
     }
     if (span_m / c->spec.cell_m > 1e9)
         return sh_fail(err, SH_EINPUT, "cells of %g m in a scene of %.3g m; allowed is a cell of at least %.2g m",
-                       c->spec.cell_m, span_m, 1e-9 * span_m);
+                       c->spec.cell_m, span_m, 1.05e-9 * span_m); /* more than two digits can be rounded down */
     const double pieces = count_pieces(c, c->spec.cell_m);
     return mib_of(c, pieces) > c->spec.memory_mib || !(pieces < MAX_PIECES) ? refuse(c, pieces, err) : SH_OK;
 }

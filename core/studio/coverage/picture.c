@@ -134,13 +134,14 @@ static int picture_make_room(struct cell_mesh *p, struct sh_err *err)
 {
     const struct coverage_spec *spec = &p->paint.c->spec;
     const double mib = ((double)p->vertices * CORNER_BYTES + (double)p->faces * FACE_BYTES) / 0x1p20;
-    if (mib > spec->memory_mib || p->vertices > MESH_MAX_VERTICES)
+    const double over = fmax(mib / spec->memory_mib, (double)p->vertices / MESH_MAX_VERTICES);
+    if (over > 1.0)
         return sh_fail(
             err, SH_EINPUT,
-            "a mesh of cells of %g m has %llu triangles, which take %.0f MiB, and %.0f MiB are allowed; use a cell of "
-            "at least %.2g m",
-            spec->cell_m, (unsigned long long)p->faces, mib, spec->memory_mib,
-            spec->cell_m * 1.5 * sqrt(mib / spec->memory_mib));
+            "a mesh of cells of %g m has %llu corners, which take %.0f MiB; allowed are %.0f MiB and %d corners; use a "
+            "cell of at least %.2g m",
+            spec->cell_m, (unsigned long long)p->vertices, mib, spec->memory_mib, (int)MESH_MAX_VERTICES,
+            spec->cell_m * 1.5 * sqrt(over));
     const size_t n = p->vertices + 1;
     p->xyz_m = malloc(n * sizeof *p->xyz_m);
     p->rgb = malloc(n * sizeof *p->rgb);

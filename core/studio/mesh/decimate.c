@@ -6,23 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/grow.h"
-#include "core/rng.h"
+#include "core/studio/mesh/numbering.h"
 #include "core/vec3.h"
 
-static const uint32_t NONE = UINT32_MAX;
-enum { AXIS_BITS = 20, FIRST_BITS = 12, MOST_PASSES = 40, STOP_EVERY = 1 << 16 };
-
-/* Numbers by key, in a hash table of open addressing. A triangle's key takes 96 bits. */
-struct slot {
-    uint64_t key;
-    uint32_t more, number; /* NONE: free */
-};
-struct table {
-    struct slot *slot; /* [1 << bits] */
-    unsigned bits;
-    uint32_t n;
-};
+static const uint32_t NONE = NUMBERING_NONE; /* of a cluster and of a vertex, too */
+enum { AXIS_BITS = 20, MOST_PASSES = 40, STOP_EVERY = 1 << 16 };
 
 struct cluster {
     double sum_m[3]; /* since the lower bound */
@@ -39,54 +27,11 @@ struct work {
     double cell_m;
     uint32_t most;
     uint32_t *of_vertex; /* [n_vertices] its cluster; NONE: not met yet */
-    struct table clusters, faces;
+    struct numbering clusters, faces;
     struct cluster *cluster;
     uint32_t (*face)[3]; /* of clusters */
     size_t cluster_room, face_room;
 };
-
-/* ---- tables */
-
-static int table_enlarge(struct table *t)
-{
-    const struct table old = *t;
-    t->bits = old.bits != 0 ? old.bits + 1 : FIRST_BITS;
-    t->slot = malloc(((size_t)1 << t->bits) * sizeof *t->slot);
-    if (t->slot == NULL) {
-        *t = old;
-        return 0;
-    }
-    memset(t->slot, 0xff, ((size_t)1 << t->bits) * sizeof *t->slot);
-    const size_t mask = ((size_t)1 << t->bits) - 1;
-    for (size_t i = 0; old.bits != 0 && i <= mask >> 1; i++) {
-        if (old.slot[i].number == NONE) continue;
-        size_t at = (size_t)rng_mix(old.slot[i].key + 0x9e3779b97f4a7c15ULL * old.slot[i].more) & mask;
-        while (t->slot[at].number != NONE)
-            at = (at + 1) & mask;
-        t->slot[at] = old.slot[i];
-    }
-    free(old.slot);
-    return 1;
-}
-
-/* Returns the number of a key, and whether it is new; NONE: no memory. */
-static uint32_t table_number(struct table *t, uint64_t key, uint32_t more, int *is_new)
-{
-    if ((t->bits == 0 || 2 * ((size_t)t->n + 1) > (size_t)1 << t->bits) && !table_enlarge(t)) return NONE;
-    const size_t mask = ((size_t)1 << t->bits) - 1;
-    size_t at = (size_t)rng_mix(key + 0x9e3779b97f4a7c15ULL * more) & mask;
-    while (t->slot[at].number != NONE && (t->slot[at].key != key || t->slot[at].more != more))
-        at = (at + 1) & mask;
-    *is_new = t->slot[at].number == NONE;
-    if (*is_new) t->slot[at] = (struct slot){key, more, t->n++};
-    return t->slot[at].number;
-}
-
-static void table_clear(struct table *t)
-{
-    if (t->bits != 0) memset(t->slot, 0xff, ((size_t)1 << t->bits) * sizeof *t->slot);
-    t->n = 0;
-}
 
 /* ---- a pass over the mesh */
 
@@ -94,14 +39,14 @@ static void table_clear(struct table *t)
 static uint32_t cluster_of(struct work *w, uint32_t vertex)
 {
     const double *v = w->mesh->vertex_m[vertex];
-    uint64_t key = 0;
-    int is_new;
+    const uint32_t known = w->clusters.n;
+    uint64_t key[2] = {0, 0};
     if (w->of_vertex[vertex] != NONE) return w->of_vertex[vertex];
     for (int i = 0; i < 3; i++)
-        key = key << (AXIS_BITS + 1) | (uint64_t)((v[i] - w->low_m[i]) * w->per_step[i] + 0.5);
-    const uint32_t c = table_number(&w->clusters, key, 0, &is_new);
+        key[0] = key[0] << (AXIS_BITS + 1) | (uint64_t)((v[i] - w->low_m[i]) * w->per_step[i] + 0.5);
+    const uint32_t c = numbering_of(&w->clusters, key);
     if (c == NONE || !grow(&w->cluster, &w->cluster_room, (size_t)c + 1, sizeof *w->cluster)) return NONE;
-    if (is_new) w->cluster[c] = (struct cluster){.vertex = NONE};
+    if (c == known) w->cluster[c] = (struct cluster){.vertex = NONE};
     for (int i = 0; i < 3; i++)
         w->cluster[c].sum_m[i] += v[i] - w->low_m[i];
     w->cluster[c].n++;
@@ -119,14 +64,14 @@ static void swap_if_above(uint32_t *a, uint32_t *b)
 /* Adds a triangle of clusters, unless it is there already. 0: no memory. */
 static int add_face(struct work *w, const uint32_t c[3])
 {
+    const uint32_t known = w->faces.n;
     uint32_t s[3] = {c[0], c[1], c[2]};
-    int is_new;
     swap_if_above(&s[0], &s[1]);
     swap_if_above(&s[1], &s[2]);
     swap_if_above(&s[0], &s[1]);
-    const uint32_t f = table_number(&w->faces, (uint64_t)s[0] << 32 | s[1], s[2], &is_new);
+    const uint32_t f = numbering_of(&w->faces, (const uint64_t[2]){(uint64_t)s[0] << 32 | s[1], s[2]});
     if (f == NONE || !grow(&w->face, &w->face_room, (size_t)f + 1, sizeof *w->face)) return 0;
-    if (is_new) memcpy(w->face[f], c, sizeof w->face[f]);
+    if (f == known) memcpy(w->face[f], c, sizeof w->face[f]);
     return 1;
 }
 
@@ -137,8 +82,8 @@ static void begin_pass(struct work *w, double cell_m)
         const double steps = fmin(ceil(w->extent_m[i] / cell_m), (double)(1 << AXIS_BITS));
         w->per_step[i] = w->extent_m[i] > 0.0 ? steps / w->extent_m[i] : 0.0;
     }
-    table_clear(&w->clusters);
-    table_clear(&w->faces);
+    numbering_clear(&w->clusters);
+    numbering_clear(&w->faces);
     memset(w->of_vertex, 0xff, w->mesh->n_vertices * sizeof *w->of_vertex);
 }
 
@@ -187,18 +132,22 @@ static void measure(struct work *w)
         w->extent_m[i] = m->n_triangles > 0 ? high_m[i] - w->low_m[i] : 0.0;
 }
 
+static int make_room(uint32_t n_vertices, uint32_t n_triangles, struct decimated *out, struct sh_err *err)
+{
+    *out = (struct decimated){.n_vertices = n_vertices, .n_triangles = n_triangles};
+    out->vertex_m = malloc(((size_t)n_vertices + 1) * sizeof *out->vertex_m);
+    out->triangle = malloc(((size_t)n_triangles + 1) * sizeof *out->triangle);
+    if (out->vertex_m != NULL && out->triangle != NULL) return SH_OK;
+    decimated_free(out);
+    return sh_fail(err, SH_ENOMEM, "no memory for a mesh of %u triangles", n_triangles);
+}
+
 /* Clusters that triangles use become vertices, in the order of their triangles. */
 static int decimate_keep(const struct work *w, struct decimated *out, struct sh_err *err)
 {
     const uint32_t n = w->faces.n;
     uint32_t n_vertices = 0;
-    *out = (struct decimated){.n_triangles = n, .cell_m = w->cell_m};
-    out->triangle = malloc(((size_t)n + 1) * sizeof *out->triangle);
-    out->vertex_m = malloc(((size_t)(w->clusters.n < 3 * n ? w->clusters.n : 3 * n) + 1) * sizeof *out->vertex_m);
-    if (out->triangle == NULL || out->vertex_m == NULL) {
-        decimated_free(out);
-        return sh_fail(err, SH_ENOMEM, "no memory for a mesh of %u triangles", n);
-    }
+    if (make_room(w->clusters.n < 3 * n ? w->clusters.n : 3 * n, n, out, err) != SH_OK) return SH_ENOMEM;
     for (uint32_t t = 0; t < n; t++)
         for (int k = 0; k < 3; k++) {
             struct cluster *c = &w->cluster[w->face[t][k]];
@@ -210,27 +159,22 @@ static int decimate_keep(const struct work *w, struct decimated *out, struct sh_
             out->triangle[t][k] = c->vertex;
         }
     out->n_vertices = n_vertices;
+    out->cell_m = w->cell_m;
     return SH_OK;
 }
 
 static int copy(const struct decimate_mesh *mesh, struct decimated *out, struct sh_err *err)
 {
-    *out = (struct decimated){.n_vertices = mesh->n_vertices, .n_triangles = mesh->n_triangles};
-    out->vertex_m = malloc(((size_t)mesh->n_vertices + 1) * sizeof *out->vertex_m);
-    out->triangle = malloc(((size_t)mesh->n_triangles + 1) * sizeof *out->triangle);
-    if (out->vertex_m == NULL || out->triangle == NULL) {
-        decimated_free(out);
-        return sh_fail(err, SH_ENOMEM, "no memory for a mesh of %u triangles", mesh->n_triangles);
-    }
+    if (make_room(mesh->n_vertices, mesh->n_triangles, out, err) != SH_OK) return SH_ENOMEM;
     memcpy(out->vertex_m, mesh->vertex_m, mesh->n_vertices * sizeof *out->vertex_m);
     memcpy(out->triangle, mesh->triangle, mesh->n_triangles * sizeof *out->triangle);
     return SH_OK;
 }
 
-static int decimate_set_up(struct work *w, const struct decimate_mesh *mesh, const struct sh_report *report,
-                           struct sh_err *err)
+static int decimate_set_up(struct work *w, const struct decimate_mesh *mesh, uint32_t most,
+                           const struct sh_report *report, struct sh_err *err)
 {
-    *w = (struct work){.mesh = mesh, .report = report, .most = UINT32_MAX};
+    *w = (struct work){.mesh = mesh, .report = report, .most = most};
     w->of_vertex = malloc(((size_t)mesh->n_vertices + 1) * sizeof *w->of_vertex);
     if (w->of_vertex == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a coarse mesh");
     measure(w);
@@ -240,24 +184,10 @@ static int decimate_set_up(struct work *w, const struct decimate_mesh *mesh, con
 static void tear_down(struct work *w)
 {
     free(w->of_vertex);
-    free(w->clusters.slot);
-    free(w->faces.slot);
+    numbering_free(&w->clusters);
+    numbering_free(&w->faces);
     free(w->cluster);
     free(w->face);
-}
-
-int decimate_by_cell(const struct decimate_mesh *mesh, double cell_m, const struct sh_report *report,
-                     struct decimated *out, struct sh_err *err)
-{
-    struct work w;
-    *out = (struct decimated){0};
-    if (!(cell_m > 0.0)) return sh_fail(err, SH_EINPUT, "a cell of %g m: allowed is more than 0", cell_m);
-    int rc = decimate_set_up(&w, mesh, report, err);
-    if (rc != SH_OK) return rc;
-    const double n = pass(&w, cell_m, err);
-    rc = n < 0.0 ? (int)n : decimate_keep(&w, out, err);
-    tear_down(&w);
-    return rc;
 }
 
 /* The number of triangles goes with 1 / cell^2 where the mesh is finer than the cells. A grid cuts a surface at an
@@ -272,9 +202,8 @@ int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_re
     if (most < DECIMATE_LEAST)
         return sh_fail(err, SH_EINPUT, "a mesh of %u triangles: allowed are %d or more", most, DECIMATE_LEAST);
     if (mesh->n_triangles <= most) return copy(mesh, out, err);
-    int rc = decimate_set_up(&w, mesh, report, err);
+    int rc = decimate_set_up(&w, mesh, most, report, err);
     if (rc != SH_OK) return rc;
-    w.most = most;
     double cell_m = fmax(sqrt(3.0 * w.area_m2 / most), 1e-6 * vec3_length(w.extent_m)), fits_m = INFINITY;
     for (int i = 0; i < MOST_PASSES; i++) {
         n = pass(&w, cell_m, err);

@@ -11,7 +11,7 @@ enum {
     ROW = (3 + 3 + 3 + 2 + MAX_SCALARS) * (DECIMAL_GENERAL_ROOM + 1)
 }; /* a vertex; a face has less */
 
-static const char *const type_name[] = {"double", "float", "ushort", "uchar"};
+static const char *const type_name[] = {"double", "float", "ushort"};
 
 static void put_header(FILE *out, const struct mesh *m)
 {
@@ -91,10 +91,8 @@ static void put_scalar(struct row *r, const struct mesh_scalar *s, uint32_t i)
         put_double(r, ((const double *)s->value)[i]);
     else if (s->type == MESH_FLOAT)
         put_float(r, ((const float *)s->value)[i]);
-    else if (s->type == MESH_UINT16)
-        put_whole(r, ((const uint16_t *)s->value)[i], 2);
     else
-        put_whole(r, ((const uint8_t *)s->value)[i], 1);
+        put_whole(r, ((const uint16_t *)s->value)[i], 2);
 }
 
 static void put_rgb(struct row *r, const uint8_t rgb[3])

@@ -57,7 +57,7 @@ static int take_layer(struct survey *s, struct column *column, struct floors *fl
         if (isinf(c->last_m)) floors->covered++;
         if (fabs(cosine) >= LEVEL && c->last_m - z_m >= LEAST_ROOM_M) {
             if (!grow(&floors->floor, &floors->room, floors->n + 1, sizeof *floors->floor)) return -1;
-            floors->floor[floors->n++] = (struct floor){.at_m = {s->rays.from_x[i], s->rays.from_y[i], z_m},
+            floors->floor[floors->n++] = (struct floor){.at_m = {s->rays.from.x[i], s->rays.from.y[i], z_m},
                                                         .room_m = c->last_m - z_m,
                                                         .front = cosine < 0.0,
                                                         .column = i};

@@ -45,12 +45,8 @@ void survey_close(struct survey *s)
 void survey_add(struct survey *s, const double from_m[3], const double dir[3])
 {
     struct survey_rays *r = &s->rays;
-    r->from_x[r->n] = from_m[0];
-    r->from_y[r->n] = from_m[1];
-    r->from_z[r->n] = from_m[2];
-    r->dir_x[r->n] = dir[0];
-    r->dir_y[r->n] = dir[1];
-    r->dir_z[r->n] = dir[2];
+    VEC3_SET(r->from, r->n, from_m);
+    VEC3_SET(r->dir, r->n, dir);
     r->n++;
 }
 
@@ -58,8 +54,8 @@ void survey_cast(struct survey *s)
 {
     struct survey_rays *r = &s->rays;
     const struct bvh_rays rays = {.n = r->n,
-                                  .from.own = {r->from_x, r->from_y, r->from_z},
-                                  .dir = {r->dir_x, r->dir_y, r->dir_z},
+                                  .from.own = {r->from.x, r->from.y, r->from.z},
+                                  .dir = {r->dir.x, r->dir.y, r->dir.z},
                                   .range_max_m = 8.0 * s->radius_m + 4.0 * s->view->range_min_m,
                                   .scattered = 1,
                                   .range_m = r->range_m,
@@ -75,7 +71,7 @@ void survey_clear(struct survey *s)
 double survey_cosine(const struct survey *s, uint32_t ray)
 {
     const struct survey_rays *r = &s->rays;
-    const double dir[3] = {r->dir_x[ray], r->dir_y[ray], r->dir_z[ray]};
+    const double dir[3] = VEC3_AT(r->dir, ray);
     struct bvh_plane plane;
     bvh_get_plane(s->bvh, r->triangle[ray], &plane);
     return vec3_dot(plane.n, dir) / vec3_length(plane.n);

@@ -8,8 +8,9 @@
 
 struct survey_rays {
     uint32_t n;
-    double from_x[BVH_CHUNK], from_y[BVH_CHUNK], from_z[BVH_CHUNK];
-    double dir_x[BVH_CHUNK], dir_y[BVH_CHUNK], dir_z[BVH_CHUNK];
+    struct {
+        double x[BVH_CHUNK], y[BVH_CHUNK], z[BVH_CHUNK];
+    } from, dir;
     /* out: */
     double range_m[BVH_CHUNK]; /* NaN: nothing */
     uint32_t triangle[BVH_CHUNK];

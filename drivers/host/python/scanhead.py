@@ -26,6 +26,7 @@ import math
 import os
 import select
 import socket
+import stat
 import struct
 import sys
 import time
@@ -56,7 +57,7 @@ _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
 _FRAME_BYTES = 512  # memory of a kept frame beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
-_ANSWERS_S = 0.2  # after one answer to *IDN?, how long the others may take
+_ANSWERS_S, _ASK_AGAIN_S = 0.2, 1.0  # after one answer to *IDN?, how long the others may take; without any
 _SCANNING, _SPIN_DOWN = 4, 5  # states of the head
 _NAN = math.nan
 _NO_WAIT = -math.inf  # a deadline: bytes that are there are taken, all of them
@@ -106,7 +107,7 @@ if np is not None:
 
 
 def _crc_pure(data: bytes) -> int:
-    """Two bytes a step."""
+    """Takes two bytes a step."""
     pairs, crc = _crc_pairs, 0xFFFFFFFF
     for pair in struct.unpack_from("<%dH" % (len(data) // 2), data):
         crc = pairs[(crc ^ pair) & 0xFFFF] ^ crc >> 16
@@ -147,8 +148,8 @@ def _shift_tables() -> List[List[List[int]]]:
 
 
 class _RunningCrc:
-    """CRCs of any pieces of a buffer, each byte summed once. For a damaged or hostile stream: there payloads
-    that are wrong may overlap, up to 65536 for a byte."""
+    """Sums each byte of a buffer once, and gives the CRC of any piece of it. Damaged and hostile streams need this:
+    their wrong payloads may overlap, up to 65536 for a byte."""
     _shifts = None  # type: Optional[List[List[List[int]]]]
 
     def __init__(self) -> None:
@@ -627,7 +628,7 @@ def _sincos(turns):
 
 
 def _fold(turns, low: float):
-    """turns within low .. low + 1."""
+    """Folds turns into low .. low + 1."""
     v = turns - low
     if np is not None and isinstance(v, np.ndarray):
         whole = v.astype(np.int64).astype(np.float64)
@@ -809,7 +810,7 @@ def _leg(a: Pose, b: Pose) -> _Leg:
 
 
 class _Poses:
-    """The poses frames of late, newest last."""
+    """Keeps the latest poses frames, newest last."""
 
     def __init__(self) -> None:
         self.forget()
@@ -1088,7 +1089,11 @@ def _open_source(name: str, timeout_s: float) -> _Source:
         return _Source(name, connection.fileno(), connection)
     if kind == "tty":
         return _Source(name, _open_tty(rest))
-    return _Source(name, os.open(name, os.O_RDONLY), is_file=True)
+    fd = os.open(name, os.O_RDONLY | os.O_NONBLOCK)  # opening a FIFO does not wait
+    if not stat.S_ISREG(os.fstat(fd).st_mode):
+        os.close(fd)
+        raise ScanheadError(f"{name}: not a file; a recording is one")
+    return _Source(name, fd, is_file=True)
 
 
 # ---- the head
@@ -1115,7 +1120,7 @@ class Head:
         self._unsettled, self._asked = source.is_tty, 0  # _asked: answers to *IDN? that may come yet
         self._ended = self._stuck = False
         self.dropped = 0  # frames dropped here while a reply was awaited
-        self.reader_lost = 0  # frames that the head says it left out for this reader
+        self._left_out = self._left_out_before = 0  # frames, by the present session and by those before it
         self._lost_told = self._lost_ended = 0  # pulses, by OVERRUN events and by SCAN_END
         self.descriptor, self.anchor = None, None  # type: Optional[Dict], Optional[Dict]
         # None: a line head; "beams": (elevation in degrees, azimuth in degrees, offset in ns) of each
@@ -1124,6 +1129,7 @@ class Head:
         self._poses, self._earth = _Poses(), None
         self._sha256 = hashlib.sha256()
         self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = self._points_time = None
+        self._last_seq, self._last_repeated = None, 0  # of a frame that is not LOCAL; how many were repeated up to it
         self._scan, self.scan_over = None, False  # the number of the present scan; whether it ends with this frame
 
     def __enter__(self) -> "Head":
@@ -1139,6 +1145,11 @@ class Head:
     def pulses_lost(self) -> int:
         """Pulses that the head says it lost. Two kinds of events count the same; of either, some may be lost."""
         return max(self._lost_told, self._lost_ended)
+
+    @property
+    def reader_lost(self) -> int:
+        """Frames that the head says it left out for this reader."""
+        return self._left_out_before + self._left_out
 
     # -- notices
 
@@ -1241,7 +1252,7 @@ class Head:
             raise
 
     def command(self, line: str, timeout_s: float = 5.0) -> str:
-        """The same; "ERR ..." becomes a CommandError."""
+        """Does as query(). A reply "ERR ..." becomes a CommandError."""
         reply = self.query(line, timeout_s)
         if reply.startswith("ERR "):
             number, _, text = reply[4:].partition(",")
@@ -1250,22 +1261,29 @@ class Head:
 
     def _settle(self, deadline_s: float) -> None:
         """Comes into step: on a terminal, which may have echoed what the head sent, and after a command that was
-        given up. The answer to *IDN? is the only reply with three commas and no quotes. All that was asked so
-        must be answered; once one answer is there, the others have a moment, as they may be lost."""
-        self._asked += 1
-        self._send("\n*IDN?\n", deadline_s)
+        given up. The head may have sent half a frame to the program before, and the rest of it may swallow the answer
+        to *IDN?. So the question is asked again."""
+        while True:
+            self._asked += 1
+            self._send("\n*IDN?\n", deadline_s)
+            if self._pass_over(min(deadline_s, time.monotonic() + _ASK_AGAIN_S)):
+                break
+            self._check(deadline_s)
+        self._unsettled = False
+
+    def _pass_over(self, deadline_s: float) -> bool:
+        """Skips replies up to the answers to all questions for the identity, the only replies with three commas and no
+        quotes. Once one is there, the others have a moment, as they may be lost. Returns whether one came."""
         answered = False
         while self._asked:
             try:
                 reply = self._reply(deadline_s, "*IDN?")
             except Timeout:
-                if not answered:
-                    raise
-                break  # query() passes over the others, if they come after all
+                return answered  # query() passes over the others, if they come after all
             if _is_identity(reply) and not answered:
                 answered, deadline_s = True, time.monotonic() + _ANSWERS_S
             self._stray(reply)
-        self._unsettled = False
+        return True
 
     def _discard_stale(self) -> None:
         """Skips replies that have come by now: they answer commands that were given up. Frames may come without end,
@@ -1376,6 +1394,7 @@ class Head:
         if not frame.flags & (REPEAT | LOCAL) and frame.type in _HASHED:
             self._sha256.update(struct.pack("<BI", frame.type, len(frame.payload)))
             self._sha256.update(frame.payload)
+        self._follow_sequence(frame)
         if frame.type in _UNPACK:
             frame = frame._replace(fields=_decode(frame.type, frame.payload))
         act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
@@ -1386,6 +1405,20 @@ class Head:
             act(frame)
         self._follow_scan(frame)
         return frame
+
+    def _follow_sequence(self, frame: Frame) -> None:
+        """Forgets what the stream said where its numbers go back: the head has started again, or recordings were put
+        one after the other. Where the new sequence began with frames equal to those before, they said the same."""
+        if frame.flags & LOCAL:
+            return
+        repeated = self.parser.repeated
+        back = self._last_seq is not None and (frame.seq - self._last_seq) % 2**32 >= 2**31
+        if back:
+            self._last_pulse0 = None
+        if back and repeated == self._last_repeated:
+            self._forget()
+            self._gps = self._scan_t0_ns = None
+        self._last_seq, self._last_repeated = frame.seq, repeated
 
     def _follow_scan(self, frame: Frame) -> None:
         """Sets scan_over. SCAN_END may be lost: so the next frame that reports another scan, or none, ends it, too."""
@@ -1479,7 +1512,8 @@ class Head:
     def _absorb_event(self, frame: Frame) -> None:
         code, a, b, c = (frame.fields[k] for k in ("code", "a", "b", "c"))
         if code == EV_READER_LOST:
-            self.reader_lost = c
+            self._left_out_before += self._left_out if c < self._left_out else 0  # another session has begun
+            self._left_out = c
         elif code == EV_OVERRUN:
             self._lost_told += b
         elif code == EV_SCAN_END:
@@ -1673,7 +1707,7 @@ def main(arguments: List[str]) -> int:
         with open(arguments[0]) as head:
             if head._source.is_file:
                 _summary(head)
-            for line in () if head._source.is_file else ["*IDN?", "HEAD:STATe?"] + arguments[1:]:
+            for line in ([] if head._source.is_file else ["*IDN?", "HEAD:STATe?"]) + arguments[1:]:
                 print(f"{line}  {head.query(line)}")
     except ScanheadError as error:
         print(error, file=sys.stderr)

@@ -27,6 +27,11 @@ export class Keeper {
     if (this.isOn) this.#put(bytes);
   }
 
+  /** Another connection begins, maybe with another head. */
+  connect() {
+    this.#front.clear();
+  }
+
   /** Keeps frames from now on. A recording begins as a reader does that joins late: with what its points need. */
   begin() {
     Object.assign(this, {bytes: 0, isOn: true, isFull: false});

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This panel has a field for each of the head's settings, with the limits, the unit and the refusals that the head
 // gives.
-import {bodyOf, byId, make, say, atMostEvery} from './page.js';
+import {bodyOf, byId, make, markField, say, atMostEvery} from './page.js';
 import {describeSettings} from './describe.js';
 import {why} from './session.js';
 
@@ -191,10 +191,8 @@ export class Knobs extends EventTarget {
 
   // Shows the head's refusal, in the head's words.
   #refuse(knob, text) {
-    for (const other of this.#knobs.values()) {
-      if (other.says === knob.says) other.field.removeAttribute('aria-invalid');
-    }
-    if (text) knob.field.setAttribute('aria-invalid', 'true');
+    for (const other of this.#knobs.values()) if (other.says === knob.says) markField(other.field, true);
+    markField(knob.field, text === '');
     say(knob.says, text);
   }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This class has the rows of the display for colour scales and their limits. Limits leave out a share of the points, or
 // are set by hand.
-import {kept, make, numberOf, say} from './page.js';
+import {kept, make, markField, numberOf, say} from './page.js';
 import {MODES} from './view_colours.js';
 import {SCALES} from './view_ramps.js';
 
@@ -78,7 +78,7 @@ export class Limits {
     p.hand.hidden = !isByHand;
     const isBegun = p.low.value.trim() !== '' && p.high.value.trim() !== '';
     say(p.says, !isByHand || isRight || !isBegun ? '' : 'Two numbers; the first has to be the lower one.');
-    for (const field of [p.low, p.high]) field.toggleAttribute('aria-invalid', p.says.textContent !== '');
+    for (const field of [p.low, p.high]) markField(field, p.says.textContent === '');
     if (!isByHand) this.#view.ramp({share: Number(p.share.value)});
     if (!isByHand) this.#view.limits();
     else if (isRight) this.#view.limits(low, high);

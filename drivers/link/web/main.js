@@ -37,6 +37,9 @@ function startPanels() {
   }
 }
 
+// A double click takes a number whole. Browsers leave its sign out, and what is typed then is no number.
+addEventListener('dblclick', ({target}) => target.matches?.('input[inputmode="decimal"]') && target.select());
+
 // The page works without a picture: figures and settings need none.
 async function makeView(cloud) {
   try {

@@ -24,6 +24,7 @@ export class MeasureTool {
   #says = make('p', {class: 'note', role: 'status'});
   #depth = make('input', {type: 'text', inputmode: 'decimal', id: 'measure-depth', value: '0.05'});
   #list = make('ol', {class: 'measured'});
+  #edges = make('p', {class: 'note', id: 'measure-edges'}, '± is the error of the points, not the distance from a point to an edge. Click faces, not edges.');
   #table = make('div', {class: 'picked', tabindex: 0, role: 'region', 'aria-label': 'Picked points'});
   #layer = (pen, camera) => this.#draw(pen, camera);
 
@@ -47,7 +48,7 @@ export class MeasureTool {
     };
     this.depthRow = make('div', {class: 'row'}, make('label', {for: 'measure-depth'}, 'Depth to each side'), this.#depth, make('span', {class: 'unit'}, 'm'));
     this.body = make('div', {}, make('div', {class: 'kinds', role: 'group', 'aria-label': 'Kind of measurement'}, ...kinds), this.depthRow,
-      this.#says, this.#list, make('div', {class: 'actions'}, ...Object.values(this.buttons)), this.#table);
+      this.#says, this.#list, this.#edges, make('div', {class: 'actions'}, ...Object.values(this.buttons)), this.#table);
     this.#choose('distance');
   }
 
@@ -180,6 +181,7 @@ export class MeasureTool {
     say(this.#says, (last ? `${this.#rowsOf(last)[0].slice(0, 2).join(' ')}. ` : '') + (isOutline ? `Click the corners of a face, then end the outline: ${n} so far.`
       : `Click the ${NAMES[n]} point${this.#kind === 'angle' && n === 1 ? ', the angle’s corner' : ''}. Enter takes the point in the middle.`));
     this.#list.replaceChildren(...this.done.map((m) => make('li', {}, make('h3', {}, m.of), this.#figuresOf(m))));
+    this.#edges.hidden = !this.done.some((m) => m.kind === 'distance' || m.kind === 'height');
     this.#showTable(points);
     this.#view.redraw();
   }
@@ -202,7 +204,7 @@ export class MeasureTool {
     const cells = (tag, all) => make('tr', {}, ...all.map((text) => make(tag, tag === 'th' ? {scope: 'col'} : {}, text)));
     this.#table.hidden = points.length === 0;
     this.#table.replaceChildren(make('table', {}, make('thead', {}, cells('th', ['Of', 'x, m', 'y, m', 'z, m', 'Surface'])),
-      make('tbody', {}, ...points.map((p) => cells('td', [p.of ? `${p.of}, ${p.number}` : String(p.number),
+      make('tbody', {}, ...points.map((p) => cells('td', [p.of ? `${p.of},\u00a0${p.number}` : String(p.number),
         ...[p.x, p.y, p.z].map((v) => grouped(v, 3)), p.surface])))));
   }
 

@@ -202,8 +202,8 @@ export class Decoder {
     this.shots += shots;
     c.amplitude.fill(NaN, from, c.n);
     if (this.batch.rgb) c.rgb.fill(128, 3 * from, 3 * c.n);
-    if (this.descriptor.layout === 0 && this.anchor.moving & 1) this.#placeMoving(view, from, t0_ns);
     this.stats.empty += n - (c.n - from);
+    if (this.descriptor.layout === 0 && this.anchor.moving & 1) this.#placeMoving(view, from, t0_ns);
     if (content & 3) this.last = {from, shots, pulse0, low, high, line, n, seq: frame.seq, content};
   }
 
@@ -211,8 +211,14 @@ export class Decoder {
     const c = this.columns;
     const time = (i) => t0_ns + (view.getUint32(HEAD + RECORD * c.record[i] + 16, true) & 0xffffff);
     const missing = this.poses.place(c, from, time);
+    if (missing === 0) return;
     this.stats.unplaced_points += missing;
-    if (missing > 0) c.dropNaN(from);
+    for (let i = from, last = -1; i < c.n; i++) {
+      if (!Number.isNaN(c.x[i]) || c.pulse[i] === last) continue; // echoes of a pulse follow each other
+      last = c.pulse[i];
+      this.stats.unplaced_shots++;
+    }
+    c.dropNaN(from);
   }
 
   // Returns the points frame that attributes or colours follow as number `after`. null: it was lost, or they belong to

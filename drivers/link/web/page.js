@@ -29,6 +29,12 @@ export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+// Says of a field whether what is in it can be taken.
+export function markField(field, isRight) {
+  if (isRight) field.removeAttribute('aria-invalid');
+  else field.setAttribute('aria-invalid', 'true'); // an empty value would say that it is right
+}
+
 // Returns the number that a user has written, NaN for none: an empty text is not 0.
 export const numberOf = (text) => (text.trim() === '' ? NaN : Number(text.trim().replace('−', '-').replace(',', '.')));
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 // This panel shows the figures of the point under the pointer. It lies over the picture, and only while there is a
 // point, so that nothing else moves.
-import {byId, grouped, make, say, NONE} from './page.js';
+import {byId, grouped, make, metres, say, NONE} from './page.js';
 
-const CELLS = [['place', 'x, y, z', 'wide'], ['range', 'Range'], ['reflectance', 'Reflectance'],
+const CELLS = [['place', 'x, y, z', 'wide'], ['deviation', 'Deviation'], ['range', 'Range'], ['reflectance', 'Reflectance'],
   ['amplitude', 'Amplitude'], ['echo', 'Echo'], ['surface', 'Surface', 'wide'], ['station', 'Station'], ['time', 'Time'],
   ['pulse', 'Pulse'], ['rgb', 'Colour']];
 
@@ -58,7 +58,8 @@ export class Point {
 
   #texts(p) {
     return {
-      place: Number.isFinite(p.x) ? `${[p.x, p.y, p.z].map((v) => fixed(v, 3, '')).join(' ')} m` : NONE, range: fixed(p.range, 3, 'm'),
+      place: Number.isFinite(p.x) ? `${[p.x, p.y, p.z].map((v) => fixed(v, 3, '')).join(' ')} m` : NONE,
+      deviation: metres(p.deviation_m), range: fixed(p.range, 3, 'm'),
       reflectance: fixed(p.reflectance, 1, 'dB'), amplitude: fixed(p.amplitude, 1, 'dB'),
       echo: p.echo ? `${p.echo} of ${p.echoes}` : NONE,
       surface: p.label === undefined || p.label === 0xffff ? NONE : this.#names('label', p.label) ?? String(p.label),

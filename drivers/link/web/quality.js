@@ -13,7 +13,7 @@ const DEVIATION = [
   ['dev-mean', 'Mean'],
   ['dev-rms', 'RMS'],
   ['dev-p95', 'p95', '95 % are smaller'],
-  ['dev-max', 'Largest'],
+  ['dev-max', 'Largest', 'Of the points looked at; another point may be farther from its surface'],
   ['dev-bound', 'Bound', 'What the methods and the noise allow'],
   ['dev-far', 'Far', 'Points with no surface within 10 m, which are in no other figure'],
   ['dev-along', 'In range', 'RMS along the beam, of points on smooth faces'],
@@ -34,6 +34,7 @@ export class Quality {
 
   #view;
   #worst = null; // the place of the largest deviation
+  #largest_m = NaN;
   #look = make('button', {type: 'button', id: 'show-largest', disabled: true, click: () => this.#showLargest(),
     title: 'Goes to the point with the largest deviation, of those looked at'}, 'Show the largest');
 
@@ -42,7 +43,7 @@ export class Quality {
     this.#view = view;
     const body = bodyOf('quality');
     const general = figureList(body, ROWS);
-    body.append(make('p', {class: 'note'}, 'The head judges the whole scan, also what did not come to this page.'),
+    body.append(make('p', {class: 'note'}, 'The head samples the whole scan, also what did not come to this page.'),
       make('h3', {}, 'Coverage of all surfaces'),
       make('div', {class: 'coverage'}, make('div', {class: 'track'}, this.#covered), this.#coverage));
     body.append(make('h3', {}, 'Deviation from the scene'), this.#svg);
@@ -79,6 +80,7 @@ export class Quality {
       'dev-far': d.far === undefined ? NONE : short(d.far), 'dev-along': metres(along.judged_rms_m),
     });
     this.#worst = d.max_at?.every(Number.isFinite) ? d.max_at : null;
+    this.#largest_m = d.max_m ?? NaN;
     this.#look.disabled = this.#worst === null || this.#view === null;
     byId('figure-dev-max').classList.toggle('bad', bound && d.max_m > bound && isBeyond);
     this.#histogram(q.along_beam ?? q.distances, q.along_beam ? ' along the beam' : '', bound);
@@ -94,7 +96,8 @@ export class Quality {
     Object.assign(view.camera, {target: [...this.#worst], distance: Math.min(view.camera.distance, LOOK_M)});
     view.touched();
     view.cameraMoved();
-    view.pointed.mark(nearestTo(view.cloud, this.#worst, NEAR_M), true);
+    const point = nearestTo(view.cloud, this.#worst, NEAR_M);
+    view.pointed.mark(point && {...point, deviation_m: this.#largest_m}, true);
   }
 
   #cover(c) {

@@ -3,7 +3,7 @@
 // alone, the surface that they see together, and the best next place. It takes the place of the list of stations while
 // it is open.
 
-import {bodyOf, grouped, kept, make, numberOf, percent, say} from './page.js';
+import {bodyOf, grouped, kept, make, markField, numberOf, percent, say} from './page.js';
 import {why} from './session.js';
 import {Cloud} from './cloud.js';
 import {SETTINGS, Trial} from './trial.js';
@@ -14,7 +14,7 @@ import {SEEN_COLOURS} from './view_paint.js';
 import {tableOf} from './view_colours.js';
 
 const STEPS = [4, 2, 1, 0.5];
-const PAINTS = [['seen', 'What is seen'], ['all', 'Also what is left to see'], ['off', 'Nothing']];
+const PAINTS = [['seen', 'What is seen'], ['all', 'Also what is left'], ['off', 'Nothing']];
 const SEEN = ['Seen by no station', 'By one', 'By several'];
 const PLACE = [['x_m', 'East x, m'], ['y_m', 'North y, m'], ['z_m', 'Height z, m'], ['heading_deg', 'Heading, °'],
   ['pitch_deg', 'Pitch, °'], ['roll_deg', 'Roll, °']];
@@ -92,8 +92,9 @@ export class TrialPanel {
     this.apply = button('trial-apply', 'Move the head’s stations', () => this.#apply());
     this.text = make('textarea', {id: 'trial-text', readonly: true, rows: 6, 'aria-label': 'Stations for a configuration', spellcheck: 'false'});
     this.#box.append(this.note,
-      make('div', {class: 'coverage'}, make('div', {class: 'track'}, this.covered), this.coverage, this.inSection),
+      make('div', {class: 'coverage'}, make('div', {class: 'track'}, this.covered), this.coverage),
       make('dl', {class: 'figures'}, ...SEEN.map((name, i) => make('div', {}, make('dt', {}, patch(SEEN_COLOURS[i]), name), this.shares[i]))),
+      this.inSection,
       make('div', {class: 'row'}, make('label', {for: 'trial-paint'}, 'Painted'), this.paint),
       make('div', {class: 'row'}, make('label', {for: 'trial-step'}, 'Points every'), this.step),
       this.list,
@@ -224,8 +225,7 @@ export class TrialPanel {
   #edit(number, key, input) {
     const value = input.value.trim() === '' && SETTINGS.includes(key) ? null : numberOf(input.value);
     const isNumber = value === null || Number.isFinite(value);
-    if (isNumber) input.removeAttribute('aria-invalid');
-    else input.setAttribute('aria-invalid', 'true');
+    markField(input, isNumber);
     if (isNumber) return this.#trial.change(number, {[key]: value});
     this.#trial.get(number).error = `${input.value.trim() || 'An empty field'} is no number.`;
     return this.#fill(this.#trial.get(number));

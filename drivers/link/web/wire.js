@@ -75,6 +75,7 @@ export class Wire {
   #connect(url, past) {
     this.#close();
     this.#fresh();
+    this.#keeper.connect();
     this.#pastUrl = past;
     this.#number++;
     const number = this.#number;

@@ -24,21 +24,13 @@ static const struct app_option OPTIONS[] = {
 };
 /* clang-format on */
 
-/* Nobody calls it: main.c calls help_run. */
-static int help_run_command(int argc, char **argv)
-{
-    (void)argc;
-    (void)argv;
-    return APP_USAGE;
-}
-
+/* main.c calls help_run in place of a function `run`. */
 const struct app_command help_command = {
     .name = "help",
     .needs = "[COMMAND]",
     .summary = "this text, that of a command, manual pages, a completion",
     .options = OPTIONS,
     .notes = "help --man PAGE | man -l - shows a page that is not installed.\n",
-    .run = help_run_command,
 };
 
 static void print_command(const struct app_command *command, FILE *out)
@@ -78,15 +70,22 @@ void help_of(const struct app_command *command, const char *second, void (*print
     app_set_help(NULL);
 }
 
-static int print_one(const struct app_command *const *commands, const char *word)
+const char *help_nearest(const struct app_command *const *commands, const char *word)
 {
     enum { MOST = 32 };
-    const char *known[MOST] = {help_command.name}, *meant;
+    const char *known[MOST] = {help_command.name};
     size_t n = 1;
+    for (; *commands != NULL && n < MOST; commands++)
+        known[n++] = (*commands)->name;
+    return app_nearest(word, known, n);
+}
+
+static int print_one(const struct app_command *const *commands, const char *word)
+{
+    const char *meant = help_nearest(commands, word);
     if (strcmp(word, help_command.name) == 0) return help_of(&help_command, NULL, NULL), APP_OK;
-    for (; *commands != NULL && n < MOST; known[n++] = (*commands++)->name)
+    for (; *commands != NULL; commands++)
         if (strcmp(word, (*commands)->name) == 0) return help_of(*commands, NULL, NULL), APP_OK;
-    meant = app_nearest(word, known, n);
     if (meant != NULL) return app_usage(&help_command, "no command %s, did you mean %s?", word, meant);
     return app_usage(&help_command, "no command %s; %s --help lists all commands", word, app_program);
 }
@@ -97,6 +96,8 @@ int help_run(const struct app_command *const *commands, int argc, char **argv)
     struct app_input in;
     if (argc == 1) return help_print(commands, stdout), APP_OK;
     if (argc == 2 && argv[1][0] != '-') return print_one(commands, argv[1]);
+    if (argc > 2 && argv[1][0] != '-' && argv[2][0] != '-')
+        return app_usage(&help_command, "one COMMAND is allowed; %s is one too many", argv[2]);
     const int status = app_parse(&help_command, argc, argv, &in, &wish);
     if (status != APP_GO_ON) return status;
     if (in.n_options > 1) return app_usage(&help_command, "--man and --completion: allowed is one of them");

@@ -2,8 +2,8 @@
 /* scanhead help: what the program says of itself, for people, for man and for a shell.
  *
  * In: the list of commands (app.h) and their tables, the table of configuration keys. Out: the help's text, manual
- * pages as roff, a completion for bash. No command or option is named here: what --help has, pages and completion
- * have. */
+ * pages as roff, a completion for bash. What --help has, pages and completion have: only man.c names a command, where
+ * one has a second help. */
 #ifndef FIRMWARE_SIM_APP_HELP_HELP_H
 #define FIRMWARE_SIM_APP_HELP_HELP_H
 
@@ -13,6 +13,9 @@
 
 /* The help of the program as a whole. commands ends with NULL. */
 void help_print(const struct app_command *const *commands, FILE *out);
+
+/* A command that a wrong word may have meant; NULL: none is near. */
+const char *help_nearest(const struct app_command *const *commands, const char *word);
 
 /* The command itself. Returns the exit status. */
 int help_run(const struct app_command *const *commands, int argc, char **argv);

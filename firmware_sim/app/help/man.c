@@ -10,11 +10,8 @@
 enum { NAME_MAX_LEN = 64 };
 static const char KEYS[] = "scanhead.yaml.5";
 
-/* Commands that have a second help, by an option. */
-static const struct {
-    const char *name, *option, *page;
-} seconds[] = {{"record", "--raw", "record-raw"}};
-enum { N_SECONDS = sizeof seconds / sizeof seconds[0] };
+/* This command has a second help, by an option. */
+static const char SECOND[] = "record", SECOND_OPTION[] = "--raw", SECOND_PAGE[] = "record-raw";
 
 /* The name of a command's page. */
 static const char *page_name(const char *command, char *name)
@@ -23,18 +20,16 @@ static const char *page_name(const char *command, char *name)
     return name;
 }
 
-static void bold(const char *text)
+static void in_font(char font, const char *text)
 {
-    fputs("\\fB", stdout);
+    printf("\\f%c", font);
     roff_put(text, strlen(text));
     fputs("\\fR", stdout);
 }
 
-static void italic(const char *text)
+static void bold(const char *text)
 {
-    fputs("\\fI", stdout);
-    roff_put(text, strlen(text));
-    fputs("\\fR", stdout);
+    in_font('B', text);
 }
 
 static void put_option(char letter, const char *name, const char *argument, const char *help)
@@ -45,7 +40,7 @@ static void put_option(char letter, const char *name, const char *argument, cons
     puts(".TP");
     if (letter != '\0') bold(dash), fputs(", ", stdout);
     bold(word);
-    if (argument != NULL) putchar(' '), italic(argument);
+    if (argument != NULL) putchar(' '), in_font('I', argument);
     putchar('\n');
     roff_text(help);
 }
@@ -165,9 +160,8 @@ static void list_pages(const struct app_command *const *commands)
     for (size_t i = 0; commands[i] != NULL; i++)
         printf("%s.1\n", page_name(commands[i]->name, name));
     printf("%s.1\n", page_name(help_command.name, name));
-    for (int k = 0; k < N_SECONDS; k++)
-        for (size_t i = 0; commands[i] != NULL; i++)
-            if (strcmp(seconds[k].name, commands[i]->name) == 0) printf("%s.1\n", page_name(seconds[k].page, name));
+    for (size_t i = 0; commands[i] != NULL; i++)
+        if (strcmp(SECOND, commands[i]->name) == 0) printf("%s.1\n", page_name(SECOND_PAGE, name));
     puts(KEYS);
 }
 
@@ -183,9 +177,8 @@ static int put_one(const struct app_command *command, const char *wanted)
 {
     char name[NAME_MAX_LEN];
     if (is_page(page_name(command->name, name), wanted)) return help_of(command, NULL, put_command), 1;
-    for (int i = 0; i < N_SECONDS; i++)
-        if (strcmp(seconds[i].name, command->name) == 0 && is_page(page_name(seconds[i].page, name), wanted))
-            return help_of(command, seconds[i].option, put_command), 1;
+    if (strcmp(SECOND, command->name) == 0 && is_page(page_name(SECOND_PAGE, name), wanted))
+        return help_of(command, SECOND_OPTION, put_command), 1;
     return 0;
 }
 

@@ -7,32 +7,15 @@
 
 void roff_put(const char *text, size_t n)
 {
+    static const char marks[] = "\\-'`^~"; /* roff takes these for something else than themselves */
+    static const char *const instead[] = {"\\e", "\\-", "\\(aq", "\\(ga", "\\(ha", "\\(ti"};
+    if (n > 0 && text[0] == '.') fputs("\\&", stdout); /* or it is a request */
     for (size_t i = 0; i < n; i++) {
-        switch (text[i]) {
-        case '\\':
-            fputs("\\e", stdout);
-            break;
-        case '-':
-            fputs("\\-", stdout);
-            break;
-        case '\'':
-            fputs("\\(aq", stdout);
-            break;
-        case '`':
-            fputs("\\(ga", stdout);
-            break;
-        case '^':
-            fputs("\\(ha", stdout);
-            break;
-        case '~':
-            fputs("\\(ti", stdout);
-            break;
-        case '.':
-            fputs(i == 0 ? "\\&." : ".", stdout);
-            break;
-        default:
+        const char *mark = strchr(marks, text[i]);
+        if (mark != NULL)
+            fputs(instead[mark - marks], stdout);
+        else
             putchar(text[i]);
-        }
     }
 }
 
@@ -71,14 +54,10 @@ void roff_notes(const char *notes)
         size_t n = 0;
         while (notes[n] != '\0' && notes[n] != '\n')
             n += line_len(notes + n);
-        if (is_paragraph(notes, n)) {
-            puts(".PP");
-            put_lines(notes, n);
-        } else {
-            puts(".PP\n.nf");
-            put_lines(notes, n);
-            puts(".fi");
-        }
+        const int is_filled = is_paragraph(notes, n);
+        puts(is_filled ? ".PP" : ".PP\n.nf");
+        put_lines(notes, n);
+        if (!is_filled) puts(".fi");
         notes += n + (notes[n] == '\n');
     }
 }

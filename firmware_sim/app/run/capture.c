@@ -109,12 +109,11 @@ static int join_links(struct capture_run *run, struct config *cfg, struct sh_err
 
 static void say_what_runs(const struct capture_run *run, const struct loop *loop)
 {
-    fprintf(stderr, "%s: answers from %s\n", app_program, run->o->in.operand[0]);
+    app_say("answers from %s", run->o->in.operand[0]);
     for (uint32_t i = 0; i < capture_n(run->capture); i++) {
         const struct capture_place *p = capture_place(run->capture, i);
-        fprintf(stderr, "%s: %s port %d of %s: %s, %u different requests, %u messages\n", app_program,
-                p->is_tcp ? "tcp" : "udp", p->port, p->device, p->is_tcp ? p->talk.kind->name : "datagrams",
-                p->talk.n_requests, p->n_messages);
+        app_say("%s port %d of %s: %s, %u different requests, %u messages", p->is_tcp ? "tcp" : "udp", p->port,
+                p->device, p->is_tcp ? p->talk.kind->name : "datagrams", p->talk.n_requests, p->n_messages);
     }
     run_say_links(loop);
 }
@@ -153,7 +152,6 @@ static int serve(struct config *cfg, void *ctx, struct sh_err *err)
     struct run_options *o = run->o;
     struct replay *replay = NULL;
     struct loop *loop = NULL;
-    struct loop_stats stats;
     const struct loop_options options = {.report = &app_report_stderr};
     int rc = join_links(run, cfg, err);
     if (rc == SH_OK && cfg->loop.pace != PACE_REALTIME)
@@ -164,9 +162,9 @@ static int serve(struct config *cfg, void *ctx, struct sh_err *err)
         .talk = run->talk,
         .talk_options = run->o->replay.talk_options,
         /* one second more, so that the last of it gets out */
-        .duration_s = o->device.duration_s > 0.0 ? o->device.duration_s
-                      : o->device.start          ? capture_duration_s(run->capture) + 1.0
-                                                 : 0.0,
+        .duration_s = o->device.duration_s > 0.0           ? o->device.duration_s
+                      : o->device.start && !o->replay.loop ? capture_duration_s(run->capture) + 1.0
+                                                           : 0.0,
         .truth = o->device.truth,
         .report = &app_report_stderr,
     };
@@ -176,10 +174,8 @@ static int serve(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) {
         if (!o->quiet) say_what_runs(run, loop);
         warn_of_capture(run);
-        rc = run_serve(o, loop, &stats, err);
-        run_warn_losses(&stats.counters);
+        rc = run_serve(o, loop, err);
     }
-    if (rc == SH_OK) rc = loop_check_links(loop, err);
     loop_free(loop);
     replay_free(replay);
     return rc;
@@ -188,16 +184,6 @@ static int serve(struct config *cfg, void *ctx, struct sh_err *err)
 static int check_options(struct run_options *o)
 {
     static const char *const words[] = {[TALK_SILENCE] = "silence", [TALK_ERROR] = "error", [TALK_CLOSE] = "close"};
-    const char *option = o->replay.speed > 0.0    ? "--speed"
-                         : o->replay.from_s > 0.0 ? "--from"
-                         : o->replay.to_s > 0.0   ? "--to"
-                         : o->clients > 0         ? "--clients"
-                         : o->view                ? "--view"
-                         : o->config != NULL      ? "--config"
-                                                  : NULL;
-    if (option != NULL)
-        return app_usage(&app_run, "%s is for recordings of a head, but %s is a capture of packets; not allowed here",
-                         option, o->in.operand[0]);
     o->replay.talk_options.loop = o->replay.loop;
     if (o->unknown == NULL) return APP_GO_ON;
     for (int i = 0; i <= TALK_CLOSE; i++)

@@ -22,34 +22,32 @@ int run_take_link(void *values, const char *text)
     return APP_OK;
 }
 
-static int check_head(const struct run_options *o)
+/* Options that are for some kinds alone of what is run. The first rows name the kinds, in enum run_kind's order. */
+enum { HEAD = 1 << RUN_HEAD, RECORDING = 1 << RUN_RECORDING, CAPTURE = 1 << RUN_CAPTURE };
+static const struct {
+    int kinds;
+    const char *names, *options[6];
+} only[] = {
+    {HEAD, "a configuration", {"journal", "replay-journal", "surfaces", "frames"}},
+    {RECORDING, "a recording of a head", {"speed", "from", "to", "clients", "config"}},
+    {CAPTURE, "a capture of packets", {"unknown", "device-port"}},
+    {HEAD | RECORDING, "a configuration or a recording", {"view"}},
+    {RECORDING | CAPTURE, "a recording or a capture", {"loop", "link"}},
+};
+
+static int check_kind(const struct run_options *o, enum run_kind kind)
 {
-    const char *option = o->replay.speed > 0.0    ? "--speed"
-                         : o->replay.from_s > 0.0 ? "--from"
-                         : o->replay.to_s > 0.0   ? "--to"
-                         : o->replay.loop         ? "--loop"
-                         : o->clients > 0         ? "--clients"
-                         : o->links[0] != '\0'    ? "--link"
-                         : o->config != NULL      ? "--config"
-                         : o->unknown != NULL     ? "--unknown"
-                         : o->device_port != 0    ? "--device-port"
-                                                  : NULL;
-    if (option == NULL) return APP_GO_ON;
-    return app_usage(&app_run, "%s is for a recording, but %s is a configuration; allowed with FILE.shs, FILE.pcapng",
-                     option, o->in.operand[0]);
+    for (size_t i = 0; i < sizeof only / sizeof only[0]; i++)
+        for (const char *const *option = only[i].options; *option != NULL; option++)
+            if ((only[i].kinds >> kind & 1) == 0 && app_is_given(&o->in, *option))
+                return app_usage(&app_run, "--%s is for %s, but %s is %s", *option, only[i].names, o->in.operand[0],
+                                 only[kind].names);
+    return APP_GO_ON;
 }
 
-int run_check_options(const struct run_options *o, int is_recording)
+int run_check_options(const struct run_options *o, enum run_kind kind)
 {
-    if (!is_recording) return check_head(o);
-    const char *option = o->device.journal != NULL  ? "--journal"
-                         : o->device.replay != NULL ? "--replay-journal"
-                         : o->surfaces != NULL      ? "--surfaces"
-                         : o->frames_given          ? "--frames"
-                                                    : NULL;
-    if (option != NULL)
-        return app_usage(&app_run, "%s needs a head that computes, but %s is a recording; allowed with a CONFIG",
-                         option, o->in.operand[0]);
+    if (check_kind(o, kind) != APP_GO_ON) return APP_USAGE;
     if (o->config != NULL && o->links[0] != '\0')
         return app_usage(&app_run, "--config and --link: both give the links; allowed is one of them");
     if (o->clients > 0 && !o->device.start)
@@ -65,10 +63,9 @@ static void say_what_runs(const struct run_options *o, struct replay *replay, co
 {
     struct replay_summary s;
     replay_get_summary(replay, &s);
-    fprintf(stderr, "%s: replay of %s: %s\n", app_program, o->in.operand[0], s.idn);
+    app_say("replay of %s: %s", o->in.operand[0], s.idn);
     run_say_links(loop);
-    if (!o->device.start)
-        fprintf(stderr, "%s: it is played when a client starts scans, natively with SCAN:START\n", app_program);
+    if (!o->device.start) app_say("it is played when a client starts scans, natively with SCAN:START");
 }
 
 static void say_what_ran(const struct run_options *o, struct replay *replay)
@@ -82,19 +79,32 @@ static void say_what_ran(const struct run_options *o, struct replay *replay)
         sh_warn(&app_report_stderr, "%s: %llu bytes left out, which belong to no complete frame%s", o->in.operand[0],
                 (unsigned long long)s.bad_bytes, s.cut ? "; its end is cut off" : "");
     if (!o->quiet)
-        fprintf(stderr, "%s: %llu frames replayed, begun %u time%s\n", app_program, (unsigned long long)s.frames,
-                s.times, s.times == 1 ? "" : "s");
+        app_say("%llu frames replayed, begun %u time%s", (unsigned long long)s.frames, s.times,
+                s.times == 1 ? "" : "s");
 }
 
 static int serve(const struct run_options *o, struct replay *replay, struct loop *loop, struct sh_err *err)
 {
-    struct loop_stats stats;
+    struct sh_err why;
     if (!o->quiet) say_what_runs(o, replay, loop);
-    int rc = run_serve(o, loop, &stats, err);
+    const int rc = run_serve(o, loop, err);
     say_what_ran(o, replay);
-    run_warn_losses(&stats.counters);
-    if (rc == SH_OK) rc = replay_check(replay, err);
-    return rc == SH_OK ? loop_check_links(loop, err) : rc;
+    return app_and_also(rc, replay_check(replay, &why), &why, err);
+}
+
+/* With fewer places than --clients names the recording would never begin. A USB link has a console, too. */
+static int check_clients(const struct run_options *o, const struct config *cfg, struct sh_err *err)
+{
+    int places = 0;
+    for (uint32_t i = 0; i < cfg->n_links; i++) {
+        const struct link_spec *link = &cfg->link[i];
+        if (link->type == LINK_TCP || link->type == LINK_WEB) places += link->max_sessions;
+        if (link->type == LINK_PTY) places++;
+        if (link->type == LINK_USB) places += 2;
+    }
+    if (o->clients <= places) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "--clients %ld: the links have room for %d; allowed is that many, or more links",
+                   o->clients, places);
 }
 
 static int replay(struct config *cfg, void *ctx, struct sh_err *err)
@@ -103,10 +113,8 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     struct replay *replay = NULL;
     struct loop *loop = NULL;
     const struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
-    int rc = o->view ? run_add_view(cfg, err) : SH_OK;
-    if (rc == SH_OK && cfg->n_links == 0)
-        rc = sh_fail(err, SH_EINPUT,
-                     "%s: links: none; a replay needs at least one of pty, tcp, udp, usb, web, file, null", cfg->file);
+    int rc = run_complete_links(o, cfg, err);
+    if (rc == SH_OK) rc = check_clients(o, cfg, err);
     if (rc == SH_OK && o->replay.speed > 0.0 && cfg->loop.pace != PACE_REALTIME)
         rc = sh_fail(err, SH_EINPUT, "--speed: allowed only with the pace realtime");
     app_warn_settings_file(cfg, "the recording has the settings");
@@ -129,10 +137,6 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
 int run_replay(struct run_options *o)
 {
     char text[sizeof o->links + 16];
-    const char *option = o->unknown != NULL ? "--unknown" : o->device_port != 0 ? "--device-port" : NULL;
-    if (option != NULL)
-        return app_usage(&app_run, "%s is for a capture of packets, but %s is a recording of a head; not allowed here",
-                         option, o->in.operand[0]);
     if (o->config != NULL) {
         struct app_input in = o->in;
         in.operand[0] = o->config;

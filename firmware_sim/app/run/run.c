@@ -24,8 +24,7 @@ static void say_sights(const struct site *site)
         n++;
     }
     if (n == 0) return;
-    fprintf(stderr, "%s: visibility maps of %u station%s in %.2f s, %.1f MiB\n", app_program, n, n > 1 ? "s" : "",
-            build_s, mib);
+    app_say("visibility maps of %u station%s in %.2f s, %.1f MiB", n, n > 1 ? "s" : "", build_s, mib);
 }
 
 /* A user who wonders why the head is not as configured finds the reason here. */
@@ -44,18 +43,16 @@ static void say_what_runs(const struct config *cfg, const struct site *site, con
 {
     struct bvh_info info;
     bvh_get_info(site->bvh, &info);
-    fprintf(stderr, "%s: %s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u\n",
-            app_program, cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_all,
-            site->scene->n_surfaces, info.build_s, (double)info.bytes / (double)scene_n_kept(site->scene), info.packet);
+    app_say("%s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u",
+            cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_all, site->scene->n_surfaces,
+            info.build_s, (double)info.bytes / (double)scene_n_kept(site->scene), info.packet);
     if (!config_is_alone(cfg))
-        fprintf(
-            stderr,
-            "%s: it is the scanner of %u of %u stations; --set head.station=N serves the scanner of another station\n",
-            app_program, site_n_served(site), site->n_stations);
+        app_say("it is the scanner of %u of %u stations; --set head.station=N serves the scanner of another station",
+                site_n_served(site), site->n_stations);
     say_sights(site);
     char plan[512];
     site_plan_text(site, plan, sizeof plan);
-    fprintf(stderr, "%s: plan: %s\n", app_program, plan);
+    app_say("plan: %s", plan);
     run_say_links(loop);
 }
 
@@ -65,19 +62,8 @@ static void say_short_scan(const struct run_options *o, struct device *device)
     const double scan_s = 1e-9 * (double)device_scan_ns(device), tick_s = 1e-9 * (double)device_tick_ns(device);
     if (o->quiet || !o->device.start || app_interrupted() || device_last_scan(device, NULL) != 1) return;
     if (scan_s <= 0.0 || scan_s + 1.5 * tick_s > o->device.duration_s) return;
-    fprintf(stderr, "%s: the scan was over after %.3f s, before --duration %.10g: %s\n", app_program, scan_s,
-            o->device.duration_s,
+    app_say("the scan was over after %.3f s, before --duration %.10g: %s", scan_s, o->device.duration_s,
             o->frames_given ? "all its frames were scanned" : "its path ended, or it was stopped");
-}
-
-static int serve(const struct run_options *o, struct loop *loop, struct device *device, struct sh_err *err)
-{
-    struct loop_stats stats;
-    int rc = run_serve(o, loop, &stats, err);
-    if (rc == SH_OK) rc = loop_check_links(loop, err);
-    say_short_scan(o, device);
-    run_warn_losses(&stats.counters);
-    return rc;
 }
 
 static void warn_of_replay(const struct run_options *o, const struct device *device)
@@ -136,17 +122,10 @@ static int open_settings(struct run_options *o, const struct config *cfg, struct
     return SH_OK;
 }
 
-/* A failure of the file is that of the run, unless the run has failed already. */
-static int close_settings(struct settings_file *settings, int rc, struct sh_err *err)
-{
-    struct sh_err why;
-    const int file_rc = settings_file_close(settings, &why);
-    return rc == SH_OK && file_rc != SH_OK ? sh_fail(err, file_rc, "%s", why.text) : rc;
-}
-
 static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct run_options *o = ctx;
+    struct sh_err why;
     struct watch *watch = NULL;
     struct site *site = NULL;
     struct device *device = NULL;
@@ -155,12 +134,8 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     o->device.report = &app_report_stderr;
     o->device.start |= cfg->head.start;
     o->device.one_scan = o->device.one_scan && o->device.start;
-    int rc = o->view ? run_add_view(cfg, err) : SH_OK;
+    int rc = run_complete_links(o, cfg, err);
     if (rc != SH_OK) return rc;
-    if (cfg->n_links == 0)
-        return sh_fail(err, SH_EINPUT,
-                       "%s: links: none; run needs at least one of pty, tcp, udp, usb, web, file, null, or --view",
-                       cfg->file);
     rc = tells_page(cfg) ? site_load_written_out(cfg, &app_report_stderr, &site, err) /* it looks at triangles */
                          : site_load(cfg, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->surfaces != NULL) rc = surfaces_write(o->surfaces, site, err);
@@ -177,12 +152,13 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
         if (!o->quiet) say_what_runs(cfg, site, loop);
         if (!o->quiet) say_stored(cfg, o->device.settings);
         warn_of_replay(o, device);
-        rc = serve(o, loop, device, err);
+        rc = run_serve(o, loop, err);
+        say_short_scan(o, device);
     }
     loop_free(loop);
     if (watch != NULL) page->close(watch);
     device_free(device);
-    rc = close_settings(o->device.settings, rc, err);
+    rc = app_and_also(rc, settings_file_close(o->device.settings, &why), &why, err);
     site_free(site);
     return rc;
 }
@@ -203,13 +179,14 @@ static int run_run(int argc, char **argv)
     if (status != APP_GO_ON) return status;
     o.frames_given = gives_frames(&o.in.sets);
     const char *path = o.in.operand[0];
-    const int is_capture = app_ends_in(path, ".pcap") || capture_is(path);
-    const int is_recording = is_capture || app_is_recording(path);
-    status = run_check_options(&o, is_recording);
+    const enum run_kind kind = app_ends_in(path, ".pcap") || capture_is(path) ? RUN_CAPTURE
+                               : app_is_recording(path)                       ? RUN_RECORDING
+                                                                              : RUN_HEAD;
+    status = run_check_options(&o, kind);
     if (status != APP_GO_ON) return status;
     app_catch_signals();
-    if (is_capture) return run_capture(&o);
-    return is_recording ? run_replay(&o) : app_with_config(&o.in, run_head, &o);
+    if (kind == RUN_CAPTURE) return run_capture(&o);
+    return kind == RUN_RECORDING ? run_replay(&o) : app_with_config(&o.in, run_head, &o);
 }
 
 #define AT(member) offsetof(struct run_options, member)
@@ -224,9 +201,10 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
-     .help = "end after S seconds of device time, counted from power-up, or with --start from the scan's start. With "
-             "--start the scan continues until then, frame after frame, and head.frames of the file is not used. "
-             "Without --duration and --frames the head runs until it is stopped"},
+     .help = "end after S seconds of device time, counted from power-up, or with --start from the scan's start, or "
+             "from a self-test that fails before one. With --start the scan continues until then, frame after frame, "
+             "and head.frames of the file is not used. Without --duration and --frames the head runs until it is "
+             "stopped"},
     {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
@@ -284,9 +262,9 @@ static const char NOTES[] =
     "the run ends with them. Queries are answered from the recording's descriptor;\n"
     "settings can't change. Faults on the wire and of links apply.\n"
     "\n"
-    "So may a capture of any device's traffic, FILE.pcap or FILE.pcapng of tcpdump, Wireshark or record --raw. Each\n"
-    "port of the device then has a link: a TCP port of this machine, or datagrams to the port that it sent to. A\n"
-    "client's requests are answered by what the device answered to the same bytes.\n";
+    "A capture of any device's traffic may take it, too: FILE.pcap or FILE.pcapng of tcpdump, Wireshark or\n"
+    "record --raw. Each port of the device then has a link: a TCP port of this machine, or datagrams to the port\n"
+    "that it sent to. A client's requests are answered by what the device answered to the same bytes.\n";
 
 const struct app_command app_run = {
     .name = "run",

@@ -7,6 +7,8 @@
 #include "firmware_sim/loop/loop.h"
 #include "firmware_sim/replay/replay.h"
 
+enum run_kind { RUN_HEAD, RUN_RECORDING, RUN_CAPTURE };
+
 struct run_options {
     struct app_input in;
     struct device_options device;
@@ -22,18 +24,18 @@ struct run_options {
     long device_port;    /* 0: not given */
 };
 
-/* serve.c: from the start of the loop to its end; writes the statistics. stats is filled in any case. */
-int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err);
-/* --view: a web link, where the configuration has none. */
-int run_add_view(struct config *cfg, struct sh_err *err);
+/* serve.c: runs the loop from its start to its end, writes the statistics, and warns of losses. */
+int run_serve(const struct run_options *o, struct loop *loop, struct sh_err *err);
+/* Adds a web link for --view, where there is none. SH_EINPUT: there is no link at all. */
+int run_complete_links(const struct run_options *o, struct config *cfg, struct sh_err *err);
 void run_say_links(const struct loop *loop);
-void run_warn_losses(const struct device_counters *c);
 
 /* replay.c */
 /* --link: adds one to the options. */
 int run_take_link(void *values, const char *text);
-/* Refuses options that don't go with a recording, or only with one: APP_GO_ON, or APP_USAGE with the reason printed. */
-int run_check_options(const struct run_options *o, int is_recording);
+/* Refuses options that are for something else than what is run, and those that contradict each other: APP_GO_ON, or
+ * APP_USAGE with the reason printed. */
+int run_check_options(const struct run_options *o, enum run_kind kind);
 /* Serves a recording. Returns the exit status. */
 int run_replay(struct run_options *o);
 

@@ -13,7 +13,7 @@
 
 enum { VIEW_SESSIONS = 4 };
 
-int run_add_view(struct config *cfg, struct sh_err *err)
+static int add_view(struct config *cfg, struct sh_err *err)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].type == LINK_WEB) return SH_OK;
@@ -24,12 +24,21 @@ int run_add_view(struct config *cfg, struct sh_err *err)
     return SH_OK;
 }
 
+int run_complete_links(const struct run_options *o, struct config *cfg, struct sh_err *err)
+{
+    if (o->view) return add_view(cfg, err);
+    if (cfg->n_links != 0) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: links: none; run needs at least one of pty, tcp, udp, usb, web, file, null, or --view",
+                   cfg->file);
+}
+
 void run_say_links(const struct loop *loop)
 {
     struct link_place place;
     for (uint32_t i = 0; loop_get_place(loop, i, &place); i++)
         if (strcmp(place.type, "fd") != 0) /* within this process */
-            fprintf(stderr, "%s: link %s%s%s\n", app_program, place.endpoint, place.protocol != NULL ? ", " : "",
+            app_say("link %s%s%s", place.endpoint, place.protocol != NULL ? ", " : "",
                     place.protocol != NULL ? place.protocol : "");
 }
 
@@ -155,7 +164,7 @@ static void put_stats(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-void run_warn_losses(const struct device_counters *c)
+static void warn_losses(const struct device_counters *c)
 {
     if (c->lost_pulses != 0)
         sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
@@ -183,9 +192,10 @@ static int close_files(struct loop *loop, struct loop_stats *stats, struct sh_er
     return SH_OK;
 }
 
-int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats *stats, struct sh_err *err)
+int run_serve(const struct run_options *o, struct loop *loop, struct sh_err *err)
 {
     struct run_stats run = {.loop = loop};
+    struct loop_stats *stats = &run.stats;
     int rc = app_begin_messages(err);
     if (rc == SH_OK) rc = loop_start(loop, err);
     if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoints, loop, err);
@@ -196,10 +206,10 @@ int run_serve(const struct run_options *o, struct loop *loop, struct loop_stats 
     else
         loop_end(loop);
     loop_join(loop, stats);
-    app_end_messages();
     struct sh_err why = {0};
     const int files_rc = close_files(loop, stats, &why);
-    run.stats = *stats;
     if (rc == SH_OK && o->stats != NULL) rc = app_write_json(o->stats, put_stats, &run, err);
-    return rc == SH_OK && files_rc != SH_OK ? sh_fail(err, files_rc, "%s", why.text) : rc;
+    warn_losses(&stats->counters);
+    rc = app_and_also(rc, files_rc, &why, err);
+    return rc == SH_OK ? loop_check_links(loop, err) : rc;
 }

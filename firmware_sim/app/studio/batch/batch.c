@@ -16,12 +16,6 @@ static int take_sweep(void *values, const char *text)
 
 /* ---- what was given */
 
-static int fail_format(const struct batch *b)
-{
-    return app_usage(&app_batch, "--format %s: allowed are up to %d endings of record, as in ply,las", b->format,
-                     RECORD_MAX_FILES);
-}
-
 /* Whether an ending is known is checked later, by `record` (batch_plan). */
 static int read_format(struct batch *b)
 {
@@ -30,7 +24,9 @@ static int read_format(struct batch *b)
     for (char *p = b->endings, *next; p != NULL; p = next) {
         if ((next = strchr(p, ',')) != NULL) *next++ = '\0';
         if (*p == '.') p++;
-        if (*p == '\0' || strchr(p, '/') != NULL || b->n_endings == RECORD_MAX_FILES) return fail_format(b);
+        if (*p == '\0' || strchr(p, '/') != NULL || b->n_endings == RECORD_MAX_FILES)
+            return app_usage(&app_batch, "--format %s: allowed are up to %d endings of record, as in ply,las",
+                             b->format, RECORD_MAX_FILES);
         b->ending[b->n_endings++] = p;
     }
     return APP_OK;
@@ -79,7 +75,8 @@ static int check_together(const struct batch *b)
     return APP_OK;
 }
 
-/* Only the manifest is checked here. The files of a job are checked when it begins. */
+/* Only the manifest is checked here. The names of jobs' files come from the plan, and batch_run compares them with the
+ * inputs. */
 static int check_manifest(const struct batch *b, struct sh_err *err)
 {
     char path[PATH_MAX];

@@ -142,9 +142,9 @@ int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *e
     if (rc == SH_OK) {
         const off_t before = lseek(fd, 0, SEEK_END);
         const ssize_t n = write(fd, line, len);
-        const int error = n >= 0 && n != (ssize_t)len ? ENOSPC : errno;
+        const int is_short = n >= 0 && n != (ssize_t)len;
         if (n != (ssize_t)len || fsync(fd) != 0) {
-            rc = sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(error));
+            rc = sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(is_short ? ENOSPC : errno));
             if (ftruncate(fd, before) != 0) sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(errno));
         }
     }

@@ -13,27 +13,23 @@
 enum { MOST_LINES = 20 };
 
 /* A job that isn't there, or isn't what it was. */
-struct gaps {
-    uint32_t n;
-};
-
-static void tell(struct gaps *gaps, uint32_t job, const char *name, const char *why)
+static void tell(uint32_t *n_gaps, uint32_t job, const char *name, const char *why)
 {
-    if (gaps->n++ < MOST_LINES) fprintf(stderr, "scanhead: job %u, %s: %s\n", job + 1, name, why);
+    if ((*n_gaps)++ < MOST_LINES) fprintf(stderr, "scanhead: job %u, %s: %s\n", job + 1, name, why);
 }
 
-static int check_job(struct batch *b, uint32_t job, struct gaps *gaps, struct sh_err *err)
+static int check_job(struct batch *b, uint32_t job, uint32_t *n_gaps, struct sh_err *err)
 {
     char name[BATCH_NAME_LEN];
     struct sh_err why = {0};
     batch_job_name(b, job, name);
     if (!b->job[job].is_done) {
-        tell(gaps, job, name, b->job[job].other != NULL ? b->job[job].other : "missing");
+        tell(n_gaps, job, name, b->job[job].other != NULL ? b->job[job].other : "missing");
         return SH_OK;
     }
     const int rc = batch_check_files(b, job, &why);
     if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
-    if (rc != SH_OK) tell(gaps, job, name, why.text);
+    if (rc != SH_OK) tell(n_gaps, job, name, why.text);
     return SH_OK;
 }
 
@@ -55,10 +51,10 @@ static int check_engines(const struct batch *b, struct sh_err *err)
     return SH_OK;
 }
 
-static int check_jobs(struct batch *b, struct gaps *gaps, struct sh_err *err)
+static int check_jobs(struct batch *b, uint32_t *n_gaps, struct sh_err *err)
 {
     for (uint32_t i = 0; i < b->n_jobs; i++) {
-        int rc = check_job(b, i, gaps, err);
+        int rc = check_job(b, i, n_gaps, err);
         if (rc != SH_OK) return rc;
         if (!b->quiet) sh_progress(&app_report_seconds, "checking files", (double)i / b->n_jobs);
     }
@@ -156,15 +152,15 @@ static int check_folder(const struct batch *b, struct sh_err *err)
 
 int batch_merge(struct batch *b)
 {
-    struct gaps gaps = {0};
+    uint32_t n_gaps = 0;
     struct sh_err err = {0};
     int rc = check_folder(b, &err);
     if (rc == SH_OK) rc = batch_find_done(b, 1, &err);
     if (rc == SH_OK) rc = check_engines(b, &err);
-    if (rc == SH_OK) rc = check_jobs(b, &gaps, &err);
-    if (rc == SH_OK && gaps.n > MOST_LINES) fprintf(stderr, "scanhead: and %u more\n", gaps.n - MOST_LINES);
-    if (rc == SH_OK && gaps.n != 0)
-        rc = sh_fail(&err, SH_EIO, "%s: %u of %u jobs are incomplete; run their shards again", b->dir, gaps.n,
+    if (rc == SH_OK) rc = check_jobs(b, &n_gaps, &err);
+    if (rc == SH_OK && n_gaps > MOST_LINES) fprintf(stderr, "scanhead: and %u more\n", n_gaps - MOST_LINES);
+    if (rc == SH_OK && n_gaps != 0)
+        rc = sh_fail(&err, SH_EIO, "%s: %u of %u jobs are incomplete; run their shards again", b->dir, n_gaps,
                      b->n_jobs);
     if (rc == SH_OK) warn_of_strangers(b);
     if (rc == SH_OK) rc = write_whole(b, &err);

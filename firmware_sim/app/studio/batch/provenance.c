@@ -12,6 +12,7 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/sidecars.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/files.h"
 #include "firmware_sim/config/load.h"
 
 const char *batch_provenance_differs(const struct batch_provenance *a, const struct batch_provenance *b)
@@ -19,7 +20,7 @@ const char *batch_provenance_differs(const struct batch_provenance *a, const str
     if (strcmp(a->program, b->program) != 0) return "another release of the program";
     if (strcmp(a->configuration, b->configuration) != 0) return "another text of the configuration";
     if (strcmp(a->inputs, b->inputs) != 0)
-        return "another head profile, mesh, texture, trajectory, scenario or list of directions";
+        return "another input file (head profile, mesh, texture, copies, trajectory, pulse, directions or scenario)";
     if (strcmp(a->job, b->job) != 0) return "another station, other values of keys or other options";
     return strcmp(a->engine, b->engine) != 0 ? "a processor or an Embree of another kind" : NULL;
 }
@@ -128,10 +129,10 @@ static const char *sha_of(struct inputs *in, const char *path)
     return k->sha;
 }
 
-/* A file with what it is for; an empty path is none. */
+/* A file with what it is for. */
 static void take_file(struct inputs *in, const char *what, const char *path)
 {
-    if (in->rc != SH_OK || path[0] == '\0') return;
+    if (in->rc != SH_OK) return;
     take_text(&in->ctx, what);
     take_text(&in->ctx, sha_of(in, path));
 }
@@ -151,10 +152,9 @@ static int keep_sidecar(void *ctx, const char *name, const char *path)
     return SH_ENOMEM;
 }
 
-/* The mesh, and what it names; a large file is searched once. */
-static void take_mesh(struct inputs *in, const char *path)
+/* Takes what a mesh names; a large file is searched once. */
+static void take_sidecars(struct inputs *in, const char *path)
 {
-    take_file(in, "mesh", path);
     if (in->rc != SH_OK) return;
     struct batch_known *k = provenance_find(in->cache, path); /* it is there by now */
     if (!k->is_searched) {
@@ -168,10 +168,14 @@ static void take_mesh(struct inputs *in, const char *path)
         take_file(in, in->cache->known[at].sidecar[i], in->cache->known[at].sidecar[i + 1]);
 }
 
-static void take_head(struct inputs *in, const struct config *cfg)
+/* Sidecars are looked for in lists of copies, too, which name none. */
+static int take_input(void *ctx, const char *key, const char *path, int is_written)
 {
-    take_file(in, "profile", cfg->profile_file);
-    take_file(in, "directions", cfg->profile.arrangement.directions);
+    struct inputs *in = ctx;
+    if (is_written) return SH_OK;
+    take_file(in, key, path);
+    if (strncmp(key, "scene.meshes", strlen("scene.meshes")) == 0) take_sidecars(in, path);
+    return in->rc;
 }
 
 /* Stations may have scanners of their own. */
@@ -182,7 +186,7 @@ static void take_other_heads(struct inputs *in, const struct config *cfg)
     for (uint32_t i = 0; i < cfg->n_stations && in->rc == SH_OK; i++) {
         if (config_serves(cfg, i) || cfg->station[i].scanner != i + 1) continue;
         in->rc = config_load_scanner(cfg, i + 1, own, in->err);
-        take_head(in, own);
+        if (in->rc == SH_OK) config_each_file(own, take_input, in);
     }
     free(own);
 }
@@ -194,13 +198,8 @@ int batch_provenance_of(const struct config *cfg, struct batch_cache *cache, str
     const char *text = sha_of(&in, cfg->file);
     snprintf(made->configuration, sizeof made->configuration, "%s", text);
     sha256_init(&in.ctx);
-    take_head(&in, cfg);
-    if (!config_is_alone(cfg)) take_other_heads(&in, cfg);
-    for (uint32_t i = 0; i < cfg->scene.n_meshes; i++)
-        take_mesh(&in, cfg->scene.mesh[i].file);
-    take_file(&in, "trajectory", cfg->platform.file);
-    take_file(&in, "waypoints", cfg->platform.waypoints);
-    take_file(&in, "scenario", cfg->scenario_file);
+    if (in.rc == SH_OK) config_each_file(cfg, take_input, &in);
+    if (in.rc == SH_OK && !config_is_alone(cfg)) take_other_heads(&in, cfg);
     take_hex(&in.ctx, made->inputs);
     return in.rc;
 }

@@ -21,7 +21,7 @@ struct batch_provenance {
     char program[32];                  /* its version */
     char engine[96];                   /* what finds hits on that machine (bvh_engine) */
     char configuration[BATCH_SHA_LEN]; /* the text of the file */
-    char inputs[BATCH_SHA_LEN];        /* head profile, meshes and what they name, trajectory, scenario */
+    char inputs[BATCH_SHA_LEN];        /* all files that the configuration names, and those that its meshes name */
     char job[BATCH_SHA_LEN];           /* station, values of keys, options */
 };
 

@@ -68,8 +68,8 @@ static int add_list(struct batch_sweep *s, const char *values, struct sh_err *er
     }
 }
 
-/* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Twelve digits: 0.3 and not
- * 0.30000000000000004. */
+/* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Values are rounded where a double of the
+ * range's size ends: 0.3 and not 0.30000000000000004, 0 and not 5.5e-17. */
 static int add_range(struct batch_sweep *s, const char *values, const double range[3], struct sh_err *err)
 {
     const double steps = floor((range[1] - range[0]) / range[2] + 1e-9);
@@ -80,9 +80,12 @@ static int add_range(struct batch_sweep *s, const char *values, const double ran
     if (steps >= BATCH_MAX_VALUES)
         return sh_fail(err, SH_EINPUT, "--sweep %s=%s: %.9g values; allowed at most %d", s->key, values, steps + 1.0,
                        BATCH_MAX_VALUES);
+    const double decimals = 14.0 - floor(log10(fmax(fabs(range[0]), fabs(range[1]))));
+    const double per_unit = pow(10.0, fmin(fmax(decimals, 0.0), 300.0));
     for (int i = 0, rc; i <= (int)steps; i++) {
         char text[32];
-        const int n = snprintf(text, sizeof text, "%.12g", range[0] + i * range[2]);
+        const double value = round((range[0] + i * range[2]) * per_unit) / per_unit;
+        const int n = snprintf(text, sizeof text, "%.15g", value + 0.0); /* no -0 */
         if ((rc = add_value(s, text, (size_t)n, err)) != SH_OK) return rc;
     }
     return SH_OK;
@@ -176,12 +179,6 @@ static uint32_t sweep_take_number(const char **p, uint32_t max)
     return number <= max ? (uint32_t)number : 0;
 }
 
-static int fail_stations(const char *text, struct sh_err *err)
-{
-    return sh_fail(err, SH_EINPUT, "--stations %s: allowed all, or rising numbers from 1 to %d, as in 1,3-5", text,
-                   CONFIG_MAX_STOPS);
-}
-
 int batch_stations_parse(const char *text, struct batch_stations *stations, struct sh_err *err)
 {
     uint32_t last = 0;
@@ -195,7 +192,9 @@ int batch_stations_parse(const char *text, struct batch_stations *stations, stru
             p++;
             to = sweep_take_number(&p, CONFIG_MAX_STOPS);
         }
-        if (from <= last || to < from || (*p != ',' && *p != '\0')) return fail_stations(text, err);
+        if (from <= last || to < from || (*p != ',' && *p != '\0'))
+            return sh_fail(err, SH_EINPUT, "--stations %s: allowed all, or rising numbers from 1 to %d, as in 1,3-5",
+                           text, CONFIG_MAX_STOPS);
         for (last = from; last <= to; last++)
             stations->number[stations->n++] = last;
         last = to;

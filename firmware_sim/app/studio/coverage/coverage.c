@@ -211,12 +211,13 @@ static int check_next(struct coverage_run *r)
 {
     struct coverage_next_options *o = &r->o;
     const int asks = o->grid_m > 0.0 || o->candidates != NULL;
-    const char *option = o->step_deg >= 0.0 ? "--step-deg" : o->scans > 0 ? "--scans" : NULL;
+    o->step_given = o->step_deg >= 0.0;
+    const char *option = o->step_given ? "--step-deg" : o->scans > 0 ? "--scans" : NULL;
     if (o->height_m >= 0.0 && !(o->grid_m > 0.0)) return app_usage(&app_coverage, "--height: allowed only with --grid");
     if (option != NULL && !asks)
-        return app_usage(&app_coverage, "%s: allowed only with --grid and --candidates", option);
+        return app_usage(&app_coverage, "%s: allowed only with --grid or --candidates", option);
     if (o->height_m < 0.0) o->height_m = HEIGHT_M;
-    if (o->step_deg < 0.0) o->step_deg = STEP_DEG;
+    if (!o->step_given) o->step_deg = STEP_DEG;
     if (o->scans < 0) o->scans = SCANS;
     for (int i = 0; i < 3; i++)
         o->area_m[0][i] = o->area_m[1][i] = (double)NAN;
@@ -292,7 +293,8 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "candidates", "FILE.csv", .at = AT(o.candidates), .file = APP_READS,
      .help = "compare the places in a file with the columns x_m,y_m,z_m of the head's origin, and perhaps heading_deg"},
     {APP_NUMBER, "step-deg", "D", .min = 0.2, .max = 30.0, .at = AT(o.step_deg),
-     .help = "angle between the rays by which places are compared (default 1)"},
+     .help = "angle between the rays by which places are compared (default 1). Rays of heads that scan a plane or have "
+             "several beams are their pulses"},
     {APP_WHOLE, "scans", "K", .min = 1, .max = COVERAGE_MOST_SCANS, .at = AT(o.scans),
      .help = "scan the K best places of each round as a whole, and take the best one (default 3)"},
     OPTION_SET,

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "firmware_sim/app/options.h"
 #include "firmware_sim/config/profile.h"
 
 static const double LEAST_FRONT = 0.5;
@@ -224,17 +225,12 @@ void coverage_next_free(struct coverage_next *next, struct coverage_finder *find
 
 int coverage_next_area(const char *text, double area_m[2][3])
 {
-    double v[6];
-    int n = 0, end = 0;
-    for (; n < 6 && sscanf(text, n == 0 ? "%lf%n" : ",%lf%n", &v[n], &end) == 1; n++) {
-        if (!isfinite(v[n])) return 0;
-        text += end;
-    }
-    if (*text != '\0' || (n != 4 && n != 6)) return 0;
+    double v[6] = {[4] = (double)NAN, [5] = (double)NAN};
+    if (!app_read_numbers(text, ',', v, 4) && !app_read_numbers(text, ',', v, 6)) return 0;
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 2; k++)
             area_m[i][k] = v[2 * i + k];
-    area_m[0][2] = n == 6 ? v[4] : (double)NAN;
-    area_m[1][2] = n == 6 ? v[5] : (double)NAN;
+    area_m[0][2] = v[4];
+    area_m[1][2] = v[5];
     return area_m[0][0] < area_m[1][0] && area_m[0][1] < area_m[1][1] && !(area_m[0][2] > area_m[1][2]);
 }

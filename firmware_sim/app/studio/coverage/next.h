@@ -14,6 +14,7 @@ struct coverage_next_options {
     double area_m[2][3];    /* of the grid: least, most x, y, floor; NaN: the scene's */
     const char *candidates; /* a file of places instead; NULL: none */
     double step_deg;        /* between rays */
+    int step_given;         /* an error where rays are pulses of the head */
     long scans;             /* of the best places each round */
 };
 

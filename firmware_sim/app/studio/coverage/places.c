@@ -10,6 +10,7 @@
 #include "core/studio/viewpoint.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/coverage/next.h"
+#include "firmware_sim/config/profile.h"
 #include "firmware_sim/config/places.h"
 
 enum { MOST_PLACES = 100000, PULSES = 40000 };
@@ -102,11 +103,6 @@ static int read_candidates(struct coverage_finder *f, struct sh_err *err)
     return rc;
 }
 
-static int find_places(struct coverage_finder *f, struct sh_err *err)
-{
-    return f->o->candidates != NULL ? read_candidates(f, err) : find_on_grid(f, err);
-}
-
 /* ---- directions, of a level head with heading 0 */
 
 static int add_direction(struct coverage_finder *f, size_t room[2], const double dir[3], double sr, struct sh_err *err)
@@ -158,7 +154,7 @@ static int draw_directions(struct coverage_finder *f, struct sh_err *err)
     const struct schedule_segment *seg = &at.scan.segment;
     const uint64_t all = seg->end_pulse - seg->k0, n = all < PULSES ? all : PULSES;
     for (uint64_t i = 0; i < n && rc == SH_OK; i++) {
-        const uint64_t k = seg->k0 + all / n * i;
+        const uint64_t k = seg->k0 + all / n * i + all % n * i / n;
         struct schedule_line line;
         schedule_get_line(seg, schedule_line_of(seg, k), &line);
         if (k < line.cast0 || k >= line.cast_end) continue;
@@ -173,7 +169,13 @@ static int draw_directions(struct coverage_finder *f, struct sh_err *err)
 static int choose_directions(struct coverage_finder *f, struct sh_err *err)
 {
     const enum emitter_kind kind = f->site->emitter.kind;
-    int rc = kind == EMITTER_PLANAR || kind == EMITTER_BEAMS ? draw_directions(f, err) : spread_directions(f, err);
+    const int of_pulses = kind == EMITTER_PLANAR || kind == EMITTER_BEAMS;
+    if (of_pulses && f->o->step_given)
+        return sh_fail(err, SH_EINPUT,
+                       "--step-deg: with head profile %s, which scans planes or cones, places are compared by its "
+                       "pulses; allowed without it",
+                       site_profile(f->site)->name);
+    int rc = of_pulses ? draw_directions(f, err) : spread_directions(f, err);
     f->next->directions = f->n_dir;
     f->next->step_deg = f->o->step_deg;
     if (rc == SH_OK && f->n_dir == 0)
@@ -189,6 +191,6 @@ int coverage_next_open(const struct coverage_next_options *options, const struct
 {
     *finder =
         (struct coverage_finder){.o = options, .result = result, .site = result->site, .report = report, .next = next};
-    int rc = find_places(finder, err);
+    const int rc = options->candidates != NULL ? read_candidates(finder, err) : find_on_grid(finder, err);
     return rc == SH_OK ? choose_directions(finder, err) : rc;
 }

@@ -114,12 +114,6 @@ static int check_draft(const struct init_run *run, const char *draft, struct sh_
     return rc;
 }
 
-static int refuse_to_overwrite(const struct init_run *run, struct sh_err *err)
-{
-    return sh_fail(err, SH_EINPUT, "%s already exists; give another name with -o, or --force to replace it",
-                   run->output);
-}
-
 static int write_checked(const struct init_run *run, const struct init_text *text, struct sh_err *err)
 {
     char draft[CONFIG_PATH_LEN];
@@ -217,7 +211,8 @@ static int init(struct init_run *run, struct sh_err *err)
 {
     struct scene *scene = NULL;
     if (!run->force && faccessat(AT_FDCWD, run->output, F_OK, AT_SYMLINK_NOFOLLOW) == 0)
-        return refuse_to_overwrite(run, err);
+        return sh_fail(err, SH_EINPUT, "%s already exists; give another name with -o, or --force to replace it",
+                       run->output);
     int rc = app_check_files(&run->in, NULL, err);
     if (rc == SH_OK) rc = init_load_mesh(&run->wish, run->name, &scene, &run->as, err);
     if (rc == SH_OK) rc = write_config(run, scene, err);

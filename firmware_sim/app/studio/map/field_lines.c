@@ -2,6 +2,7 @@
 #include "firmware_sim/app/studio/map/field_lines.h"
 
 #include "core/mat3.h"
+#include "core/vec3.h"
 #include "drivers/protocol/cola_field.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/placement.h"
@@ -14,8 +15,7 @@ static int outline(const struct cola_shape *shape, const struct placement *at, f
     int rc = SH_OK;
     for (uint32_t i = 0; i < n; i++) {
         mat3_apply(at->rotation, (const double[3]){corner_m[i][0], corner_m[i][1], 0.0}, prcs[i]);
-        for (int k = 0; k < 3; k++)
-            prcs[i][k] += at->position_m[k];
+        vec3_add(prcs[i], at->position_m, prcs[i]);
     }
     for (uint32_t i = 0; i < n && rc == SH_OK; i++)
         rc = take(ctx, prcs[i], prcs[i + 1 < n ? i + 1 : 0], err);

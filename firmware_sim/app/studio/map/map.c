@@ -41,7 +41,8 @@ static void to_map(const struct map_run *run, const double p_prcs[3], double p[3
 {
     memcpy(p, p_prcs, 3 * sizeof *p);
     if (!run->turned) return;
-    const double d[3] = {p_prcs[0] - run->origin_m[0], p_prcs[1] - run->origin_m[1], p_prcs[2] - run->origin_m[2]};
+    double d[3];
+    vec3_sub(p_prcs, run->origin_m, d);
     mat3_apply(run->to_enu, d, p);
 }
 
@@ -105,13 +106,27 @@ static int add_station(struct map_run *run, const struct site_station *station, 
     return map_add_station(run->map, &mark, err);
 }
 
-static int add_field_line(void *ctx, const double a[3], const double b[3], struct sh_err *err)
+static int add_line(const struct map_run *run, enum map_line kind, const double a[3], const double b[3],
+                    struct sh_err *err)
 {
-    struct map_run *run = ctx;
     double from[3], to[3];
     to_map(run, a, from);
     to_map(run, b, to);
-    return map_add_field(run->map, from, to, err);
+    return map_add_line(run->map, kind, from, to, err);
+}
+
+static void warn_left_out(const struct map_run *run, enum map_line kind, const char *what)
+{
+    struct map_counts counts;
+    map_get_counts(run->map, &counts);
+    if (counts.lines_left_out[kind] > 0)
+        sh_warn(&app_report_stderr, "map: %llu %s are not drawn; a map has up to %d of them",
+                (unsigned long long)counts.lines_left_out[kind], what, (int)MAP_MAX_LINES);
+}
+
+static int add_field_line(void *ctx, const double a[3], const double b[3], struct sh_err *err)
+{
+    return add_line(ctx, MAP_FIELD, a, b, err);
 }
 
 /* Fields belong to links, and so to the scanner of head.station alone. */
@@ -196,11 +211,7 @@ static int create_map(struct map_run *run, const struct site *site, struct sh_er
 
 static int add_edge(void *ctx, const double a[3], const double b[3], struct sh_err *err)
 {
-    struct map_run *run = ctx;
-    double from[3], to[3];
-    to_map(run, a, from);
-    to_map(run, b, to);
-    return map_add_edge(run->map, from, to, err);
+    return add_line(ctx, MAP_OPEN_EDGE, a, b, err);
 }
 
 /* Edges of what stands still are marked; those of bodies that move are not. */
@@ -212,12 +223,10 @@ static int mark_open_edges(struct map_run *run, const struct scene *scene, struc
     if (!run->open_edges) return SH_OK;
     const int rc = scene_objects_find(scene, &edges, &app_report_seconds, &objects, err);
     scene_objects_free(&objects);
+    warn_left_out(run, MAP_OPEN_EDGE, "open edges");
     map_get_counts(run->map, &counts);
-    if (counts.edges_left_out > 0)
-        sh_warn(&app_report_stderr, "map: %llu open edges are not drawn; a map has up to %d of them",
-                (unsigned long long)counts.edges_left_out, (int)MAP_MAX_EDGES);
-    else if (rc == SH_OK && !run->quiet)
-        fprintf(stderr, "scanhead: %llu open edges\n", (unsigned long long)counts.edges);
+    if (rc == SH_OK && !run->quiet)
+        fprintf(stderr, "scanhead: %llu open edges drawn\n", (unsigned long long)counts.lines[MAP_OPEN_EDGE]);
     return rc;
 }
 
@@ -261,6 +270,7 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = mark_open_edges(run, heads->first->site->scene, err);
     if (rc == SH_OK) rc = heads_record(heads, &options, &result, err);
     if (rc == SH_OK && app_interrupted()) rc = sh_fail(err, SH_EIO, "interrupted; nothing written");
+    if (rc == SH_OK) warn_left_out(run, MAP_FIELD, "lines of monitored fields");
     if (rc == SH_OK) rc = write_map(run, heads->first->site->n_stations, err);
     if (rc == SH_OK && !run->quiet) {
         struct map_counts counts;

@@ -149,29 +149,21 @@ struct showing {
     const struct sh_report *report;
 };
 
-/* Points of the geo layout are in output.crs; they are brought to the scene's frame, one by one. */
+/* Points of the geo layout are in output.crs; they are brought to the scene's frame. */
 static int to_scene(struct showing *s, const struct config *cfg, struct sh_err *err)
 {
-    struct cloud *c = &s->cloud;
-    for (size_t i = 0; i < c->n; i++) {
-        const unsigned station = c->station != NULL ? c->station[i] : 1;
-        if (station > s->site->n_stations)
-            return sh_fail(err, SH_EINPUT, "%s: point %zu is of station %u; %s has %u", s->path, i + 1, station,
-                           cfg->file, s->site->n_stations);
-        const struct georef *georef = cfg->output.layout == LINE_GEO ? s->site->station[station - 1].georef : NULL;
-        const int epsg = georef != NULL ? georef_epsg(georef) : 0;
-        if (c->epsg != CLOUD_EPSG_UNKNOWN && c->epsg != epsg)
-            return sh_fail(err, SH_EINPUT,
-                           "%s: its points are in EPSG %lld, those of %s are in EPSG %d (0: scene frame)", s->path,
-                           (long long)c->epsg, cfg->file, epsg);
-        if (georef == NULL || isnan(c->xyz_m[i][0])) continue;
-        double d_crs[3];
-        georef_difference(georef, c->xyz_m[i], d_crs);
-        georef_reverse(georef, d_crs, c->xyz_m[i]);
-        if ((i & 0xfff) == 0) sh_progress(s->report, "bringing the points to the scene", (double)i / (double)c->n);
-        if ((i & 0xfff) == 0 && app_interrupted()) return sh_fail_stopped(err);
-    }
-    return SH_OK;
+    const struct site *site = s->site;
+    const struct georef **georef = calloc(site->n_stations, sizeof *georef);
+    struct cloud_site of = {.georef = cfg->output.layout == LINE_GEO ? georef : NULL,
+                            .n_stations = site->n_stations,
+                            .threads = config_threads(cfg)};
+    struct sh_err why = {0};
+    if (georef == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", site->n_stations);
+    for (uint32_t i = 0; i < site->n_stations; i++)
+        georef[i] = site->station[i].georef;
+    const int rc = cloud_into_scene(&s->cloud, &of, s->report, &why);
+    free(georef);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %.300s", s->path, why.text);
 }
 
 static int check_columns(const struct showing *s, struct sh_err *err)

@@ -62,8 +62,12 @@ int record_files_have(const struct record_files *files, const char *ending)
 
 int record_files_have_colours(const struct record_files *files)
 {
-    for (int i = 0; i < files->n; i++)
-        if (files->file[i].ops->track.wants_colours) return 1;
+    const unsigned columns = files->recorder.columns;
+    const int ply_has = columns == 0 || (columns & PLY_COLOUR) != 0;
+    for (int i = 0; i < files->n; i++) {
+        const struct recorder_ops *ops = files->file[i].ops;
+        if (ops->track.wants_colours && (ply_has || strcmp(ops->ending, ".ply") != 0)) return 1;
+    }
     return 0;
 }
 
@@ -357,10 +361,10 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
     } else if (files->spooling && is_other) {
         rc = add_spool(files, err);
     }
-    if (frame->type == SCANHEAD_POINTS) files->has_points = 1;
     if (rc == SH_OK && files->spooling) rc = colour_spool_frame(files->spool[files->n_spools - 1], sh, frame, err);
     for (int i = 0; i < files->n && rc == SH_OK; i++)
         if (!files->spooling || !files->file[i].ops->track.wants_colours)
             rc = recorder_frame(files->file[i].rec, sh, frame, err);
+    if (rc == SH_OK && frame->type == SCANHEAD_POINTS) files->has_points = 1;
     return rc;
 }

@@ -29,7 +29,7 @@ struct record_files {
     } file[RECORD_MAX_FILES];
     int n;
     unsigned part;               /* number of the scan in split files, from 1 */
-    int has_points;              /* in the present files */
+    int has_points;              /* all present files took some */
     int spooling;                /* the frames of the present files wait for the limits */
     struct colour_spool **spool; /* one for each head that comes, in their order */
     uint32_t n_spools;

@@ -216,11 +216,8 @@ static int record_one(struct heads *heads, const struct recording_options *optio
     const uint32_t first = options->first_station != 0 ? options->first_station : own;
     const uint32_t last = options->first_station != 0 ? options->last_station : own;
     memset(result, 0, sizeof *result);
-    for (uint32_t s = first; s <= last && s <= site->n_stations && heads->fits != NULL; s++) {
-        const int rc = heads->fits(heads->ctx, site, s, err);
-        if (rc != SH_OK) return rc;
-    }
-    return recording_run(heads->first->sh, options, result, err);
+    const int rc = check_fits(heads, 0, site, first, last, err);
+    return rc == SH_OK ? recording_run(heads->first->sh, options, result, err) : rc;
 }
 
 int heads_record(struct heads *heads, const struct recording_options *options, struct recording_result *result,
@@ -229,10 +226,10 @@ int heads_record(struct heads *heads, const struct recording_options *options, s
     const uint32_t last = options->last_station;
     const int64_t start_ns = clock_now_ns();
     int rc = SH_OK;
-    if (heads->n == 1 || options->first_station == 0) return record_one(heads, options, result, err);
-    if (last > heads->first->site->n_stations)
+    if (options->first_station != 0 && last > heads->first->site->n_stations)
         return sh_fail(err, SH_EINPUT, "%s: there is no station %u; allowed 1 to %u", heads->one[0].cfg->file, last,
                        heads->first->site->n_stations);
+    if (heads->n == 1 || options->first_station == 0) return record_one(heads, options, result, err);
     memset(result, 0, sizeof *result);
     rc = check_all(heads, options->first_station, last, err);
     for (uint32_t from = options->first_station, to; from <= last && rc == SH_OK && result->missing[0] == '\0';

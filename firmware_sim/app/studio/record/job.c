@@ -108,13 +108,15 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     const int is_cut = rc == SH_ERESET || rc == SH_ECLOSED; /* by the bus; the stream ended within a scan */
     const int has_figures = rc == SH_OK || rc == SH_ELOST || is_cut;
     const int whole = rc == SH_OK && recording_check_complete(result, NULL) == SH_OK;
-    const int keep = r->only_whole ? whole : result->points != 0 || (rc == SH_OK && result->missing[0] == '\0');
+    const int has_points = result->points != 0 && r->files.has_points; /* a format may have refused the first ones */
+    const int keep = r->only_whole ? whole : has_points || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
     int after = close_files(r, keep && !is_stopped(r), &why);
     if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why.text);
     if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     if (!has_figures || r->stats == NULL) return rc;
     after = app_write_json(r->stats, recording_put, result, &why);
+    if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
     return rc == SH_OK && after != SH_OK ? sh_fail(err, after, "%s", why.text) : rc;
 }
 

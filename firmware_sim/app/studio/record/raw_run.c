@@ -164,6 +164,7 @@ int raw_run(struct raw *r, struct sh_err *err)
     if (r->capture.packets != 0 && after == SH_OK && !r->quiet) fprintf(stderr, "scanhead: %s in %s\n", text, r->path);
     if (has_figures && r->stats != NULL) {
         after = app_write_json(r->stats, put_stats, r, &why);
+        if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
         if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
     }
     r->ops->close(r);

@@ -214,7 +214,8 @@ int talk_wait_for(const struct talk *talk, struct pollfd *fds, int *timeout_ms)
         const short events = (short)((is_free(end) ? POLLIN : 0) | (other->sent < other->len ? POLLOUT : 0));
         if (end->fd >= 0 && events != 0) fds[n++] = (struct pollfd){.fd = end->fd, .events = events};
     }
-    if (talk->end[0].fd < 0 && talk->next_send<talk->r->n_sends && * timeout_ms> LOOK_MS) *timeout_ms = LOOK_MS;
+    const int waits_to_send = talk->end[0].fd < 0 && talk->next_send < talk->r->n_sends;
+    if (waits_to_send && *timeout_ms > LOOK_MS) *timeout_ms = LOOK_MS;
     return n;
 }
 

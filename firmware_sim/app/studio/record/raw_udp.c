@@ -67,16 +67,15 @@ static int open_port(struct raw *r, struct port *p, int number, struct sh_err *e
         &r->capture, p->name, "Datagrams that scanhead received, with rebuilt headers; times are the kernel's.", err);
 }
 
-/* An own address may come late: an interface that is not up yet. */
-static int wait_for_address(struct raw *r, struct sh_err *err)
+/* An own address may come late: an interface that is not up yet. Where it does not come, open_port says why. */
+static void wait_for_address(const struct raw *r)
 {
     struct stamped_socket probe;
+    struct sh_err why;
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->wait_s);
-    int rc;
-    while ((rc = stamped_open(r->place.host, 0, &probe, err)) != SH_OK && clock_now_ns() < end_ns && !app_interrupted())
+    while (stamped_open(r->place.host, 0, &probe, &why) != SH_OK && clock_now_ns() < end_ns && !app_interrupted())
         poll(NULL, 0, RETRY_MS);
     stamped_close(&probe);
-    return rc;
 }
 
 static int udp_open(struct raw *r, struct sh_err *err)
@@ -85,7 +84,8 @@ static int udp_open(struct raw *r, struct sh_err *err)
     r->state = udp;
     if (udp == NULL || (udp->port = calloc((size_t)r->place.n_ports, sizeof *udp->port)) == NULL)
         return sh_fail(err, SH_ENOMEM, "no memory for %d sockets", r->place.n_ports);
-    int rc = wait_for_address(r, err);
+    wait_for_address(r);
+    int rc = SH_OK;
     for (int i = 0; i < r->place.n_ports && rc == SH_OK; i++) {
         udp->port[i].socket.fd = -1;
         udp->n++;

@@ -179,7 +179,7 @@ static int check_options(const struct record_line *r)
 static int check_commands(const struct record_line *r)
 {
     const int is_file = app_is_recording(r->in.operand[0]);
-    const char *option = r->job.station > 0 ? "--station" : r->job.recording.frames >= 0 ? "--frames" : NULL;
+    const char *option = r->job.station != 0 ? "--station" : r->job.recording.frames >= 0 ? "--frames" : NULL;
     if (option == NULL || (!is_file && !r->job.recording.listen)) return APP_OK;
     return app_usage(&app_record, "%s: %s; allowed with a CONFIG, and with a head on a wire without --listen", option,
                      is_file ? "a recorded stream has the scans that it has" : "--listen sends no command");
@@ -190,7 +190,8 @@ static int check_colours(const struct record_line *r)
     const enum colour_mode mode = r->job.files.recorder.colour.scale.mode;
     if (mode != COLOUR_NONE && !record_files_have_colours(&r->job.files))
         return app_usage(&app_record,
-                         "--colour: no .ply, .las, .ptx, .e57, .obj, .gltf, .glb or .fbx is among the files");
+                         "--colour: no .ply, .las, .ptx, .e57, .obj, .gltf, .glb or .fbx is among the files, or "
+                         "--ply-columns has no colour");
     if (r->has_rgb && mode != COLOUR_SOLID) return app_usage(&app_record, "--colour-rgb needs --colour solid");
     if (mode == COLOUR_SOLID && !r->has_rgb) return app_usage(&app_record, "--colour solid needs --colour-rgb R,G,B");
     if (r->limited && !colour_has_limits(mode))
@@ -253,6 +254,9 @@ int record_line_read(struct record_line *r, int argc, char **argv)
         return app_usage(
             &app_record,
             "--listen, --wait, --replug: a CONFIG runs in this process; allowed only with a head on a wire");
+    if (app_is_recording(r->in.operand[0]) && (r->job.wait_s > 0 || r->job.recording.replug_s > 0))
+        return app_usage(&app_record,
+                         "--wait, --replug: a recorded stream is there or not; allowed only with a head on a wire");
     if (r->job.files.split && r->job.each)
         return app_usage(&app_record,
                          "--split and --each: --split writes only files of each scan; allowed is one of them");

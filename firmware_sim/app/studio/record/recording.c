@@ -180,9 +180,15 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* The head was unplugged, or its bus reset: waits for it. Where it scans no more when it is back, the scan ended
- * meanwhile. Where it still scans, the rest of the scan will come. */
-static int replug(struct recording *r, int reset, struct sh_err *err)
+/* Whether that result says that the head was unplugged, or its bus reset, and it is to be waited for. */
+static int is_gone(const struct recording *r, int rc)
+{
+    return r->o->replug_s > 0.0 && (rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED);
+}
+
+/* Waits for a head that is gone. Where it scans no more when it is back, the scan ended meanwhile. Where it still scans,
+ * the rest of the scan will come. Its state is in r->reply. */
+static int replug(struct recording *r, int why, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
     int rc, scanning = 0;
@@ -194,7 +200,7 @@ static int replug(struct recording *r, int reset, struct sh_err *err)
     if (rc != SCANHEAD_OK) return sh_fail(err, SH_ELOST, "the head did not come back: %s", scanhead_error(r->sh));
     scanning = strncmp(r->reply, "s", 1) == 0; /* spin-up, scanning, spin-down */
     sh_warn(r->o->report, "the head is back");
-    *(reset ? &r->result->bus_resets : &r->result->replugs) += 1;
+    *(why == SCANHEAD_ERESET ? &r->result->bus_resets : &r->result->replugs) += 1;
     int within = r->result->counts.within;
     r->result->broken_scans += (uint64_t)(within && !r->broken);
     r->broken = within && scanning;
@@ -219,8 +225,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     const int reported = recording_report(r, err);
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
-    if ((rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED) && r->o->replug_s > 0.0)
-        return replug(r, rc == SCANHEAD_ERESET, err);
+    if (is_gone(r, rc)) return replug(r, rc, err);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
@@ -242,6 +247,10 @@ static int wait_idle(struct recording *r, struct sh_err *err)
     while (clock_now_ns() < deadline_ns) {
         if (is_interrupted(r)) return SH_OK;
         int rc = command(r, "HEAD:STAT?", err);
+        if (is_gone(r, rc)) {
+            rc = replug(r, rc, err);
+            deadline_ns = clock_now_ns() + (int64_t)BOOT_MS * 1000000;
+        }
         if (rc != SH_OK) return rc;
         if (strcmp(r->reply, "idle") == 0) return SH_OK;
         if (strcmp(r->reply, "scanning") == 0 || strcmp(r->reply, "fault") == 0 || strcmp(r->reply, "off") == 0)
@@ -267,6 +276,7 @@ static int look_for_end(struct recording *r, struct sh_err *err)
 {
     if (!has_lost_frames(r) || (r->o->listen && !(r->o->replug_s > 0.0))) return SH_OK;
     int rc = command(r, "HEAD:STAT?", err);
+    if (is_gone(r, rc)) return replug(r, rc, err);
     if (rc != SH_OK || strcmp(r->reply, "idle") != 0) return rc;
     sh_warn(r->o->report, "the scan's end was lost; the head is idle");
     r->scan_started = r->scan_over = 1;

@@ -59,12 +59,6 @@ void report_count(struct report_verdict *v, const struct deviation_head *head, d
     v->beyond += distance_m > bound_m;
 }
 
-static void verdict_say(struct report_verdict *v, enum report_judgement judgement, const char *text)
-{
-    v->judgement = judgement;
-    snprintf(v->text, sizeof v->text, "%s", text);
-}
-
 const char *report_judgement_name(enum report_judgement j)
 {
     return j == REPORT_WITHIN ? "within" : j == REPORT_BEYOND ? "beyond" : "not judged";
@@ -132,12 +126,13 @@ void report_judge_one(const struct report_subject *s, struct report_verdict *v)
 {
     const struct figures *f = s->figures;
     if (f->points == 0)
-        verdict_say(v, REPORT_NONE, "Not judged: there is no point of this station.");
+        snprintf(v->text, sizeof v->text, "Not judged: there is no point of this station.");
     else if (s->moving)
-        verdict_say(v, REPORT_NONE, "Not judged: the head moved, and the file doesn't say where each pulse began.");
+        snprintf(v->text, sizeof v->text,
+                 "Not judged: the head moved, and the file doesn't say where each pulse began.");
     else if (s->head->has_instrument_errors)
-        verdict_say(v, REPORT_NONE,
-                    "Not judged: the configuration has errors of the instrument, which move points on purpose.");
+        snprintf(v->text, sizeof v->text,
+                 "Not judged: the configuration has errors of the instrument, which move points on purpose.");
     else if (f->far > 0)
         beyond_everything(v, f, s->reach);
     else if (isfinite(v->bound_m) && can_judge_bound(s, v))

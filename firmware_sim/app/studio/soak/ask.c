@@ -9,6 +9,7 @@
 #include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/app/studio/soak/row.h"
 #include "firmware_sim/base/clock.h"
+#include "firmware_sim/command/head.h"
 #include "firmware_sim/fault/fault.h"
 
 /* On a busy machine a reply takes seconds behind the frames that a terminal still has to carry. */
@@ -25,9 +26,8 @@ static int is_count(const char *text)
 
 static int is_state(const char *text)
 {
-    static const char *const words[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
-    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (strcmp(text, words[i]) == 0) return 1;
+    for (int state = 0; state < HEAD_N_STATES; state++)
+        if (strcmp(text, head_state_name((enum head_state)state)) == 0) return 1;
     return 0;
 }
 

@@ -78,7 +78,7 @@ static int open_link(struct soak *soak, uint32_t i, const struct link_place *pla
                            : NULL;
     link->usable = link->not_soaked == NULL;
     if (!link->usable) return 0;
-    link->fact = soak_ledger_open();
+    link->fact = calloc(SOAK_RING, sizeof *link->fact);
     return link->fact != NULL ? 1 : -1;
 }
 

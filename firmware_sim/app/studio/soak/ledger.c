@@ -24,11 +24,6 @@
 /* Blocks are computed so far ahead, at most. */
 static const int64_t AHEAD_NS = 500000000, JUST_NS = 500000000;
 
-struct soak_fact *soak_ledger_open(void)
-{
-    return calloc(SOAK_RING, sizeof(struct soak_fact));
-}
-
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq)
 {
     struct soak_fact *fact = &link->fact[seq % SOAK_RING];

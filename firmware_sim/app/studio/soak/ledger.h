@@ -42,8 +42,6 @@ struct soak_act {
     int64_t t_ns; /* device time */
 };
 
-/* The frames of a ledger, SOAK_RING of them, for free(). NULL: no memory. */
-struct soak_fact *soak_ledger_open(void);
 /* The listener of the board. */
 void soak_heard(void *soak, const struct fault_note *note);
 void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, int64_t now_ns);

@@ -156,7 +156,7 @@ static int serve(const struct soak_options *o, struct soak *soak, struct soak_he
 static int say_result(const struct soak_options *o, struct soak *soak, struct sh_err *err)
 {
     soak_conclude(soak);
-    soak_print(soak, stdout);
+    soak_print(soak, verdicts_out(&o->verdicts));
     const int rc = o->verdicts.json != NULL ? app_write_json(o->verdicts.json, soak_put, soak, err) : SH_OK;
     if (rc != SH_OK || soak->n_failures == 0) return rc;
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
@@ -211,8 +211,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct soak_head head = {0};
     if (cfg->loop.pace == PACE_STEP)
         return sh_fail(err, SH_EINPUT, "loop.pace: step, but no client grants time; allowed realtime and fast");
-    if (o->link > (long)cfg->n_links)
-        return sh_fail(err, SH_EINPUT, "--link %ld: there is no such link; allowed 1 to %u", o->link, cfg->n_links);
+    if (soak_check_link(cfg, (uint32_t)o->link, err) != SH_OK) return SH_EINPUT;
     app_warn_settings_file(cfg, "a soak has the settings of the configuration");
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
@@ -272,7 +271,6 @@ static int check_options(const struct soak_options *o)
 static int run_theirs(struct soak_options *o)
 {
     struct verdict_options *v = &o->verdicts.options;
-    v->truth = o->device.truth;
     v->duration_s = o->duration_s;
     v->match_m = 1e-3 * o->match_mm;
     if (v->limit_s <= 0.0) v->limit_s = 10.0;
@@ -287,6 +285,7 @@ static int soak_run_command(int argc, char **argv)
     int status = app_parse(&app_soak, argc, argv, &o.in, &o);
     if (status == APP_GO_ON) status = check_options(&o);
     if (status != APP_GO_ON) return status;
+    o.verdicts.options.truth = o.device.truth;
     app_catch_signals();
     if (o.verdicts.options.command != NULL) return run_theirs(&o);
     return app_with_config(&o.in, soak_head, &o);
@@ -323,9 +322,9 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,
      .help = "write the verdict on the client as JUnit XML, too"},
     {APP_TEXT, "json", "FILE", .at = AT(verdicts.json), .file = APP_WRITES,
-     .help = "write the results as JSON, too; - is standard output"},
+     .help = "write the results as JSON, too; - is standard output, and the table then goes to standard error"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_WRITES,
-     .help = "write each fault that is injected as a line of JSON; - is standard output"},
+     .help = "write each fault that is injected as a line of JSON; - as with --json"},
     {APP_KEY, "pace", "PACE", .key = "loop.pace", .help = "realtime or fast"},
     OPTION_SET,
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},

@@ -34,6 +34,23 @@ static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t
         snprintf(to, cap, "%.*s", len, name);
 }
 
+FILE *verdicts_out(const struct verdicts *verdicts)
+{
+    const char *const file[] = {verdicts->json, verdicts->options.truth};
+    for (int i = 0; i < 2; i++)
+        if (file[i] != NULL && strcmp(file[i], "-") == 0) return stderr;
+    return stdout;
+}
+
+int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err)
+{
+    if (number <= cfg->n_links) return SH_OK;
+    if (cfg->n_links > 0)
+        return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", number, cfg->n_links);
+    return sh_fail(err, SH_EINPUT, "%s: links: there are none; needed is one, as in --set 'links=[{type: tcp}]'",
+                   cfg->file);
+}
+
 static int check_one(struct config *cfg, void *ctx, struct sh_err *err)
 {
     const struct verdicts_work *work = ctx;
@@ -42,8 +59,8 @@ static int check_one(struct config *cfg, void *ctx, struct sh_err *err)
         return sh_fail(err, SH_EINPUT,
                        "--client: loop.pace is not realtime, and the client has no other time; allowed is "
                        "realtime");
-    if (number > cfg->n_links)
-        return sh_fail(err, SH_EINPUT, "--link %u: there is no such link; allowed 1 to %u", number, cfg->n_links);
+    const int rc = soak_check_link(cfg, number, err);
+    if (rc != SH_OK) return rc;
     const enum link_type type = cfg->link[number - 1].type;
     if (type == LINK_FILE || type == LINK_NULL || type == LINK_WEB)
         return sh_fail(err, SH_EINPUT,
@@ -68,7 +85,7 @@ static int judge_one(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_ESTOPPED) return fail_stopped(work, err);
     if (rc != SH_OK) return rc;
     work->n++;
-    verdict_print(made, stdout);
+    verdict_print(made, verdicts_out(work->verdicts));
     fflush(stdout);
     return SH_OK;
 }
@@ -121,7 +138,8 @@ static int say_findings(const struct verdicts_work *work, struct sh_err *err)
         found += verdict_count(&work->made[i], VERDICT_FOUND);
         judged += VERDICT_N_CHECKS - verdict_count(&work->made[i], VERDICT_NOT_JUDGED);
     }
-    printf("findings: %u, of %u checks in %u scenario%s\n", found, judged, work->n, work->n == 1 ? "" : "s");
+    fprintf(verdicts_out(work->verdicts), "findings: %u, of %u checks in %u scenario%s\n", found, judged, work->n,
+            work->n == 1 ? "" : "s");
     return found == 0 ? SH_OK : sh_fail(err, SH_ESTATE, "soak: the client has findings: %u", found);
 }
 

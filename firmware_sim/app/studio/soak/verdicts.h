@@ -3,6 +3,8 @@
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_VERDICTS_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_VERDICTS_H
 
+#include <stdio.h>
+
 #include "firmware_sim/app/options.h"
 #include "firmware_sim/app/studio/verdict/verdict.h"
 
@@ -15,6 +17,10 @@ struct verdicts {
     const char *json, *junit;                     /* NULL: none */
 };
 
+/* Where sheets go: standard output, or standard error where --json or --truth has that. */
+FILE *verdicts_out(const struct verdicts *verdicts);
+/* SH_EINPUT where the configuration has no link of that number; 0 is none. */
+int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err);
 /* Prints the sheets. Returns the exit status: APP_FAILED where there are findings. */
 int verdicts_run(struct verdicts *verdicts, struct app_input *in);
 

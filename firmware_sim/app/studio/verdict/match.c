@@ -11,6 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/mat3.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/studio/verdict/match.h"
 #include "firmware_sim/app/studio/verdict/match_index.h"
 
@@ -25,20 +27,18 @@ struct way {
     double turn[9], at[3]; /* then this rotation, row by row, and this place */
 };
 
-static const double UNTURNED[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-
 static void match_go(const struct way *way, const double from[3], double to[3])
 {
     const double p[3] = {way->is_forward ? -from[1] : from[0], way->is_forward ? from[0] : from[1], from[2]};
-    for (int k = 0; k < 3; k++)
-        to[k] = way->turn[3 * k] * p[0] + way->turn[3 * k + 1] * p[1] + way->turn[3 * k + 2] * p[2] + way->at[k];
+    mat3_apply(way->turn, p, to);
+    vec3_add(to, way->at, to);
 }
 
 static struct way *add_way(struct way ways[MAX_WAYS], int *n, const char *frame, int is_forward)
 {
     struct way *way = &ways[(*n)++];
     *way = (struct way){.frame = frame, .is_forward = is_forward};
-    memcpy(way->turn, UNTURNED, sizeof way->turn);
+    memcpy(way->turn, mat3_unit, sizeof way->turn);
     return way;
 }
 
@@ -66,12 +66,10 @@ static int find_ways(const struct own_stream *stream, struct way ways[MAX_WAYS])
     add_way(ways, &n, "head, x forward", 1);
     if (!stands) return n;
     struct way *way = add_way(ways, &n, "scene", 0); /* the inverse of head to scene */
-    for (int row = 0; row < 3; row++) {
-        for (int k = 0; k < 3; k++)
-            way->turn[3 * row + k] = info->rotation[3 * k + row];
-        for (int k = 0; k < 3; k++)
-            way->at[row] -= way->turn[3 * row + k] * info->station_m[k];
-    }
+    mat3_transpose(info->rotation, way->turn);
+    mat3_apply(way->turn, info->station_m, way->at);
+    for (int k = 0; k < 3; k++)
+        way->at[k] = -way->at[k];
     return n;
 }
 
@@ -205,13 +203,10 @@ static int count_points(struct match_index *index, const struct match_input *in,
 /* No point of the head has a coordinate beyond this one, in any of the frames: a rotation keeps lengths. */
 static double limit_of(const struct own_stream *stream)
 {
-    const double *at = stream->info.station_m;
     double largest = 0.0;
-    for (size_t i = 0; i < stream->n; i++) {
-        const double *p = stream->xyz_m[i];
-        largest = fmax(largest, sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]));
-    }
-    return largest + sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
+    for (size_t i = 0; i < stream->n; i++)
+        largest = fmax(largest, vec3_length(stream->xyz_m[i]));
+    return largest + vec3_length(stream->info.station_m);
 }
 
 static int is_within(const double p[3], double limit_m)

@@ -6,18 +6,14 @@
 
 #include "core/grow.h"
 #include "core/studio/scan_mesh.h"
+#include "core/vec3.h"
 #include "firmware_sim/app/studio/view/stream.h"
-
-static double edge2(const double *a, const double *b)
-{
-    return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
-}
 
 /* Rounded upwards, so that ratio <= f holds for a float f just where it holds for the exact one. */
 static float ratio_of(const double (*xyz_m)[3], const uint32_t f[3], double mean_m)
 {
     const double *a = xyz_m[f[0]], *b = xyz_m[f[1]], *c = xyz_m[f[2]];
-    const double ratio = sqrt(fmax(edge2(a, b), fmax(edge2(b, c), edge2(c, a)))) / mean_m;
+    const double ratio = fmax(vec3_distance(a, b), fmax(vec3_distance(b, c), vec3_distance(c, a))) / mean_m;
     const float near = (float)ratio;
     return (double)near < ratio ? nextafterf(near, INFINITY) : near;
 }

@@ -201,24 +201,16 @@ int viewed_add_surface(struct viewed *v, uint32_t label, const char *object, con
                                                     : sh_fail(err, SH_ENOMEM, "no memory for the surfaces' names");
 }
 
-struct viewed_station *viewed_find_station(struct viewed *v, uint32_t number)
+struct viewed_station *viewed_add_station(struct viewed *v, uint32_t number, struct sh_err *err)
 {
     for (size_t i = 0; i < v->n_stations; i++)
         if (v->station[i].number == number) return &v->station[i];
-    return NULL;
-}
-
-struct viewed_station *viewed_add_station(struct viewed *v, uint32_t number, struct sh_err *err)
-{
-    struct viewed_station *s = viewed_find_station(v, number);
-    if (s != NULL) return s;
     if (!grow(&v->station, &v->room_stations, v->n_stations + 1, sizeof *v->station)) {
         sh_fail(err, SH_ENOMEM, "no memory for the stations");
         return NULL;
     }
-    s = &v->station[v->n_stations++];
-    *s = (struct viewed_station){.number = number};
-    return s;
+    v->station[v->n_stations] = (struct viewed_station){.number = number};
+    return &v->station[v->n_stations++];
 }
 
 void viewed_free(struct viewed *v)

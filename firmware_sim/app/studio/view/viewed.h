@@ -113,7 +113,6 @@ void viewed_measure(struct viewed *viewed);
 /* SH_ENOMEM. The text is copied. */
 int viewed_add_surface(struct viewed *viewed, uint32_t label, const char *object, const char *material,
                        struct sh_err *err);
-struct viewed_station *viewed_find_station(struct viewed *viewed, uint32_t number);
 /* The one of that number, made where there was none. NULL: no memory, with err filled. */
 struct viewed_station *viewed_add_station(struct viewed *viewed, uint32_t number, struct sh_err *err);
 

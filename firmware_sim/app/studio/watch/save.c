@@ -157,7 +157,7 @@ static void save_join(struct save *s)
 
 static void put_state(struct json *json, const void *ctx)
 {
-    static const char *const words[] = {"idle", "working", "done", "idle"};
+    static const char *const words[] = {"idle", "working", "done"};
     const struct save *s = ctx;
     json_open_object(json, NULL);
     json_string(json, "state", words[s->state]);
@@ -206,8 +206,7 @@ int save_get(struct save *s, const char *query, struct web_body *out, struct sh_
     else if (query[0] != '\0')
         rc = sh_fail(err, SH_EINPUT, "%.64s: allowed is as=ENDING, or nothing", query);
     else if (s->state == SAVE_FAILED)
-        rc = sh_fail(err, s->failure.code, "%s", s->failure.text);
-    if (s->state == SAVE_FAILED && rc != SH_OK) s->state = SAVE_IDLE;
+        rc = sh_fail(err, s->failure.code, "%s", s->failure.text); /* to each page that asks */
     if (rc == SH_OK) rc = page_json(put_state, s, out, err);
     pthread_mutex_unlock(&s->lock);
     return rc;
