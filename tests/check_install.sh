@@ -105,7 +105,7 @@ has_ifc_readers() {
 }
 check "scanheadd comes with it, and a page that leads to scanhead's" test \
     "$("$work/root$prefix/bin/scanheadd" --version):$(cat "$work/root$prefix/share/man/man1/scanheadd.1")" = \
-    "$("$work/root$prefix/bin/scanhead" --version):.so man1/scanhead.1"
+    "$("$work/root$prefix/bin/scanhead" --version | sed 's/^scanhead /scanheadd /'):.so man1/scanhead.1"
 check "the readers of IFC come with it" has_ifc_readers
 check "scripts for campaigns come with it" test -x "$work/root$prefix/share/scanhead/campaign/slurm.sh" -a \
     -x "$work/root$prefix/share/scanhead/campaign/parallel.sh"

@@ -231,8 +231,7 @@ static int fail_by_signal(const struct import_apart *a, int number, struct sh_er
 int import_judge(struct import_apart *a, struct sh_err *err)
 {
     if (a->n_warnings > MAX_WARNINGS)
-        sh_warn(a->task.b->report, "%s: %s gave %d warnings; the first %d are shown", a->task.b->name, a->task.name,
-                a->n_warnings, MAX_WARNINGS);
+        build_warn(a->task.b, "%s gave %d warnings; the first %d are shown", a->task.name, a->n_warnings, MAX_WARNINGS);
     if (a->end == IMPORT_STOPPED) return sh_fail_stopped(err);
     if (a->end == IMPORT_TIME) return fail_by_time(a, err);
     if (a->end == IMPORT_MEMORY) return fail_by_memory(a, err);

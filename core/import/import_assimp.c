@@ -277,12 +277,10 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     const struct aiNode root = root_of(im.in, b->spec->file);
     rc = add_node(&im, &root, 0, err);
     if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
-    if (rc == SH_OK && log.n > 0)
-        sh_warn(b->report, "%s: %u warnings while it was read, the first: %s", b->name, log.n, log.first);
+    if (rc == SH_OK && log.n > 0) build_warn(b, "%u warnings while it was read, the first: %s", log.n, log.first);
     if (rc == SH_OK) import_say_colours(&im.lib, b, im.in);
     if (rc == SH_OK && im.n_turned > 0)
-        sh_warn(b->report, "%s: the textures of %u meshes are rotated: they are read without the rotation", b->name,
-                im.n_turned);
+        build_warn(b, "the textures of %u meshes are rotated: they are read without the rotation", im.n_turned);
     im.lib.aiReleaseImport(im.in);
     return rc;
 }

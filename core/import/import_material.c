@@ -57,8 +57,8 @@ void import_say_colours(const struct assimp_lib *lib, const struct scene_build *
         if (n++ == 0) first = name;
     }
     if (n > 0)
-        sh_warn(b->report, "%s: %u material%s with a colour beyond 0 to 1, which is left out; the first is '%.100s'",
-                b->name, n, n > 1 ? "s" : "", first.data);
+        build_warn(b, "%u material%s with a colour beyond 0 to 1, which is left out; the first is '%.100s'", n,
+                   n > 1 ? "s" : "", first.data);
 }
 
 /* Keeps transparency, also of glTF packed by Draco; for other glTF their own reader does it. */

@@ -358,8 +358,7 @@ static void warn_of_materials(const struct mtl *m)
         if (n++ == 0) first = scene->surface[i].material;
     }
     if (n > 0 && build_wants_textures(m->b))
-        sh_warn(m->b->report, "%s: %u of its surfaces have a material that no library defines; the first: '%.100s'",
-                m->b->name, n, first);
+        build_warn(m->b, "%u of its surfaces have a material that no library defines; the first: '%.100s'", n, first);
 }
 
 int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err)

@@ -319,8 +319,8 @@ int read_obj(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK) rc = read_statements(&o, err);
     if (rc == SH_OK) rc = read_later(&o, err);
     if (rc == SH_OK && o.n_unknown > 0)
-        sh_warn(b->report, "%s: %llu unknown statements ignored; the first is '%s' in line %llu", b->name,
-                (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
+        build_warn(b, "%llu unknown statements ignored; the first is '%s' in line %llu",
+                   (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
     if (rc == SH_OK) rc = read_mtl(b, o.library, o.n_libraries, first_surface, err);
     b->scene->n_meshes++;
     free(o.uv);

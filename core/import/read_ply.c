@@ -62,9 +62,7 @@ static void put_away_lost(struct ply *y)
     for (size_t i = 0; i < y->n_lost && y->weld.number == NULL && s->n_triangles > y->b->triangle0; i++)
         for (int k = 0; k < 3; k++)
             s->vertex_m[y->b->vertex0 + y->lost[i].number][k] = s->vertex_m[s->triangle[y->b->triangle0][0]][k];
-    if (y->n_lost > 0)
-        sh_warn(y->b->report, "%s: %zu vertices that are not finite left out; no face uses them", y->b->name,
-                y->n_lost);
+    if (y->n_lost > 0) build_warn(y->b, "%zu vertices that are not finite left out; no face uses them", y->n_lost);
 }
 
 static int take_vertex(struct ply *y, struct sh_err *err)
@@ -196,7 +194,7 @@ static int read_body(struct ply *y, struct sh_err *err)
     if (rc == SH_OK) put_away_lost(y);
     if (rc == SH_OK && y->r.is_single) rc = note_rounding(y, err);
     if (rc == SH_OK && y->n_empty > 0)
-        sh_warn(y->b->report, "%s: %llu faces without corners left out", y->b->name, (unsigned long long)y->n_empty);
+        build_warn(y->b, "%llu faces without corners left out", (unsigned long long)y->n_empty);
     if (rc == SH_OK) ply_end_textures(y);
     y->b->scene->n_meshes++;
     return rc;

@@ -71,13 +71,11 @@ int ply_begin_textures(struct ply *y, struct sh_err *err)
     for (int i = 0; i < n && y->has_uv && rc == SH_OK; i++)
         rc = add_texture(y, i, &missing, err);
     if (rc != SH_OK) return rc;
-    if (missing > 1) sh_warn(y->b->report, "%s: %u of %d textures are missing", y->b->name, missing, n);
+    if (missing > 1) build_warn(y->b, "%u of %d textures are missing", missing, n);
     if (n > 1 && !y->has_texnumbers && y->has_uv)
-        sh_warn(y->b->report, "%s: it names %d textures, but its faces have no texnumber: the first texture is used",
-                y->b->name, n);
+        build_warn(y->b, "it names %d textures, but its faces have no texnumber: the first texture is used", n);
     if (n > 0 && !y->has_uv && build_wants_textures(y->b))
-        sh_warn(y->b->report, "%s: it names a texture, but has no texture coordinates: the texture is not used",
-                y->b->name);
+        build_warn(y->b, "it names a texture, but has no texture coordinates: the texture is not used");
     return SH_OK;
 }
 
@@ -101,9 +99,9 @@ static int use_label(struct ply *y, int i, struct sh_err *err)
 void ply_end_textures(struct ply *y)
 {
     if (y->n_unfit > 0)
-        sh_warn(y->b->report,
-                "%s: %llu faces have more or fewer texture coordinates than corners: these coordinates are left out",
-                y->b->name, (unsigned long long)y->n_unfit);
+        build_warn(y->b,
+                   "%llu faces have more or fewer texture coordinates than corners: these coordinates are left out",
+                   (unsigned long long)y->n_unfit);
 }
 
 void ply_free_colours(struct ply *y)

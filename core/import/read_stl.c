@@ -75,8 +75,8 @@ static int read_binary(struct stl *s, struct sh_err *err)
     }
     if (rc == SH_OK) rc = build_single(s->b, s->largest, s->largest * BUILD_SINGLE_ROUNDING, false, err);
     if (rc == SH_OK && s->t.size > size)
-        sh_warn(s->b->report, "%s: %llu bytes after the last of its %u triangles ignored", s->b->name,
-                (unsigned long long)(s->t.size - size), n);
+        build_warn(s->b, "%llu bytes after the last of its %u triangles ignored",
+                   (unsigned long long)(s->t.size - size), n);
     return rc;
 }
 

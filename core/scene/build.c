@@ -67,19 +67,17 @@ int build_end_file(struct scene_build *b, struct sh_err *err)
     b->line = 0;
     b->mesh = NULL;
     if (b->counts.zero_area > 0)
-        sh_warn(b->report, "%s: %llu triangles without area left out", b->name,
-                (unsigned long long)b->counts.zero_area);
+        build_warn(b, "%llu triangles without area left out", (unsigned long long)b->counts.zero_area);
     if (b->counts.not_triangles > 0)
-        sh_warn(b->report, "%s: %llu points and lines left out", b->name, (unsigned long long)b->counts.not_triangles);
+        build_warn(b, "%llu points and lines left out", (unsigned long long)b->counts.not_triangles);
     if (b->counts.names_cut > 0)
-        sh_warn(b->report, "%s: %llu names cut to %d bytes", b->name, (unsigned long long)b->counts.names_cut,
-                SCENE_NAME_LEN - 1);
+        build_warn(b, "%llu names cut to %d bytes", (unsigned long long)b->counts.names_cut, SCENE_NAME_LEN - 1);
     if (b->not_simple > 0)
-        sh_warn(b->report, "%s: the outlines of %llu polygons cross themselves; their triangles overlap", b->name,
-                (unsigned long long)b->not_simple);
+        build_warn(b, "the outlines of %llu polygons cross themselves; their triangles overlap",
+                   (unsigned long long)b->not_simple);
     if (b->n_rgb_limited > 0)
-        sh_warn(b->report, "%s: %llu colour%s of corners or vertices beyond the range of 0 to %g, limited to it",
-                b->name, (unsigned long long)b->n_rgb_limited, b->n_rgb_limited > 1 ? "s" : "", b->rgb_most);
+        build_warn(b, "%llu colour%s of corners or vertices beyond the range of 0 to %g, limited to it",
+                   (unsigned long long)b->n_rgb_limited, b->n_rgb_limited > 1 ? "s" : "", b->rgb_most);
     b->scene->counts.zero_area += b->counts.zero_area;
     b->scene->counts.not_triangles += b->counts.not_triangles;
     b->scene->counts.names_cut += b->counts.names_cut;
@@ -166,6 +164,16 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
     return sh_fail(err, code, "%s%s: %s", b->name, place, text);
 }
 
+void build_warn(const struct scene_build *b, const char *fmt, ...)
+{
+    char text[512];
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
+    sh_warn(b->report, "%s: %s", b->name, text);
+}
+
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err)
 {
     const double most_m = 1.0;    /* of the tolerance */
@@ -184,8 +192,8 @@ int build_single(struct scene_build *b, double largest, double error, bool refus
     }
     b->scene->error_m = fmax(b->scene->error_m, error_m);
     if (error_m > 1e-6)
-        sh_warn(b->report, "%s: read in single precision, with errors up to %.2g m: coordinates go up to %.9g%s",
-                b->name, error_m, largest, error_m > coarse_m ? "; move it near its origin, then export it again" : "");
+        build_warn(b, "read in single precision, with errors up to %.2g m: coordinates go up to %.9g%s", error_m,
+                   largest, error_m > coarse_m ? "; move it near its origin, then export it again" : "");
     return SH_OK;
 }
 

@@ -10,6 +10,8 @@ struct scene_build;
 /* Fails with "FILE, line N, mesh 'M': text". Returns code. */
 int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
+/* Warns with "FILE: text". */
+void build_warn(const struct scene_build *b, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
 /* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
  * stop: SH_ESTOPPED. build: a struct scene_build. */

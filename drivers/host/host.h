@@ -68,6 +68,7 @@ struct scanhead {
     int have_seq, have_descriptor, have_anchor, have_pulse;
     uint32_t last_seq;      /* of a frame that is not LOCAL */
     uint64_t last_repeated; /* how many frames were repeated up to it */
+    int told_alone;         /* since then a descriptor came for this reader alone */
     struct native_descriptor descriptor;
     struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
     struct native_beam beam[NATIVE_MAX_BEAMS];

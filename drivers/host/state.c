@@ -34,6 +34,7 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
     }
     sh->descriptor = d;
     sh->have_descriptor = 1;
+    sh->told_alone |= (header->flags & NATIVE_LOCAL) != 0;
     return 0;
 }
 
@@ -66,14 +67,15 @@ static void forget(struct scanhead *sh)
 
 /* The parser hands out a number that goes back only where another sequence begins: the head has started again, or
  * recordings were put one after the other. What the stream said before does not hold there, nor do its times. It does
- * if the new sequence began with frames equal to those before: they were dropped as repeated, and said the same. */
+ * if the new sequence began with frames equal to those before: they were dropped as repeated, and said the same. And
+ * what a descriptor for this reader alone has said just before, and the frames after it, is about the new sequence. */
 static void follow_sequence(struct scanhead *sh, const struct native_header *header)
 {
     const uint64_t repeated = sh->parser.stats.repeated;
     if ((header->flags & NATIVE_LOCAL) != 0) return;
     if (sh->have_seq && header->seq - sh->last_seq > INT32_MAX) {
         sh->have_pulse = 0;
-        if (repeated == sh->last_repeated) {
+        if (repeated == sh->last_repeated && !sh->told_alone) {
             forget(sh);
             sh->times = (struct host_times){0};
         }
@@ -81,6 +83,7 @@ static void follow_sequence(struct scanhead *sh, const struct native_header *hea
     sh->have_seq = 1;
     sh->last_seq = header->seq;
     sh->last_repeated = repeated;
+    sh->told_alone = 0;
 }
 
 static int absorb_points(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)

@@ -99,7 +99,7 @@ static int plan(struct config *cfg, void *ctx, struct sh_err *err)
     if (!config_is_alone(cfg))
         app_say("the plan of the scanner of station %u; others have other scanners: --set head.station=N",
                 cfg->head.settings.station);
-    int rc = site_load_plan(cfg, &app_report_stderr, &site, err);
+    int rc = site_load_for(cfg, SITE_FOR_PLAN, NULL, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->json) rc = app_write_json("-", put_rows, &site->plan, err);
     if (rc == SH_OK && !o->json) print_text(&site->plan);
     site_free(site);

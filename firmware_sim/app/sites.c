@@ -16,7 +16,8 @@ static int sites_add(const struct config *cfg, uint32_t station, const struct sh
     if (one->cfg == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the scanner of station %u", station + 1);
     int rc = config_load_scanner(cfg, station + 1, one->cfg, err);
     scanner_report_set_up(&one->report, report, station + 1, &sites->warnings);
-    return rc == SH_OK ? site_load_beside(one->cfg, sites->first, &one->report.report, &one->site, err) : rc;
+    return rc == SH_OK ? site_load_for(one->cfg, SITE_FOR_SCANS, sites->first, &one->report.report, &one->site, err)
+                       : rc;
 }
 
 /* The first is there. */
@@ -36,16 +37,10 @@ static int load_others(const struct config *cfg, const struct sh_report *report,
     return rc;
 }
 
-int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err)
+int sites_load(const struct config *cfg, enum site_purpose purpose, const struct sh_report *report, struct sites *sites,
+               struct sh_err *err)
 {
-    const int rc = site_load(cfg, report, &sites->first, err);
-    return rc == SH_OK ? load_others(cfg, report, sites, err) : rc;
-}
-
-int sites_load_written_out(const struct config *cfg, const struct sh_report *report, struct sites *sites,
-                           struct sh_err *err)
-{
-    const int rc = site_load_written_out(cfg, report, &sites->first, err);
+    const int rc = site_load_for(cfg, purpose, NULL, report, &sites->first, err);
     return rc == SH_OK ? load_others(cfg, report, sites, err) : rc;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sites of all scanners of a configuration, in one scene (site_load_beside). For commands that ask each station
+/* The sites of all scanners of a configuration, in one scene (site_load_for). For commands that ask each station
  * what its own scanner sees from there. */
 #ifndef FIRMWARE_SIM_APP_SITES_H
 #define FIRMWARE_SIM_APP_SITES_H
@@ -21,9 +21,8 @@ struct sites {
 };
 
 /* sites begins as zeros, and is to be freed, also after an error. cfg must live on, with its sets. */
-int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err);
-int sites_load_written_out(const struct config *cfg, const struct sh_report *report, struct sites *sites,
-                           struct sh_err *err);
+int sites_load(const struct config *cfg, enum site_purpose purpose, const struct sh_report *report, struct sites *sites,
+               struct sh_err *err);
 /* The same beside the first site of a head that runs, which stays the caller's. */
 int sites_load_beside(const struct config *cfg, const struct site *first, const struct sh_report *report,
                       struct sites *sites, struct sh_err *err);

@@ -44,12 +44,9 @@ int worker_create(const struct site *site, struct worker **out, struct sh_err *e
     struct worker *worker = calloc(1, sizeof *worker);
     if (worker == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     worker->site = site;
+    const uint32_t n_pulses = device_tick_pulses(site->cfg), n_points = n_pulses * site_most_points_per_pulse(site);
     int rc = caster_create(&worker->caster, err);
-    if (rc == SH_OK)
-        rc = line_block_alloc(&worker->block, device_tick_pulses(site->cfg) * site_most_points_per_pulse(site), err);
-    if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&worker->block, err);
-    if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = line_block_alloc_colours(&worker->block, err);
-    if (rc == SH_OK) rc = site_add_waves(site, device_tick_pulses(site->cfg), worker->caster, &worker->block, err);
+    if (rc == SH_OK) rc = site_make_block(site, n_pulses, n_points, worker->caster, &worker->block, err);
     worker->waves = worker->block.waves;
     if (rc != SH_OK) {
         worker_free(worker);

@@ -11,7 +11,6 @@
 #include "firmware_sim/site/bvhs.h"
 #include "firmware_sim/site/colours.h"
 #include "firmware_sim/site/copies.h"
-#include "firmware_sim/site/create.h"
 #include "firmware_sim/site/detection.h"
 #include "firmware_sim/site/plausibility.h"
 #include "firmware_sim/site/georeference.h"
@@ -192,8 +191,8 @@ static int load_load(struct site *site, const struct sh_report *report, struct s
     return rc;
 }
 
-int site_create(const struct config *cfg, enum site_purpose purpose, const struct site *other,
-                const struct sh_report *report, struct site **out, struct sh_err *err)
+int site_load_for(const struct config *cfg, enum site_purpose purpose, const struct site *other,
+                  const struct sh_report *report, struct site **out, struct sh_err *err)
 {
     struct site *site = *out = calloc(1, sizeof *site);
     if (site == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
@@ -216,24 +215,7 @@ int site_create(const struct config *cfg, enum site_purpose purpose, const struc
 
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
 {
-    return site_create(cfg, SITE_FOR_SCANS, NULL, report, out, err);
-}
-
-int site_load_written_out(const struct config *cfg, const struct sh_report *report, struct site **out,
-                          struct sh_err *err)
-{
-    return site_create(cfg, SITE_WRITTEN_OUT, NULL, report, out, err);
-}
-
-int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,
-                     struct site **out, struct sh_err *err)
-{
-    return site_create(cfg, SITE_FOR_SCANS, other, report, out, err);
-}
-
-int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err)
-{
-    return site_create(cfg, SITE_FOR_PLAN, NULL, report, out, err);
+    return site_load_for(cfg, SITE_FOR_SCANS, NULL, report, out, err);
 }
 
 void site_free(struct site *site)

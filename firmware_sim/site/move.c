@@ -5,7 +5,6 @@
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/site/create.h"
 #include "firmware_sim/site/sights.h"
 #include "firmware_sim/site/site.h"
 
@@ -109,7 +108,7 @@ int site_load_moved(const struct site *from, const struct site_station_move *mov
     cfg->head.settings.frames = from->planned_frames;
     cfg->station[station] = move->first->cfg->station[station];
     int rc = place(move->first, station, move->to, &cfg->station[station], &why);
-    if (rc == SH_OK) rc = site_create(cfg, SITE_MOVED, from, report, out, &why);
+    if (rc == SH_OK) rc = site_load_for(cfg, SITE_MOVED, from, report, out, &why);
     if (rc != SH_OK) {
         rc = fail_without_file(from, rc, &why, err);
         free(cfg);

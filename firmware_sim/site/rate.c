@@ -48,11 +48,7 @@ static int open_gauge(struct gauge *g, const struct site *site, struct sh_err *e
                      native_colours_bound(n_points) + native_waves_bound(n_points, room.windows, room.samples);
     g->frame = malloc(g->frame_bytes);
     int rc = g->frame != NULL ? caster_create(&g->caster, err) : sh_fail(err, SH_ENOMEM, "no memory");
-    if (rc == SH_OK) rc = line_block_alloc(&g->block, n_points, err);
-    if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(&g->block, err);
-    if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = line_block_alloc_colours(&g->block, err);
-    if (rc == SH_OK) rc = site_add_waves(site, RUN, g->caster, &g->block, err);
-    return rc;
+    return rc == SH_OK ? site_make_block(site, RUN, n_points, g->caster, &g->block, err) : rc;
 }
 
 static void close_gauge(struct gauge *g)

@@ -168,19 +168,19 @@ struct site {
 /* Room left beyond the head's largest range, for noise. */
 #define SITE_MARGIN 1.01
 
+enum site_purpose {
+    SITE_FOR_SCANS,
+    SITE_FOR_PLAN,    /* site->plan.row is filled, too, with bounds even of methods that the configuration forces */
+    SITE_WRITTEN_OUT, /* for tools that look at triangles one by one: copies of meshes are written out as triangles */
+    SITE_MOVED,       /* only for site_load_moved */
+};
+#define SITE_MOST_WRITTEN_OUT 10000000 /* triangles; SH_EINPUT: there would be more */
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
-/* The same for tools that look at triangles one by one: copies of meshes are written out as triangles. SH_EINPUT: these
- * would be more than SITE_MOST_WRITTEN_OUT. */
-int site_load_written_out(const struct config *cfg, const struct sh_report *report, struct site **out,
-                          struct sh_err *err);
-#define SITE_MOST_WRITTEN_OUT 10000000
-/* The same beside the site of another scanner of the same file. Where both have the same scene, scene and BVHs are
- * shared, not loaded again. `other` may be freed before or after. */
-int site_load_beside(const struct config *cfg, const struct site *other, const struct sh_report *report,
-                     struct site **out, struct sh_err *err);
-/* The same for `plan`: also fills site->plan.row, with bounds even of methods that the configuration forces. */
-int site_load_plan(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
+/* The same for a purpose, and beside the site of another scanner of the same file, or NULL. Where both have the same
+ * scene, scene and BVHs are shared, not loaded again. `other` may be freed before or after. */
+int site_load_for(const struct config *cfg, enum site_purpose purpose, const struct site *other,
+                  const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
 
 /* Whether two settings differ in values that a site is planned for: ranges, noise, step of a sphere. */

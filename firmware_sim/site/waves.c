@@ -278,12 +278,15 @@ static void describe_digitiser(const struct waveform_spec *spec, struct line_wav
     waves->count_signal = (float)count_signal(spec);
 }
 
-int site_add_waves(const struct site *site, uint32_t n_pulses, struct caster *caster, struct line_block *block,
-                   struct sh_err *err)
+int site_make_block(const struct site *site, uint32_t n_pulses, uint32_t n_points, struct caster *caster,
+                    struct line_block *block, struct sh_err *err)
 {
     const struct site_wave_room room = site_wave_room(site, n_pulses);
-    if (site->waves == NULL) return SH_OK;
-    int rc = caster_add_waves(caster, err);
+    int rc = line_block_alloc(block, n_points, err);
+    if (rc == SH_OK && site->cfg->output.attributes) rc = line_block_alloc_attributes(block, err);
+    if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = line_block_alloc_colours(block, err);
+    if (rc != SH_OK || site->waves == NULL) return rc;
+    rc = caster_add_waves(caster, err);
     if (rc == SH_OK && room.windows != 0) rc = line_block_alloc_waves(block, room.windows, room.samples, err);
     if (rc == SH_OK && room.windows != 0) describe_digitiser(waveform_spec_of(site->waves->waveform), block->waves);
     if (rc == SH_OK && site->waves->cast.finds && block->width_cns != NULL)

@@ -37,10 +37,10 @@ struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
 /* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
 double site_wave_bytes_s(const struct site *site);
-/* Prepares a caster and a block of so many pulses for the site's waveforms, and for the deviations of echoes that are
- * found in them. Does nothing where there are none. */
-int site_add_waves(const struct site *site, uint32_t n_pulses, struct caster *caster, struct line_block *block,
-                   struct sh_err *err);
+/* Makes a block of so many pulses and points, with what the site's output has of attributes, colours, waveforms, and
+ * deviations of echoes that are found in these. Prepares the caster for waveforms. */
+int site_make_block(const struct site *site, uint32_t n_pulses, uint32_t n_points, struct caster *caster,
+                    struct line_block *block, struct sh_err *err);
 
 /* Returns the cost of a usual pulse's waveform, ns; 0: there are none. */
 double site_wave_ns(const struct site *site);

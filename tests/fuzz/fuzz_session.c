@@ -30,13 +30,13 @@ static int run_command(void *ctx, const char *line, char *reply, size_t cap)
 {
     struct command_result out;
     (void)ctx;
-    fuzz_must(cap >= COMMAND_MAX_REPLY && strlen(line) <= COMMAND_MAX_LINE,
-              "a command is a line, with room for a reply");
+    fuzz_must((reply == NULL || cap >= COMMAND_MAX_REPLY) && strlen(line) <= COMMAND_MAX_LINE,
+              "a command is a line, with room for a reply if there is any");
     command_execute(&device, 1, line, &out);
     if (out.effect == COMMAND_START) device.state = HEAD_SCANNING;
     if (out.effect == COMMAND_STOP || out.effect == COMMAND_RESET) device.state = HEAD_IDLE;
     device.control = 0;
-    snprintf(reply, cap, "%s", out.reply);
+    if (reply != NULL) snprintf(reply, cap, "%s", out.reply);
     return out.error;
 }
 

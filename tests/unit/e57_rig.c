@@ -48,6 +48,14 @@ void e57rig_read(const char *path)
     assert_string_equal(e57rig_xml + xml_len - 11, "</e57Root>\n");
 }
 
+void e57rig_record_one(struct recorder_options options)
+{
+    struct sh_err err = {0};
+    if (rig_record(rig_path("a.e57"), options, RIG_KEEP, &err) != SH_OK) fail_msg("%s", err.text);
+    e57rig_read(rig_path("a.e57"));
+    unlink(rig_path("a.e57"));
+}
+
 struct e57rig_record e57rig_record[8192];
 size_t e57rig_n_records;
 

@@ -19,6 +19,8 @@ extern char *e57rig_xml; /* the XML section, as a string */
 
 /* Checks the CRCs and the file's header, and finds the XML. */
 void e57rig_read(const char *path);
+/* Records the stream into a file, reads it, and removes it. Where the recorder fails, the test fails. */
+void e57rig_record_one(struct recorder_options options);
 /* Reads scan k of the file, from 0, by the XML. */
 void e57rig_scan(int k, int empty_shots, int coloured);
 /* Returns the value of the first such element. */

@@ -290,6 +290,16 @@ test('points before their anchor are counted and not placed', () => {
   equal(decoder.stats.unplaced_shots, 3, 'unplaced');
 });
 
+test('points without a pose are not placed, and are not counted as shots without echo', () => {
+  const [descriptor, anchor, points] = [1, 2, 3].map((type) => Buffer.from(samples.find(({bytes}) => bytes[1] === type).bytes));
+  const still = readAll([Buffer.concat([descriptor, anchor, points])]).decoder.stats;
+  anchor[28 + 12] = 1; // moving
+  const moving = readAll([Buffer.concat([descriptor, signed(anchor), points])]).decoder.stats;
+  equal(moving.empty, still.empty, 'shots without echo');
+  equal(moving.unplaced_points, moving.points - still.empty, 'unplaced');
+  equal(moving.unplaced_shots, 2, 'pulses of these');
+});
+
 test('another sequence: its points have no place before its own descriptor and anchor', () => {
   const at = (type) => samples.findIndex(({bytes}) => bytes[1] === type);
   const renumbered = ({bytes}, seq, pulses) => {
@@ -309,16 +319,6 @@ test('another sequence: its points have no place before its own descriptor and a
   const repeated = Object.assign(Buffer.from(d.bytes), {3: REPEAT}); // the descriptor alone says the same scan
   const again = readAll([...front, renumbered({bytes: repeated}, 7), renumbered(p, 8, 1000n)]);
   equal(again.decoder.stats.unplaced_shots, 3, 'after a repeated descriptor without its anchor');
-});
-
-test('points without a pose are not placed, and are not counted as shots without echo', () => {
-  const [descriptor, anchor, points] = [1, 2, 3].map((type) => Buffer.from(samples.find(({bytes}) => bytes[1] === type).bytes));
-  const still = readAll([Buffer.concat([descriptor, anchor, points])]).decoder.stats;
-  anchor[28 + 12] = 1; // moving
-  const moving = readAll([Buffer.concat([descriptor, signed(anchor), points])]).decoder.stats;
-  equal(moving.empty, still.empty, 'shots without echo');
-  equal(moving.unplaced_points, moving.points - still.empty, 'unplaced');
-  equal(moving.unplaced_shots, 2, 'pulses of these');
 });
 
 // ---- replies

@@ -31,7 +31,7 @@ struct room room_open_with(const char *tripod, const char *body)
         tripod);
     write_in("test.yaml", text);
     if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK) fail_msg("%s", err.text);
-    if (site_load_written_out(cfg, NULL, &r.site, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load_for(cfg, SITE_WRITTEN_OUT, NULL, NULL, &r.site, &err) != SH_OK) fail_msg("%s", err.text);
     const struct coverage_spec spec = {.bvh = r.site->bvh, .cell_m = 0.2, .memory_mib = 64, .threads = 1};
     if (coverage_create(&spec, NULL, &r.coverage, &err) != SH_OK) fail_msg("%s", err.text);
     const struct preview_options options = {.cfg = cfg, .site = r.site, .coverage = r.coverage, .cell_m = spec.cell_m};

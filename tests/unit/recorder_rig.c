@@ -150,9 +150,24 @@ uint8_t *rig_read(const char *path, size_t *len)
     FILE *in = fopen(path, "rb");
     assert_non_null(in);
     uint8_t *data = calloc(1, 1 << 22);
-    *len = fread(data, 1, (1 << 22) - 1, in);
+    const size_t n = fread(data, 1, (1 << 22) - 1, in);
     fclose(in);
+    if (len != NULL) *len = n;
     return data;
+}
+
+void *rig_take(const char *name, size_t *len)
+{
+    uint8_t *file = rig_read(rig_path(name), len);
+    assert_int_equal(unlink(rig_path(name)), 0);
+    return file;
+}
+
+void *rig_record_bytes(const char *name, struct recorder_options options, size_t *len)
+{
+    struct sh_err err = {0};
+    if (rig_record(rig_path(name), options, RIG_KEEP, &err) != SH_OK) fail_msg("%s", err.text);
+    return rig_take(name, len);
 }
 
 int rig_count(const char *text, const char *what)

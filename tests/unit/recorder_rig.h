@@ -57,8 +57,12 @@ int rig_record(const char *path, struct recorder_options options, int keep, stru
 
 const char *rig_path(const char *name);
 
-/* Returns the whole file, NUL-terminated; free() it. */
+/* Returns the whole file, NUL-terminated; free() it. len may be NULL. */
 uint8_t *rig_read(const char *path, size_t *len);
+/* Does the same with the file of a name (rig_path), and removes it. */
+void *rig_take(const char *name, size_t *len);
+/* Records the stream into the file of a name, and takes it. Where the recorder fails, the test fails. */
+void *rig_record_bytes(const char *name, struct recorder_options options, size_t *len);
 
 /* Returns how often `what` is in text. */
 int rig_count(const char *text, const char *what);

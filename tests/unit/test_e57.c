@@ -6,13 +6,8 @@ static int coloured; /* by label */
 
 static void record_e57(int empty_shots)
 {
-    struct sh_err err = {0};
-    const char *path = rig_path("a.e57");
     const struct colour_choice colour = {.given = coloured, .scale.mode = COLOUR_LABEL};
-    int rc = rig_record(path, (struct recorder_options){.empty_shots = empty_shots, .colour = colour}, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
-    e57rig_read(path);
-    unlink(path);
+    e57rig_record_one((struct recorder_options){.empty_shots = empty_shots, .colour = colour});
 }
 
 static const struct rig_point points[] = {

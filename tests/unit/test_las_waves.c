@@ -11,19 +11,11 @@ static size_t las_len, wdp_len;
 /* With a .wdp beside it, `wdp` has its bytes, else those of the record in the file. */
 static void record(struct recorder_options options)
 {
-    struct sh_err err = {0};
-    char path[2][128];
-    snprintf(path[0], sizeof path[0], "%s", rig_path("a.las"));
-    snprintf(path[1], sizeof path[1], "%s", rig_path("a.wdp"));
-    if (rig_record(path[0], options, 1, &err) != 0) fail_msg("%s", err.text);
     free(las);
     free(wdp);
     wdp = NULL;
-    las = rig_read(path[0], &las_len);
-    unlink(path[0]);
-    if (access(path[1], F_OK) != 0) return;
-    wdp = rig_read(path[1], &wdp_len);
-    unlink(path[1]);
+    las = rig_record_bytes("a.las", options, &las_len);
+    if (access(rig_path("a.wdp"), F_OK) == 0) wdp = rig_take("a.wdp", &wdp_len);
 }
 
 static const uint8_t *point_at(size_t i)

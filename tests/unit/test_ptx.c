@@ -6,14 +6,8 @@ static char *text, *at;
 
 static void record_text(const char *name)
 {
-    struct sh_err err = {0};
-    size_t len;
-    const char *path = rig_path(name);
-    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
     free(text);
-    text = at = (char *)rig_read(path, &len);
-    unlink(path);
+    text = at = rig_record_bytes(name, (struct recorder_options){0}, NULL);
 }
 
 static void expect_line(const char *want)

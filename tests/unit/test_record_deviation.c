@@ -35,18 +35,13 @@ static void put_attributes(int has_deviations)
 /* Records a stream; lost: the frame of attributes does not come. */
 static uint8_t *record(const char *name, uint32_t content, int lost, int ascii)
 {
-    struct sh_err err = {0};
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
-    size_t len;
     rig_begin();
     rig_wave_descriptor(0, 1, content);
     rig_anchor(&a);
     rig_points(0, 0, 0, points, N);
     if (!lost) put_attributes((content & DEVIATIONS) != 0);
-    if (rig_record(rig_path(name), (struct recorder_options){.ascii = ascii}, 1, &err) != 0) fail_msg("%s", err.text);
-    uint8_t *file = rig_read(rig_path(name), &len);
-    unlink(rig_path(name));
-    return file;
+    return rig_record_bytes(name, (struct recorder_options){.ascii = ascii}, NULL);
 }
 
 /* The extra bytes after format 6 are label, amplitude, width, deviation. 65535 says that it is lost, so the largest one

@@ -25,22 +25,10 @@ static void put_scan(uint32_t scan, const struct native_anchor *a, const struct 
     rig_points(0, 0, 0, p, n);
 }
 
-static uint8_t *record(const char *name, struct recorder_options options)
-{
-    struct sh_err err = {0};
-    size_t len;
-    const char *path = rig_path(name);
-    const int rc = rig_record(path, options, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
-    uint8_t *file = rig_read(path, &len);
-    unlink(path);
-    return file;
-}
-
 static const uint8_t *record_las(void)
 {
     free(las);
-    las = record("a.las", (struct recorder_options){0});
+    las = rig_record_bytes("a.las", (struct recorder_options){0}, NULL);
     return las + rig_uint(las + 96, 4);
 }
 
@@ -55,7 +43,7 @@ static void test_ply_digits(void **state)
     a.scale[0] = a.scale[1] = 1e-11;
     rig_begin();
     put_scan(1, &a, &p, 1);
-    char *text = (char *)record("a.ply", (struct recorder_options){.ascii = 1}),
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL),
          *at = strstr(text, "end_header\n") + strlen("end_header\n");
     assert_int_equal(sscanf(at, "%lf %lf %lf", &lat_deg, &lon_deg, &height_m), 3);
     assert_true(fabs(lat_deg - (a.anchor[0] + 123456e-11)) < 0.6e-12);

@@ -87,14 +87,6 @@ static void record_ok(const char *name, struct recorder_options options)
     if (rig_record(rig_path(name), options, RIG_KEEP, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-static char *text_of(const char *name)
-{
-    size_t len;
-    char *text = (char *)rig_read(rig_path(name), &len);
-    assert_int_equal(unlink(rig_path(name)), 0);
-    return text;
-}
-
 static void has(const char *text, const char *expected)
 {
     if (strstr(text, expected) == NULL) fail_msg("no '%s' in:\n%s", expected, text);
@@ -113,8 +105,7 @@ static void a_step_as_ply(void **state)
     rig_begin();
     begin_scan(1, 3);
     put_step(5);
-    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 1.2});
-    char *text = text_of("a.ply");
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 1.2}, NULL);
     has(text, "comment crs scene frame, metres\n");
     has(text, "comment mean_edge_m 1.18972");
     has(text, "comment long_edge 1.2 left_out 4\n");
@@ -131,15 +122,15 @@ static void a_step_as_ply(void **state)
     rig_begin();
     begin_scan(1, 3);
     put_step(5);
-    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .columns = PLY_LABEL | PLY_COLOUR});
-    text = text_of("a.ply");
+    text = rig_record_bytes("a.ply",
+                            (struct recorder_options){.ascii = 1, .mesh = 1, .columns = PLY_LABEL | PLY_COLOUR}, NULL);
     has(text, "property float nz\nproperty ushort label\nelement face 12\n"); /* there are no colours */
     free(text);
     rig_begin();
     begin_scan(1, 3);
     put_step(5);
-    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 1, .scalar_names = 1});
-    text = text_of("a.ply");
+    text = rig_record_bytes("a.ply",
+                            (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 1, .scalar_names = 1}, NULL);
     has(text, "comment points_without_triangle 12\n");
     has(text, "property double scalar_range\n");
     has(text, "element vertex 0\n");
@@ -158,9 +149,10 @@ static void points_spread_over_the_step(void **state)
         rig_begin();
         begin_scan(1, 3);
         put_step(0);
-        record_ok("a.ply", (struct recorder_options){
-                               .ascii = 1, .sparse_per_m2 = 100, .sparse_seed = i < 2 ? 7 : 8, .long_edge = 1.2});
-        text[i] = text_of("a.ply");
+        text[i] = rig_record_bytes(
+            "a.ply",
+            (struct recorder_options){.ascii = 1, .sparse_per_m2 = 100, .sparse_seed = i < 2 ? 7 : 8, .long_edge = 1.2},
+            NULL);
     }
     has(text[0], "comment sparse 100 points per m2, seed 7: 400 points on 4 m2\n");
     has(text[0], "element vertex 400\n");
@@ -245,8 +237,8 @@ static void two_stations_are_two_objects(void **state)
     put_step(0);
     begin_scan(2, 2);
     put_step(3);
-    record_ok("b.obj", (struct recorder_options){.long_edge = 1.2});
-    char *text = text_of("b.obj"), *materials = text_of("b.mtl");
+    char *text = rig_record_bytes("b.obj", (struct recorder_options){.long_edge = 1.2}, NULL),
+         *materials = rig_take("b.mtl", NULL);
     has(text, "mtllib b.mtl\no station 1\nv 10 30 30\nvt 0.125 0.166666672\nvn 0 -1 0\n");
     has(text, "usemtl station 1\nf ");
     has(text, "o station 2\nv 10 30 30\n");
@@ -261,8 +253,7 @@ static void two_stations_are_two_objects(void **state)
     rig_begin();
     begin_scan(1, 1);
     put_step(0);
-    record_ok("c.obj", (struct recorder_options){.colour = {.given = 1}}); /* --colour none */
-    text = text_of("c.obj");
+    text = rig_record_bytes("c.obj", (struct recorder_options){.colour = {.given = 1}}, NULL); /* --colour none */
     assert_null(strstr(text, "mtl"));
     assert_null(strstr(text, "vt "));
     free(text);
@@ -286,8 +277,7 @@ static void later_echoes_and_lines_that_go_back(void **state)
     first_pulse = 2 * PULSES;
     put_step(0); /* line 0 again: a mesh of its own */
     first_pulse = 0;
-    record_ok("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 0});
-    char *text = text_of("a.ply");
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 0}, NULL);
     has(text, "element face 14\n"); /* a cell, and the step */
     has(rig_notes, "2 echoes left out; a mesh holds the first of a shot\n");
     has(rig_notes, "1 additional meshes begun within a scan, since its line numbers went back\n");

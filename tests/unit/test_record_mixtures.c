@@ -35,25 +35,15 @@ static int record(const char *name, struct recorder_options options, struct sh_e
     return rig_record(rig_path(name), options, 1, err);
 }
 
-static char *read_of(const char *name)
-{
-    size_t len;
-    char *text = (char *)rig_read(rig_path(name), &len);
-    unlink(rig_path(name));
-    return text;
-}
-
 /* The names of two heads of one model are kept apart. For two models LAS has MERGE. */
 static void test_several_heads(void **state)
 {
     (void)state;
-    struct sh_err err = {0};
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1), b = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
     rig_begin();
     put_scan("Maker,Model,SN1,1", "model", 1, &a);
     put_scan("Maker,Model,SN2,1", "model", 1, &b);
-    assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 2}, &err), 0);
-    char *text = read_of("a.ply");
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 2}, NULL);
     assert_non_null(strstr(text, "comment station 1 idn Maker,Model,SN1,1\n"));
     assert_non_null(strstr(text, "comment station 2 idn Maker,Model,SN2,1\n"));
     free(text);
@@ -61,8 +51,7 @@ static void test_several_heads(void **state)
         rig_begin();
         put_scan("Maker,Model,SN1,1", "model", 1, &a);
         put_scan("Maker,Model,SN2,1", other ? "other" : "model", 1, &b);
-        assert_int_equal(record("a.las", (struct recorder_options){0}, &err), 0);
-        text = read_of("a.las");
+        text = rig_record_bytes("a.las", (struct recorder_options){0}, NULL);
         assert_string_equal(text + 26, other ? "MERGE" : "model");
         free(text);
     }
@@ -72,14 +61,12 @@ static void test_several_heads(void **state)
 static void test_many_heads(void **state)
 {
     (void)state;
-    struct sh_err err = {0};
     rig_begin();
     for (uint32_t i = 1; i <= 130; i++) {
         const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, i);
         put_scan(i % 2 == 0 ? "Maker,Model,SN1,1" : "Maker,Model,SN2,1", "model", 1, &a);
     }
-    assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 130}, &err), 0);
-    char *text = read_of("a.ply");
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 130}, NULL);
     assert_int_equal(rig_count(text, " idn "), 128);
     assert_non_null(strstr(rig_notes, "a.ply: 2 names of surfaces and heads left out"));
     free(text);
@@ -129,8 +116,7 @@ static void test_ply_says(void **state)
         a.heights = geoid ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
         rig_begin();
         put_scan("a,b,c,d", "model", 1, &a);
-        assert_int_equal(record("a.ply", (struct recorder_options){.ascii = 1}, &err), 0);
-        char *text = read_of("a.ply");
+        char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL);
         assert_non_null(strstr(text, geoid ? "in degrees, height above the geoid in metres\n"
                                            : "in degrees, ellipsoidal height in metres\n"));
         assert_non_null(strstr(text, "comment x latitude, y longitude in degrees, z range in metres, time"));
@@ -153,7 +139,6 @@ static void put_emitter(const struct native_emitter *e, const struct native_beam
 static void test_rows_of_beams(void **state)
 {
     (void)state;
-    struct sh_err err = {0};
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
     const struct native_emitter e = {
         .kind = NATIVE_EMIT_BEAMS, .n_beams = 4, .turn = 1, .sequence_ns_num = 10000, .sequence_ns_den = 1};
@@ -181,9 +166,7 @@ static void test_rows_of_beams(void **state)
     put_emitter(&e, beam);
     rig_anchor(&a);
     rig_put(out, native_encode_points(out, sizeof out, &block, 0));
-    assert_int_equal(record("a.e57", (struct recorder_options){0}, &err), 0);
-    e57rig_read(rig_path("a.e57"));
-    unlink(rig_path("a.e57"));
+    e57rig_record_one((struct recorder_options){0});
     e57rig_scan(0, 0, 0);
     assert_int_equal(e57rig_record[0].row, 2);
 }
@@ -192,7 +175,6 @@ static void test_rows_of_beams(void **state)
 static void test_lines_of_rings(void **state)
 {
     (void)state;
-    struct sh_err err = {0};
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
     const struct native_emitter e = {.kind = NATIVE_EMIT_SPHERE,
                                      .steps = 10,
@@ -207,8 +189,7 @@ static void test_lines_of_rings(void **state)
     rig_anchor(&a);
     rig_points(0, 0, 0, &one, 1);
     rig_points(9, 90, 90, &one, 1);
-    assert_int_equal(record("a.ptx", (struct recorder_options){0}, &err), 0);
-    char *text = read_of("a.ptx");
+    char *text = rig_record_bytes("a.ptx", (struct recorder_options){0}, NULL);
     assert_memory_equal(text, "10\n1\n", 5);
     assert_null(strstr(rig_notes, "grids begun"));
     free(text);

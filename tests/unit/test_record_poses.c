@@ -8,15 +8,8 @@ static char *text;
 
 static const char *record(void)
 {
-    struct sh_err err = {0};
-    size_t len;
-    const char *path = rig_path("a.poses.csv");
-    const int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
     free(text);
-    text = (char *)rig_read(path, &len);
-    unlink(path);
-    return text;
+    return text = rig_record_bytes("a.poses.csv", (struct recorder_options){0}, NULL);
 }
 
 static void put_scan(int geo, uint32_t scan, const struct native_anchor *a)
@@ -133,7 +126,6 @@ static void test_same_numbers(void **state)
     struct scanhead *sh[2];
     struct scanhead_frame frame;
     struct recorder *rec;
-    size_t len;
     const char *path = rig_path("a.poses.csv");
     a.moving = NATIVE_MOVING;
     rig_begin();
@@ -155,8 +147,7 @@ static void test_same_numbers(void **state)
     for (int i = 0; i < 2; i++)
         scanhead_close(sh[i]);
     free(text);
-    text = (char *)rig_read(path, &len);
-    unlink(path);
+    text = rig_take("a.poses.csv", NULL);
     for (int i = 1; i <= 4; i++) {
         char rows[160];
         snprintf(rows, sizeof rows,

@@ -35,19 +35,6 @@ static void put_two(void)
     put_scan(2, 65);
 }
 
-static uint8_t *record(const char *name, struct recorder_options options)
-{
-    struct sh_err err = {0};
-    size_t len;
-    const char *path = rig_path(name);
-    const int rc = rig_record(path, options, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
-    uint8_t *file = rig_read(path, &len);
-    if (strstr(name, ".e57") != NULL) e57rig_read(path);
-    unlink(path);
-    return file;
-}
-
 /* Adjusted standard GPS time is a billion seconds less. A double of 4e8 s steps by 6e-8. */
 static void test_las(void **state)
 {
@@ -55,7 +42,7 @@ static void test_las(void **state)
     static const int encoding[] = {1 << 0 | 1 << 4, 1 << 0}, time_at[] = {22, 20}, len[] = {POINT, POINT_12};
     for (int old = 0; old < 2; old++) {
         put_two();
-        uint8_t *las = record("a.las", (struct recorder_options){.las_minor = old ? 2 : 4}),
+        uint8_t *las = rig_record_bytes("a.las", (struct recorder_options){.las_minor = old ? 2 : 4}, NULL),
                 *p = las + rig_uint(las + 96, 4);
         assert_int_equal(rig_uint(las + 6, 2), encoding[old]);
         assert_int_equal(rig_uint(las + 90, 2), 366);
@@ -70,7 +57,7 @@ static void test_e57(void **state)
 {
     (void)state;
     put_two();
-    free(record("a.e57", (struct recorder_options){0}));
+    e57rig_record_one((struct recorder_options){0});
     const char *start = strstr(e57rig_xml, "<acquisitionStart"),
                *second = start != NULL ? strstr(start + 1, "<acquisitionStart") : NULL;
     assert_non_null(start);
@@ -85,7 +72,7 @@ static void test_e57(void **state)
 
 static void expect_ply(const char *want, int is_there)
 {
-    char *ply = (char *)record("a.ply", (struct recorder_options){.ascii = 1});
+    char *ply = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL);
     const int found = strstr(ply, want) != NULL;
     if (found != is_there) fail_msg("%s: %s", is_there ? "not there" : "there", want);
     free(ply);
@@ -115,13 +102,13 @@ static void test_late_clock(void **state)
         const uint32_t code = pps ? NATIVE_EV_PPS : NATIVE_EV_TIME;
         const uint64_t gps = (GPS_S + 2) * (pps ? 1 : S);
         put_late(code, gps);
-        free(record("a.e57", (struct recorder_options){0}));
+        e57rig_record_one((struct recorder_options){0});
         assert_non_null(strstr(e57rig_xml, "<acquisitionStart"));
         assert_true(e57rig_number(strstr(e57rig_xml, "<acquisitionStart"), "dateTimeValue") == (double)GPS_S);
         put_late(code, gps);
         expect_ply("comment the first scan starts at GPS week 2347 second 259190.000000\n", 1);
         put_late(code, gps);
-        uint8_t *las = record("a.las", (struct recorder_options){0}), *p = las + rig_uint(las + 96, 4);
+        uint8_t *las = rig_record_bytes("a.las", (struct recorder_options){0}, NULL), *p = las + rig_uint(las + 96, 4);
         assert_int_equal(rig_uint(las + 6, 2), 1 << 4);
         assert_int_equal(rig_uint(las + 90, 4), 0); /* no day, no year */
         assert_true(rig_double(p + POINT + 22) == 10e-3);
@@ -145,7 +132,7 @@ static void test_clock_of_a_later_scan(void **state)
     put_second_alone();
     expect_ply("the first scan starts", 0);
     put_second_alone();
-    free(record("a.e57", (struct recorder_options){0}));
+    e57rig_record_one((struct recorder_options){0});
     const char *start = strstr(e57rig_xml, "<acquisitionStart"), *second = strstr(e57rig_xml, "scan 2, station 2");
     assert_true(start != NULL && second != NULL && start > second);
     assert_true(e57rig_number(start, "dateTimeValue") == (double)GPS_S);

@@ -199,7 +199,7 @@ static void faults_of_all_are_told_once(void **state)
 static struct site *load_site(const struct config *of, const struct site *other)
 {
     struct site *site;
-    if (site_load_beside(of, other, NULL, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load_for(of, SITE_FOR_SCANS, other, NULL, &site, &err) != SH_OK) fail_msg("%s", err.text);
     return site;
 }
 

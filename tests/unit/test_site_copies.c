@@ -79,7 +79,7 @@ static struct site *load_site(const char *text, int written_out)
 {
     struct site *site;
     assert_loads(load_text(text));
-    const int rc = written_out ? site_load_written_out(cfg, NULL, &site, &err) : site_load(cfg, NULL, &site, &err);
+    const int rc = site_load_for(cfg, written_out ? SITE_WRITTEN_OUT : SITE_FOR_SCANS, NULL, NULL, &site, &err);
     if (rc != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(site->scene->n_copies > 0 || (site->n_movers > 0 && site->mover[0].scene->n_copies > 0),
                      !written_out);

@@ -122,7 +122,7 @@ static void targets_are_chosen_in_all_meshes(void **state)
     const struct site_target *t = &site->world->target;
     assert_true(t->triangles == 2 && t->all_triangles == 5 && t->surfaces == 2 && t->all_surfaces == 5);
     struct site *beside;
-    assert_int_equal(site_load_beside(cfg, site, NULL, &beside, &err), SH_OK);
+    assert_int_equal(site_load_for(cfg, SITE_FOR_SCANS, site, NULL, &beside, &err), SH_OK);
     assert_string_equal(strrchr(beside->mover[0].mesh->file, '/'), "/moving.obj");
     assert_int_equal(beside->world->n_loads, 1);
     site_free(site);

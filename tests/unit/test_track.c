@@ -51,14 +51,9 @@ static void put_stream(void)
 
 static uint8_t *record(const char *name, struct recorder_options options, size_t *len)
 {
-    struct sh_err err = {0};
-    const char *path = rig_path(name);
     put_stream();
-    int rc = rig_record(path, options, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
+    uint8_t *file = rig_record_bytes(name, options, len);
     assert_non_null(strstr(rig_notes, "9 points left out whose pose was lost"));
-    uint8_t *file = rig_read(path, len);
-    unlink(path);
     return file;
 }
 
@@ -76,8 +71,7 @@ static void expect(int n, const double p[3], const double *t_s, const double *fr
 static void test_ply(void **state)
 {
     (void)state;
-    size_t len;
-    char *text = (char *)record("a.ply", (struct recorder_options){.ascii = 1}, &len), *at;
+    char *text = (char *)record("a.ply", (struct recorder_options){.ascii = 1}, NULL), *at;
     assert_non_null(strstr(text, "comment points_without_pose 9\n"));
     assert_non_null(strstr(text, "element vertex 18\n"));
     at = strstr(text, "end_header\n") + 11;
@@ -96,8 +90,7 @@ static void test_ply(void **state)
 static void test_las(void **state)
 {
     (void)state;
-    size_t len;
-    uint8_t *las = record("a.las", (struct recorder_options){0}, &len), *p = las + rig_uint(las + 96, 4);
+    uint8_t *las = record("a.las", (struct recorder_options){0}, NULL), *p = las + rig_uint(las + 96, 4);
     assert_int_equal(rig_uint(las + 247, 8), 18);
     for (int n = 0; n < 18; n++, p += 32) {
         double xyz[3], t_s = rig_double(p + 22);
@@ -113,8 +106,7 @@ static void test_las(void **state)
 static void test_ptx(void **state)
 {
     (void)state;
-    size_t len;
-    char *text = (char *)record("a.ptx", (struct recorder_options){0}, &len), *at = text;
+    char *text = (char *)record("a.ptx", (struct recorder_options){0}, NULL), *at = text;
     static const char head[] = "3\n10\n0.000000000 0.000000000 0.000000000\n1.000000000000000 0.000000000000000";
     assert_memory_equal(text, head, sizeof head - 1);
     for (int i = 0; i < 10; i++)
@@ -175,9 +167,6 @@ static void test_geo(void **state)
 {
     (void)state;
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
-    struct sh_err err = {0};
-    size_t len;
-    const char *path = rig_path("g.ply");
     a.moving = NATIVE_MOVING;
     rig_begin();
     rig_descriptor(1, 1);
@@ -185,11 +174,8 @@ static void test_geo(void **state)
     put_poses(0, 100);
     rig_points(0, 0, 0, (struct rig_point[]){{1000, 2000, 3000, INT16_MIN, 3, 1, 1}}, 1);
     rig_points(1, 150, 150, (struct rig_point[]){{1001, 2001, 3001, INT16_MIN, 3, 1, 1}}, 1);
-    int rc = rig_record(path, (struct recorder_options){.ascii = 1}, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
+    char *text = rig_record_bytes("g.ply", (struct recorder_options){.ascii = 1}, NULL);
     assert_string_equal(rig_notes, "");
-    char *text = (char *)rig_read(path, &len);
-    unlink(path);
     assert_non_null(strstr(text, "\n500001.250000 5000002.000000 403.125000 nan nan 0.000000000 1 1 3 1 100\n"
                                  "500001.251000 5000002.001000 403.126000 nan nan 0.150000000 1 1 3 1 nan\n"));
     free(text);
@@ -200,9 +186,6 @@ static void test_empty_shot(void **state)
 {
     (void)state;
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
-    struct sh_err err = {0};
-    size_t len;
-    const char *path = rig_path("g.ply");
     a.moving = NATIVE_MOVING;
     rig_begin();
     rig_descriptor(0, 1);
@@ -210,10 +193,7 @@ static void test_empty_shot(void **state)
     put_poses(0, 100);
     rig_points(0, 0, 100, (struct rig_point[]){{0, 0, 0, INT16_MIN, 65535, 0, 0}}, 1);
     rig_points(1, 150, 150, (struct rig_point[]){{0, 0, 0, INT16_MIN, 65535, 0, 0}}, 1);
-    int rc = rig_record(path, (struct recorder_options){.ascii = 1, .empty_shots = 1}, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
-    char *text = (char *)rig_read(path, &len);
-    unlink(path);
+    char *text = rig_record_bytes("g.ply", (struct recorder_options){.ascii = 1, .empty_shots = 1}, NULL);
     assert_non_null(strstr(text, "\nnan nan nan nan nan 0.100000000 0 0 65535 1 "));
     assert_null(strstr(text, "\nnan nan nan nan nan 0.100000000 0 0 65535 1 nan\n"));
     assert_non_null(strstr(text, "\nnan nan nan nan nan 0.150000000 0 0 65535 1 nan\n"));
@@ -225,9 +205,6 @@ static void test_long_way(void **state)
 {
     (void)state;
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
-    struct sh_err err = {0};
-    size_t len;
-    const char *path = rig_path("g.las");
     a.moving = NATIVE_MOVING;
     a.scale_m = a.scale[0] = a.scale[1] = a.scale[2] = 1e-6;
     rig_begin();
@@ -237,10 +214,7 @@ static void test_long_way(void **state)
     a.anchor[0] += 200000; /* where the head has come to */
     rig_anchor(&a);
     rig_points(1, 150, 150, (struct rig_point[]){{130, 0, 51, INT16_MIN, 3, 1, 1}}, 1);
-    int rc = rig_record(path, (struct recorder_options){0}, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
-    uint8_t *las = rig_read(path, &len), *p = las + rig_uint(las + 96, 4);
-    unlink(path);
+    uint8_t *las = rig_record_bytes("g.las", (struct recorder_options){0}, NULL), *p = las + rig_uint(las + 96, 4);
     static const int32_t want[2][3] = {{12346, -76543, 0}, {2000000001, 0, 1}};
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 3; k++) {

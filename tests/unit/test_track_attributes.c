@@ -105,17 +105,6 @@ static void put_points(uint32_t line, uint64_t pulse0, int with, int lost, int l
     put(len, -1);
 }
 
-static uint8_t *record(const char *name, struct recorder_options options, size_t *len)
-{
-    struct sh_err err = {0};
-    const char *path = rig_path(name);
-    int rc = rig_record(path, options, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
-    uint8_t *file = rig_read(path, len);
-    unlink(path);
-    return file;
-}
-
 /* Checks the next vertex of a PLY as text; number -1: its attributes are lost. */
 static char *expect(char *at, int number)
 {
@@ -134,7 +123,6 @@ static char *expect(char *at, int number)
 static void test_moving(void **state)
 {
     (void)state;
-    size_t len;
     rig_begin();
     seq = 7;
     put_descriptor(1, NATIVE_HAS_ATTRIBUTES);
@@ -148,7 +136,7 @@ static void test_moving(void **state)
     put_points(4, 220, 1, 0, 0);  /* points lost */
     put_points(5, 240, 1, -1, 0);
     put_points(6, 260, 1, 1, 0); /* lost, at the end */
-    char *text = (char *)record("a.ply", (struct recorder_options){.ascii = 1}, &len);
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL);
     assert_non_null(strstr(text, "comment points_without_attributes 18\n"));
     assert_non_null(strstr(rig_notes, "18 points without amplitude and width, which were lost"));
     char *at = strstr(text, "property double frame\nproperty float amplitude\nproperty float width\nend_header\n");
@@ -173,7 +161,7 @@ static void test_binary(void **state)
     put_descriptor(1, NATIVE_HAS_ATTRIBUTES);
     put_anchor(0);
     put_points(0, 0, 1, -1, 0);
-    uint8_t *file = record("a.ply", (struct recorder_options){.empty_shots = 1}, &len);
+    uint8_t *file = rig_record_bytes("a.ply", (struct recorder_options){.empty_shots = 1}, &len);
     uint8_t *at = (uint8_t *)strstr((char *)file, "end_header\n") + 11;
     assert_int_equal(len, (size_t)(at - file) + SHOTS * (50 + 8));
     for (int i = 0; i < SHOTS; i++, at += 58) {
@@ -190,7 +178,6 @@ static void test_binary(void **state)
 static void test_time(void **state)
 {
     (void)state;
-    size_t len;
     const uint64_t gps_ns[2] = {UINT64_C(1400000000) * 1000000000, UINT64_C(1400001000) * 1000000000};
     rig_begin();
     for (uint32_t scan = 1; scan <= 2; scan++) {
@@ -199,7 +186,7 @@ static void test_time(void **state)
         put_anchor(0);
         put_points(0, 100, 1, scan == 1 ? 1 : -1, 0);
     }
-    uint8_t *las = record("a.las", (struct recorder_options){0}, &len), *p = las + rig_uint(las + 96, 4);
+    uint8_t *las = rig_record_bytes("a.las", (struct recorder_options){0}, NULL), *p = las + rig_uint(las + 96, 4);
     assert_int_equal(rig_uint(las + 105, 2), 36);
     assert_int_equal(rig_uint(las + 247, 8), 2 * (SHOTS - 1));
     for (int i = 0; i < 2 * SHOTS; i++) {

@@ -74,17 +74,6 @@ static void put_points(uint32_t line, uint64_t pulse0, uint32_t content, unsigne
     put(native_encode_points(out, sizeof out, &block, 0), lost);
 }
 
-static char *record(const char *name, struct recorder_options options, size_t *len)
-{
-    struct sh_err err = {0};
-    const char *path = rig_path(name);
-    int rc = rig_record(path, options, 1, &err);
-    if (rc != 0) fail_msg("%s", err.text);
-    char *file = (char *)rig_read(path, len);
-    unlink(path);
-    return file;
-}
-
 /* Reads the colour at the end of a line of text. Returns the text after it. */
 static char *expect(char *at, const uint8_t want[3])
 {
@@ -114,7 +103,6 @@ static void test_as_sent(void **state)
     (void)state;
     for (unsigned content = COLOURS; content <= (COLOURS | ATTRIBUTES); content++) {
         const unsigned colours = content & ATTRIBUTES ? 4 : 2; /* the bit of their frame */
-        size_t len;
         rig_begin();
         seq = UINT32_MAX - 2;
         put_head(1, content, NULL);
@@ -124,7 +112,7 @@ static void test_as_sent(void **state)
         put_points(3, 60, content, 1);
         put_points(4, 80, content, 0);
         put_points(5, 100, content, colours);
-        char *text = record("a.ply", (struct recorder_options){.ascii = 1, .empty_shots = 1}, &len), *at;
+        char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .empty_shots = 1}, NULL), *at;
         assert_non_null(strstr(text, "comment red green blue as the head sent them"));
         assert_non_null(strstr(text, "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"));
         assert_non_null(strstr(rig_notes, "18 points that are grey, since their colours were lost"));
@@ -144,16 +132,15 @@ static void test_as_sent(void **state)
 static void test_another_choice(void **state)
 {
     (void)state;
-    size_t len;
     rig_begin();
     put_head(1, COLOURS, NULL);
     put_points(0, 0, COLOURS, 0);
-    char *text = record("a.ply", (struct recorder_options){.ascii = 1, .colour = {.given = 1}}, &len);
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .colour = {.given = 1}}, NULL);
     assert_null(strstr(text, "red"));
     free(text);
     const struct recorder_options solid = {.ascii = 1,
                                            .colour = {.given = 1, .scale = {COLOUR_SOLID, {9, 8, 7}, 0, 0}}};
-    text = record("a.ply", solid, &len);
+    text = rig_record_bytes("a.ply", solid, NULL);
     char *at = body_of(text);
     for (int i = 0; i < SHOTS - 1; i++)
         at = expect(at, (const uint8_t[]){9, 8, 7});
@@ -164,12 +151,11 @@ static void test_another_choice(void **state)
 static void test_formats(void **state)
 {
     (void)state;
-    size_t len;
     rig_begin();
     put_head(1, COLOURS, NULL);
     put_points(0, 30, COLOURS, 0);
     for (int minor = 2; minor <= 4; minor += 2) {
-        uint8_t *las = (uint8_t *)record("a.las", (struct recorder_options){.las_minor = minor}, &len);
+        uint8_t *las = rig_record_bytes("a.las", (struct recorder_options){.las_minor = minor}, NULL);
         const uint8_t *p = las + rig_uint(las + 96, 4);
         assert_int_equal(las[104], minor == 2 ? 3 : 7);
         for (int i = 0; i < SHOTS; i++) {
@@ -182,7 +168,7 @@ static void test_formats(void **state)
         }
         free(las);
     }
-    char *ptx = record("a.ptx", (struct recorder_options){0}, &len), *at = ptx;
+    char *ptx = rig_record_bytes("a.ptx", (struct recorder_options){0}, NULL), *at = ptx;
     for (int i = 0; i < 10; i++)
         at = strchr(at, '\n') + 1;
     for (int i = 0; i < SHOTS; i++)
@@ -196,12 +182,11 @@ static void test_formats(void **state)
 static void test_range(void **state)
 {
     (void)state;
-    size_t len;
     rig_begin();
     put_head(1, 0, NULL);
     put_points(0, 0, 0, 0);
     struct recorder_options options = {.ascii = 1, .colour = {.given = 1, .scale = {COLOUR_RANGE, {0}, 1.5, 9.0}}};
-    char *text = record("a.ply", options, &len), *at = body_of(text);
+    char *text = rig_record_bytes("a.ply", options, NULL), *at = body_of(text);
     assert_non_null(strstr(text, "comment red green blue show the range, blue is 1.5, red 9 m\n"));
     for (int i = 0; i < SHOTS; i++) {
         const double part = fmin(1.0, fmax(0.0, (1.0 + i - 1.5) / 7.5)), blue = 1.0 - 3.0 * part,
@@ -220,14 +205,13 @@ static void test_range(void **state)
 static void test_height(void **state)
 {
     (void)state;
-    size_t len;
     rig_begin();
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
     a.station_m[2] = 5.0;
     put_head(1, 0, &a);
     put_points(0, 0, 0, 0);
     struct recorder_options options = {.ascii = 1, .colour = {.given = 1, .scale = {COLOUR_HEIGHT, {0}, 5.0, 15.0}}};
-    char *text = record("a.ply", options, &len), *at = body_of(text);
+    char *text = rig_record_bytes("a.ply", options, NULL), *at = body_of(text);
     for (int i = 0; i < SHOTS; i++) {
         uint8_t rgb[3];
         colour_ramp((1.0 + i) * sin(9.0 * i * M_PI / 180.0) / 10.0, rgb);
@@ -240,7 +224,6 @@ static void test_height(void **state)
 static void test_frame(void **state)
 {
     (void)state;
-    size_t len;
     struct sh_err err = {0};
     const struct recorder_options options = {.ascii = 1,
                                              .colour = {.given = 1, .scale = {COLOUR_FRAME, {0}, 100.0, 103.0}}};
@@ -250,7 +233,7 @@ static void test_frame(void **state)
     rig_begin();
     put_head(1, 0, &a);
     put_points(0, 0, 0, 0);
-    char *text = record("a.ply", options, &len), *at = body_of(text);
+    char *text = rig_record_bytes("a.ply", options, NULL), *at = body_of(text);
     for (int i = 0; i < SHOTS - 1; i++)
         at = expect(at, (const uint8_t[]){0, 255, 0});
     free(text);

@@ -27,10 +27,8 @@ const char *ask_python(struct wire *wire, const char *flavour, const char *what,
     if (has_numpy < 0)
         has_numpy = wire_wait(wire, wire_spawn_program(wire, python, probe, "probe.out", "probe.err", -1)) == 0;
     if (strcmp(flavour, "numpy") == 0 && !has_numpy) return NULL;
-    int status = wire_wait(wire, wire_spawn_program(wire, python, args, "python.out", "python.err", -1));
-    if (status != 0) wire_show(wire, "python.err");
-    assert_int_equal(status, 0);
-    return text = wire_read(wire_path(wire, "python.out"), NULL);
+    wire_run_program(wire, python, args, 0);
+    return text = wire_read(wire_path(wire, "out"), NULL);
 }
 
 int setup(void **state)
@@ -57,9 +55,7 @@ const char *record(struct wire *wire, const struct room_config *c, const char *n
     const char *args[32] = {"record", config, "-o", path, "--stats", stats, "--quiet"};
     for (int n = 7; (args[n + 1] = strtok_r(rest, " ", &rest)) != NULL; n += 2)
         args[n] = "--set";
-    int status = wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1));
-    if (status != 0) wire_show(wire, "head.err");
-    assert_int_equal(status, 0);
+    wire_run(wire, args, 0);
     return wire_path(wire, name);
 }
 

@@ -24,13 +24,6 @@ static void write_scene(const struct wire *wire)
     wire_write_text(wire, "way.csv", "x_m,y_m,z_m,speed_m_s\n0,-1,0,1\n0,9,0,1\n");
 }
 
-static int run(struct wire *wire, const char *const *args)
-{
-    const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    if (status == 1) wire_show(wire, "err");
-    return status;
-}
-
 static void record(struct wire *wire, const char *config)
 {
     char in[352], out[352];
@@ -49,9 +42,7 @@ static void record(struct wire *wire, const char *config)
                                 "--ply-columns",
                                 "label,station,frame",
                                 NULL};
-    const int status = run(wire, args);
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
+    wire_run(wire, args, 0);
 }
 
 /* The expected contents of a file: the time of its frame, and the place of the head for each point. */
@@ -141,7 +132,7 @@ static void test_driving(void **state)
     snprintf(in, sizeof in, "%s", wire_path(wire, "config.yaml"));
     snprintf(out, sizeof out, "%s", wire_path(wire, "all.poses.csv"));
     const char *const args[] = {"record", in, "--station", "all", "-o", out, "--quiet", NULL};
-    assert_int_equal(run(wire, args), 0);
+    wire_run(wire, args, 0);
     char *text = wire_read(out, NULL), *line = strchr(text, '\n') + 1;
     for (unsigned i = 0; i < 3; i++, line = strchr(line, '\n') + 1) {
         unsigned scan, station;
@@ -176,7 +167,7 @@ static void test_faults(void **state)
         snprintf(config, sizeof config, HEAD SCENE OUTPUT "platform: %s\n" TWO "}\n", faults[i].platform);
         wire_write_text(wire, "config.yaml", config);
         const char *const args[] = {"check", in, NULL};
-        assert_int_equal(run(wire, args), 2);
+        wire_run(wire, args, 2);
         char *text = wire_read(wire_path(wire, "err"), NULL);
         if (strstr(text, faults[i].says) == NULL)
             fail_msg("%s: '%s' without '%s'", faults[i].platform, text, faults[i].says);

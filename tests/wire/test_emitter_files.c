@@ -21,11 +21,6 @@ static const char *write_config(struct wire *wire, const char *profile, double p
     return write_config_with(wire, profile, prr_hz, lines_hz, frames, "links: []\n");
 }
 
-static int run(struct wire *wire, const char *const *args)
-{
-    return wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-}
-
 static void assert_said(const struct wire *wire, const char *file, const char *words)
 {
     char *text = wire_read(wire_path(wire, file), NULL);
@@ -36,7 +31,7 @@ static void assert_said(const struct wire *wire, const char *file, const char *w
 static int record_as(struct wire *wire, const char *config, const char *name)
 {
     const char *const args[] = {"record", config, "-o", wire_path(wire, name), "--quiet", NULL};
-    return run(wire, args);
+    return wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
 }
 
 /* The first two lines are the columns and rows. */
@@ -64,7 +59,7 @@ static void beams_have_no_grid(void **state)
     char ply[256];
     snprintf(ply, sizeof ply, "%s", wire_path(wire, "a.ply"));
     const char *const args[] = {"record", config, "-o", ply, "-o", wire_path(wire, "a.ptx"), "--quiet", NULL};
-    assert_int_equal(run(wire, args), 2);
+    wire_run(wire, args, 2);
     assert_said(wire, "err", "a.ptx: a grid has rows and columns, but this head fires beams in turn; allowed are .ply");
     assert_int_equal(access(ply, F_OK), -1); /* refused before a file is begun */
 }
@@ -79,11 +74,11 @@ static void other_formats_take_them(void **state)
         assert_int_equal(record_as(wire, config, name[i]), 0);
     assert_said(wire, "a.ply", "element vertex 28939\n");
     const char *const report[] = {"report", config, wire_path(wire, "a.ply"), NULL};
-    assert_int_equal(run(wire, report), 0);
+    wire_run(wire, report, 0);
     assert_said(wire, "out", "points     28939\n");
     assert_said(wire, "out", "beyond     0 farther than 0.001 m\n");
     const char *const map[] = {"map", config, "-o", wire_path(wire, "a.png"), "--quiet", NULL};
-    assert_int_equal(run(wire, map), 0);
+    wire_run(wire, map, 0);
 }
 
 /* b.shs is a.shs without its line ends, as if they were lost. */
@@ -133,13 +128,13 @@ static void plan_and_check_name_the_emitter(void **state)
     struct wire *wire = *state;
     const char *config = write_config(wire, "velodyne-vlp16", 289351.851852, 20, 2);
     const char *const check[] = {"check", config, NULL}, *const plan[] = {"plan", config, "--json", NULL};
-    assert_int_equal(run(wire, check), 0);
+    wire_run(wire, check, 0);
     assert_said(wire, "out", "emitter   beams, 16 in a sequence of 55296 ns, turning clockwise\n");
-    assert_int_equal(run(wire, plan), 0);
+    wire_run(wire, plan, 0);
     assert_said(wire, "out", "\"stage\": \"emitter\",\n    \"method\": \"beams\"");
     config = write_config(wire, "hokuyo-urg-04lx", 10240, 10, 1);
     const char *const planar[] = {"check", config, NULL};
-    assert_int_equal(run(wire, planar), 0);
+    wire_run(wire, planar, 0);
     assert_said(wire, "out", "emitter   planar, steps 44..725 of 1024 a turn, 384 ahead, counter-clockwise\n");
 }
 
@@ -150,7 +145,7 @@ static void links_forbid_no_map(void **state)
     const char *config =
         write_config_with(wire, "hokuyo-ust-20lx", 57600, 40, 1, "links: [{type: tcp, protocol: scip, port: 0}]\n");
     const char *const map[] = {"map", config, "-o", wire_path(wire, "a.png"), "--quiet", NULL};
-    assert_int_equal(run(wire, map), 0);
+    wire_run(wire, map, 0);
 }
 
 int main(void)

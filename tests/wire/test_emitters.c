@@ -147,11 +147,7 @@ static void record(struct wire *wire, const struct model *m)
     room_write(wire);
     const char *config = room_config_write(wire, &c);
     const char *const args[] = {"record", config, "-o", wire_path(wire, "out.shs"), "--quiet", NULL};
-    pid_t pid = wire_spawn(wire, args, "out", "err", -1);
-    if (wire_wait(wire, pid) != 0) {
-        wire_show(wire, "err");
-        fail_msg("%s was not recorded", m->profile);
-    }
+    wire_run(wire, args, 0);
     check_recording(m, wire_path(wire, "out.shs"));
     unlink(wire_path(wire, "out.shs"));
 }

@@ -10,13 +10,6 @@ struct picture {
     uint8_t *rgb;
 };
 
-static void run(struct wire *wire, const char *const *args)
-{
-    const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
-}
-
 static struct picture load(struct wire *wire, const char *name)
 {
     png_image image = {.version = PNG_IMAGE_VERSION};
@@ -67,7 +60,7 @@ static struct picture view(struct wire *wire, const char *from, const char *clou
                                 cloud != NULL ? "--cloud" : NULL,
                                 with,
                                 NULL};
-    run(wire, args);
+    wire_run(wire, args, 0);
     struct picture p = load(wire, "view.png");
     assert_true(p.width == 300 && p.height == 200);
     return p;
@@ -79,7 +72,7 @@ static void record(struct wire *wire, const char *out)
     snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
     snprintf(to, sizeof to, "%s", wire_path(wire, out));
     const char *const args[] = {"record", config, "-o", to, "--quiet", NULL};
-    run(wire, args);
+    wire_run(wire, args, 0);
 }
 
 static void write_room(struct wire *wire, const char *output)

@@ -43,7 +43,7 @@ static void the_points_so_far_are_a_file(void **state)
     watch_prepare(wire, config);
     snprintf(path, sizeof path, "%s", wire_path(wire, "whole.ply"));
     free(watch_command(wire, (const char *const[]){"record", config, "-o", path, "--station", "1", "--quiet", NULL},
-                       NULL, "out"));
+                       NULL));
     char *recorded = wire_read(path, &len);
     const char *want = ply_points(recorded, len, &n_recorded);
     struct head head = head_start(wire, config, NULL);

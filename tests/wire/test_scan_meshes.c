@@ -17,9 +17,7 @@ static struct sh_err err;
 
 static void run_well(struct wire *wire, const char *program, const char *const *args)
 {
-    const int status = wire_wait(wire, wire_spawn_program(wire, program, args, "out", "err", -1));
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
+    wire_run_program(wire, program, args, 0);
 }
 
 /* Runs `record` on the sphere, with up to twelve more arguments; -o NAME is a file of the folder. */

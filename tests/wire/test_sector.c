@@ -51,13 +51,6 @@ static const char *write_config(const struct wire *wire, const struct panorama *
     return wire_write_text(wire, "config.yaml", text);
 }
 
-static void run(struct wire *wire, const char *const *args)
-{
-    const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
-}
-
 /* Returns a path that stays good. */
 static const char *path_of(const struct wire *wire, const char *name, char buf[128])
 {
@@ -130,10 +123,7 @@ static void assert_python_agrees(struct wire *wire, const struct panorama *p)
     double first_deg, step_deg;
     int rings, front;
     if (access(PYTHON, X_OK) != 0) return;
-    if (wire_wait(wire, wire_spawn_program(wire, PYTHON, args, "out", "err", -1)) != 0) {
-        wire_show(wire, "err");
-        fail_msg("the client in Python");
-    }
+    wire_run_program(wire, PYTHON, args, 0);
     char *text = wire_read(wire_path(wire, "out"), NULL);
     assert_int_equal(sscanf(text, "%d %lf %lf %d", &rings, &first_deg, &step_deg, &front), 4);
     assert_int_equal(rings, p->rings);
@@ -177,7 +167,7 @@ static void sectors_and_circles(void **state)
                                     "-o",      path_of(wire, "a.ptx", path[2]),
                                     "-o",      path_of(wire, "a.e57", path[3]),
                                     "--quiet", NULL};
-        run(wire, args);
+        wire_run(wire, args, 0);
         check_stream(wire, p);
         assert_python_agrees(wire, p);
         char *text = wire_read(wire_path(wire, "a.ptx"), NULL); /* columns, rows: nothing is filled up */
@@ -218,7 +208,7 @@ static void meshes_of_parts(void **state)
         const char *const args[] = {
             "record", path_of(wire, "config.yaml", config), "-o", path_of(wire, "a.ply", ply), "--mesh", "--quiet",
             NULL};
-        run(wire, args);
+        wire_run(wire, args, 0);
         assert_said(wire, "a.ply", cases[i].faces);
         wire_empty(wire);
     }
@@ -242,11 +232,11 @@ static void rounding_is_said(void **state)
     const char *const exact[] = {"check", config, "--set", "head.step_deg=2.25", NULL};
     const char *const *const commands[] = {check, record, head};
     for (int i = 0; i < 3; i++) {
-        run(wire, commands[i]);
+        wire_run(wire, commands[i], 0);
         assert_said(wire, "err", said);
         assert_said(wire, "err", figures);
     }
-    run(wire, exact);
+    wire_run(wire, exact, 0);
     assert_said(wire, "out",
                 "emitter   sphere, 24 rings 2.25 deg apart, of 160 steps of 2.25 deg; elevations -20.25 to "
                 "31.5 deg\n");
@@ -271,13 +261,13 @@ static void heights_and_openings_are_said(void **state)
     const char *const plan[] = {"plan", config, "--set", legs, "--set", above, NULL};
     const char *const record[] = {"record", config, "--set", legs, "--set", above, "-o", path_of(wire, "a.ply", ply),
                                   NULL};
-    run(wire, check);
+    wire_run(wire, check, 0);
     assert_said(wire, "out", "  tripod    ");
     assert_said(wire, "out", said);
-    run(wire, plan);
+    wire_run(wire, plan, 0);
     assert_said(wire, "out", "tripod   cone ");
     assert_said(wire, "out", said);
-    run(wire, record);
+    wire_run(wire, record, 0);
     assert_said(wire, "err", "scanhead: station 1 station-1: tripod: legs of 2 m");
     assert_said(wire, "err", said);
 }
@@ -302,7 +292,7 @@ static void tripods_with_any_threads(void **state)
                                         "--set",     "stations.0.tripod.head_above_m=0.3",
                                         "--set",     variants[v],
                                         "--quiet",   NULL};
-            run(wire, args);
+            wire_run(wire, args, 0);
             stats_hash(wire, hash[i]);
             assert_string_equal(hash[i], hash[0]);
         }

@@ -9,13 +9,6 @@ static const char CONFIG[] = "head: {profile: full-sweep, prr_hz: 10000, lines_h
                              "  - {position_m: [1, 1, 0]}\n"
                              "links: [{type: \"null\"}]\n";
 
-static void record(struct wire *wire, const char *const *args)
-{
-    int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
-}
-
 static void copy_path(const struct wire *wire, const char *name, char path[352])
 {
     snprintf(path, 352, "%s", wire_path(wire, name));
@@ -37,7 +30,7 @@ static void convert(struct wire *wire, const char *in, const char *out)
     char from[352], to[352];
     copy_path(wire, in, from);
     copy_path(wire, out, to);
-    record(wire, (const char *const[]){"record", from, "-o", to, "--quiet", NULL});
+    wire_run(wire, (const char *const[]){"record", from, "-o", to, "--quiet", NULL}, 0);
 }
 
 /* The raw streams one after the other are the whole stream, but for the times of frames between scans. Each has the
@@ -52,10 +45,13 @@ static void test_split(void **state)
     copy_path(wire, "s.shs", shs);
     copy_path(wire, "s.las", las);
     copy_path(wire, "s.poses.csv", csv);
-    record(wire, (const char *const[]){"record", config, "--station", "all", "--split", "-o", shs, "-o", las, "-o", csv,
-                                       "--quiet", NULL});
+    wire_run(wire,
+             (const char *const[]){"record", config, "--station", "all", "--split", "-o", shs, "-o", las, "-o", csv,
+                                   "--quiet", NULL},
+             0);
     assert_int_equal(access(las, F_OK), -1);
-    record(wire, (const char *const[]){"record", config, "--station", "all", "-o", shs, "-o", las, "--quiet", NULL});
+    wire_run(wire, (const char *const[]){"record", config, "--station", "all", "-o", shs, "-o", las, "--quiet", NULL},
+             0);
     char *first = wire_read(wire_path(wire, "s-1.shs"), &len[0]),
          *second = wire_read(wire_path(wire, "s-2.shs"), &len[1]);
     assert_true(len[0] > 100000 && len[1] > 100000);

@@ -19,13 +19,6 @@ static struct wire *wire;
 static char stream[128], endpoint[128];
 static pid_t viewer;
 
-static void run_well(const char *const *args)
-{
-    const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
-}
-
 /* Runs `record` on the recording into NAME, with up to four more arguments. */
 static const char *record_again(const char *name, const char *const *more)
 {
@@ -34,7 +27,7 @@ static const char *record_again(const char *name, const char *const *more)
     snprintf(to, sizeof to, "%s", wire_path(wire, name));
     for (int n = 6; *more != NULL; n++)
         args[n] = *more++;
-    run_well(args);
+    wire_run(wire, args, 0);
     return to;
 }
 
@@ -293,7 +286,7 @@ static int setup(void **state)
     snprintf(config, sizeof config, "%s", wire_write_text(wire, "sphere.yaml", SPHERE));
     snprintf(stream, sizeof stream, "%s", wire_path(wire, "sphere.shs"));
     const char *const args[] = {"record", config, "--quiet", "-o", stream, NULL};
-    run_well(args);
+    wire_run(wire, args, 0);
     start(stream);
     return 0;
 }

@@ -43,8 +43,8 @@ static char *report_of(struct wire *wire, const char *config, const char *set)
     snprintf(cloud, sizeof cloud, "%s", wire_path(wire, "scan.ply"));
     const char *const record[] = {"record", config, "-o", cloud, "--station", "1", "--empty-shots", "--quiet", NULL};
     const char *const report[] = {"report", config, cloud, "--json", "--tolerance-m", "1", NULL};
-    free(watch_command(wire, record, set, "out"));
-    return watch_command(wire, report, set, "report.json");
+    free(watch_command(wire, record, set));
+    return watch_command(wire, report, set);
 }
 
 static void same(const char *what, double value, double expected, double tolerance)
@@ -103,7 +103,7 @@ static void check_figures(const char *quality, const char *report)
 static void check_coverage(struct wire *wire, const char *config, const char *quality)
 {
     const char *const args[] = {"coverage", config, "--json", "--quiet", NULL};
-    char *coverage = watch_command(wire, args, NULL, "coverage.json");
+    char *coverage = watch_command(wire, args, NULL);
     const double area_m2 = number(coverage, "{", "area_m2"), seen_m2 = area_m2 - number(coverage, "{", "none_m2");
     same("cells", number(quality, "\"coverage\"", "cells"), number(coverage, "{", "cells"), 0);
     same("cell_m", number(quality, "\"coverage\"", "cell_m"), 0.25, 0);

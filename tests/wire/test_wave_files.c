@@ -93,13 +93,6 @@ static void read_stream(const char *path)
     assert_true(n_echoes > 1000 && n_windows > 1000 && n_more > 10);
 }
 
-static void run_program(const char *const *args)
-{
-    const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
-    if (status != 0) wire_show(wire, "err");
-    assert_int_equal(status, 0);
-}
-
 /* Returns the text that the reader prints of a LAS file. */
 static char *read_las(const char *las)
 {
@@ -108,9 +101,7 @@ static char *read_las(const char *las)
     snprintf(path, sizeof path, "%s", wire_path(wire, las));
     snprintf(text, sizeof text, "%s", wire_path(wire, "read.txt"));
     const char *const args[] = {script, path, text, NULL};
-    const int status = wire_wait(wire, wire_spawn_program(wire, python, args, "tool.out", "tool.err", -1));
-    if (status != 0) wire_show(wire, "tool.err");
-    assert_int_equal(status, 0);
+    wire_run_program(wire, python, args, 0);
     return wire_read(text, NULL);
 }
 
@@ -211,9 +202,12 @@ static void record_all(const char *keys)
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SCAN));
     for (int i = 0; i < 4; i++)
         snprintf(path[i], sizeof path[i], "%s", wire_path(wire, name[i]));
-    run_program((const char *const[]){"record", config, "--quiet", "--set", keys, "--set", "output.crs=local", "-o",
-                                      path[0], "-o", path[1], "-o", path[2], NULL});
-    run_program((const char *const[]){"record", path[0], "--quiet", "--wdp", "--colour", "label", "-o", path[3], NULL});
+    wire_run(wire,
+             (const char *const[]){"record", config, "--quiet", "--set", keys, "--set", "output.crs=local", "-o",
+                                   path[0], "-o", path[1], "-o", path[2], NULL},
+             0);
+    wire_run(wire,
+             (const char *const[]){"record", path[0], "--quiet", "--wdp", "--colour", "label", "-o", path[3], NULL}, 0);
 }
 
 static void check_layout(const char *keys)

@@ -92,7 +92,7 @@ char *watch_scan(const struct head *head, struct scanhead *sh, unsigned station,
     return watch_quality(head, station, scan);
 }
 
-char *watch_command(struct wire *wire, const char *const *first, const char *set, const char *out)
+char *watch_command(struct wire *wire, const char *const *first, const char *set)
 {
     const char *args[WIRE_MAX_ARGS];
     size_t n = 0;
@@ -103,9 +103,6 @@ char *watch_command(struct wire *wire, const char *const *first, const char *set
         args[n++] = set;
     }
     args[n] = NULL;
-    if (wire_wait(wire, wire_spawn(wire, args, out, "err", -1)) != 0) {
-        wire_show(wire, "err");
-        fail_msg("%s", args[0]);
-    }
-    return wire_read(wire_path(wire, out), NULL);
+    wire_run(wire, args, 0);
+    return wire_read(wire_path(wire, "out"), NULL);
 }

@@ -16,6 +16,6 @@ char *watch_quality(const struct head *head, unsigned station, unsigned scan);
 /* Commands a scan from a station, as any client does, and returns its quality. */
 char *watch_scan(const struct head *head, struct scanhead *sh, unsigned station, unsigned scan);
 /* Runs the program with these arguments to its end, and returns what it wrote. set: of `--set`; NULL: none. */
-char *watch_command(struct wire *wire, const char *const *first, const char *set, const char *out);
+char *watch_command(struct wire *wire, const char *const *first, const char *set);
 
 #endif

@@ -137,13 +137,10 @@ pid_t wire_spawn_program(struct wire *wire, const char *program, const char *con
         assert_true(n < WIRE_MAX_ARGS);
         argv[n] = (char *)(uintptr_t)args[n - 1];
     }
-    char out_path[352], err_path[352];
-    snprintf(out_path, sizeof out_path, "%s", wire_path(wire, out));
-    snprintf(err_path, sizeof err_path, "%s", wire_path(wire, err));
     pid_t pid = wire_fork(wire);
     if (pid != 0) return pid;
-    int null = open("/dev/null", O_RDONLY), o = open(out_path, O_WRONLY | O_CREAT | O_TRUNC, 0600),
-        e = open(err_path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    int null = open("/dev/null", O_RDONLY), o = open(wire_path(wire, out), O_WRONLY | O_CREAT | O_TRUNC, 0600),
+        e = open(wire_path(wire, err), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     /* The number is high, as 3 may be any open descriptor. */
     int ready = ready_fd >= 0 ? fcntl(ready_fd, F_DUPFD, 100) : -1;
     dup2(null, 0);
@@ -159,22 +156,22 @@ pid_t wire_spawn_program(struct wire *wire, const char *program, const char *con
 }
 
 /* $SCANHEAD may be scanheadd, a head to be tested. Its clients and judges are then of the scanhead beside it. */
-static const char *program_for(const char *command, char path[PATH_MAX])
+static const char *program_for(const char *command)
 {
+    static char path[PATH_MAX];
     static const char *const head[] = {"run", "plan", "check", "list"};
     const char *program = wire_program();
     const size_t n = strlen(program);
     if (command == NULL || n < 2 || strcmp(program + n - 2, "dd") != 0) return program;
     for (size_t i = 0; i < sizeof head / sizeof head[0]; i++)
         if (strcmp(command, head[i]) == 0) return program;
-    snprintf(path, PATH_MAX, "%.*s", (int)n - 1, program);
+    snprintf(path, sizeof path, "%.*s", (int)n - 1, program);
     return path;
 }
 
 pid_t wire_spawn(struct wire *wire, const char *const *args, const char *out, const char *err, int ready_fd)
 {
-    char path[PATH_MAX];
-    return wire_spawn_program(wire, program_for(args[0], path), args, out, err, ready_fd);
+    return wire_spawn_program(wire, program_for(args[0]), args, out, err, ready_fd);
 }
 
 int wire_wait(struct wire *wire, pid_t pid)
@@ -195,6 +192,18 @@ void wire_show(const struct wire *wire, const char *name)
     char *text = wire_read(wire_path(wire, name), NULL);
     printf("# %s: %s\n", name, text); /* print_message cuts long texts, and their newline */
     free(text);
+}
+
+void wire_run_program(struct wire *wire, const char *program, const char *const *args, int status)
+{
+    const int got = wire_wait(wire, wire_spawn_program(wire, program, args, "out", "err", -1));
+    if (got != status) wire_show(wire, "err");
+    assert_int_equal(got, status);
+}
+
+void wire_run(struct wire *wire, const char *const *args, int status)
+{
+    wire_run_program(wire, program_for(args[0]), args, status);
 }
 
 struct head head_start(struct wire *wire, const char *config, const char *const *more)
@@ -390,8 +399,7 @@ int wire_bind(int type, int *port)
 
 int raw_try_connect(const char *endpoint)
 {
-    const char *port = strrchr(endpoint, ':');
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(port + 1))};
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)endpoint_port(endpoint))};
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     int fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     assert_true(fd >= 0);

@@ -95,6 +95,12 @@ int wire_wait(struct wire *wire, pid_t pid);
 
 void wire_show(const struct wire *wire, const char *name);
 
+/* Runs a program to its end, with its streams in the files "out" and "err". A status other than this one shows "err",
+ * and the test fails. */
+void wire_run_program(struct wire *wire, const char *program, const char *const *args, int status);
+/* Does the same with the head's program. */
+void wire_run(struct wire *wire, const char *const *args, int status);
+
 /* Starts `scanhead run CONFIG ...` and reads its ready line. more: further arguments, ends with NULL, or NULL. */
 struct head head_start(struct wire *wire, const char *config, const char *const *more);
 

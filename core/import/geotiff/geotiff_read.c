@@ -124,12 +124,9 @@ static int look_at_others(struct raster *r, struct sh_err *err)
             r->b, SH_EINPUT, err,
             "a mask marks the cells without height; allowed is a value that marks them: gdalwarp -dstnodata -9999 "
             "makes one");
-    if (n > 0)
-        sh_warn(r->b->report, "%s: only its first image is read; there %s %u more", r->b->name, n > 1 ? "are" : "is",
-                n);
+    if (n > 0) build_warn(r->b, "only its first image is read; there %s %u more", n > 1 ? "are" : "is", n);
     if (r->said[0] != '\0')
-        sh_warn(r->b->report, "%s: only its first image is read; the data after it are broken: %.200s", r->b->name,
-                r->said);
+        build_warn(r->b, "only its first image is read; the data after it are broken: %.200s", r->said);
     r->said[0] = '\0';
     return r->lib.TIFFSetDirectory(r->tif, 0) ? SH_OK : fail_reading(r, "its directory", err);
 }
@@ -347,36 +344,31 @@ static void doubt_heights(const struct raster *r)
     const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;
     const double odd = is_low ? r->lowest : r->highest;
     if (!is_low && odd <= 9000.0) return;
-    sh_warn(r->b->report,
-            "%s: its heights go from %g to %g m; if %g marks cells without height, add that to the file with "
-            "gdal_translate -a_nodata",
-            r->b->name, r->lowest, r->highest, (odd - r->g.height_m) / r->g.height_scale_m);
+    build_warn(r->b,
+               "its heights go from %g to %g m; if %g marks cells without height, add that to the file with "
+               "gdal_translate -a_nodata",
+               r->lowest, r->highest, (odd - r->g.height_m) / r->g.height_scale_m);
 }
 
 static int geotiff_read_say(struct raster *r, struct sh_err *err)
 {
-    const struct sh_report *report = r->b->report;
     int rc = r->n_holes > 0 ? count_alone(r, err) : SH_OK;
     if (r->n_holes == (uint64_t)r->g.width * r->g.height)
         return build_fail(r->b, SH_EINPUT, err, "none of %u x %u cells has a height", r->g.width, r->g.height);
     if (r->n_holes > 0)
-        sh_warn(report, "%s: %llu of %llu cells have no height, and are holes", r->b->name,
-                (unsigned long long)r->n_holes, (unsigned long long)r->g.width * r->g.height);
+        build_warn(r->b, "%llu of %llu cells have no height, and are holes", (unsigned long long)r->n_holes,
+                   (unsigned long long)r->g.width * r->g.height);
     if (r->n_alone > 0)
-        sh_warn(report, "%s: %llu heights beside holes touch no triangle, and are left out", r->b->name,
-                (unsigned long long)r->n_alone);
-    if (!r->g.unit_given)
-        sh_warn(report, "%s: it names neither its system nor its unit: metres are assumed", r->b->name);
+        build_warn(r->b, "%llu heights beside holes touch no triangle, and are left out",
+                   (unsigned long long)r->n_alone);
+    if (!r->g.unit_given) build_warn(r->b, "it names neither its system nor its unit: metres are assumed");
     if (!r->g.height_unit_given && r->g.unit_m != 1.0)
-        sh_warn(report, "%s: its system is in feet, but its heights have no unit: metres are assumed", r->b->name);
+        build_warn(r->b, "its system is in feet, but its heights have no unit: metres are assumed");
     if (r->g.maps_heights)
-        sh_warn(
-            report,
-            "%s: its ModelPixelScale or ModelTiepoint scales the heights; this is not used, since the file names no "
-            "system for heights",
-            r->b->name);
-    if (r->g.turns_heights)
-        sh_warn(report, "%s: its ModelTransformation changes the heights; this is not used", r->b->name);
+        build_warn(r->b,
+                   "its ModelPixelScale or ModelTiepoint scales the heights; this is not used, since the file names no "
+                   "system for heights");
+    if (r->g.turns_heights) build_warn(r->b, "its ModelTransformation changes the heights; this is not used");
     doubt_heights(r);
     return rc;
 }

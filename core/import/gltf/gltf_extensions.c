@@ -63,8 +63,7 @@ static void warn_unknown(const struct scene_build *b, const json_t *used)
         if (at < 200) at += (size_t)snprintf(names + at, sizeof names - at, "%s%.48s", n > 0 ? ", " : "", name);
         n++;
     }
-    if (n > 0)
-        sh_warn(b->report, "%s: %u extensions are unknown but not required; they are not read: %s", b->name, n, names);
+    if (n > 0) build_warn(b, "%u extensions are unknown but not required; they are not read: %s", n, names);
 }
 
 json_t *gltf_extension(const json_t *of, const char *name)
@@ -89,7 +88,7 @@ static int check_for_assimp(struct scene_build *b, const json_t *root, struct sh
             return build_fail(b, SH_EINPUT, err, "it needs KHR_draco_mesh_compression and %s; allowed is one of them",
                               other[i]);
     if (json_array_size(json_object_get(root, "skins")) > 0)
-        sh_warn(b->report, "%s: its meshes are packed by Draco, so Assimp reads it, which ignores its skins", b->name);
+        build_warn(b, "its meshes are packed by Draco, so Assimp reads it, which ignores its skins");
     return SH_OK;
 }
 
@@ -128,7 +127,7 @@ int gltf_check_extensions(struct scene_build *b, const json_t *root, bool *by_as
     }
     warn_unknown(b, used);
     if (is_in(used, "KHR_techniques_webgl") || is_in(used, "KHR_technique_webgl"))
-        sh_warn(b->report, "%s: its colours come from shaders (KHR_techniques_webgl), which are not read", b->name);
+        build_warn(b, "its colours come from shaders (KHR_techniques_webgl), which are not read");
     *by_assimp = gltf_is_required(root, "KHR_draco_mesh_compression") || has_packed(root);
     return *by_assimp ? check_for_assimp(b, root, err) : SH_OK;
 }

@@ -26,8 +26,7 @@ static int find_chunks(struct gltf *g, struct gltf_bytes *json)
     const struct text *t = &g->file;
     const size_t length = le_get32(t->data + 8);
     if (length > t->size) return gltf_fail(g, "cut off: it has %zu bytes, but its header says %zu", t->size, length);
-    if (length < t->size)
-        sh_warn(g->b->report, "%s: %zu bytes after its end are not read", g->b->name, t->size - length);
+    if (length < t->size) build_warn(g->b, "%zu bytes after its end are not read", t->size - length);
     for (size_t at = GLB_HEAD; at < length;) {
         if (length - at < CHUNK_HEAD || le_get32(t->data + at) > length - at - CHUNK_HEAD)
             return gltf_fail(g, "the chunk at byte %zu goes beyond its end, byte %zu", at, length);

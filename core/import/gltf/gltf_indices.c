@@ -129,7 +129,7 @@ void gltf_say_indices(const struct scene_build *b, const json_t *root)
     struct search s = {.root = root};
     walk(&s, root, "", "", 0);
     if (s.n > 0)
-        sh_warn(b->report, "%s: %llu ind%s missing elements; the first: %s is %g, but there are %zu %s", b->name,
-                (unsigned long long)s.n, s.n > 1 ? "ices name" : "ex names", s.first.text, s.number,
-                json_array_size(json_object_get(root, s.list)), s.list);
+        build_warn(b, "%llu ind%s missing elements; the first: %s is %g, but there are %zu %s", (unsigned long long)s.n,
+                   s.n > 1 ? "ices name" : "ex names", s.first.text, s.number,
+                   json_array_size(json_object_get(root, s.list)), s.list);
 }

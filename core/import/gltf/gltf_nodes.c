@@ -229,8 +229,7 @@ static int draw_default(struct gltf *g, uint32_t *stack)
         return rc;
     }
     if (rc == SH_OK && number == GLTF_NONE && json_array_size(scenes) > 1)
-        sh_warn(g->b->report, "%s: it has %zu scenes and no default scene: the first is read", g->b->name,
-                json_array_size(scenes));
+        build_warn(g->b, "it has %zu scenes and no default scene: the first is read", json_array_size(scenes));
     if (number == GLTF_NONE) number = 0;
     const struct gltf_at at = gltf_at("scenes[%u]", number);
     if (rc == SH_OK) rc = gltf_object(g, "scenes", number, &scene);

@@ -23,28 +23,24 @@ bool gltf_is_name(const char *file)
 /* Warns of what was left out or changed, one line for each kind. */
 static void say_counts(const struct gltf *g)
 {
-    const struct sh_report *report = g->b->report;
-    const char *name = g->b->name;
     gltf_say_indices(g->b, g->root);
     if (g->n_hidden > 0)
-        sh_warn(report, "%s: %u nodes are hidden (KHR_node_visibility); they and their children are left out", name,
-                g->n_hidden);
-    if (g->n_shapeless > 0) sh_warn(report, "%s: %u primitives without POSITION left out", name, g->n_shapeless);
+        build_warn(g->b, "%u nodes are hidden (KHR_node_visibility); they and their children are left out",
+                   g->n_hidden);
+    if (g->n_shapeless > 0) build_warn(g->b, "%u primitives without POSITION left out", g->n_shapeless);
     if (g->n_unmapped > 0)
-        sh_warn(report, "%s: %u primitives have no texture coordinates: their texture is not used", name,
-                g->n_unmapped);
+        build_warn(g->b, "%u primitives have no texture coordinates: their texture is not used", g->n_unmapped);
     if (g->n_jointless > 0)
-        sh_warn(report, "%s: %u primitives have a skin and no JOINTS_0: no joint moves them", name, g->n_jointless);
+        build_warn(g->b, "%u primitives have a skin and no JOINTS_0: no joint moves them", g->n_jointless);
     if (g->n_unweighted > 0)
-        sh_warn(report, "%s: %llu vertices of a skin have no weights: no joint moves them", name,
-                (unsigned long long)g->n_unweighted);
+        build_warn(g->b, "%llu vertices of a skin have no weights: no joint moves them",
+                   (unsigned long long)g->n_unweighted);
     if (g->n_images > 0)
-        sh_warn(report,
-                "%s: %u primitives have a texture of %s, which is not supported: their surfaces have no texture", name,
-                g->n_images, g->image);
+        build_warn(g->b, "%u primitives have a texture of %s, which is not supported: their surfaces have no texture",
+                   g->n_images, g->image);
     if (g->n_odd > 0)
-        sh_warn(report, "%s: %u value%s of materials left out, since the format doesn't allow them; the first: %s",
-                name, g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
+        build_warn(g->b, "%u value%s of materials left out, since the format doesn't allow them; the first: %s",
+                   g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
 }
 
 /* The error of whole numbers is the writer's choice: it is never refused. */
@@ -54,8 +50,7 @@ static int say_errors(struct gltf *g)
     const double step_m = g->step_error * b->spec->scale;
     b->scene->error_m = fmax(b->scene->error_m, step_m);
     if (step_m > 1e-6)
-        sh_warn(b->report, "%s: its positions are whole numbers (KHR_mesh_quantization), with errors up to %.2g m",
-                b->name, step_m);
+        build_warn(b, "its positions are whole numbers (KHR_mesh_quantization), with errors up to %.2g m", step_m);
     return build_single(b, g->largest, g->error, true, g->err);
 }
 

@@ -142,7 +142,7 @@ static int say_missing(struct reading *r, const char *name, const struct sh_err 
     if (r->limits.ifc_strict)
         return build_fail(r->b, SH_EINPUT, r->err, "not cross-checked, but scene.ifc_strict demands both readers: %s",
                           why);
-    sh_warn(r->b->report, "%s: not cross-checked: %s gave no answer: %s", r->b->name, name, why);
+    build_warn(r->b, "not cross-checked: %s gave no answer: %s", name, why);
     return SH_OK;
 }
 
@@ -156,10 +156,10 @@ static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
             "facets of its curves, of radii up to %.3g m, are up to %.2g m away from the curves; allowed %.2g m "
             "(scene.tolerance_m)",
             r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
-    sh_warn(r->b->report,
-            "%s: facets of its curves, of radii up to %.3g m, are up to %.2g m away from the curves, more than %.2g m "
-            "(scene.tolerance_m)",
-            r->b->name, r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
+    build_warn(r->b,
+               "facets of its curves, of radii up to %.3g m, are up to %.2g m away from the curves, more than %.2g m "
+               "(scene.tolerance_m)",
+               r->records.radius_m, fineness->deviation_m, r->b->tolerance_m);
     return SH_OK;
 }
 
@@ -203,7 +203,7 @@ static int read_by_assimp(struct reading *r, const char *why)
     if (r->limits.ifc_strict)
         return build_fail(r->b, SH_EINPUT, r->err,
                           "%s, so nothing is cross-checked, but scene.ifc_strict demands both readers", why);
-    if (!asked) sh_warn(r->b->report, "%s: %s: Assimp reads it", r->b->name, why);
+    if (!asked) build_warn(r->b, "%s: Assimp reads it", why);
     const int rc = ifc_say_assimp(r->b, &r->records, !asked, why, r->err);
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
 }
@@ -236,8 +236,8 @@ static int read_records(struct reading *r)
     else
         return build_fail(r->b, SH_EINPUT, r->err, "%s; to read without them set scene.ifc_reader: assimp", why);
     if (rc == SH_OK && r->records.n_limited > 0)
-        sh_warn(r->b->report, "%s: %zu style%s of surfaces with a colour or transparency beyond 0 to 1, limited to it",
-                r->b->name, r->records.n_limited, r->records.n_limited > 1 ? "s" : "");
+        build_warn(r->b, "%zu style%s of surfaces with a colour or transparency beyond 0 to 1, limited to it",
+                   r->records.n_limited, r->records.n_limited > 1 ? "s" : "");
     r->b->scene->says = (struct scene_says){.unit_m = 1.0, .up = 2};
     return rc;
 }

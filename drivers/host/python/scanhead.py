@@ -1130,6 +1130,7 @@ class Head:
         self._sha256 = hashlib.sha256()
         self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = self._points_time = None
         self._last_seq, self._last_repeated = None, 0  # of a frame that is not LOCAL; how many were repeated up to it
+        self._told_alone = False  # since then a descriptor came for this reader alone
         self._scan, self.scan_over = None, False  # the number of the present scan; whether it ends with this frame
 
     def __enter__(self) -> "Head":
@@ -1408,17 +1409,18 @@ class Head:
 
     def _follow_sequence(self, frame: Frame) -> None:
         """Forgets what the stream said where its numbers go back: the head has started again, or recordings were put
-        one after the other. Where the new sequence began with frames equal to those before, they said the same."""
+        one after the other. Where the new sequence began with frames equal to those before, they said the same. And what
+        a descriptor for this reader alone has said just before is about the new sequence."""
         if frame.flags & LOCAL:
             return
         repeated = self.parser.repeated
         back = self._last_seq is not None and (frame.seq - self._last_seq) % 2**32 >= 2**31
         if back:
             self._last_pulse0 = None
-        if back and repeated == self._last_repeated:
+        if back and repeated == self._last_repeated and not self._told_alone:
             self._forget()
             self._gps = self._scan_t0_ns = None
-        self._last_seq, self._last_repeated = frame.seq, repeated
+        self._last_seq, self._last_repeated, self._told_alone = frame.seq, repeated, False
 
     def _follow_scan(self, frame: Frame) -> None:
         """Sets scan_over. SCAN_END may be lost: so the next frame that reports another scan, or none, ends it, too."""
@@ -1454,6 +1456,7 @@ class Head:
         if not frame.flags & REPEAT or self.descriptor is None or self.descriptor["scan"] != d["scan"]:
             self._forget()
         self.descriptor = d
+        self._told_alone |= frame.flags & LOCAL != 0
 
     def _absorb_emitter(self, frame: Frame) -> None:
         e = frame.fields

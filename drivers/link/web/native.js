@@ -31,6 +31,7 @@ export class Decoder {
     this.on = callbacks;
     this.descriptor = this.anchor = null;
     this.emitter = null; // null: a line head
+    this.toldAlone = false; // since the last numbered frame a descriptor came for this reader alone
     this.stats = {points: 0, shots: 0, empty: 0, unplaced_points: 0, unplaced_shots: 0, refused: 0, unknown: 0, lost_samples: 0};
     this.hash = new PointHash();
     this.poses = new Poses();
@@ -67,10 +68,11 @@ export class Decoder {
     }
   }
 
-  /** Takes a notice of the parser. Where another sequence begins, all that the stream has said is void. */
+  /** Takes a notice of the parser. Where another sequence begins, all that the stream has said is void, except what a
+   *  descriptor for this reader alone has said just before: it is the one of the new sequence. */
   notice({kind}) {
     if (kind !== 'restarted') return;
-    this.#forget();
+    if (!this.toldAlone) this.#forget();
     this.waves.clear(); // pulses and scans may have the numbers of earlier ones
     this.on.restarted?.({});
   }
@@ -102,6 +104,7 @@ export class Decoder {
 
   #take(frame, view) {
     const isOwn = (frame.flags & LOCAL) !== 0;
+    this.toldAlone = isOwn && (this.toldAlone || frame.type === DESCRIPTOR);
     if (frame.type === POINTS) return this.#points(frame, view);
     if (!isOwn && frame.type !== ATTRIBUTES && frame.type !== COLOURS) this.last = null;
     const own = {t_ns: frame.t_ns, repeat: (frame.flags & REPEAT) !== 0, local: isOwn};

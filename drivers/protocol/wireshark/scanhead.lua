@@ -678,9 +678,10 @@ local function absorb(flow, h, bytes, at, m)
     flow.line.whole = false
   end
   if m.notice == RESTARTED then
-    forget(flow)
+    if not flow.told_alone then forget(flow) end -- else the descriptor for this reader alone is of the new sequence
     flow.scan, flow.final, flow.last_pulse0, flow.line = nil, nil, nil, {pulses = 0, whole = false}
   end
+  flow.told_alone = h.is_local and (flow.told_alone or h.type == DESCRIPTOR)
   if m.notice then m.lost_so_far = flow.lost end
   if h.version ~= 1 then return end
   m.has_deviations = flow.descriptor and floor(flow.descriptor.content / 8) % 2 == 1

@@ -136,8 +136,8 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     o->device.one_scan = o->device.one_scan && o->device.start;
     int rc = run_complete_links(o, cfg, err);
     if (rc != SH_OK) return rc;
-    rc = tells_page(cfg) ? site_load_written_out(cfg, &app_report_stderr, &site, err) /* it looks at triangles */
-                         : site_load(cfg, &app_report_stderr, &site, err);
+    /* The page looks at triangles. */
+    rc = site_load_for(cfg, tells_page(cfg) ? SITE_WRITTEN_OUT : SITE_FOR_SCANS, NULL, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->surfaces != NULL) rc = surfaces_write(o->surfaces, site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
     /* After the plan, which is made for the configuration: a replayed journal gives the same stream without

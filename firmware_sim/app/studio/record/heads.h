@@ -3,7 +3,7 @@
  * configuration, and from which stations to scan. Out: the frames of all scans, station by station, and what came of
  * them in one sum.
  *
- * The head of head.station is there from the start. Any other is opened beside it (site_load_beside) when its first
+ * The head of head.station is there from the start. Any other is opened beside it (site_load_for) when its first
  * station is due, and ends after its last. Before the first scan each is set up once, so that its errors come then.
  * Their clocks all begin at the same power-up. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_HEADS_H

@@ -38,7 +38,7 @@ int offline_load(struct config *cfg, const struct site *beside, const struct sh_
 {
     cfg->loop.pace = PACE_FAST;
     cfg->n_links = 0;
-    return site_load_beside(cfg, beside, report, site, err);
+    return site_load_for(cfg, SITE_FOR_SCANS, beside, report, site, err);
 }
 
 /* ---- the client's end of a memory link, as a source of the library */

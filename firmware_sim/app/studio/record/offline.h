@@ -32,7 +32,7 @@ int offline_open(struct config *cfg, double scan_s, const struct sh_report *repo
                  struct sh_err *err);
 /* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
  * gives the site, which is site_free's; offline_open_at takes it. beside: a site to share a scene with, as
- * site_load_beside has it; NULL: none. */
+ * site_load_for has it; NULL: none. */
 int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
                  struct sh_err *err);
 int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *offline,
