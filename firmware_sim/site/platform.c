@@ -47,7 +47,7 @@ static int check_part(const struct site *site, double length_s, struct sh_err *e
     const int wrong_end = p->has_end && p->end_s > length_s + ROUNDING_S;
     /* A scan that stops at the end has no pulse if it begins there. One stop may be there, or a platform that waits. */
     const int must_go = p->kind == PLATFORM_TRAJECTORY && p->at_end == PLATFORM_STOP;
-    if (!wrong_end && must_go && p->start_s >= length_s)
+    if (!wrong_end && must_go && p->start_s >= length_s - ROUNDING_S)
         return sh_fail(err, SH_EINPUT,
                        "%s: platform.%s: %.9g %s is not before the trajectory's end; allowed 0 to below %.9g",
                        site->cfg->file, times.start, times.per_s * p->start_s, times.unit, times.per_s * length_s);
