@@ -100,7 +100,7 @@ int app_ends_in(const char *path, const char *ending);
 int app_is_recording(const char *path);
 
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
-void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
+void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 
 /* Opens the file that a user names for output, empty; "-": standard output. */
 int app_open_new(const char *path, FILE **out, struct sh_err *err);

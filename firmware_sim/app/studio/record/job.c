@@ -123,8 +123,7 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
 static void warn_of_little(const struct record_job *r)
 {
     const struct recording_result *result = &r->result;
-    const uint64_t pulses = result->counts.pulses;
-    if (result->empty <= pulses) app_warn_empty(pulses, pulses - result->empty, result->faint);
+    app_warn_empty(result->counts.pulses, result->empty, result->faint);
     if (r->files.recorder.colour.scale.mode == COLOUR_REFLECTANCE && result->points != 0 &&
         result->with_reflectance == 0)
         sh_warn(
