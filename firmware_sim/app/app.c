@@ -239,7 +239,7 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples)
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err)
 {
     if (rc == SH_OK && more != SH_OK) return sh_fail(err, more, "%s", why->text);
-    if (more != SH_OK) sh_warn(&app_report_stderr, "%s", why->text);
+    if (more != SH_OK && strcmp(why->text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why->text);
     return rc;
 }
 

@@ -51,7 +51,7 @@ int app_with_links(const struct app_input *in, const char *links,
                    int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
 
 /* Adds the result `more`, with its reason, to rc, that of earlier work. The first failure is returned, and err has its
- * text; a second one is printed as a warning. */
+ * text; a second one is printed as a warning, unless its text is the same. */
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
 /* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */

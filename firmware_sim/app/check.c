@@ -234,7 +234,7 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     const struct sh_report report = {run, check_warn, app_report_stderr.progress, app_report_stderr.stop};
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
-    int rc = sites_load(cfg, &report, &sites, err);
+    int rc = sites_load(cfg, site_load, &report, &sites, err);
     const double all_mb = peak_mb(); /* of the scene, without the head's queues */
     if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);
     if (rc == SH_OK) rc = print_summary(cfg, &sites, all_mb, out, err);

@@ -36,16 +36,10 @@ static int load_others(const struct config *cfg, const struct sh_report *report,
     return rc;
 }
 
-int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err)
+int sites_load(const struct config *cfg, sites_load_first *load, const struct sh_report *report, struct sites *sites,
+               struct sh_err *err)
 {
-    const int rc = site_load(cfg, report, &sites->first, err);
-    return rc == SH_OK ? load_others(cfg, report, sites, err) : rc;
-}
-
-int sites_load_written_out(const struct config *cfg, const struct sh_report *report, struct sites *sites,
-                           struct sh_err *err)
-{
-    const int rc = site_load_written_out(cfg, report, &sites->first, err);
+    const int rc = load(cfg, report, &sites->first, err);
     return rc == SH_OK ? load_others(cfg, report, sites, err) : rc;
 }
 

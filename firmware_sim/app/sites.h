@@ -20,10 +20,12 @@ struct sites {
     struct scanner_warnings warnings;
 };
 
+/* site_load or site_load_written_out */
+typedef int sites_load_first(const struct config *cfg, const struct sh_report *report, struct site **out,
+                             struct sh_err *err);
 /* sites begins as zeros, and is to be freed, also after an error. cfg must live on, with its sets. */
-int sites_load(const struct config *cfg, const struct sh_report *report, struct sites *sites, struct sh_err *err);
-int sites_load_written_out(const struct config *cfg, const struct sh_report *report, struct sites *sites,
-                           struct sh_err *err);
+int sites_load(const struct config *cfg, sites_load_first *load, const struct sh_report *report, struct sites *sites,
+               struct sh_err *err);
 /* The same beside the first site of a head that runs, which stays the caller's. */
 int sites_load_beside(const struct config *cfg, const struct site *first, const struct sh_report *report,
                       struct sites *sites, struct sh_err *err);

@@ -145,7 +145,7 @@ static int open_all(struct coverage_run *r, struct sh_err *err)
     struct sh_err why = {0};
     int rc = check_platform(r->cfg, err);
     if (rc == SH_OK) rc = check_output(r, err);
-    if (rc == SH_OK) rc = sites_load_written_out(r->cfg, &app_report_stderr, &r->sites, err);
+    if (rc == SH_OK) rc = sites_load(r->cfg, site_load_written_out, &app_report_stderr, &r->sites, err);
     r->site = r->sites.first;
     if (rc == SH_OK && r->output != NULL)
         rc = mesh_check_box(r->output, r->site->scene->min_m, r->site->scene->max_m, err);

@@ -43,7 +43,7 @@ static int work_load(struct report *r, struct sh_err *err)
     const unsigned columns = CLOUD_TIME | CLOUD_ECHO_COUNT | (config_head_moves(&r->cfg->platform) ? CLOUD_RANGE : 0u);
     int rc = cloud_read_columns(r->cloud_path, columns, &app_report_seconds, &r->cloud, err);
     if (rc == SH_OK && stat(r->cloud_path, &file) == 0) r->modified = file.st_mtim;
-    if (rc == SH_OK) rc = sites_load_written_out(r->cfg, &app_report_stderr, &r->sites, err);
+    if (rc == SH_OK) rc = sites_load(r->cfg, site_load_written_out, &app_report_stderr, &r->sites, err);
     r->site = r->sites.first;
     if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
     if (rc == SH_OK) leave_out_ghosts(r);
