@@ -257,6 +257,10 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     if (app_is_recording(r->in.operand[0]) && (r->job.wait_s > 0 || r->job.recording.replug_s > 0))
         return app_usage(&app_record,
                          "--wait, --replug: a recorded stream is there or not; allowed only with a head on a wire");
+    if (strncmp(r->in.operand[0], "fd:", 3) == 0 && r->job.recording.replug_s > 0)
+        return app_usage(
+            &app_record,
+            "--replug: an open descriptor can not be opened again; allowed with usb, tty:PATH and tcp:HOST:PORT");
     if (r->job.files.split && r->job.each)
         return app_usage(&app_record,
                          "--split and --each: --split writes only files of each scan; allowed is one of them");
