@@ -32,7 +32,7 @@ prepares='core/scene/build.c core/bvh/bvh.c core/sight/sight.c'
 #   usb            itself, protocol (its data), socket
 #   link           itself, usb, socket, protocol's lines of HTTP, core/late.h, core/newfile.h
 #   host           itself, protocol, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
-#   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, core/decimal.h, core/direct.h, the studio's rooms mesh and picture
+#   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, core/decimal.h, core/digits.h, core/direct.h, the studio's rooms mesh and picture
 # The arrows that run upward, one a line as FROM TO REASON: room FROM includes header TO, or calls what that header declares.
 # There is at most one in core, one in firmware_sim and one in drivers.
 upward='
@@ -78,7 +78,7 @@ rules='
             return b ~ /^(core|drivers)\// || (b in rank && b ~ /^firmware_sim\// && rank[b] < rank[a])
         }
         if (to ~ /^core\/(err|bytes|date|monotonic)\.h$/) return 1
-        if (to ~ /^core\/(colour|infile|decimal|direct)\.h$/ || b == "core/studio/mesh" || b == "core/studio/picture") return a == "drivers/record"
+        if (to ~ /^core\/(colour|infile|decimal|digits|direct)\.h$/ || b == "core/studio/mesh" || b == "core/studio/picture") return a == "drivers/record"
         if (to == "core/late.h") return a == "drivers/link"
         if (to == "core/newfile.h") return a == "drivers/record" || a == "drivers/link"
         if (a == "drivers/host" || a == "drivers/record")

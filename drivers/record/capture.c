@@ -4,33 +4,18 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "core/newfile.h"
 #include "drivers/protocol/pcapng.h"
 
 enum { SNAP_LEN = 262144 }; /* as other programs write it; no frame is longer */
-
-static int check_left(const char *path, struct sh_err *err)
-{
-    char *part;
-    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", path);
-    const long long len = newfile_left_len(part);
-    const int rc =
-        len == 0
-            ? SH_OK
-            : sh_fail(
-                  err, SH_EINPUT,
-                  "%s: an earlier recording left %lld bytes there; scanhead record --repair %s makes a complete file "
-                  "of them; or remove it",
-                  part, len, path);
-    free(part);
-    return rc;
-}
 
 int capture_open(struct capture *capture, const char *path, struct sh_err *err)
 {
     *capture = (struct capture){.file.fd = -1};
     uint8_t section[PCAPNG_FRONT_ROOM];
-    int rc = check_left(path, err);
+    char *part;
+    if (asprintf(&part, "%s.part", path) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", path);
+    int rc = outfile_check_left(part, path, err);
+    free(part);
     if (rc == SH_OK) rc = outfile_open(&capture->file, path, err);
     return rc == SH_OK ? outfile_write(&capture->file, section, pcapng_put_section(section, "scanhead"), err) : rc;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "core/digits.h"
 #include "core/studio/mesh.h"
 #include "core/studio/scan_mesh.h"
 
@@ -50,11 +51,11 @@ static int check_count(double n, double area_m2, double per_m2, struct sh_err *e
     if (n > MESH_MAX_VERTICES)
         return sh_fail(err, SH_EINPUT,
                        "--sparse %g: %.4g m2 of mesh would get %.4g points; a file holds %d: give at most %.3g", per_m2,
-                       area_m2, n, MESH_MAX_VERTICES, MESH_MAX_VERTICES / area_m2);
+                       area_m2, n, MESH_MAX_VERTICES, digits_down(MESH_MAX_VERTICES / area_m2, 3));
     if (there <= 0 || n <= held) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "--sparse %g: %.4g m2 of mesh would get %.4g points; there is memory for %.3g: give at most %.3g",
-                   per_m2, area_m2, n, held, held / area_m2);
+                   per_m2, area_m2, n, held, digits_down(held / area_m2, 3));
 }
 
 static int add_points(const struct mesh_sparse *sparse, const struct scan_sampler *sampler,

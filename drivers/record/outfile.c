@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -166,6 +167,27 @@ int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err
     if (!closed && !(stays && leave(file))) newfile_drop(file->part, file->fd);
     outfile_leave(file);
     return how == OUTFILE_LEAVE ? 0 : rc;
+}
+
+int outfile_check_left(const char *part, const char *path, struct sh_err *err)
+{
+    const long long len = newfile_left_len(part);
+    if (len == 0) return SH_OK;
+    return sh_fail(
+        err, SH_EINPUT,
+        "%s: an earlier recording left %lld bytes there; scanhead record --repair %s makes a complete file of them; "
+        "or remove it",
+        part, len, path);
+}
+
+void outfile_say_left(const char *path, const struct sh_report *report)
+{
+    char part[PATH_MAX];
+    snprintf(part, sizeof part, "%s.part", path);
+    if (newfile_left_len(part) > 0)
+        sh_warn(report,
+                "%s keeps the data that reached the disk; scanhead record --repair %s makes a complete file of it",
+                part, path);
 }
 
 /* Returns whether file sizes are limited. Room is reserved far beyond the end. Some file systems compare that place

@@ -2,13 +2,10 @@
 #include "drivers/record/recorder.h"
 
 #include <inttypes.h>
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-
-#include "core/newfile.h"
 
 /* The one list of formats. */
 extern const struct recorder_ops recorder_ply, recorder_las, recorder_ptx, recorder_e57, recorder_poses, recorder_waves,
@@ -145,16 +142,6 @@ static enum outfile_end how_it_ends(const struct recorder *rec, int keep, int rc
     return can_be_repaired ? OUTFILE_LEAVE : OUTFILE_DROP;
 }
 
-static void say_left(const struct recorder *rec, const char *path)
-{
-    char part[PATH_MAX];
-    snprintf(part, sizeof part, "%s.part", path);
-    if (newfile_left_len(part) > 0)
-        sh_warn(rec->options.report,
-                "%s keeps the data that reached the disk; scanhead record --repair %s makes a complete file of it",
-                part, path);
-}
-
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
 {
     const struct recorder_ops *ops = rec->ops;
@@ -164,7 +151,8 @@ int recorder_close(struct recorder *rec, int keep, struct sh_err *err)
     if (keep && rc == SH_OK) report_losses(rec);
     const enum outfile_end how = how_it_ends(rec, keep, rc);
     const int closed = outfile_close(&rec->file, how, err);
-    if (path != NULL && (how == OUTFILE_LEAVE || (how == OUTFILE_KEEP_PART && closed != SH_OK))) say_left(rec, path);
+    if (path != NULL && (how == OUTFILE_LEAVE || (how == OUTFILE_KEEP_PART && closed != SH_OK)))
+        outfile_say_left(path, rec->options.report);
     track_free(&rec->track);
     if (ops->release != NULL) ops->release(rec);
     free(rec);

@@ -239,7 +239,7 @@ void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples)
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err)
 {
     if (rc == SH_OK && more != SH_OK) return sh_fail(err, more, "%s", why->text);
-    if (more != SH_OK) sh_warn(&app_report_stderr, "%s", why->text);
+    if (more != SH_OK && strcmp(why->text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why->text);
     return rc;
 }
 
@@ -254,8 +254,10 @@ int app_is_recording(const char *path)
     return app_ends_in(path, ".shs") || app_ends_in(path, ".pcapng");
 }
 
-void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint)
+void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint)
 {
+    if (empty > pulses) return; /* a stream may be damaged */
+    const uint64_t with_echo = pulses - empty;
     if (pulses == 0 || with_echo >= pulses / 20) return;
     sh_warn(&app_report_stderr, "mostly empty: %llu of %llu pulses have an echo, %.2g %%; %llu hits were not detected",
             (unsigned long long)with_echo, (unsigned long long)pulses, 100.0 * (double)with_echo / (double)pulses,

@@ -51,7 +51,7 @@ int app_with_links(const struct app_input *in, const char *links,
                    int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
 
 /* Adds the result `more`, with its reason, to rc, that of earlier work. The first failure is returned, and err has its
- * text; a second one is printed as a warning. */
+ * text; a second one is printed as a warning, unless its text is the same. */
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
 /* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
@@ -100,7 +100,7 @@ int app_ends_in(const char *path, const char *ending);
 int app_is_recording(const char *path);
 
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
-void app_warn_empty(uint64_t pulses, uint64_t with_echo, uint64_t faint);
+void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 
 /* Opens the file that a user names for output, empty; "-": standard output. */
 int app_open_new(const char *path, FILE **out, struct sh_err *err);

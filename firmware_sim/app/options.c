@@ -150,9 +150,6 @@ static int apply(const struct app_command *command, const struct app_option *row
         if (row->kind == APP_OUTPUT && check_output(command, row, (int)number) != APP_OK) return APP_USAGE;
         *(long *)at = (long)number;
         return APP_OK;
-    case APP_KEY_GIVEN:
-        *(int *)at = 1;
-        /* fall through */
     case APP_KEY:
         return add_key(&in->sets, row->key, text);
     case APP_SET:

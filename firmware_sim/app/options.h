@@ -27,7 +27,6 @@ enum app_option_kind {
     APP_WHOLE,     /* sets a long, from min to max */
     APP_OUTPUT,    /* the same, of a descriptor that the program was started with and can write to */
     APP_KEY,       /* stands for a configuration key */
-    APP_KEY_GIVEN, /* the same, and sets an int to 1 */
     APP_SET,       /* any configuration key */
     APP_CALL,      /* calls apply */
     APP_PASS,      /* adds --NAME, and its value, to a struct app_words */

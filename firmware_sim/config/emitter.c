@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Emitters of head profiles: the keys that belong to each, and the values that follow from them: pulse rates,
  * limits of line angles, the schedule of a head. */
+#include "core/digits.h"
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/profile_keys.h"
@@ -191,7 +192,7 @@ static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
                          "%.15g makes more than %.10g pulses/s at %.15g lines/s, lines_min_hz of head profile %s; "
                          "allowed at least %.6g deg",
                          from_micro(h->step_udeg), PRR_MOST_HZ, from_micro(p->lines_min_uhz), p->name,
-                         360.0 * from_micro(p->lines_min_uhz) / PRR_MOST_HZ);
+                         digits_up(360.0 * from_micro(p->lines_min_uhz) / PRR_MOST_HZ, 6));
             return;
         }
         emitter_set_sphere(&p->emitter, h->step_udeg);

@@ -2,6 +2,7 @@
 /* Programs of a head profile: the figures that depend on its pulse rate. In: the figures of the file. Out: each
  * program complete, or diagnostics with their lines. Also converts the widths of the beam from the maker's definition
  * to this project's. */
+#include "core/digits.h"
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
@@ -119,7 +120,8 @@ static void check_used(struct cfg_reader *rd, const struct config_profile *p, ui
             rd, "programs[].used_hz", i,
             "%.10g is not the share of %.10g Hz in the field of view; allowed %.6g to %.6g Hz, within 2 %% of the "
             "share %.4g",
-            said_hz, rate_hz, (1.0 - USED_WITHIN) * used_hz, (1.0 + USED_WITHIN) * used_hz, share);
+            said_hz, rate_hz, digits_up((1.0 - USED_WITHIN) * used_hz, 6),
+            digits_down((1.0 + USED_WITHIN) * used_hz, 6), share);
 }
 
 static void check_limits(struct cfg_reader *rd, const struct config_profile *p, uint32_t i)

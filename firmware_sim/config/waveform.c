@@ -3,6 +3,7 @@
  * core/waveform, that of the stream's rate is in ../site. */
 #include <math.h>
 
+#include "core/digits.h"
 #include "core/light.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/check_signal.h"
@@ -63,7 +64,7 @@ static void check_gate(struct cfg_reader *rd, const struct config_waveform *w)
     if (long_m >= sample_m && long_m <= most_m) return;
     cfg_fail_key(rd, "waveform.far_m", 0,
                  "a window from %.10g to %.10g m; allowed are %.4g to %.6g m of length, 1 to %d samples", w->near_m,
-                 w->far_m, sample_m, most_m, WAVEFORM_MAX_SAMPLES - 1);
+                 w->far_m, digits_up(sample_m, 4), digits_down(most_m, 6), WAVEFORM_MAX_SAMPLES - 1);
 }
 
 static void check_windows(struct cfg_reader *rd, const struct config *cfg)

@@ -34,6 +34,7 @@ enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 360
 struct device_counters {
     _Atomic uint64_t fired, cast;             /* claimed */
     _Atomic uint64_t pulses, echoes, lines;   /* delivered, so released */
+    _Atomic uint64_t empty;                   /* delivered pulses without echo */
     _Atomic uint64_t lost_pulses, lost_ticks; /* not computed in time */
     _Atomic uint64_t crowded, faint, unfit;   /* hits that are not echoes: struct cast_counters */
     _Atomic uint64_t lost_samples;            /* of waveforms: no room in their block */

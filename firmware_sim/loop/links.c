@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/digits.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/pump.h"
@@ -17,13 +18,6 @@ static double stream_rate(const struct links *links, const struct config *cfg)
     double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0) +
                        (cfg->output.colour != COLOUR_NONE ? NATIVE_COLOUR_LEN : 0);
     return config_cast_hz(cfg) * point_len + links->waves_bytes_s;
-}
-
-/* Rounds down to two digits, so that the result still fits. */
-static double two_digits_of(double share)
-{
-    const double unit = pow(10.0, floor(log10(share)) - 1.0);
-    return floor(share / unit) * unit;
 }
 
 /* Says how the stream becomes this share of what it is. A head that fires at steps of a turn has no pulse rate of its
@@ -61,7 +55,7 @@ static int check_capacity(const struct links *links, const struct config *cfg, c
     if (capacity <= 0.0 || capacity >= rate) return SH_OK;
     if (links->source->ops->next != NULL) /* a recording */
         snprintf(advice, sizeof advice, "allowed is %.2g times this speed, or another link",
-                 two_digits_of(capacity / rate));
+                 digits_down(capacity / rate, 2));
     else
         advise(cfg, capacity / rate, advice, sizeof advice);
     return sh_fail(err, SH_EINPUT, "link %s: the stream has %.2f MB/s, the link carries %.2f MB/s; %s", place.endpoint,

@@ -20,6 +20,7 @@ static struct ring_slot *slot_of(struct ring *ring, uint64_t tick)
 void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more)
 {
     sum->echoes += more->echoes;
+    sum->empty += more->empty;
     sum->crowded += more->crowded;
     sum->faint += more->faint;
     sum->unfit += more->unfit;

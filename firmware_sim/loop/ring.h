@@ -30,9 +30,10 @@
  * the two that device_tick_lines adds. */
 enum { RING_MAX_READERS = 73, RING_MAX_MARKS = 104 };
 
-/* These count echoes, hits that gave none, and samples of waveforms without room (struct cast_counters). */
+/* These count echoes, shots without echo, hits that gave none, and samples of waveforms without room (struct
+ * cast_counters). */
 struct ring_hits {
-    uint32_t echoes, crowded, faint, unfit, lost_samples;
+    uint32_t echoes, empty, crowded, faint, unfit, lost_samples;
 };
 void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more);
 

@@ -136,6 +136,7 @@ static void stream_count(struct stream *stream, const struct ring_tick *tick, in
     atomic_fetch_add(&c->pulses, tick->n_cast);
     if (tick->n_cast != 0) scan_of(stream, tick->scan)->delivered += tick->n_cast;
     atomic_fetch_add(&c->echoes, tick->hits.echoes);
+    atomic_fetch_add(&c->empty, tick->hits.empty);
     atomic_fetch_add(&c->crowded, tick->hits.crowded);
     atomic_fetch_add(&c->faint, tick->hits.faint);
     atomic_fetch_add(&c->unfit, tick->hits.unfit);

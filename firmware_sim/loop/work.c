@@ -259,6 +259,7 @@ static void count_hits(struct worker *worker, uint32_t echoes)
     struct cast_counters now, *was = &worker->counted;
     caster_get_counters(worker->caster, &now);
     const struct ring_hits hits = {.echoes = echoes,
+                                   .empty = worker->block.n_points - echoes,
                                    .crowded = (uint32_t)(now.crowded - was->crowded),
                                    .faint = (uint32_t)(now.faint - was->faint),
                                    .unfit = (uint32_t)(now.unfit - was->unfit),

@@ -18,14 +18,13 @@ static void note_event(struct replay *r, const uint8_t *frame, uint64_t tick)
 static void count_points(struct replay *r, const uint8_t *payload, size_t len)
 {
     struct native_points points;
-    struct native_point point;
+    uint32_t empty, with_reflectance;
     if (native_decode_points(payload, len, &points) != SH_OK) return;
     r->tick.n_cast += points.n_pulses;
     r->tick.n_fired += points.n_pulses;
-    for (uint32_t i = 0; i < points.n_points; i++) {
-        native_decode_point(payload, i, &point);
-        r->tick.hits.echoes += point.echo != 0;
-    }
+    native_count_points(payload, points.n_points, &empty, &with_reflectance);
+    r->tick.hits.echoes += points.n_points - empty;
+    r->tick.hits.empty += empty;
 }
 
 static void count_line(struct replay *r, const uint8_t *payload, size_t len)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Georeferencing of a site: heights, method, counts. */
+#include "core/digits.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/detection.h"
 #include "firmware_sim/site/georeference.h"
@@ -133,13 +134,6 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
 
 static const double FINEST_M = 1e-6, MOST_RANGE_COUNTS = 4294967295.0;
 
-/* Rounds up to three digits, as messages have limits. */
-static double three_digits_of(double least)
-{
-    const double unit = pow(10.0, floor(log10(least)) - 2.0);
-    return ceil(least / unit) * unit;
-}
-
 /* For the polar layout. A range that needs more than 32 bits would be read as a short one. */
 static int choose_range_scale(struct site *site, double *scale_m, struct sh_err *err)
 {
@@ -153,7 +147,7 @@ static int choose_range_scale(struct site *site, double *scale_m, struct sh_err 
         err, SH_EINPUT,
         "%s: output.scale_m: %g: ranges up to %.6g m do not fit into 32 bits; allowed 0 (automatic) and from "
         "%.3g m on",
-        cfg->file, *scale_m, most_m, three_digits_of(least_m));
+        cfg->file, *scale_m, most_m, digits_up(least_m, 3));
 }
 
 /* Chooses the finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale. In the polar

@@ -280,6 +280,9 @@ const struct bad bad[] = {
     {AT_16("signal: {model: on}\nwaveform: {send: on, near_m: 1, far_m: 2000}"), 17, "waveform.far_m", "1 to 4095 samples"},
     {AT_16("signal: {model: on}\nwaveform: {send: on, near_m: 1, far_m: 1.1}"), 17, "waveform.far_m",
      "allowed are 0.1499 to 613.825 m"},
+    /* A sample is 0.104927 m here, which 0.1049 m would be too short for. */
+    {AT_16("signal: {model: on}\nwaveform: {send: on, sample_ns: 0.7, near_m: 1, far_m: 1.05}"), 17, "waveform.far_m",
+     "allowed are 0.105 to 429.677 m"},
     {AT_16("waveform: {dead_ns: 5}"), 16, "waveform.dead_ns", "allowed with saturation_db above 0"},
     {AT_16("signal: {model: on}\nwaveform: {send: on, near_m: 5}"), 17, "waveform.near_m", "allowed a far_m above 5"},
     {AT_16("signal: {model: on}\nwaveform: {send: on, near_m: 9, far_m: 8}"), 17, "waveform.far_m",

@@ -192,7 +192,7 @@ static void a_claimed_slot_is_empty(void **state)
     static struct ring_mark mark[1];
     struct ring_tick full = {.bytes = buf, .len = SLOT_BYTES, .broken = 1, .mark = mark, .n_marks = 1};
     full.n_fired = full.n_cast = full.n_lines = 1;
-    full.hits = full.tail = (struct ring_hits){1, 1, 1, 1, 1};
+    full.hits = full.tail = (struct ring_hits){1, 1, 1, 1, 1, 1};
     for (uint64_t tick = 0; tick < 3 * ring.n_slots; tick++) {
         struct ring_slot *slot = ring_claim(&ring, tick);
         assert_non_null(slot);

@@ -50,6 +50,7 @@ static struct ring_slot *make_tick(uint64_t tick, int n_events, int before, uint
         made.len += (uint32_t)native_encode_line_end(bytes + made.len, sizeof bytes - made.len, &mark.end, 0);
     }
     made.hits.echoes = (uint32_t)(before > 0 ? before : 0) + tail;
+    made.hits.empty = 2 * made.hits.echoes;
     made.n_lines = made.n_marks;
     assert_int_equal(ring_put(slot, &made), SH_OK);
     return slot;
@@ -92,6 +93,7 @@ static void a_line_has_the_echoes_of_all_its_ticks(void **state)
     release(make_tick(3, 0, 1, 0), 3);
     assert_int_equal(read_echoes(3, 4, 1), 2 + 1);
     assert_int_equal(counters.echoes, 5 + 4 + 7 + 2 + 1);
+    assert_int_equal(counters.empty, 2 * counters.echoes);
     assert_int_equal(counters.lines, 2);
 }
 

@@ -170,6 +170,40 @@ static void places_below_many_surfaces_are_found(void **state)
     scene_free(scene);
 }
 
+/* The figure of the message is taken, and to two digits it is the least one: a step shorter by a tenth is refused. The
+ * last grid is shorter along x than a step. */
+static void the_step_that_a_large_grid_is_told_to_use_is_enough(void **state)
+{
+    (void)state;
+    static const double sides_m[][2] = {{6, 6}, {6.1, 5.3}, {100, 0.3}, {1000, 1e-6}};
+    struct scene *scene = NULL;
+    struct bvh *bvh = NULL;
+    struct viewpoint_place *place;
+    uint32_t n;
+    struct sh_err err;
+    clear();
+    add_plates(1, 6, 0);
+    const struct scene_arrays arrays = {
+        (const double(*)[3])vertex_m, n_vertices, (const uint32_t(*)[3])triangle, n_triangles, NULL, NULL, 0};
+    assert_int_equal(scene_from_arrays(&arrays, &scene, &err), SH_OK);
+    assert_int_equal(bvh_create(scene, 0, NULL, &bvh, &err), SH_OK);
+    for (size_t i = 0; i < sizeof sides_m / sizeof sides_m[0]; i++) {
+        /* The area is far away from the surface, so that its columns cost next to nothing. */
+        struct viewpoint_grid grid = {1e-5, 1.2, {50, 50, -1}, {50 + sides_m[i][1], 50 + sides_m[i][0], 1}};
+        assert_int_equal(viewpoint_places(bvh, &grid, NULL, &place, &n, &err), SH_EINPUT);
+        const char *figure = strstr(err.text, "use a step of at least ");
+        assert_non_null(figure);
+        const double named_m = strtod(figure + strlen("use a step of at least "), NULL);
+        grid.step_m = 0.9 * named_m;
+        assert_int_equal(viewpoint_places(bvh, &grid, NULL, &place, &n, &err), SH_EINPUT);
+        grid.step_m = named_m;
+        if (viewpoint_places(bvh, &grid, NULL, &place, &n, &err) != SH_OK) fail_msg("%zu: %s", i, err.text);
+        free(place);
+    }
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
 /* All eight corners are within the scanned view, and nothing is nearer than the head can see. */
 static void assert_all_in_view(const double lo[3], const double hi[3])
 {
@@ -301,6 +335,7 @@ int main(void)
         cmocka_unit_test(of_two_storeys_the_lower_one),
         cmocka_unit_test(a_floor_below_many_surfaces_is_found),
         cmocka_unit_test(places_below_many_surfaces_are_found),
+        cmocka_unit_test(the_step_that_a_large_grid_is_told_to_use_is_enough),
         cmocka_unit_test(an_object_is_looked_at_from_the_front),
         cmocka_unit_test(a_plate_is_looked_at_from_its_side),
         cmocka_unit_test(land_is_stood_on),

@@ -97,11 +97,11 @@ static void expect_stats(const struct wire *wire, const struct sums *sums)
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* Scans by a head with several threads, whose blocks end within lines. Then `record` does the same. */
-static void scan(struct wire *wire, const char *noise, const char *more, check_fn *check, struct sums *sums)
+/* Scans by a head with several threads, whose blocks end within lines. */
+static void scan_live(struct wire *wire, const char *noise, const char *more, check_fn *check, struct sums *sums)
 {
     struct room_config config = SCAN;
-    char path[352], stats[352];
+    char path[352];
     config.noise = noise;
     config.more = more;
     wire_write_text(wire, "two-echoes.yaml", PROFILE);
@@ -118,9 +118,22 @@ static void scan(struct wire *wire, const char *noise, const char *more, check_f
     assert_int_equal(sums->cast, oracle_count_cast(&oracle, 0, oracle_end(&oracle)));
     assert_int_equal(sums->lines, oracle_frame_lines(&oracle));
     expect_stats(wire, sums);
+}
+
+static void record_it(struct wire *wire)
+{
+    char path[352], stats[352];
+    snprintf(path, sizeof path, "%s", wire_path(wire, "config.yaml"));
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
     const char *const args[] = {"record", path, "--stats", stats, "--quiet", NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
+}
+
+/* The head does it, then `record`. */
+static void scan(struct wire *wire, const char *noise, const char *more, check_fn *check, struct sums *sums)
+{
+    scan_live(wire, noise, more, check, sums);
+    record_it(wire);
     expect_stats(wire, sums);
 }
 
@@ -234,12 +247,60 @@ static void test_positions_beyond_the_integers(void **state)
     free(said);
 }
 
+/* Two panes of glass, upright and 2 degrees wide as seen from the station, in the middle of the scan's 60 degrees of
+ * pan. There is nothing else. */
+static void two_panes_write(const struct wire *wire)
+{
+    const double turn = (30.0 + HEADING_DEG) * M_PI / 180.0, half = tan(M_PI / 180.0);
+    FILE *f = fopen(wire_path(wire, "room.obj"), "w");
+    assert_non_null(f);
+    fprintf(f, "usemtl glass\n");
+    for (int far_m = 1; far_m <= 2; far_m++)
+        for (int i = 0; i < 4; i++) {
+            const double side = i == 1 || i == 2 ? half : -half, up = i >= 2 ? 2.0 : -1.0;
+            fprintf(f, "v %.17g %.17g %.17g\n", STATION[0] + far_m * (sin(turn) + side * cos(turn)),
+                    STATION[1] + far_m * (cos(turn) - side * sin(turn)), STATION[2] + far_m * up);
+        }
+    fprintf(f, "f 1 2 3 4\nf 5 6 7 8\n");
+    assert_int_equal(fclose(f), 0);
+}
+
+static void with_two_or_none(const struct line_end *end, const struct oracle *oracle)
+{
+    (void)oracle;
+    assert_int_equal(end->n_echoes % 2, 0);
+}
+
+static void expect_mostly_empty(struct wire *wire, const struct sums *sums)
+{
+    char *said = wire_read(wire_path(wire, "head.err"), NULL), want[96];
+    snprintf(want, sizeof want, "mostly empty: %" PRIu64 " of %" PRIu64 " pulses have an echo", sums->echoes / 2,
+             sums->cast);
+    if (strstr(said, want) == NULL) fail_msg("no \"%s\" in: %s", want, said);
+    free(said);
+}
+
+/* One pulse in thirty has echoes, so they are more than one for twenty pulses. The warning is about pulses. */
+static void test_a_pulse_with_two_echoes_is_one_pulse(void **state)
+{
+    struct sums sums;
+    two_panes_write(*state);
+    scan_live(*state, NULL,
+              "beam: {mode: single}\noptics: {depth: 2}\nsurfaces: [{material: glass, glass: 0.9, reflectance: 0.1}]\n",
+              with_two_or_none, &sums);
+    assert_true(20 * sums.echoes > sums.cast && 10 * sums.echoes < sums.cast);
+    expect_mostly_empty(*state, &sums);
+    record_it(*state);
+    expect_mostly_empty(*state, &sums);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_echoes_left_out, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hits_too_faint, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_positions_beyond_the_integers, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_pulse_with_two_echoes_is_one_pulse, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_plain_scan, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -117,6 +117,7 @@ static const struct {
      {"--station: --listen sends no command"}},
     {{"record", "DIR/scan.shs", "-o", "DIR/x.ply", "--replug", "2"}, {"--wait, --replug: a recorded stream"}},
     {{"record", "DIR/scan.shs", "-o", "DIR/x.ply", "--wait", "2"}, {"--wait, --replug: a recorded stream"}},
+    {{"record", "fd:0", "-o", "DIR/x.ply", "--replug", "2"}, {"--replug: an open descriptor", "usb, tty:PATH"}},
     {{"record", "CONFIG", "-o", "DIR/x.ply", "--colour", "height", "--ply-columns", "xyz,range"},
      {"--colour: no .ply", "--ply-columns has no colour"}},
     {{"record", "tcp:localhost:1", "-o", "DIR/x.ply", "--send=a", "--send=b"}, {"--send", "allowed with --raw"}},

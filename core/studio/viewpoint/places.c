@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "core/digits.h"
 #include "core/grow.h"
 #include "core/studio/viewpoint/survey.h"
 #include "core/vec3.h"
@@ -139,6 +140,13 @@ static int places_find(struct search *s, struct sh_err *err)
     return choose(s) ? sh_check_stop(s->report, err) : sh_fail(err, SH_ENOMEM, "no memory for places to stand");
 }
 
+/* The step with which the grid has as many places as are allowed. A side that is shorter than a step still has one. */
+static double least_step_m(const struct viewpoint_grid *g)
+{
+    const double x_m = g->max_m[0] - g->min_m[0], y_m = g->max_m[1] - g->min_m[1];
+    return fmax(sqrt(x_m * y_m / VIEWPOINT_MAX_PLACES), fmax(x_m, y_m) / VIEWPOINT_MAX_PLACES);
+}
+
 static int check_grid(struct search *s, struct sh_err *err)
 {
     const struct viewpoint_grid *g = s->grid;
@@ -147,7 +155,7 @@ static int check_grid(struct search *s, struct sh_err *err)
         n[i] = fmax(floor((g->max_m[i] - g->min_m[i]) / g->step_m), 1.0);
     if (n[0] * n[1] > VIEWPOINT_MAX_PLACES)
         return sh_fail(err, SH_EINPUT, "a grid of %.0f by %.0f places; allowed are %d: use a step of at least %.2g m",
-                       n[0], n[1], VIEWPOINT_MAX_PLACES, 1.1 * g->step_m * sqrt(n[0] * n[1] / VIEWPOINT_MAX_PLACES));
+                       n[0], n[1], VIEWPOINT_MAX_PLACES, digits_up(least_step_m(g), 2));
     for (int i = 0; i < 2; i++) {
         s->across[i] = (uint64_t)n[i];
         s->first_m[i] = 0.5 * (g->min_m[i] + g->max_m[i] - (n[i] - 1.0) * g->step_m);

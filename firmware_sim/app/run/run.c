@@ -133,7 +133,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
     o->device.report = &app_report_stderr;
     o->device.start |= cfg->head.start;
-    o->device.one_scan = o->device.one_scan && o->device.start;
+    o->device.one_scan = app_is_given(&o->in, "frames") && o->device.start;
     int rc = run_complete_links(o, cfg, err);
     if (rc != SH_OK) return rc;
     /* The page looks at triangles. */
@@ -205,7 +205,7 @@ static const struct app_option OPTIONS[] = {
              "from a self-test that fails before one. With --start the scan continues until then, frame after frame, "
              "and head.frames of the file is not used. Without --duration and --frames the head runs until it is "
              "stopped"},
-    {APP_KEY_GIVEN, "frames", "N", .key = "head.frames", .at = AT(device.one_scan),
+    {APP_KEY, "frames", "N", .key = "head.frames",
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     OPTION_SET,

@@ -169,7 +169,7 @@ static void warn_losses(const struct device_counters *c)
     if (c->lost_pulses != 0)
         sh_warn(&app_report_stderr, "%llu pulses could not be computed in time", (unsigned long long)c->lost_pulses);
     app_warn_left_out(c->crowded, c->unfit, c->lost_samples);
-    app_warn_empty(c->pulses, c->echoes, c->faint);
+    app_warn_empty(c->pulses, c->empty, c->faint);
     if (c->reader_lost_frames != 0)
         sh_warn(&app_report_stderr, "readers lost %llu frames with %llu pulses",
                 (unsigned long long)c->reader_lost_frames, (unsigned long long)c->reader_lost_pulses);

@@ -198,17 +198,6 @@ static int open_file(const struct record_files *files, struct record_file *file,
     return file->now != NULL ? recorder_open(file->ops, file->now, &files->recorder, &file->rec, err) : SH_ENOMEM;
 }
 
-static int check_part(const char *part, const char *path, struct sh_err *err)
-{
-    const long long len = newfile_left_len(part);
-    if (len == 0) return SH_OK;
-    return sh_fail(
-        err, SH_EINPUT,
-        "%s: an earlier recording left %lld bytes there; scanhead record --repair %s makes a complete file of them; "
-        "or remove it",
-        part, len, path);
-}
-
 /* The ending of the second file that a format leaves behind, in place of FILE's own ending; NULL: it leaves none. The
  * second file may be there without FILE.part, where somebody moved only FILE.part away. */
 static const char *second_of(const struct record_files *files, const struct record_file *file)
@@ -260,11 +249,11 @@ static int check_left(const struct record_files *files, const struct record_file
     if (files->takes_over || file->ops->repair == NULL) return SH_OK;
     snprintf(end, sizeof end, "%s.part", file->ops->ending);
     if (files->split) {
-        rc = check_parts_of_scans(file, end, check_part, err);
+        rc = check_parts_of_scans(file, end, outfile_check_left, err);
         return rc == SH_OK && second != NULL ? check_parts_of_scans(file, second, check_second, err) : rc;
     }
     snprintf(left, sizeof left, "%s.part", file->path);
-    rc = check_part(left, file->path, err);
+    rc = outfile_check_left(left, file->path, err);
     if (rc != SH_OK || second == NULL) return rc;
     snprintf(left, sizeof left, "%.*s%s", stem, file->path, second);
     return check_second(left, file->path, err);

@@ -57,8 +57,7 @@ static int close_files(struct record_job *r, int keep, struct sh_err *err)
     struct sh_err why = {0};
     const int of_each = r->each ? record_files_close(&r->parts, keep, &why) : SH_OK;
     const int rc = record_files_close(&r->files, keep, err);
-    if (rc != SH_OK && of_each != SH_OK) sh_warn(&app_report_stderr, "%s", why.text); /* both are shown */
-    return rc == SH_OK && of_each != SH_OK ? sh_fail(err, of_each, "%s", why.text) : rc;
+    return app_and_also(rc, of_each, &why, err);
 }
 
 static void say_tripod(const struct record_job *r, uint32_t station)
@@ -112,19 +111,16 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     const int keep = r->only_whole ? whole : has_points || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
     int after = close_files(r, keep && !is_stopped(r), &why);
-    if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why.text);
-    if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
+    rc = app_and_also(rc, after, &why, err);
     if (!has_figures || r->stats == NULL) return rc;
     after = app_write_json(r->stats, recording_put, result, &why);
-    if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
-    return rc == SH_OK && after != SH_OK ? sh_fail(err, after, "%s", why.text) : rc;
+    return app_and_also(rc, after, &why, err);
 }
 
 static void warn_of_little(const struct record_job *r)
 {
     const struct recording_result *result = &r->result;
-    const uint64_t pulses = result->counts.pulses;
-    if (result->empty <= pulses) app_warn_empty(pulses, pulses - result->empty, result->faint);
+    app_warn_empty(result->counts.pulses, result->empty, result->faint);
     if (r->files.recorder.colour.scale.mode == COLOUR_REFLECTANCE && result->points != 0 &&
         result->with_reflectance == 0)
         sh_warn(
@@ -142,7 +138,8 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     r->files.recorder.report = &r->notes;
     int rc = open_files(r, err);
     if (rc != SH_OK) {
-        close_files(r, 0, NULL);
+        struct sh_err why;
+        close_files(r, 0, &why);
         return rc;
     }
     r->recording.frame = write_frame;
@@ -333,8 +330,7 @@ static int record_heads(struct record_job *r, struct config *cfg, struct heads *
     r->heads = NULL;
     if (r->truth == NULL || heads->first == NULL) return rc;
     struct sh_err why;
-    const int truth_rc = offline_finish(heads->first, &why);
-    return rc != SH_OK || truth_rc == SH_OK ? rc : sh_fail(err, truth_rc, "%s", why.text);
+    return app_and_also(rc, offline_finish(heads->first, &why), &why, err);
 }
 
 int record_job_off_line(struct record_job *r, struct config *cfg, struct sh_err *err)

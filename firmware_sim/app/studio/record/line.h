@@ -15,7 +15,7 @@ struct record_line {
     int quiet;
     double long_edge;                       /* negative: not given */
     long sparse_seed;                       /* likewise */
-    int has_rgb, limited;                   /* --colour-rgb, --colour-limits */
+    int limited;                            /* --colour-limits */
     int raw;                                /* 1: raw.h reads the whole line instead */
     int raw_only;                           /* 1: an option that needs --raw was given */
     const char *repair[RECORD_MAX_REPAIRS]; /* --repair; with it nothing is recorded */

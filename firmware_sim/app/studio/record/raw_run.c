@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The recording of `record --raw`: from open files to closed ones, whatever the source is. */
 #include <errno.h>
-#include <limits.h>
 #include <netinet/in.h>
 #include <string.h>
 
-#include "core/newfile.h"
 #include "firmware_sim/app/studio/record/raw.h"
 #include "firmware_sim/base/clock.h"
 
@@ -132,16 +130,6 @@ static int check_any(const struct raw *r, struct sh_err *err)
     return sh_fail(err, SH_ETIMEOUT, "%s: no packet came; %s is not written", r->in.operand[0], r->path);
 }
 
-static void say_left(const struct raw *r)
-{
-    char part[PATH_MAX];
-    snprintf(part, sizeof part, "%s.part", r->path);
-    if (newfile_left_len(part) > 0)
-        sh_warn(&app_report_stderr,
-                "%s keeps the data that reached the disk; scanhead record --repair %s makes a complete file of it",
-                part, r->path);
-}
-
 /* Like other recordings, one that failed keeps the packets that came. */
 int raw_run(struct raw *r, struct sh_err *err)
 {
@@ -155,17 +143,15 @@ int raw_run(struct raw *r, struct sh_err *err)
     const int has_figures = r->capture.packets != 0 || rc == SH_OK;
     if (rc == SH_OK) rc = check_any(r, err);
     int after = capture_close(&r->capture, r->capture.packets != 0, &why);
-    if (rc != SH_OK && after != SH_OK && strcmp(why.text, err->text) != 0) sh_warn(&app_report_stderr, "%s", why.text);
-    if (after != SH_OK) say_left(r);
-    if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
+    rc = app_and_also(rc, after, &why, err);
+    if (after != SH_OK) outfile_say_left(r->path, &app_report_stderr);
     if (rc == SH_OK) rc = r->ops->check(r, err);
     char text[96];
     raw_run_describe(r, text, sizeof text);
     if (r->capture.packets != 0 && after == SH_OK && !r->quiet) fprintf(stderr, "scanhead: %s in %s\n", text, r->path);
     if (has_figures && r->stats != NULL) {
         after = app_write_json(r->stats, put_stats, r, &why);
-        if (rc != SH_OK && after != SH_OK) sh_warn(&app_report_stderr, "%s", why.text);
-        if (rc == SH_OK && after != SH_OK) rc = sh_fail(err, after, "%s", why.text);
+        rc = app_and_also(rc, after, &why, err);
     }
     r->ops->close(r);
     return rc;

@@ -77,7 +77,6 @@ static int take_colour_rgb(void *values, const char *text)
                          text);
     for (int i = 0; i < 3; i++)
         r->job.files.recorder.colour.scale.rgb[i] = (uint8_t)v[i];
-    r->has_rgb = 1;
     return APP_OK;
 }
 
@@ -192,8 +191,9 @@ static int check_colours(const struct record_line *r)
         return app_usage(&app_record,
                          "--colour: no .ply, .las, .ptx, .e57, .obj, .gltf, .glb or .fbx is among the files, or "
                          "--ply-columns has no colour");
-    if (r->has_rgb && mode != COLOUR_SOLID) return app_usage(&app_record, "--colour-rgb needs --colour solid");
-    if (mode == COLOUR_SOLID && !r->has_rgb) return app_usage(&app_record, "--colour solid needs --colour-rgb R,G,B");
+    const int has_rgb = app_is_given(&r->in, "colour-rgb");
+    if (has_rgb && mode != COLOUR_SOLID) return app_usage(&app_record, "--colour-rgb needs --colour solid");
+    if (mode == COLOUR_SOLID && !has_rgb) return app_usage(&app_record, "--colour solid needs --colour-rgb R,G,B");
     if (r->limited && !colour_has_limits(mode))
         return app_usage(&app_record, "--colour-limits needs --colour range, height or frame");
     if (mode == COLOUR_TEXTURE && !is_config(r->in.operand[0]))
@@ -257,6 +257,10 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     if (app_is_recording(r->in.operand[0]) && (r->job.wait_s > 0 || r->job.recording.replug_s > 0))
         return app_usage(&app_record,
                          "--wait, --replug: a recorded stream is there or not; allowed only with a head on a wire");
+    if (strncmp(r->in.operand[0], "fd:", 3) == 0 && r->job.recording.replug_s > 0)
+        return app_usage(
+            &app_record,
+            "--replug: an open descriptor can not be opened again; allowed with usb, tty:PATH and tcp:HOST:PORT");
     if (r->job.files.split && r->job.each)
         return app_usage(&app_record,
                          "--split and --each: --split writes only files of each scan; allowed is one of them");
@@ -268,6 +272,7 @@ int record_line_read(struct record_line *r, int argc, char **argv)
         return APP_USAGE;
     r->job.source = r->in.operand[0];
     r->job.recording.progress = !r->quiet;
+    r->job.crs_given = app_is_given(&r->in, "crs");
     if (r->job.station > 0) r->job.recording.first_station = r->job.recording.last_station = (uint32_t)r->job.station;
     return APP_GO_ON;
 }
@@ -364,7 +369,7 @@ static const struct app_option OPTIONS[] = {
      .help = "write counts of the received data as JSON; - is standard output"},
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
-    {APP_KEY_GIVEN, "crs", "CRS", .key = "output.crs", .at = AT(job.crs_given),
+    {APP_KEY, "crs", "CRS", .key = "output.crs",
      .help = "write points in this system: local, ecef, utm or geodetic; the same as output.layout=geo"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     {APP_FLAG, "raw", NULL, .at = AT(raw),

@@ -63,7 +63,5 @@ int verdict_write_junit(const char *path, const struct verdict *verdict, uint32_
     for (uint32_t i = 0; i < n; i++)
         put_suite(out, &verdict[i]);
     fputs("</testsuites>\n", out);
-    int failed = ferror(out) != 0;
-    failed |= (out == stdout ? fflush(out) : fclose(out)) != 0;
-    return failed ? sh_fail(err, SH_EIO, "%s: writing failed", path) : SH_OK;
+    return app_close_new(path, out, err);
 }
