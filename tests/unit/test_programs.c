@@ -122,7 +122,7 @@ static void tables_that_do_not_fit_are_refused(void **state)
         {"range_min_m: { value: 1.5,", "range_min_m: { value: 700,", 21, "programs[0].range_min_m", "below 600 m"},
         /* 100 / 240 of 100 kHz: 41,667 Hz */
         {"used_hz: { value: 42000,", "used_hz: { value: 100000,", 22, "programs[0].used_hz",
-         "allowed 40833.3 to 42500 Hz"},
+         "allowed 40833.4 to 42500 Hz"},
         {"prr_hz: { value: 100000,", "prr_hz: { valu: 100000,", 17, "programs[0].prr_hz", "unknown"},
         {"max_echoes: { value: 7, from: quoted }", "max_echoes: 7", 18, "programs[0].max_echoes",
          "allowed { value: V, from: data sheet }"},
