@@ -57,6 +57,7 @@ static void read_stream(struct beam_run *run, const char *path)
     scanhead_hash_start(sh);
     while (scanhead_next(sh, &frame, DEADLINE_MS) == SCANHEAD_OK) {
         if (frame.type == SCANHEAD_POINTS) take_points(run, sh, &frame);
+        if (frame.type == SCANHEAD_POINTS && frame.pulse0 == 0) run->start_ns = frame.t_ns - run->shot[0].t_ns;
         if (frame.type == SCANHEAD_ATTRIBUTES) take_attributes(run, sh, &frame);
         if (frame.type != SCANHEAD_LINE_END) continue;
         assert_true(run->lines < BEAM_MAX_LINES);

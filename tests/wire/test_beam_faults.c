@@ -82,15 +82,19 @@ static void windows_in_time_are_exact_to_the_pulse(void **state)
     const int64_t zero_ns = beam_note(first, "laser_off", 0, 0)->t_ns; /* of pulse 0 */
     char faults[160];
     assert_window(first, "laser_off", 0, 8000);
+    assert_int_equal(first->start_ns, zero_ns);
     /* Pulses are 50 us apart. 0.1 s and 10 ns later is after pulse 2000; its end is at pulse 2345. */
     snprintf(faults, sizeof faults, "  - {kind: laser_off, from_s: %.9f, until_s: %.9f}\n",
              1e-9 * (double)(zero_ns + 100000010), 1e-9 * (double)(zero_ns + 2345 * 50000));
     const struct beam_run *run = beam_record(*state, 1, faults, NULL);
-    assert_window(run, "laser_off", 2001, 2345);
+    const int64_t later_ns = run->start_ns - zero_ns;
+    assert_int_equal(later_ns % 50000, 0);
+    const uint64_t from = (uint64_t)(2001 - later_ns / 50000), until = from + 2345 - 2001;
+    assert_window(run, "laser_off", from, until);
     for (uint64_t k = 0; k < run->pulses; k++)
-        assert_int_equal(run->shot[k].is_empty, k >= 2001 && k < 2345);
+        assert_int_equal(run->shot[k].is_empty, k >= from && k < until);
     const struct beam_note *note = beam_note(run, "laser_off", 0, 0);
-    assert_int_equal(note->t_ns, zero_ns + run->shot[2001].t_ns);
+    assert_int_equal(note->t_ns, run->start_ns + run->shot[from].t_ns);
 }
 
 /* The speed is half from pulse 1003 to 5008. Phases are whole 800ths of a line, and 400ths once it is over. */
