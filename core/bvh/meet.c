@@ -63,7 +63,7 @@ VEC_INLINE void judge_packet(const struct bvh_query *query, const struct bvh_edg
 }
 
 /* The fate of a ray that is inside of a triangle for certain. */
-enum { BEHIND, NEARER, SAME, FLAT_SEEN };
+enum { BEHIND, NEARER, SAME };
 
 /* Finds the ranges of one triangle's plane, and the fate of each ray. */
 VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plane *plane, double *range_m,
@@ -72,7 +72,7 @@ VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plan
     const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2], *o = query->at_local;
     const double *px = query->local[0], *py = query->local[1], *pz = query->local[2], *nearest_m = query->range_m;
     const double nx = plane->n[0], ny = plane->n[1], nz = plane->n[2], d = plane->d;
-    const double least = BVH_FLAT * BVH_FLAT * vec3_dot(plane->n, plane->n), off = nx * o[0] + ny * o[1] + nz * o[2];
+    const double off = nx * o[0] + ny * o[1] + nz * o[2];
     const double begin_m = query->at_origin_m;
     const int own = query->has_own;
     VEC_LOOP
@@ -82,7 +82,7 @@ VEC_INLINE void find_ranges(const struct bvh_query *query, const struct bvh_plan
         const double more = range + BVH_SAME * range, most = nearest_m[i] + BVH_SAME * nearest_m[i];
         const int64_t ahead = range > begin_m, nearer = more < nearest_m[i], as_near = range <= most;
         range_m[i] = range;
-        becomes[i] = along * along > least ? (ahead & as_near) << (1 - nearer) : FLAT_SEEN;
+        becomes[i] = (ahead & as_near) << (1 - nearer);
     }
 }
 
@@ -125,7 +125,7 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
     if (others == 0 && !any(found, (uint8_t)(DOUBT << shift))) return;
     for (uint32_t i = 0; i < LANES; i++) {
         const unsigned it = (unsigned)found->of[i] >> shift & EITHER;
-        if (it == DOUBT || (it == INSIDE && becomes[i] == FLAT_SEEN))
+        if (it == DOUBT)
             bvh_try_one(query, tfar + i, i, leaf, which);
         else if (it == INSIDE && !takes[i] && becomes[i] != BEHIND)
             bvh_note_hit(query, tfar + i, i, triangle, range_m[i]);

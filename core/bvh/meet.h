@@ -25,7 +25,9 @@ void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const stru
 /* Notes a hit whose range is no further than the nearest, or counts as the same, unless there is a hole. */
 void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m);
 
-/* Where a plane is seen at a smaller sine, the range comes from the edges. */
+/* Where a plane is seen at a smaller sine, the range comes from the edges. Rays that are inside for certain never see it
+ * so: each side is then at least 9 units of 2^-24 of F L (see below), so the three of them, which add up to n . d, are
+ * at least 1.6e-6 L L, and |n| is at most L L. */
 #define BVH_FLAT 1e-6
 
 /* ---- edges */

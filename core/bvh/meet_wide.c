@@ -62,42 +62,38 @@ WIDE __m256 tfar_of_8(__m512d range_m, __m512d start_m)
 /* The plane of a triangle for a packet. */
 struct plane {
     const struct bvh_plane *of;
-    double least, off;
+    double off;
     uint32_t triangle;
 };
 
 /* Takes the triangle as the hit of those rays for which it is the nearest so far, among the eight from `at` on; `in` are
- * inside of it for certain. Sets the rays that see it flat. Returns these and those to which it is as near as another
- * one. */
+ * inside of it for certain. Returns those to which it is as near as another one. */
 WIDE __mmask8 take_8(struct bvh_query *query, float *tfar, const struct plane *p, int at, __mmask8 in,
-                     double range_m[8], __mmask8 *flat, int own)
+                     double range_m[8], int own)
 {
     const __m512d along = dot_8(p->of->n, query->dir, at);
     const __m512d here = own ? dot_8(p->of->n, query->local, at) : _mm512_set1_pd(p->off);
     const __m512d range = _mm512_div_pd(_mm512_sub_pd(_mm512_set1_pd(p->of->d), here), along);
     const __m512d nearest = _mm512_loadu_pd(query->range_m + at);
-    const __mmask8 seen = _mm512_cmp_pd_mask(_mm512_mul_pd(along, along), _mm512_set1_pd(p->least), _CMP_GT_OQ),
-                   ahead = _mm512_cmp_pd_mask(range, _mm512_set1_pd(query->at_origin_m), _CMP_GT_OQ),
+    const __mmask8 ahead = _mm512_cmp_pd_mask(range, _mm512_set1_pd(query->at_origin_m), _CMP_GT_OQ),
                    as_near = _mm512_cmp_pd_mask(range, and_same(nearest), _CMP_LE_OQ),
                    nearer = _mm512_cmp_pd_mask(and_same(range), nearest, _CMP_LT_OQ);
-    const __mmask8 counts = in & seen & ahead & as_near, takes = query->may_pass ? 0 : counts & nearer;
+    const __mmask8 counts = in & ahead & as_near, takes = query->may_pass ? 0 : counts & nearer;
     _mm512_mask_storeu_pd(query->range_m + at, takes, range);
     _mm512_mask_storeu_pd(query->hit_m + at, takes, range);
     _mm256_mask_storeu_epi32(query->triangle + at, takes, _mm256_set1_epi32((int)p->triangle));
     _mm256_mask_storeu_ps(tfar + at, takes, tfar_of_8(range, _mm512_loadu_pd(query->start_m + at)));
     _mm512_storeu_pd(range_m, range);
-    *flat = in & (__mmask8)~seen;
-    return (counts & (__mmask8)~takes) | *flat;
+    return counts & (__mmask8)~takes;
 }
 
-/* Looks at rays one by one: those of one_by_one may meet the triangle, `others` do. */
+/* Looks at rays one by one: it is in doubt whether `doubt` meet the triangle; `others` do. */
 static __attribute__((noinline)) void look_closer(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf,
-                                                  int which, unsigned others, unsigned one_by_one,
-                                                  const double *range_m)
+                                                  int which, unsigned others, unsigned doubt, const double *range_m)
 {
-    for (others |= one_by_one; others != 0; others &= others - 1) {
+    for (others |= doubt; others != 0; others &= others - 1) {
         const uint32_t lane = (uint32_t)__builtin_ctz(others);
-        if ((one_by_one >> lane & 1) != 0)
+        if ((doubt >> lane & 1) != 0)
             bvh_try_one(query, tfar + lane, lane, leaf, which);
         else
             bvh_note_hit(query, tfar + lane, lane, bvh_leaf_triangle(leaf, which), range_m[lane]);
@@ -109,19 +105,15 @@ WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_l
 {
     const double *n = leaf->plane[which].n, *o = query->at_local;
     const struct plane plane = {.of = &leaf->plane[which],
-                                .least = BVH_FLAT * BVH_FLAT * vec3_dot(n, n),
                                 .off = n[0] * o[0] + n[1] * o[1] + n[2] * o[2],
                                 .triangle = bvh_leaf_triangle(leaf, which)};
     double range_m[BVH_PACKET];
-    unsigned others = 0, one_by_one = judged.doubt;
+    unsigned others = 0;
     for (int at = 0; at < BVH_PACKET; at += 8) {
         const __mmask8 in = (__mmask8)(judged.in >> at);
-        __mmask8 flat;
-        if (in == 0) continue;
-        others |= (unsigned)take_8(query, tfar, &plane, at, in, range_m + at, &flat, own) << at;
-        one_by_one |= (unsigned)flat << at;
+        if (in != 0) others |= (unsigned)take_8(query, tfar, &plane, at, in, range_m + at, own) << at;
     }
-    if ((others | one_by_one) != 0) look_closer(query, tfar, leaf, which, others, one_by_one, range_m);
+    if ((others | judged.doubt) != 0) look_closer(query, tfar, leaf, which, others, judged.doubt, range_m);
 }
 
 /* Adds what rays from points of their own add to each edge's side. */
