@@ -209,7 +209,7 @@ static void test_too_slow(void **state)
     } while (frames + told < all.n);
     scanhead_get_stats(slow, &stats);
     assert_true(told > 0);
-    assert_int_equal(first, 0);
+    assert_true(first <= told); /* on a busy machine even the first frames may be too late; they are told then */
     assert_int_equal(frames + told, all.n);
     assert_true(stats.seq_lost <= told);                      /* no gap shows what is missing at the end */
     assert_int_equal(stats.bad_payload + stats.bad_bytes, 0); /* whole frames */
