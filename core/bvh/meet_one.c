@@ -15,7 +15,7 @@
 static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
     const struct scene *scene = query->bvh->scene;
-    if (scene->cutout == NULL || scene_cutout(scene, triangle) == NULL) return 0;
+    if (!query->may_pass || scene_cutout(scene, triangle) == NULL) return 0;
     double v[3][3], p[3], uv[2];
     for (int j = 0; j < 3; j++)
         p[j] = range_m * query->dir[j][lane];
@@ -30,7 +30,7 @@ static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triang
 
 void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m)
 {
-    if (query->bvh->scene->cutout != NULL && is_hole(query, lane, triangle, range_m)) return;
+    if (is_hole(query, lane, triangle, range_m)) return;
     bvh_take_hit(query, tfar, lane, triangle, range_m, range_m);
 }
 

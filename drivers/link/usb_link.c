@@ -87,7 +87,7 @@ static double usb_capacity(const void *link)
     return rate[usb_device_identity(self->head.device)->highest];
 }
 
-/* Of a session that is over, only bytes from before its end are read. */
+/* Once a session is over, only bytes from before its end are read. */
 static int is_readable(const struct usb_link *self, int i)
 {
     const uint8_t out = row_of(self, i)->out;
