@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* A capture of what came over a wire that is not the native protocol's: Ethernet frames to a .pcapng.
+/* A capture of the traffic of any protocol: Ethernet frames to a .pcapng.
  *
- * In: frames (drivers/protocol/ethernet.h), each with its time of UTC and the place it came from. Out: a file that
- * appears whole or not at all (outfile.h). Functions return SH_OK, or SH_EIO and what outfile.h says. */
+ * In: frames (drivers/protocol/ethernet.h), each with its time in UTC and its interface. Out: a file that appears whole
+ * or not at all (outfile.h). Functions return SH_OK, or SH_EIO and the errors of outfile.h. */
 #ifndef DRIVERS_RECORD_CAPTURE_H
 #define DRIVERS_RECORD_CAPTURE_H
 

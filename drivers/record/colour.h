@@ -13,7 +13,7 @@ struct track;
 
 /* Where a recording's colours come from. */
 struct colour_choice {
-    int given;                 /* 0: as the head sends them, if it does; 1: made here, by scale */
+    int given;                 /* 0: as the head sends them, if it does; 1: computed here from scale */
     struct colour_scale scale; /* not texture, which only the head knows */
 };
 

@@ -84,7 +84,7 @@ static int fail_damaged(const struct left *l, struct sh_err *err)
                    l->repair->path, e57_physical(l->end));
 }
 
-/* ---- the way through what is there */
+/* ---- scans and packets up to the last whole one */
 
 /* Takes the scan that begins at the end of what is kept. Returns 1, or 0 where there is none, or not all of its
  * beginning. */

@@ -35,7 +35,8 @@ static uint8_t *put_vlr_head(uint8_t *to, const char *user, uint16_t record, siz
     return to + LAS_VLR_HEAD_LEN;
 }
 
-/* Describes one of the extra fields after a point, of 2 bytes. scale 0: none; no_data as its type has it. */
+/* Describes one of the extra fields after a point, of 2 bytes. no_data is the value that stands for none. scale 0:
+ * none. */
 static uint8_t *put_extra(uint8_t *to, uint8_t type, const char *name, int64_t no_data, double scale, const char *text)
 {
     memset(to, 0, LAS_EXTRA_LEN);
@@ -95,7 +96,7 @@ static uint8_t *put_crs_vlr(uint8_t *to, int epsg, int geoid)
     return to + n + 1;
 }
 
-/* The CRS of LAS 1.2: GeoTIFF's directory of keys (OGC 19-008), each of number, 0, 1 and value. */
+/* Writes the CRS for LAS 1.2, as GeoTIFF's directory of keys (OGC 19-008). A key is four words: number, 0, 1, value. */
 static uint8_t *put_keys_vlr(uint8_t *to, int epsg, int geoid)
 {
     enum { MODEL = 1024, RASTER = 1025, GEODETIC = 2048, GEOCENTRIC_LENGTHS = 2052, ANGLES = 2054 };

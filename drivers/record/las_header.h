@@ -15,13 +15,13 @@
 enum {
     LAS_HEADER_LEN = 375,
     LAS_HEADER_12_LEN = 227,
-    LAS_SOFTWARE_AT = 58, /* what made the file: 32 bytes */
+    LAS_SOFTWARE_AT = 58, /* the name of the program that wrote the file: 32 bytes */
     LAS_VLR_HEAD_LEN = 54,
     LAS_EXTRA_LEN = 192,
-    LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own */
-    LAS_ATTRIBUTES_LEN = 4, /* and after these */
-    LAS_DEVIATION_LEN = 2,
-    LAS_WAVE_LEN = 29, /* a point's reference to its waveform; formats 9 and 10 end in it */
+    LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own: first the label, */
+    LAS_ATTRIBUTES_LEN = 4, /* then amplitude and width, */
+    LAS_DEVIATION_LEN = 2,  /* then the deviation */
+    LAS_WAVE_LEN = 29,      /* a point's reference to its waveform; formats 9 and 10 end in it */
     LAS_POINT_LEN_MAX = 38 + LAS_WAVE_LEN + LAS_LABEL_LEN + LAS_ATTRIBUTES_LEN + LAS_DEVIATION_LEN,
     LAS_RETURNS = 15,
     LAS_12_RETURNS = 5,
@@ -52,7 +52,7 @@ struct las_facts {
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */
     double created_gps_s;       /* adjusted standard GPS time of the first point, with gps_time */
     uint64_t n_points, n_by_return[LAS_RETURNS];
-    int32_t min[3], max[3]; /* counts; only with points */
+    int32_t min[3], max[3]; /* of the coordinates' counts; valid once there are points */
     int has_waves;
     const struct las_waves *waves; /* with waveforms: their descriptors */
     uint64_t waves_at;             /* where the record of packets begins in the file; 0: it is in the .wdp */

@@ -98,7 +98,8 @@ static int count_places(struct las *las, int n, int *rc, struct sh_err *err)
     return n;
 }
 
-/* Makes metres of geodetic coordinates about the pose's place, accurately enough for an angle. */
+/* Converts latitude and longitude to metres east and north of the pose, accurately enough for an angle. The pose's
+ * shift is added to them, since the reverse of the pose subtracts it. */
 static void make_level(const struct track *t, double *x, double *y, int n)
 {
     const double *s = t->pose.shift_m, m_deg = 6371000 * NATIVE_RAD_PER_DEG;
@@ -153,7 +154,8 @@ static void set_attributes(struct las *las, int n)
     }
 }
 
-/* The packets of the batch are written before its points, as a new descriptor changes what comes before all points. */
+/* The packets of the batch are written before its points, since a new descriptor goes into the records before all
+ * points. */
 static int put_packets(struct las *las, int n, struct sh_err *err)
 {
     const struct track *t = &las->base.track;

@@ -182,8 +182,8 @@ static void put_binary(struct ply *ply, struct ply_rows rows)
 
 /* ---- rows of text */
 
-/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
- * digits would say nothing. "nan" without a sign, as some readers know no other. */
+/* On the wire, micrometres (1e-11 degrees) are the finest scale, and 0.01 dB and nanoseconds are the units. So more
+ * digits would add nothing. NaN is written without a sign, since some readers know only "nan". */
 static char *put_number(char *to, unsigned decimals, double v)
 {
     to = isnan(v) ? stpcpy(to, "nan") : decimal_put_fixed(to, v, decimals);

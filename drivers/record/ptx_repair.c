@@ -200,7 +200,7 @@ static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, st
     uint64_t cut;
     int rc = ptx_grid_find(grid, &head, &cut, err);
     if (rc < 0) return rc;
-    if (rc == 0) { /* there is no grid besides: the text is all there is */
+    if (rc == 0) { /* FILE.grid holds no grid, so the text is all that is left */
         rc = read_text(r, r->len, p, err);
         return rc == SH_OK ? end_text(r, p, err) : rc;
     }

@@ -42,9 +42,9 @@ static void say_progress(struct ptx_text *t, uint32_t n_rows)
 {
     char what[LINE_MAX_LEN];
     t->n_columns++;
-    t->n_unsaid_rows += n_rows;
-    if (t->n_unsaid_rows < ROWS_BETWEEN_STOPS) return;
-    t->n_unsaid_rows = 0;
+    t->n_rows_unreported += n_rows;
+    if (t->n_rows_unreported < ROWS_BETWEEN_STOPS) return;
+    t->n_rows_unreported = 0;
     snprintf(what, sizeof what, "completing %s", t->file->path);
     sh_progress(t->report, what, (double)t->n_columns / ((double)t->grid->column_max - t->grid->column_min + 1));
 }

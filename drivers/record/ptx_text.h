@@ -18,7 +18,7 @@ struct ptx_text {
     /* out */
     uint64_t n_points;
     /* inner state */
-    uint64_t n_columns, n_unsaid_rows;
+    uint64_t n_columns, n_rows_unreported; /* so far; since the last report of progress */
 };
 
 /* Puts the grid, whose shots are then gone (ptx_grid_drain). SH_EFORMAT: a coordinate is too long. */

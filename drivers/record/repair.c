@@ -74,7 +74,7 @@ int repair_cut(struct repair *r, uint64_t end, struct sh_err *err)
     return SH_OK;
 }
 
-/* Is called between blocks: reports progress, and checks whether a stop was asked for. */
+/* Reports progress, and checks whether a stop was asked for; called between blocks. */
 static int go_on(const struct repair *r, uint64_t at, struct sh_err *err)
 {
     sh_progress(r->report, "looking for complete data", (double)at / (double)(r->len + 1));

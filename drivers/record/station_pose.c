@@ -56,7 +56,8 @@ void station_pose_forward_all(const struct station_pose *pose, int n, double *x,
     forward_all(pose->shift_m, pose->rotation, n, x, y, z);
 }
 
-/* By the largest of the four components, so that none is the difference of near numbers (Shepperd 1978). */
+/* The quaternion is a row of the matrix of its products, divided by the row's length. The row of the largest component
+ * is taken, so that no figure is the difference of near numbers (Shepperd 1978). */
 void station_pose_quaternion(const struct station_pose *pose, double q[4])
 {
     const double *r = pose->rotation;

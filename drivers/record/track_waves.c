@@ -46,7 +46,7 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
     if (t->ops->points == NULL) return 0;
-    if (!t->has_waves) { /* of a recorder that wants them, no scan has begun */
+    if (!t->has_waves) { /* where the recorder wants them, no scan has begun yet */
         *(t->ops->wants_waves ? &t->missing.n_waves_unplaced : &t->missing.n_waves_unheld) += frame->n_points;
         return 0;
     }
