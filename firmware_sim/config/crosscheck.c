@@ -23,13 +23,13 @@
 #include "core/infile.h"
 #include "firmware_sim/config/epoch.h"
 
-/* The key to name where two contradict each other: the first, unless only the second was given. */
+/* Returns the key to name where two contradict each other: the first, unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
 {
     return !cfg_is_given(rd, first, 0) && cfg_is_given(rd, second, 0) ? second : first;
 }
 
-/* Settings within the head profile: limits that a row of keys.c names by min_key and max_key. */
+/* Checks settings against the limits of the head profile that their rows in keys.c name (min_key, max_key). */
 static void check_limits(struct cfg_reader *rd, const struct config *cfg)
 {
     for (size_t i = 0; i < rd->table.n && cfg_has_profile(rd); i++) {
@@ -185,7 +185,7 @@ const char *config_rays_move(const struct config *cfg)
     return config_head_moves(&cfg->platform) ? "the head moves" : offset_of(cfg);
 }
 
-/* All other checks of it need the loaded scene and the plan (firmware_sim/site/sights.c). */
+/* All other checks of cast.sight need the loaded scene and the plan (firmware_sim/site/sights.c). */
 static void check_sight(struct cfg_reader *rd, const struct config *cfg)
 {
     const char *why = config_rays_move(cfg);

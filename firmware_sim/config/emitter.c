@@ -177,8 +177,8 @@ int cfg_line_has_width(const struct config *cfg)
 
 static const char *const of_sphere[] = {"head.step_deg", "head.ring_start_deg", "head.ring_stop_deg"};
 
-/* The step and the rings that the configuration asks for. With many pulses a line the fastest line rate falls, so that
- * the pulse rate stays within what any head may have. */
+/* Sets the step and the rings that the configuration asks for. With many pulses a line the fastest line rate falls, so
+ * that the pulse rate stays within PRR_MOST_HZ. */
 static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct config_profile *p = &cfg->profile;

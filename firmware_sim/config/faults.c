@@ -181,7 +181,7 @@ static int needs_time(enum fault_kind kind)
            kind == FAULT_LEAP_SECOND || (kind >= FAULT_PPS_LOST && kind <= FAULT_NMEA_CHECKSUM);
 }
 
-/* ntp.role is no need: a client may set it later by telegram. */
+/* ntp.role: client is not required here: a client may set it later by telegram. */
 static int can_ask_server(const struct config *cfg)
 {
     return cfg->links_are_not_here || (config_speaks(cfg, PROTOCOL_COLA) && cfg->loop.pace == PACE_REALTIME);
@@ -201,7 +201,7 @@ static void check_needs(struct cfg_reader *rd, const struct config *cfg, const s
                      name);
 }
 
-/* Whether faults of the kind can strike on the link. */
+/* Returns whether faults of the kind can strike on the link. */
 static int link_has_fault(const struct link_spec *link, enum fault_kind kind)
 {
     const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;

@@ -18,7 +18,7 @@ enum { CONFIG_MAX_DIAGNOSTICS = 20 };
 struct config_diagnostics {
     uint32_t n; /* all diagnostics that were found; err[] has the first CONFIG_MAX_DIAGNOSTICS */
     struct sh_err err[CONFIG_MAX_DIAGNOSTICS];
-    uint64_t place[CONFIG_MAX_DIAGNOSTICS]; /* they rise with it: file, --set or profile, and the line there */
+    uint64_t place[CONFIG_MAX_DIAGNOSTICS]; /* err[] is sorted by it: file, --set or profile, then the line there */
 };
 
 /* Reads path, then the `key=value` settings of --set, in order, then the profile that they name. The settings are

@@ -62,7 +62,7 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
         cfg_fail_key(rd, "links[].port", i, "0, but the head must connect to this port; allowed 1 to 65535");
 }
 
-/* Whether both listen on one port of one address. */
+/* Returns whether both listen on one port of one address. */
 static int listens_as(const struct link_spec *a, const struct link_spec *b)
 {
     const unsigned tcp = CFG_KIND(LINK_TCP) | CFG_KIND(LINK_WEB);

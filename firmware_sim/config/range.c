@@ -81,8 +81,8 @@ void cfg_take_scan_settings(struct config *cfg)
                                                                : 0;
 }
 
-/* A length of the settings, in metres. Where it wasn't changed it is the configuration's, to the last bit. Else it is
- * the double that the configuration would have read: nm and 1e9 are below 2^53, so their quotient is the nearest
+/* Returns a length of the settings, in metres. Where it wasn't changed it is the configuration's, to the last bit. Else
+ * it is the double that the configuration would have read: nm and 1e9 are below 2^53, so their quotient is the nearest
  * double. */
 static double take_length(int64_t nm, int64_t own_nm, double own_m)
 {

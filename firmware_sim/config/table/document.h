@@ -10,7 +10,7 @@
 struct cfg_key;
 struct cfg_reader;
 
-/* SH_OK, or the code of a diagnostic that leaves nothing to check: no file, no YAML, no section. */
+/* Returns SH_OK, or the code of a diagnostic that leaves nothing to check: no file, no YAML, no keys. */
 int cfg_read_file(struct cfg_reader *rd);
 /* The same; the document stays open for the scanner. *doc is NULL after an error. */
 struct cfg_document;

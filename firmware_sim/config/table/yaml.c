@@ -68,7 +68,7 @@ static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t 
                           cfg_allowed(key, w->rd->profile, allowed));
 }
 
-/* A scalar that may stand for a value of this type, or an error. */
+/* Checks that the node is a scalar that may stand for a value of this type. */
 static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char allowed[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
@@ -141,7 +141,7 @@ static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item
     }
 }
 
-/* The number of a word among names; -1: none of them. */
+/* Returns the number of a word among names; -1: none of them. */
 static int word_of(const yaml_node_t *node, const char *const *names)
 {
     for (int i = 0; names[i] != NULL && node->type == YAML_SCALAR_NODE; i++)
@@ -165,7 +165,7 @@ static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item
     cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" must say %s; allowed %s", figure_parts[part],
                    part == FIGURE_FROM         ? "where the figure is from"
                    : part == FIGURE_DEFINITION ? "how the width is defined"
-                                               : "it in words",
+                                               : "something in words",
                    words != NULL ? allowed : "a text in one line");
 }
 
@@ -318,7 +318,8 @@ static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item,
     }
 }
 
-/* The row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is not accepted for a key in a section. */
+/* Returns the row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is not accepted for a key in a
+ * section. */
 static const struct cfg_key *row_below(const struct walk *w, const char *path, const yaml_node_t *word)
 {
     char full[CFG_PATH_MAX];
