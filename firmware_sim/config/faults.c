@@ -273,7 +273,7 @@ int config_read_fault(const struct config *cfg, const char *text, struct fault *
     struct fault_list list = {0};
     char yaml[TEXT_MAX];
     const int len = snprintf(yaml, sizeof yaml, "faults: [ %s ]\n", text);
-    if (len >= (int)sizeof yaml) return sh_fail(err, SH_EINPUT, "longer than %d characters", TEXT_MAX - 16);
+    if (len >= (int)sizeof yaml) return sh_fail(err, SH_EINPUT, "longer than %d characters", TEXT_MAX - 14);
     cfg_reader_init(&rd, "fault", &fault_table, &list, &diagnostics);
     int code = cfg_open_text(&rd, (const unsigned char *)yaml, (size_t)len, &doc);
     if (code == SH_OK) cfg_close_file(doc);
