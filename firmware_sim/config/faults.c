@@ -117,7 +117,7 @@ static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
     }
 }
 
-/* The longest for_ms of a kind, as text: a late pulse must come before the next one. */
+/* Returns the longest for_ms of a kind, as text: a late pulse must come before the next one. */
 static const char *find_most_ms(enum fault_kind kind)
 {
     return kind == FAULT_PPS_JITTER ? "400" : kind == FAULT_NMEA_LATE ? "5000" : "1e8";

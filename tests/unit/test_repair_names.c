@@ -157,7 +157,13 @@ static void test_stopped(void **state)
 static void put_descriptor(uint32_t scan, int64_t t_s, int flags)
 {
     static uint8_t out[1024];
-    const struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0", .profile = "model", .scan = scan};
+    const struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0",
+                                        .profile = "model",
+                                        .scan = scan,
+                                        .prr_uhz = 1000000000,
+                                        .mirror_counts_per_turn = 3600,
+                                        .pan_counts_per_turn = 3600,
+                                        .range_scale_m = 1e-3};
     rig_put(out, native_encode_descriptor(out, sizeof out, &d, t_s * 1000000000, flags));
 }
 
