@@ -134,8 +134,7 @@ static void report_waves(struct las *las)
 static int las_finish(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    int rc = outfile_check(&las->base.file, err); /* after a failure the header still says "its end is missing" */
-    if (rc == 0 && !las->begun) rc = put_front(las, err);
+    int rc = las->begun ? 0 : put_front(las, err);
     las->facts.is_growing = 0;
     if (rc == 0 && las->facts.has_waves) rc = end_waves(las, err);
     las->facts.incomplete = 0;

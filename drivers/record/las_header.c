@@ -198,7 +198,7 @@ void las_count_record(struct las_facts *f, const uint8_t *record)
     if (echo >= 1) f->n_by_return[echo - 1]++;
 }
 
-static size_t header_len(const struct las_facts *f)
+size_t las_header_len(const struct las_facts *f)
 {
     return f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
 }
@@ -211,7 +211,7 @@ static int encoding_of(const struct las_facts *f)
 
 static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len, uint32_t n_vlrs)
 {
-    memset(to, 0, header_len(f));
+    memset(to, 0, las_header_len(f));
     memcpy(to, "LASF", 4);
     le_put16(to + LAS_ENCODING_AT, (uint16_t)encoding_of(f));
     to[24] = 1;
@@ -219,7 +219,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
     put_text(to + 26, 32, f->profile);
     put_text(to + LAS_SOFTWARE_AT, 32, f->incomplete ? LAS_SOFTWARE_INCOMPLETE : LAS_SOFTWARE);
     put_date(to + 90, f);
-    le_put16(to + 94, (uint16_t)header_len(f));
+    le_put16(to + 94, (uint16_t)las_header_len(f));
     le_put32(to + 96, (uint32_t)front_len);
     le_put32(to + 100, n_vlrs);
     to[104] = format_of(f);
@@ -239,7 +239,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
 {
     const struct track *t = f->track;
-    uint8_t *end = to + header_len(f);
+    uint8_t *end = to + las_header_len(f);
     if (f->minor != 2) end = put_extra_vlr(end, t);
     end = put_note_vlr(end, f);
     uint8_t *crs = end;

@@ -58,13 +58,15 @@ struct las_facts {
     uint64_t waves_at;             /* where the record of packets begins in the file; 0: it is in the .wdp */
 };
 
-/* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
+/* Returns how many bytes the header takes. */
+size_t las_header_len(const struct las_facts *facts);
+/* Returns how many bytes a point takes; at most LAS_POINT_LEN_MAX. */
 size_t las_point_len(const struct las_facts *facts);
-/* How many bytes a point of format 0 to 10 takes without extra bytes. */
+/* Returns how many bytes a point of format 0 to 10 takes without extra bytes. */
 size_t las_format_len(int format);
-/* How many of a point's bytes are the format's own; extra bytes follow them. */
+/* Returns how many of a point's bytes are the format's own; extra bytes follow them. */
 size_t las_own_len(const struct las_facts *facts);
-/* Where in a point's bytes the time begins; a colour may follow it. */
+/* Returns where in a point's bytes the time begins; a colour may follow it. */
 size_t las_time_at(const struct las_facts *facts);
 
 /* Counts a point's record as it is in the file: its place and its return. Of the facts it needs `minor`. */

@@ -102,12 +102,11 @@ static int count_places(struct las *las, int n, int *rc, struct sh_err *err)
  * shift is added to them, since the reverse of the pose subtracts it. */
 static void make_level(const struct track *t, double *x, double *y, int n)
 {
-    const double *s = t->pose.shift_m, m_deg = 6371000 * NATIVE_RAD_PER_DEG;
     for (int i = 0; i < n; i++) {
-        const double north = (x[i] - s[0]) * m_deg;
-        const double east = remainder(y[i] - s[1], 360) * m_deg * cos(x[i] * NATIVE_RAD_PER_DEG);
-        x[i] = s[0] + east;
-        y[i] = s[1] + north;
+        double east_north_m[2];
+        station_pose_level(&t->pose, x[i], y[i], east_north_m);
+        x[i] = t->pose.shift_m[0] + east_north_m[0];
+        y[i] = t->pose.shift_m[1] + east_north_m[1];
     }
 }
 

@@ -30,8 +30,8 @@ struct outfile {
 /* Errors name the path; SH_EPERM, SH_EINPUT (no such folder, a link, a device), SH_EIO, SH_ENOMEM. */
 int outfile_open(struct outfile *file, const char *path, struct sh_err *err);
 int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_err *err);
-/* Room for n <= OUTFILE_BUFFER bytes, to be filled before the next call; outfile_used() says how many were.
- * NULL: err. */
+/* Returns room for n <= OUTFILE_BUFFER bytes, to be filled before the next call. Then outfile_used gets the number of
+ * bytes that were filled. NULL: err. */
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err);
 void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);

@@ -400,8 +400,7 @@ static int ply_finish(void *rec, struct sh_err *err)
     ply->facts.n_without_attributes = ply->base.track.missing.n_without_attributes;
     ply->facts.n_unplaced = ply->base.track.missing.n_unplaced;
     ply->facts.n_without_pose = ply->base.track.missing.n_without_pose;
-    const int rc = outfile_check(&ply->base.file, err); /* after a failure the header still says "incomplete" */
-    return rc != 0 ? rc : write_header(ply, 0, err);
+    return write_header(ply, 0, err);
 }
 
 const struct recorder_ops recorder_ply = {

@@ -117,8 +117,7 @@ static int end_file(const struct repair *r, struct outfile *file, int rc, struct
 
 static int fill_column(const struct repair *r, const struct place *p, uint64_t n, struct sh_err *err)
 {
-    static const char empty[2][20] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};
-    const char *line = empty[p->coloured];
+    const char *line = ptx_text_empty[p->coloured];
     struct outfile file;
     int rc = outfile_over(&file, r->fd, r->path, p->at, err);
     if (rc != SH_OK) return rc;

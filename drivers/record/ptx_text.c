@@ -49,12 +49,13 @@ static void say_progress(struct ptx_text *t, uint32_t n_rows)
     sh_progress(t->report, what, (double)t->n_columns / ((double)t->grid->column_max - t->grid->column_min + 1));
 }
 
+const char ptx_text_empty[2][17] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};
+
 /* Returns the end of the line, which may be more than LINE_MAX_LEN away. */
 static char *put_cell(char *to, const struct ptx_cell *c, int coloured)
 {
-    static const char empty[2][17] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};
     if (c->intensity < 0) {
-        memcpy(to, empty[coloured != 0], sizeof empty[0]);
+        memcpy(to, ptx_text_empty[coloured != 0], sizeof ptx_text_empty[0]);
         return to + (coloured ? 16 : 10);
     }
     for (int i = 0; i < 3; i++) {

@@ -9,6 +9,9 @@
 
 enum { PTX_ROWS_MAX = 1 << 22 }; /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
 
+/* The line of a shot without echo, without and with colours. */
+extern const char ptx_text_empty[2][17];
+
 struct ptx_text {
     struct outfile *file;
     struct ptx_grid *grid;

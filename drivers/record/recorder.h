@@ -129,7 +129,7 @@ int recorder_save(struct recorder *rec, struct sh_err *err);
  * failure what reached the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
-/* For formats: reports "PATH: ", n and `what`, unless n is 0. */
+/* Warns of n things: "PATH: N WHAT". n 0: does nothing. For formats. */
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what);
 
 #endif

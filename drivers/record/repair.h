@@ -56,6 +56,8 @@ int repair_read(const struct repair *repair, uint64_t at, void *to, size_t len, 
 int repair_write(const struct repair *repair, uint64_t at, const void *from, size_t len, struct sh_err *err);
 /* Returns whether the file has the name FILE.part: its recorder did not complete it. */
 int repair_is_part(const struct repair *repair);
+/* Returns whether there is a file of that name, or a link. */
+int repair_exists(const char *path);
 /* Cuts the file at `end`, and counts the bytes that go. */
 int repair_cut(struct repair *repair, uint64_t end, struct sh_err *err);
 /* Rows of one length lie one after the other. repair_rows calls fn for each; fn may not keep the pointer. */

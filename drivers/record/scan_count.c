@@ -4,8 +4,8 @@
 /* A repetition alone begins no scan: between scans it is that of the last one. If it has another number than the
  * descriptor before, that of a new scan was lost. A head that was started again counts from 1 again, and so does its
  * time. */
-static int begins_scan(const struct scan_count *count, const struct native_descriptor *d,
-                       const struct native_header *header)
+static int scan_count_begins(const struct scan_count *count, const struct native_descriptor *d,
+                             const struct native_header *header)
 {
     const int is_other = d->scan != count->number;
     if ((header->flags & NATIVE_REPEAT) != 0) return count->within && is_other && count->number != 0 && d->scan != 0;
@@ -20,7 +20,7 @@ void scan_count_frame(struct scan_count *count, const uint8_t *frame)
     int begins = header.type == NATIVE_POINTS && !count->within;
     if (header.type == NATIVE_DESCRIPTOR &&
         native_decode_descriptor(frame + NATIVE_HEADER_LEN, header.length, &d) == 0) {
-        begins = begins_scan(count, &d, &header);
+        begins = scan_count_begins(count, &d, &header);
         count->number = d.scan;
         count->t_ns = header.t_ns;
     }

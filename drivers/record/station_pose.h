@@ -23,6 +23,10 @@ struct station_pose {
  * geodetic coordinates the shift is degrees, degrees, metres, and the axes are east, north, up. */
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose);
 
+#define EARTH_RADIUS_M 6371000.0 /* of a sphere, which is accurate enough for angles and colours */
+/* Converts latitude and longitude to metres east and north of a pose in geodetic coordinates. */
+void station_pose_level(const struct station_pose *pose, double lat_deg, double lon_deg, double east_north_m[2]);
+
 /* p = shift + rotation * p, and back. */
 static inline void station_pose_forward(const struct station_pose *pose, double p[3])
 {
@@ -33,10 +37,12 @@ static inline void station_pose_forward(const struct station_pose *pose, double 
 }
 void station_pose_reverse(const struct station_pose *pose, double p[3]);
 /* These do the same for n points in columns; the results are equal bit for bit. */
-void station_pose_reverse_all(const struct station_pose *pose, int n, double *x, double *y, double *z);
-void station_pose_forward_all(const struct station_pose *pose, int n, double *x, double *y, double *z);
+void station_pose_reverse_all(const struct station_pose *restrict pose, int n, double *restrict x, double *restrict y,
+                              double *restrict z);
+void station_pose_forward_all(const struct station_pose *restrict pose, int n, double *restrict x, double *restrict y,
+                              double *restrict z);
 
-/* The unit quaternion w, x, y, z of the rotation; w is not negative. */
+/* Writes the unit quaternion w, x, y, z of the rotation; w is not negative. */
 void station_pose_quaternion(const struct station_pose *pose, double q[4]);
 
 /* SH_EFORMAT, with path in its text, where the stream is broken: the shift or the quaternion is infinite or NaN. For

@@ -8,7 +8,7 @@
 
 /* ---- the batch's columns (track_columns.c) */
 
-/* Point i of the batch as a struct, without encoder angles; and the way back. */
+/* Returns point i of the batch as a struct, without encoder angles. track_set_point does the reverse. */
 static inline struct scanhead_point track_get_point(const struct track *track, int i)
 {
     const struct track_points *p = &track->points;

@@ -3,10 +3,14 @@
 #ifndef FIRMWARE_SIM_CONFIG_CHECK_PLACES_H
 #define FIRMWARE_SIM_CONFIG_CHECK_PLACES_H
 
+#include <stdint.h>
+
 struct cfg_reader;
 struct config;
 struct config_platform;
 
+/* Checks that the file at `path`, the value of a key, can be read. kind: "mesh". */
+void cfg_check_readable(struct cfg_reader *rd, const char *key, uint32_t item, const char *path, const char *kind);
 /* Checks the lists of copies, once all are read. */
 void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg);
 /* Checks the anchor, and the forms of a station's place. */

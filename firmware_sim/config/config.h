@@ -257,10 +257,10 @@ static inline int config_has_waves(const struct config *cfg)
 {
     return cfg->head.settings.waves != 0 || cfg->waveform.echoes != WAVE_ECHOES_MODEL;
 }
-/* Pulses per second that are cast with these settings: all but those in the blind part of a sweep. */
+/* Returns the pulses per second that are cast with these settings: all but those in the blind part of a sweep. */
 double config_cast_hz(const struct config *cfg);
 
-/* Threads that cast: loop.threads, or one per processor. */
+/* Returns the number of threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
 /* Says why the beams of a scan do not all begin at one place of a scene that stands still, as an adaptive beam needs;

@@ -5,7 +5,6 @@
 
 #include "drivers/protocol/cola_field.h"
 #include "drivers/protocol/cola_model.h"
-#include "firmware_sim/config/check.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/fields.h"
 #include "firmware_sim/config/table/given.h"

@@ -5,11 +5,9 @@
 
 #include <stddef.h>
 
-/* Writes the i-th place, from 0, where a file that comes with the program ("heads", "scenes/x.obj") may be: beside an
- * installed program, beside one in its build folder, in config/ of the working directory. buf holds CONFIG_PATH_LEN.
- * Returns 0 if there is no i-th place. */
-int cfg_shared_path(int i, const char *name, char *buf);
-/* Writes the first of these places that has the file. Returns 0 if none has it. */
+/* Writes the first place that has a file that comes with the program ("heads", "scenes/x.obj"): beside an installed
+ * program, beside one in its build folder, or in config/ of the working directory. buf holds CONFIG_PATH_LEN. Returns 0
+ * if none has it. */
 int cfg_find_shared(const char *name, char *buf);
 /* Returns whether a name ends in .yaml and has more than that. */
 int cfg_is_yaml(const char *name);

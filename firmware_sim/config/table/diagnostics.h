@@ -18,7 +18,7 @@ int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ..
 /* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
 int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* The same for the value of a key, which is bad from now on. */
+/* Does the same for the value of a key, which is bad from now on. */
 int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
 /* Reports an unknown key below the section parent ("" for the top), suggests a similar key and lists the known ones.

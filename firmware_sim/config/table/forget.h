@@ -18,7 +18,7 @@ void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key);
 void cfg_end_scanner(struct cfg_reader *rd);
 /* Resets a list as if it had not been given. */
 void cfg_forget_list(struct cfg_reader *rd, const char *path);
-/* The same for a list, a section, or an element of a list. */
+/* Does the same for a list, a section, or an element of a list. */
 void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 
 #endif

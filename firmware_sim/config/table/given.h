@@ -8,6 +8,7 @@
 
 struct cfg_reader;
 
+/* Returns whether the key was given. item: its element, from 0, where the path has []; else 0. */
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
 /* Returns whether the head profile was read without a diagnostic. */
 int cfg_has_profile(const struct cfg_reader *rd);
@@ -25,7 +26,7 @@ int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const 
  * already: the new one may only be its consequence. */
 int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* The same for a key that is not given and has no default. */
+/* Does the same for a key that is not given and has no default. */
 void cfg_fail_missing(struct cfg_reader *rd, const char *path, uint32_t item);
 /* Makes text fit for one line of an error: cuts it, and replaces control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };

@@ -90,25 +90,30 @@ static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item
         cfg_store(w->rd, key, item, line_of(w, node), text_of(node), w->base_dir);
 }
 
+/* Reads the n numbers of a list. */
+static void read_numbers(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_item_t *first, int n,
+                         double *to)
+{
+    for (int i = 0; i < n; i++) {
+        const yaml_node_t *number = yaml_document_get_node(w->doc, first[i]);
+        if (check_scalar(w, key, item, number) == SH_OK)
+            cfg_store_number(w->rd, key, item, line_of(w, number), to + i, text_of(number));
+    }
+}
+
 static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
-    double *dst = cfg_address(w->rd, key, item);
     char allowed[CFG_ALLOWED_MAX];
     if (node->type != YAML_SEQUENCE_NODE) {
         wrong_kind(w, key, item, node);
         return;
     }
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
-    if (top - first != cfg_axes(key)) {
+    if (top - first != cfg_axes(key))
         cfg_fail_value(w->rd, key, item, line_of(w, node), "has %td numbers instead of %d; %s", top - first,
                        cfg_axes(key), cfg_allowed(key, w->rd->profile, allowed));
-        return;
-    }
-    for (int axis = 0; axis < cfg_axes(key); axis++) {
-        const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
-        if (check_scalar(w, key, item, number) == SH_OK)
-            cfg_store_number(w->rd, key, item, line_of(w, number), dst + axis, text_of(number));
-    }
+    else
+        read_numbers(w, key, item, first, cfg_axes(key), cfg_address(w->rd, key, item));
 }
 
 static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
@@ -133,11 +138,7 @@ static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item
                            cfg_allowed(key, w->rd->profile, allowed));
             return;
         }
-        for (uint32_t axis = 0; axis < 2; axis++) {
-            const yaml_node_t *number = yaml_document_get_node(w->doc, pair->data.sequence.items.start[axis]);
-            if (check_scalar(w, key, item, number) == SH_OK)
-                cfg_store_number(w->rd, key, item, line_of(w, number), &points->at[i][axis], text_of(number));
-        }
+        read_numbers(w, key, item, pair->data.sequence.items.start, 2, points->at[i]);
     }
 }
 
