@@ -14,11 +14,12 @@
 #include "core/err.h"
 #include "drivers/record/station_pose.h"
 
+/* A shot of the grid. The struct has no padding bytes, since it is written as a whole. */
 struct ptx_cell {
     uint32_t column, row;
     float intensity; /* 0..1 */
     uint8_t rgb[3];
-    uint8_t check; /* checksum of the other bytes; ptx_grid_cells sets it. There are no padding bytes before or after */
+    uint8_t check; /* checksum of the other bytes; ptx_grid_cells sets it */
     double p_socs[3];
 };
 

@@ -16,19 +16,9 @@
 
 static const double PRR_MOST_HZ = 1e7;
 
-/* Writes "planar, beams". */
-static const char *words_of(unsigned emitters, char *buf, size_t len)
-{
-    const char *const *names = cfg_find(&cfg_profile_table, "emitter")->names;
-    buf[0] = '\0';
-    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
-        if (emitters & CFG_KIND(kind)) cfg_list_add(buf, len, names[kind]);
-    return buf;
-}
-
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len)
 {
-    if (key->needed) words_of(key->of, words, len);
+    if (key->needed) cfg_list_kinds(key->of, emitter_names, words, len);
     return key->needed;
 }
 
@@ -41,7 +31,7 @@ static void check_owners(struct cfg_reader *rd, unsigned emitter)
         const int given = cfg_is_given(rd, key->path, 0), has = (key->of & emitter) != 0;
         if (given && !has)
             cfg_fail_key(rd, key->path, 0, "this emitter has no such key; allowed only with emitter: %s",
-                         words_of(key->of, words, sizeof words));
+                         cfg_list_kinds(key->of, emitter_names, words, sizeof words));
         else if (!given && has && key->needed)
             cfg_fail_missing(rd, key->path, 0);
     }

@@ -80,6 +80,8 @@ const char *cfg_word_below(const char *path, const char *parent);
 
 /* Appends a word to the list "a, b, c" in buf, as far as it fits. */
 void cfg_list_add(char *buf, size_t len, const char *word);
+/* Writes the names of the kinds whose bits are set (CFG_KIND), "a, b". NULL ends the names. */
+const char *cfg_list_kinds(unsigned kinds, const char *const *names, char *buf, size_t len);
 /* Returns whether the list has the word. A list of NULL has none. */
 int cfg_list_has(const char *list, const char *word);
 
