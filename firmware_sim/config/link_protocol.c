@@ -63,7 +63,7 @@ static const char *link_protocol_place_of(const struct cfg_reader *rd, const cha
     return buf;
 }
 
-static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, const struct protocol_ops *ops)
+static void check_stream(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
     char where[40];
     if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && cfg->output.layout != LINE_POLAR &&
@@ -74,14 +74,6 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
         cfg_fail_key(rd, PROTOCOL_KEY, i,
                      "%s has no first echoes, but beam.echoes is first%s; required is all, last or strongest",
                      ops->name, link_protocol_place_of(rd, "beam.echoes", where));
-    if ((ops->needs & PROTOCOL_NEEDS_ATTRIBUTES) == 0) return;
-    if (!cfg_is_given(rd, "output.attributes", 0))
-        cfg->output.attributes = 1;
-    else if (!cfg->output.attributes && CFG_SOUND(rd, 0, "output.attributes"))
-        cfg_fail_key(rd, PROTOCOL_KEY, i,
-                     "%s needs amplitudes, but output.attributes is off%s; required is on, or no "
-                     "such key",
-                     ops->name, link_protocol_place_of(rd, "output.attributes", where));
 }
 
 static int has_kind(const struct protocol_ops *ops, const struct emitter *emitter)
