@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* A capture of what came over a wire that is not the native protocol's: Ethernet frames to a .pcapng.
+/* A capture of the traffic of any protocol: Ethernet frames to a .pcapng.
  *
- * In: frames (drivers/protocol/ethernet.h), each with its time of UTC and the place it came from. Out: a file that
- * appears whole or not at all (outfile.h). Functions return SH_OK, or SH_EIO and what outfile.h says. */
+ * In: frames (drivers/protocol/ethernet.h), each with its time in UTC and its interface. Out: a file that appears whole
+ * or not at all (outfile.h). Functions return SH_OK, or SH_EIO and the errors of outfile.h. */
 #ifndef DRIVERS_RECORD_CAPTURE_H
 #define DRIVERS_RECORD_CAPTURE_H
 
@@ -29,7 +29,7 @@ int capture_add(struct capture *capture, const struct capture_frame *frame, stru
 /* Adds the statistics of an interface, at the end: how many frames came, and how many the system had no room for. */
 int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t t_ns, uint64_t received,
                            uint64_t dropped, struct sh_err *err);
-/* To be called each second: as outfile_save. */
+/* To be called each second; does what outfile_save does. */
 int capture_save(struct capture *capture, struct sh_err *err);
 /* keep 0: leaves no file. Else, if the file can't be completed, what reached the disk stays as PATH.part, for a
  * repair. */

@@ -8,8 +8,6 @@
 #include "drivers/protocol/native.h"
 #include "drivers/record/track.h"
 
-static const double EARTH_M = 6371000;
-
 int colour_check(enum colour_mode mode, const struct track *t, struct sh_err *err)
 {
     if (mode == COLOUR_FRAME && !t->info.moving && !t->info.stop)
@@ -34,16 +32,13 @@ int colour_check(enum colour_mode mode, const struct track *t, struct sh_err *er
 static void from_anchor(const struct track *t, const double p[3], double d[3])
 {
     const struct scanhead_info *info = &t->info;
-    const double *a = info->anchor, m_deg = EARTH_M * NATIVE_RAD_PER_DEG;
+    const double *a = info->anchor;
     for (int i = 0; i < 3; i++)
         d[i] = p[i] - a[i];
-    if (info->crs == NATIVE_CRS_GEODETIC) {
-        d[0] = remainder(p[1] - a[1], 360) * m_deg * cos(p[0] * NATIVE_RAD_PER_DEG);
-        d[1] = (p[0] - a[0]) * m_deg;
-    }
+    if (info->crs == NATIVE_CRS_GEODETIC) station_pose_level(&t->pose, p[0], p[1], d);
     const int is_own = memcmp(info->station_m, a, sizeof info->station_m) == 0; /* the scene lies in the grid itself */
     if ((info->crs == NATIVE_CRS_UTM && !is_own) || info->crs == NATIVE_CRS_GEODETIC)
-        d[2] -= (d[0] * d[0] + d[1] * d[1]) / (2 * EARTH_M); /* the surface falls away below the level */
+        d[2] -= (d[0] * d[0] + d[1] * d[1]) / (2 * EARTH_RADIUS_M); /* the surface falls away below the level */
 }
 
 static double height_of(const struct track *t, int i)

@@ -13,7 +13,7 @@ struct track;
 
 /* Where a recording's colours come from. */
 struct colour_choice {
-    int given;                 /* 0: as the head sends them, if it does; 1: made here, by scale */
+    int given;                 /* 0: as the head sends them, if it does; 1: computed here from scale */
     struct colour_scale scale; /* not texture, which only the head knows */
 };
 
@@ -21,13 +21,13 @@ struct colour_choice {
  * moving head also ranges in the geo layout, and heights in ECEF. */
 int colour_check(enum colour_mode mode, const struct track *track, struct sh_err *err);
 
-/* The figure that range, height or frame shows for point i of the track's batch: metres, metres above the scene's zero,
- * frame scalar. NaN: lost, or a shot without echo. Heights of geo points are taken back to the scene by the tangent at
- * the station and the Earth's curvature. For a head that moves through a CRS on the Earth they are the CRS's
- * heights. */
+/* Returns the figure that range, height or frame shows for point i of the track's batch: metres, metres above the
+ * scene's zero, frame scalar. NaN: lost, or a shot without echo. Heights of geo points are converted to those of the
+ * scene by the tangent at the station and the Earth's curvature. For a head that moves through a CRS on the Earth they
+ * are the CRS's heights. */
 double colour_figure(enum colour_mode mode, const struct track *track, int i);
 
-/* The colour of point i. */
+/* Writes the colour of point i. */
 void colour_of_point(const struct colour_scale *scale, const struct track *track, int i, uint8_t rgb[3]);
 
 #endif

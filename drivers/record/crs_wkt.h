@@ -8,7 +8,7 @@
 
 enum { CRS_WKT_MAX = 1536 };
 
-/* The text of one of the CRSs that a stream can be in, all on WGS 84: 4978 (ECEF), 326zz and 327zz (UTM),
+/* Writes the text of one of the CRSs that a stream can be in, all on WGS 84: 4978 (ECEF), 326zz and 327zz (UTM),
  * 32661 and 32761 (UPS), 4979 (geodetic; longitude first). All but ECEF come with the vertical CRS of their
  * heights: above the ellipsoid or, where geoid is 1, above EGM96. UPS is written as 5041 and 5042, the same
  * projections with the easting first, which is the order of x and y here. Returns the length. It is 0, and

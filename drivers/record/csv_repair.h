@@ -8,7 +8,7 @@
 
 struct csv_format {
     const char *const *title; /* the first line, one of these, with its newline; NULL at the end */
-    const char *letters;      /* all that rows may consist of */
+    const char *letters;      /* the characters that a row may have */
     const char *unit, *what;  /* "poses", "file of poses" */
     size_t line_most;         /* bytes of a row */
 };

@@ -134,7 +134,7 @@ static int find_streams(const uint8_t *packet, size_t len, const struct e57_fact
     return len - at < 4 ? (int)n : -1;
 }
 
-/* NAME widens limit[0] to limit[1] by n records of TYPE, which GET reads. */
+/* NAME widens the limits so that they include n records of TYPE, which GET reads. */
 #define FIND_LIMITS(NAME, TYPE, GET)                                                  \
     VEC_CLONES static void NAME(const uint8_t *restrict v, unsigned n, TYPE limit[2]) \
     {                                                                                 \
@@ -163,8 +163,8 @@ VEC_CLONES static unsigned find_most4(const uint8_t *restrict v, size_t n_bytes)
 
 typedef void count_run(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first, unsigned n);
 
-/* Counts the records whose field in stream s is 0, run by run. A byte of such records alone is one step, and so is a
- * byte without any. */
+/* Calls `count` for each run of records whose field in stream s is 0. A byte that holds only such records is taken in
+ * one step, and so is a byte without any. */
 static void count_zeros(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], int s, unsigned n,
                         count_run *count)
 {
@@ -180,8 +180,8 @@ static void count_zeros(struct e57_scan *scan, const uint8_t *const stream[E57_N
     }
 }
 
-/* Counts the points of the records from `first` on. Coordinates count from the least int32, so their order is that of
- * the counts. */
+/* Counts the points of the records from `first` on. Since coordinates count from INT32_MIN on, they are compared as
+ * unsigned numbers. */
 static void count_points(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first, unsigned n)
 {
     const uint32_t least = 0x80000000u;

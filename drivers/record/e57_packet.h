@@ -21,7 +21,7 @@ enum {
     E57_PACKET_MAX = 65536,
 };
 enum e57_stream {
-    E57_X, /* coordinates are counted from the least int32 */
+    E57_X, /* coordinates are counts from INT32_MIN on, so the smallest is 0 */
     E57_Y,
     E57_Z,
     E57_INVALID, /* where there are shots without echo: 2 */

@@ -22,7 +22,7 @@ struct e57_pages {
 
 uint64_t e57_logical(const struct e57_pages *pages); /* where the next byte will be */
 uint64_t e57_physical(uint64_t logical);
-int e57_page_is_right(const uint8_t page[E57_PAGE]); /* its CRC is */
+int e57_page_is_right(const uint8_t page[E57_PAGE]); /* whether its CRC is right */
 
 int e57_put(struct e57_pages *pages, const void *data, size_t len, struct sh_err *err);
 /* Fills the page at hand with zeros and flushes the file. */
@@ -33,9 +33,9 @@ int e57_keep_page(struct e57_pages *pages, struct sh_err *err);
 /* Overwrites content. */
 int e57_patch(struct e57_pages *pages, uint64_t logical, const void *data, size_t len, struct sh_err *err);
 
-/* The file's own header, once everything else is there. */
+/* Makes the file's own header, which is written once everything else is there. */
 void e57_file_header(uint64_t n_pages, uint64_t xml, size_t xml_len, uint8_t out[E57_FILE_HEADER_LEN]);
-/* The header of a section of packets without an index. section and len are logical. */
+/* Makes the header of a section of packets without an index. section and len are logical. */
 void e57_section_header(uint64_t section, uint64_t len, uint8_t out[E57_SECTION_HEADER_LEN]);
 
 #endif

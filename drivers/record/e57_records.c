@@ -29,7 +29,7 @@ static void set_run(struct run *run, const struct track *t, int has_empty, int f
             if (points->echo_count[first + i] == 0) run->own[k][i] = 0;
 }
 
-/* Puts coordinates in counts from the least int32. Returns 0 where one of them has no room. */
+/* Puts coordinates as counts from INT32_MIN on. Returns 0 where one of them has no room. */
 VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n, uint8_t *restrict to)
 {
     uint64_t n_bad = 0;

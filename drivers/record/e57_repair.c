@@ -42,20 +42,18 @@ static int read_page(struct left *l, uint64_t number, struct sh_err *err)
 static int count_pages(struct left *l, struct sh_err *err)
 {
     const uint64_t n = l->repair->len / E57_PAGE;
-    int rc = 1;
-    for (; l->n_pages < n; l->n_pages++) {
-        if (l->n_pages % PAGES_BETWEEN_STOPS == 0 && (rc = sh_check_stop(l->repair->report, err)) != SH_OK) return rc;
-        if ((rc = read_page(l, l->n_pages, err)) <= 0) break;
-    }
-    for (uint64_t i = l->n_pages + 1; rc >= 0 && i < n; i++) {
-        rc = read_page(l, i, err);
-        if (rc > 0)
+    int rc;
+    for (uint64_t i = 0; i < n; i++) {
+        if (i % PAGES_BETWEEN_STOPS == 0 && (rc = sh_check_stop(l->repair->report, err)) != SH_OK) return rc;
+        if ((rc = read_page(l, i, err)) < 0) return rc;
+        if (rc > 0 && i > l->n_pages)
             return sh_fail(err, SH_EFORMAT,
                            "%s: bytes %" PRIu64 " to %" PRIu64
                            " are damaged, and the file goes on after them; a repair can only cut its end",
                            l->repair->path, l->n_pages * E57_PAGE, i * E57_PAGE);
+        l->n_pages += rc > 0;
     }
-    return rc < 0 ? rc : SH_OK;
+    return SH_OK;
 }
 
 /* Reads content. Returns 1, or 0 where not all of it is in whole pages. */
@@ -84,7 +82,7 @@ static int fail_damaged(const struct left *l, struct sh_err *err)
                    l->repair->path, e57_physical(l->end));
 }
 
-/* ---- the way through what is there */
+/* ---- scans and packets up to the last whole one */
 
 /* Takes the scan that begins at the end of what is kept. Returns 1, or 0 where there is none, or not all of its
  * beginning. */
@@ -174,13 +172,6 @@ static int is_whole(struct left *l, struct sh_err *err)
            l->n_pages * E57_PAGE == l->repair->len;
 }
 
-/* Takes the file's header away, since a file with a header counts as whole. */
-static int blank_header(struct e57_pages *pages, struct sh_err *err)
-{
-    static const uint8_t blank[E57_FILE_HEADER_LEN];
-    return e57_patch(pages, 0, blank, sizeof blank, err);
-}
-
 /* A scan without any packet gets an empty one, as its recorder would have written. */
 static int put_empty_packet(struct left *l, struct e57_pages *pages, struct sh_err *err)
 {
@@ -200,6 +191,7 @@ static int put_empty_packet(struct left *l, struct e57_pages *pages, struct sh_e
 
 static int write_end(struct left *l, struct sh_err *err)
 {
+    static const uint8_t blank[E57_FILE_HEADER_LEN];
     struct repair *r = l->repair;
     struct outfile file;
     struct e57_pages pages = {.file = &file, .n_full = l->end / E57_PAGE_CONTENT, .used = l->end % E57_PAGE_CONTENT};
@@ -207,7 +199,7 @@ static int write_end(struct left *l, struct sh_err *err)
     if (rc <= 0) return rc < 0 ? rc : fail_damaged(l, err);
     rc = outfile_over(&file, r->fd, r->path, pages.n_full * E57_PAGE, err);
     if (rc != 0) return rc;
-    rc = blank_header(&pages, err);
+    rc = e57_patch(&pages, 0, blank, sizeof blank, err); /* a file with a header counts as whole */
     if (rc == 0) rc = put_empty_packet(l, &pages, err);
     l->facts.is_incomplete = 1;
     if (rc == 0) rc = e57_end(&pages, &l->facts, NULL, err);

@@ -10,7 +10,7 @@
 #include "core/err.h"
 #include "drivers/record/station_pose.h"
 
-/* One scan: an entry of data3D. Coordinates in the head's frame. */
+/* One scan, which is an entry of data3D. Coordinates are in the head's frame. */
 struct e57_scan {
     uint64_t note;        /* logical offset of the note before it (e57_note.h) */
     uint64_t section;     /* of its binary section */

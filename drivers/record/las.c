@@ -28,8 +28,8 @@ static int las_begin(void *rec, struct sh_err *err)
     return las->base.options.las_wdp ? las_waves_check(las->base.file.path, err) : 0;
 }
 
-/* Writes header and records before the points. Their counts are overwritten at the end. Until then they mark the file
- * as incomplete, for a repair (las_repair.c). */
+/* Writes the header and the records before the points. Until the header is written again at the end, with the counts,
+ * it marks the file as incomplete, for a repair (las_repair.c). */
 static int put_front(struct las *las, struct sh_err *err)
 {
     uint8_t front[LAS_FRONT_MAX];
@@ -47,8 +47,8 @@ int las_write_front(struct las *las, struct sh_err *err)
     return rc != 0 ? rc : outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
 }
 
-/* The stream's own counts from the first anchor, or coarser ones for a head that moves. */
-static void set_counts(struct las *las)
+/* Sets the offset to the first anchor, and the scale to the stream's own, or to a coarser one for a head that moves. */
+static void set_scale(struct las *las)
 {
     const struct track *t = &las->base.track;
     struct las_facts *f = &las->facts;
@@ -70,7 +70,7 @@ static int las_scan(void *rec, struct sh_err *err)
         return las_write_front(las, err);
     }
     if (las->begun) return 0;
-    set_counts(las);
+    set_scale(las);
     f->has_colour = t->has_colours;
     f->has_waves = t->has_waves && f->minor != 2;
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
@@ -134,8 +134,7 @@ static void report_waves(struct las *las)
 static int las_finish(void *rec, struct sh_err *err)
 {
     struct las *las = rec;
-    int rc = outfile_check(&las->base.file, err); /* after a failure the header still says "its end is missing" */
-    if (rc == 0 && !las->begun) rc = put_front(las, err);
+    int rc = las->begun ? 0 : put_front(las, err);
     las->facts.is_growing = 0;
     if (rc == 0 && las->facts.has_waves) rc = end_waves(las, err);
     las->facts.incomplete = 0;

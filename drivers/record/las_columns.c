@@ -10,7 +10,7 @@
 
 /* ---- coordinates */
 
-/* Rounds as rint does. Returns 0 where a number is too far for 32 bits; vec_round keeps such numbers too far. */
+/* Rounds as rint does. Returns 0 where a number is too far for 32 bits; vec_round never makes such a number small. */
 VEC_CLONES static int counts_fit(const double *restrict at, int n, double offset, double scale, int32_t *restrict to)
 {
     uint64_t any_beyond = 0;

@@ -35,7 +35,8 @@ static uint8_t *put_vlr_head(uint8_t *to, const char *user, uint16_t record, siz
     return to + LAS_VLR_HEAD_LEN;
 }
 
-/* Describes one of the extra fields after a point, of 2 bytes. scale 0: none; no_data as its type has it. */
+/* Describes one of the extra fields after a point, of 2 bytes. no_data is the value that stands for none. scale 0:
+ * none. */
 static uint8_t *put_extra(uint8_t *to, uint8_t type, const char *name, int64_t no_data, double scale, const char *text)
 {
     memset(to, 0, LAS_EXTRA_LEN);
@@ -95,7 +96,7 @@ static uint8_t *put_crs_vlr(uint8_t *to, int epsg, int geoid)
     return to + n + 1;
 }
 
-/* The CRS of LAS 1.2: GeoTIFF's directory of keys (OGC 19-008), each of number, 0, 1 and value. */
+/* Writes the CRS for LAS 1.2, as GeoTIFF's directory of keys (OGC 19-008). A key is four words: number, 0, 1, value. */
 static uint8_t *put_keys_vlr(uint8_t *to, int epsg, int geoid)
 {
     enum { MODEL = 1024, RASTER = 1025, GEODETIC = 2048, GEOCENTRIC_LENGTHS = 2052, ANGLES = 2054 };
@@ -197,7 +198,7 @@ void las_count_record(struct las_facts *f, const uint8_t *record)
     if (echo >= 1) f->n_by_return[echo - 1]++;
 }
 
-static size_t header_len(const struct las_facts *f)
+size_t las_header_len(const struct las_facts *f)
 {
     return f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
 }
@@ -210,7 +211,7 @@ static int encoding_of(const struct las_facts *f)
 
 static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len, uint32_t n_vlrs)
 {
-    memset(to, 0, header_len(f));
+    memset(to, 0, las_header_len(f));
     memcpy(to, "LASF", 4);
     le_put16(to + LAS_ENCODING_AT, (uint16_t)encoding_of(f));
     to[24] = 1;
@@ -218,7 +219,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
     put_text(to + 26, 32, f->profile);
     put_text(to + LAS_SOFTWARE_AT, 32, f->incomplete ? LAS_SOFTWARE_INCOMPLETE : LAS_SOFTWARE);
     put_date(to + 90, f);
-    le_put16(to + 94, (uint16_t)header_len(f));
+    le_put16(to + 94, (uint16_t)las_header_len(f));
     le_put32(to + 96, (uint32_t)front_len);
     le_put32(to + 100, n_vlrs);
     to[104] = format_of(f);
@@ -238,7 +239,7 @@ static void put_header(uint8_t *to, const struct las_facts *f, size_t front_len,
 size_t las_front(const struct las_facts *f, uint8_t to[LAS_FRONT_MAX])
 {
     const struct track *t = f->track;
-    uint8_t *end = to + header_len(f);
+    uint8_t *end = to + las_header_len(f);
     if (f->minor != 2) end = put_extra_vlr(end, t);
     end = put_note_vlr(end, f);
     uint8_t *crs = end;

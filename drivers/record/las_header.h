@@ -15,13 +15,13 @@
 enum {
     LAS_HEADER_LEN = 375,
     LAS_HEADER_12_LEN = 227,
-    LAS_SOFTWARE_AT = 58, /* what made the file: 32 bytes */
+    LAS_SOFTWARE_AT = 58, /* the name of the program that wrote the file: 32 bytes */
     LAS_VLR_HEAD_LEN = 54,
     LAS_EXTRA_LEN = 192,
-    LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own */
-    LAS_ATTRIBUTES_LEN = 4, /* and after these */
-    LAS_DEVIATION_LEN = 2,
-    LAS_WAVE_LEN = 29, /* a point's reference to its waveform; formats 9 and 10 end in it */
+    LAS_LABEL_LEN = 2,      /* extra bytes of 1.4, after the format's own: first the label, */
+    LAS_ATTRIBUTES_LEN = 4, /* then amplitude and width, */
+    LAS_DEVIATION_LEN = 2,  /* then the deviation */
+    LAS_WAVE_LEN = 29,      /* a point's reference to its waveform; formats 9 and 10 end in it */
     LAS_POINT_LEN_MAX = 38 + LAS_WAVE_LEN + LAS_LABEL_LEN + LAS_ATTRIBUTES_LEN + LAS_DEVIATION_LEN,
     LAS_RETURNS = 15,
     LAS_12_RETURNS = 5,
@@ -52,19 +52,21 @@ struct las_facts {
     double scale[3], offset[3]; /* of x, y, z; x and y are longitude and latitude in geodetic coordinates */
     double created_gps_s;       /* adjusted standard GPS time of the first point, with gps_time */
     uint64_t n_points, n_by_return[LAS_RETURNS];
-    int32_t min[3], max[3]; /* counts; only with points */
+    int32_t min[3], max[3]; /* of the coordinates' counts; valid once there are points */
     int has_waves;
     const struct las_waves *waves; /* with waveforms: their descriptors */
     uint64_t waves_at;             /* where the record of packets begins in the file; 0: it is in the .wdp */
 };
 
-/* How many bytes a point takes; at most LAS_POINT_LEN_MAX. */
+/* Returns how many bytes the header takes. */
+size_t las_header_len(const struct las_facts *facts);
+/* Returns how many bytes a point takes; at most LAS_POINT_LEN_MAX. */
 size_t las_point_len(const struct las_facts *facts);
-/* How many bytes a point of format 0 to 10 takes without extra bytes. */
+/* Returns how many bytes a point of format 0 to 10 takes without extra bytes. */
 size_t las_format_len(int format);
-/* How many of a point's bytes are the format's own; extra bytes follow them. */
+/* Returns how many of a point's bytes are the format's own; extra bytes follow them. */
 size_t las_own_len(const struct las_facts *facts);
-/* Where in a point's bytes the time begins; a colour may follow it. */
+/* Returns where in a point's bytes the time begins; a colour may follow it. */
 size_t las_time_at(const struct las_facts *facts);
 
 /* Counts a point's record as it is in the file: its place and its return. Of the facts it needs `minor`. */

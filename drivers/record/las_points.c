@@ -98,15 +98,15 @@ static int count_places(struct las *las, int n, int *rc, struct sh_err *err)
     return n;
 }
 
-/* Makes metres of geodetic coordinates about the pose's place, accurately enough for an angle. */
+/* Converts latitude and longitude to metres east and north of the pose, accurately enough for an angle. The pose's
+ * shift is added to them, since the reverse of the pose subtracts it. */
 static void make_level(const struct track *t, double *x, double *y, int n)
 {
-    const double *s = t->pose.shift_m, m_deg = 6371000 * NATIVE_RAD_PER_DEG;
     for (int i = 0; i < n; i++) {
-        const double north = (x[i] - s[0]) * m_deg;
-        const double east = remainder(y[i] - s[1], 360) * m_deg * cos(x[i] * NATIVE_RAD_PER_DEG);
-        x[i] = s[0] + east;
-        y[i] = s[1] + north;
+        double east_north_m[2];
+        station_pose_level(&t->pose, x[i], y[i], east_north_m);
+        x[i] = t->pose.shift_m[0] + east_north_m[0];
+        y[i] = t->pose.shift_m[1] + east_north_m[1];
     }
 }
 
@@ -153,7 +153,8 @@ static void set_attributes(struct las *las, int n)
     }
 }
 
-/* The packets of the batch are written before its points, as a new descriptor changes what comes before all points. */
+/* The packets of the batch are written before its points, since a new descriptor goes into the records before all
+ * points. */
 static int put_packets(struct las *las, int n, struct sh_err *err)
 {
     const struct track *t = &las->base.track;

@@ -11,7 +11,7 @@
 
 struct records {
     struct las_facts facts; /* counts of all records but those of zeros at the end */
-    size_t len, time_at, station_at;
+    size_t len;
     uint64_t n_zero; /* records at the end that hold zeros alone */
     struct point_scans scans;
     int has_waves;
@@ -32,7 +32,8 @@ static void take_record(void *ctx, const uint8_t *record)
     }
     las_count_record(&r->facts, record);
     if (r->has_waves) las_packets_take(&r->packets, record);
-    point_scans_take(&r->scans, le_get16(record + r->station_at), le_get_double(record + r->time_at));
+    const uint8_t *time = record + las_time_at(&r->facts); /* after the station */
+    point_scans_take(&r->scans, le_get16(time - 2), le_get_double(time));
 }
 
 /* Accepts only files as las.c writes them: *front_len bytes, then records of r->len. */
@@ -45,7 +46,7 @@ static int parse_header(const struct repair *repair, const uint8_t *header, size
     if (!is_las) return repair_fail_none(repair, "LAS file of scanhead", err);
     const int format = header[104];
     f->minor = header[25];
-    const size_t header_len = f->minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
+    const size_t header_len = las_header_len(f);
     r->len = le_get16(header + 105);
     *front_len = le_get32(header + 96);
     const int known = f->minor == 2 ? (format == 1 || format == 3) && r->len == las_format_len(format)
@@ -54,8 +55,6 @@ static int parse_header(const struct repair *repair, const uint8_t *header, size
     if (!known || len < header_len || *front_len < header_len || *front_len > LAS_FRONT_MAX || *front_len > repair->len)
         return repair_fail_none(repair, "LAS file of scanhead", err);
     r->has_waves = f->minor == 4 && format >= 9;
-    r->station_at = f->minor == 2 ? 18 : 20;
-    r->time_at = f->minor == 2 ? 20 : 22;
     for (int i = 0; i < 3; i++) {
         f->scale[i] = le_get_double(header + 131 + 8 * i);
         f->offset[i] = le_get_double(header + 155 + 8 * i);
@@ -66,7 +65,7 @@ static int parse_header(const struct repair *repair, const uint8_t *header, size
 static int make_whole(struct repair *repair, uint8_t *header, struct records *r, uint32_t front_len, struct sh_err *err)
 {
     uint8_t renewed[LAS_HEADER_LEN];
-    const size_t len = r->facts.minor == 2 ? LAS_HEADER_12_LEN : LAS_HEADER_LEN;
+    const size_t len = las_header_len(&r->facts);
     const struct repair_rows points = {front_len, r->facts.n_points, r->len};
     uint64_t end = front_len + points.n * points.len;
     if (r->facts.minor == 2 && r->facts.n_points > UINT32_MAX)

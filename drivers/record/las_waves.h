@@ -31,7 +31,7 @@ struct las_kind {
 /* A point refers to its waveform by this; zeros: it has none. */
 struct las_packet {
     uint8_t kind; /* from 1 on */
-    uint64_t at;  /* byte after the begin of the record of packets */
+    uint64_t at;  /* bytes from the beginning of the record of packets */
     uint32_t len;
 };
 

@@ -16,11 +16,6 @@ static int is_inside(const struct las_packets *p)
     return p->path == NULL;
 }
 
-static int exists(const char *path)
-{
-    return access(path, F_OK) == 0;
-}
-
 static int packets_open(struct las_packets *p, int is_part, struct sh_err *err)
 {
     struct stat st;
@@ -46,7 +41,7 @@ static int will_be_renamed(const struct repair *r, char *las)
 {
     if (!repair_is_part(r)) return 0;
     las[strlen(las) - strlen(".part")] = '\0';
-    return !exists(las);
+    return !repair_exists(las);
 }
 
 static int find_outside(struct las_packets *p, const struct repair *r, struct sh_err *err)
@@ -59,11 +54,11 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
         part = NULL;
         rc = sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", r->path);
     } else {
-        is_part = repair_is_part(r) && exists(part);
-        if (is_part && is_renamed && exists(wdp))
+        is_part = repair_is_part(r) && repair_exists(part);
+        if (is_part && is_renamed && repair_exists(wdp))
             rc = sh_fail(err, SH_ESTATE, "%s: %s exists, and is not replaced; move it away, and repeat the command",
                          part, wdp);
-        else if (!is_part && !exists(wdp))
+        else if (!is_part && !repair_exists(wdp))
             rc = sh_fail(err, SH_EINPUT,
                          "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep "
                          "the points alone",

@@ -20,8 +20,8 @@
 #include "drivers/record/mesh_texture.h"
 
 static const double GIB = 1073741824.0;
-/* Memory per point, measured with 6.5 million points. The first has the point, its place in the grid and its triangles,
- * also while arrays grow. The exporter takes the second besides. */
+/* Memory per point, measured with 6.5 million points. BYTES_A_POINT includes the point's place in the grid, its
+ * triangles and the spare room of growing arrays. The exporter takes BYTES_OF_EXPORTER in addition. */
 enum { BYTES_A_POINT = 170, BYTES_OF_EXPORTER = 900 };
 
 static int check_points(const char *path, double n, struct sh_err *err)
@@ -42,7 +42,7 @@ static int check_points(const char *path, double n, struct sh_err *err)
     return SH_OK;
 }
 
-/* The scan's size as the descriptor says it, before the scan is made. */
+/* Checks the size that the descriptor gives for the scan, before the scan is made. */
 static int check_size(const struct mesh_recorder *m, struct sh_err *err)
 {
     const struct track *t = &m->base.track;

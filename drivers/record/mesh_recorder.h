@@ -32,7 +32,7 @@ struct mesh_recorder {
     uint64_t n_later, n_loose, n_long, n_flat, n_lost, n_split;
     uint64_t n_edges;
     double edges_m, area_m2; /* sum of lengths */
-    uint32_t every;          /* the largest of all images */
+    uint32_t every;          /* the largest `every` of all images (mesh_texture_draw) */
 };
 
 static inline int is_ply(const struct mesh_recorder *m)

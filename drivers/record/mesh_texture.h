@@ -17,7 +17,7 @@
 enum { MESH_TEXTURE_SIDE = 16384 };
 
 /* Sets the texture coordinates of the grid's points, and draws their colours; places without an echo are black.
- * picture_free is due in any case. *every: the image has each so many-th line and row. SH_ENOMEM. */
+ * The caller calls picture_free in any case. The image has only each *every-th line and row. SH_ENOMEM. */
 int mesh_texture_draw(const struct mesh_grid *grid, struct mesh_points *points, struct picture *image, uint32_t *every,
                       struct sh_err *err);
 

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LINE_MOST = 512 };
+enum { LINE_MOST = 1024 }; /* a comment may name two names of 255 bytes */
 
 struct obj_lines {
     uint64_t n_vertices, n_objects;

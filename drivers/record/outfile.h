@@ -20,18 +20,18 @@ struct outfile {
     uint64_t written; /* bytes of the file that are before buf */
     int error;        /* errno of the first write that failed: something of the file may be missing; 0: none */
     uint64_t saved;   /* `written` when outfile_save was called last */
-    /* 1: what goes beyond DIRECT_FROM is written past the system's cache (O_DIRECT), where the file system can
-     * do that. It saves copying, which is most of the cost of a long recording, but each write then waits for the disk:
-     * for writers that may wait. Set after opening. */
+    /* 1: the bytes from DIRECT_FROM on are written past the system's cache (O_DIRECT), where the file system can do
+     * that. It saves copying, which is most of the cost of a long recording. But each write then waits for the disk, so
+     * only writers that may wait set it. Set after opening. */
     int may_be_direct;
-    int is_direct; /* 1: the descriptor writes so, just now; -1: the file system can't do that (direct.h) */
+    int is_direct; /* 1: O_DIRECT is set at present; -1: the file system can't do that (direct.h) */
 };
 
 /* Errors name the path; SH_EPERM, SH_EINPUT (no such folder, a link, a device), SH_EIO, SH_ENOMEM. */
 int outfile_open(struct outfile *file, const char *path, struct sh_err *err);
 int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_err *err);
-/* Room for n <= OUTFILE_BUFFER bytes, to be filled before the next call; outfile_used() says how many were.
- * NULL: err. */
+/* Returns room for n <= OUTFILE_BUFFER bytes, to be filled before the next call. Then outfile_used gets the number of
+ * bytes that were filled. NULL: err. */
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err);
 void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);

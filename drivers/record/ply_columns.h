@@ -37,23 +37,23 @@ struct ply_facts {
     struct scanhead_stats stats;
 };
 
-/* The columns that points of the track have. To be called once the track has begun. */
+/* Returns those of the columns that points of the track have. To be called once the track has begun. */
 unsigned ply_columns_there(const struct track *track, unsigned columns);
-/* Bytes of a binary row of these columns. */
+/* Returns the bytes of a binary row of these columns. */
 size_t ply_row_len(unsigned columns);
-/* The meaning of the track's coordinates, in words. */
+/* Returns the meaning of the track's coordinates, in words. */
 const char *ply_crs_text(const struct track *track);
-/* "label N OBJECT | MATERIAL", a line each with `before` in front, of all surfaces that the stream has named so far. */
+/* Puts a line "label N OBJECT | MATERIAL", with `before` in front, for each surface that the stream has named. */
 void ply_put_names(FILE *out, const char *before, const struct scanhead *sh);
 
-/* Bytes to leave for the header: all that is known now, and room for the names of n_surfaces not known yet. */
+/* Returns the bytes to leave for the header: for all that is known now, and for names of n_surfaces not known yet. */
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces);
 
-/* The header, padded by comment lines to exactly `size` bytes; 0: as long as it gets. Names, and heads after the
- * first, that do not fit are left out; *n_left_out says how many. Free *text. */
+/* Makes the header, padded by comment lines to exactly `size` bytes; 0: without padding. Names, and heads after the
+ * first, that do not fit are left out; *n_left_out says how many. The caller frees *text. */
 int ply_header_make(const struct ply_facts *facts, size_t size, char **text, size_t *len, uint64_t *n_left_out,
                     struct sh_err *err);
-/* Lines of comment that take exactly n bytes; n is 0 or at least PLY_PAD_MIN. */
+/* Puts lines of comment that take exactly n bytes; n is 0 or at least PLY_PAD_MIN. */
 void ply_put_padding(FILE *out, size_t n);
 
 #endif

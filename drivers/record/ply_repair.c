@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The repair of .ply (repair.h): points, binary or text, with any columns of one number each. The count in the header
- * is corrected within the header's room: lines of blank comment make place.
+ * is corrected without changing the header's length: lines of blank comment become longer or shorter.
  *
  * A mesh is written in one piece at the end. So a mesh is kept only if it is complete, as after a kill just before the
  * file got its name. */
@@ -122,7 +122,8 @@ static int parse_header(const struct repair *r, struct ply_header *h, struct sh_
     return repair_fail_none(r, h->is_mesh ? "PLY mesh" : "PLY file of points", err);
 }
 
-/* Blank comments, and pieces of comments left when the recorder was killed while it overwrote the header. */
+/* Returns whether the line is a blank comment, or a piece of a comment. Such pieces are left when the recorder was
+ * killed while it overwrote the header. */
 static int is_padding(const char *line, size_t n)
 {
     static const char *const first[] = {"ply",      "format ",   "comment ",  "obj_info ",
@@ -134,12 +135,11 @@ static int is_padding(const char *line, size_t n)
     return strncmp(line, "comment ", 8) == 0 && strspn(line + 7, " ") >= n - 7;
 }
 
-/* This goes into a renewed header. In bytes: padding of blank comments before the count, blanks at the end of the first
- * comment. */
+/* This goes into a renewed header. */
 struct renewal {
     uint64_t n_vertices;
     int incomplete;
-    size_t padding, blanks;
+    size_t padding, blanks; /* bytes of blank comments before the count; spaces at the end of the first comment */
 };
 
 static void put_line(FILE *out, const struct ply_header *h, const char *line, int n, struct renewal *new)
@@ -171,8 +171,8 @@ static char *put_lines(const struct ply_header *h, struct renewal new, size_t *l
     return NULL;
 }
 
-/* The same header with that count, and with the line of an incomplete one, in the same length. NULL: there is no
- * room. */
+/* Returns the same header with that count and, if incomplete, with the line PLY_INCOMPLETE, in the same length. NULL:
+ * there is no room. */
 static char *renew(const struct ply_header *h, uint64_t n_vertices, int incomplete)
 {
     struct renewal new = {.n_vertices = n_vertices, .incomplete = incomplete};

@@ -82,7 +82,7 @@ static int pose_file_put(struct pose_file *file, const struct scanhead_pose *p, 
 }
 
 /* Poses are in the scene frame. If the points are in a CRS, comments say how the scene frame lies in it. */
-static int put_link(struct pose_file *file, const struct scanhead_info *info, struct sh_err *err)
+static int put_scene_in_crs(struct pose_file *file, const struct scanhead_info *info, struct sh_err *err)
 {
     char text[4 * LINE];
     const double *p = info->station_m, *r = info->axes;
@@ -101,8 +101,9 @@ static int put_link(struct pose_file *file, const struct scanhead_info *info, st
     return outfile_write(&file->base.file, text, (size_t)n, err);
 }
 
-/* The number alone does not say it: another head, or one that has started again, numbers its scans from 1 on. A new
- * descriptor does not say it either: settings may change within a scan, whose poses go on then. */
+/* A scan's number alone does not show that the scan is new: another head, or one that has started again, numbers its
+ * scans from 1 on. A new descriptor does not show it either: settings may change within a scan, whose poses then go
+ * on. */
 static int is_new_scan(const struct pose_file *file, const struct scanhead *sh, const struct scanhead_info *info)
 {
     return file->n_scans == 0 || file->is_due || sh != file->sh || info->scan != file->scan ||
@@ -115,8 +116,8 @@ static int put_poses(struct pose_file *file, struct scanhead *sh, const struct s
     struct scanhead_pose pose[BATCH];
     struct scanhead_info info;
     int n, rc = put_title(file, MOVING, err);
-    if (rc != SH_OK || scanhead_get_info(sh, &info) != SCANHEAD_OK) return rc; /* their scan is not known yet */
-    if (file->n_scans == 0) rc = put_link(file, &info, err);
+    if (rc != SH_OK || scanhead_get_info(sh, &info) != SCANHEAD_OK) return rc; /* the poses' scan is not known yet */
+    if (file->n_scans == 0) rc = put_scene_in_crs(file, &info, err);
     if (is_new_scan(file, sh, &info)) {
         file->n_scans++;
         file->last_ns = INT64_MIN;

@@ -8,7 +8,7 @@
  * The grid of a sphere has a column per ring; that of a pole has one shot. Beams and lists of directions have
  * no rows and columns: they are refused.
  *
- * With colours each line goes on with red, green and blue, 0 to 255; all 0 for a place without a point.
+ * With colours each text line of a point ends in red, green and blue, 0 to 255. They are 0 for a place without a point.
  *
  * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
  * white Lambertian target and for what is brighter, 0.5 where not modelled. Echoes without room in the
@@ -72,7 +72,7 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
                             .coloured = ptx->base.track.has_colours,
                             .report = ptx->base.options.report};
     int rc = ptx_text_put(&text, err);
-    if (rc == 0) rc = outfile_flush(&ptx->base.file, err); /* before the cells go that it was made from */
+    if (rc == 0) rc = outfile_flush(&ptx->base.file, err); /* before the cells are deleted, which a repair needs */
     return rc == 0 ? ptx_grid_clear(g, err) : rc;
 }
 
@@ -136,8 +136,8 @@ static int make_cell(struct ptx *ptx, int i, struct ptx_cell *cell)
     return 1;
 }
 
-/* Writes an empty grid where the text will be. So a killed recorder leaves no empty file, which nobody would try to
- * repair. */
+/* Writes an empty grid where the text will be. So a killed recorder leaves a FILE.part that is not empty: an empty one
+ * would count as holding no data (outfile_check_left), and would not be repaired. */
 static int begin_grid(struct ptx *ptx, struct sh_err *err)
 {
     static const char text[] = "0\n0\n";

@@ -14,11 +14,12 @@
 #include "core/err.h"
 #include "drivers/record/station_pose.h"
 
+/* A shot of the grid. The struct has no padding bytes, since it is written as a whole. */
 struct ptx_cell {
     uint32_t column, row;
     float intensity; /* 0..1 */
     uint8_t rgb[3];
-    uint8_t check; /* checksum of the other bytes; ptx_grid_cells sets it. A cell has no gap, as it is written whole */
+    uint8_t check; /* checksum of the other bytes; ptx_grid_cells sets it */
     double p_socs[3];
 };
 
@@ -42,11 +43,11 @@ struct ptx_grid {
 int ptx_grid_open(struct ptx_grid *grid, const char *path, struct sh_err *err);
 /* Removes the file, unless it holds a grid that is not yet in the recording's PATH.part, and PATH.part exists. */
 void ptx_grid_close(struct ptx_grid *grid);
-/* Before the first shot of a grid. */
+/* To be called before the first shot of a grid: writes the head. */
 int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station_pose *pose, int coloured,
                    struct sh_err *err);
-/* Takes a shot at this place. Returns 1 if it makes the grid larger. Each shot with an echo, and each that makes the
- * grid larger, then gives a cell. Columns never go back. */
+/* Takes a shot at this place. Returns 1 if it makes the grid larger. For each shot with an echo, and each that makes
+ * the grid larger, the caller then gives a cell to ptx_grid_cells. Columns never go back. */
 int ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row);
 /* Takes n cells; intensity -1: a shot without echo. */
 int ptx_grid_cells(struct ptx_grid *grid, struct ptx_cell *cell, int n, struct sh_err *err);
@@ -57,7 +58,7 @@ int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err);
 int ptx_grid_drain(struct ptx_grid *grid,
                    int (*fn)(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err), void *ctx,
                    struct sh_err *err);
-/* Once the text is in the recording: the file is empty again. */
+/* Empties the file; to be called once the text is in the recording. */
 int ptx_grid_clear(struct ptx_grid *grid, struct sh_err *err);
 
 /* ---- for a repair. spool and path are set, and nothing else. */

@@ -117,8 +117,7 @@ static int end_file(const struct repair *r, struct outfile *file, int rc, struct
 
 static int fill_column(const struct repair *r, const struct place *p, uint64_t n, struct sh_err *err)
 {
-    static const char empty[2][20] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};
-    const char *line = empty[p->coloured];
+    const char *line = ptx_text_empty[p->coloured];
     struct outfile file;
     int rc = outfile_over(&file, r->fd, r->path, p->at, err);
     if (rc != SH_OK) return rc;
@@ -200,7 +199,7 @@ static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, st
     uint64_t cut;
     int rc = ptx_grid_find(grid, &head, &cut, err);
     if (rc < 0) return rc;
-    if (rc == 0) { /* there is no grid besides: the text is all there is */
+    if (rc == 0) { /* FILE.grid holds no grid, so the text is all that is left */
         rc = read_text(r, r->len, p, err);
         return rc == SH_OK ? end_text(r, p, err) : rc;
     }

@@ -42,19 +42,20 @@ static void say_progress(struct ptx_text *t, uint32_t n_rows)
 {
     char what[LINE_MAX_LEN];
     t->n_columns++;
-    t->n_unsaid_rows += n_rows;
-    if (t->n_unsaid_rows < ROWS_BETWEEN_STOPS) return;
-    t->n_unsaid_rows = 0;
+    t->n_rows_unreported += n_rows;
+    if (t->n_rows_unreported < ROWS_BETWEEN_STOPS) return;
+    t->n_rows_unreported = 0;
     snprintf(what, sizeof what, "completing %s", t->file->path);
     sh_progress(t->report, what, (double)t->n_columns / ((double)t->grid->column_max - t->grid->column_min + 1));
 }
 
+const char ptx_text_empty[2][17] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};
+
 /* Returns the end of the line, which may be more than LINE_MAX_LEN away. */
 static char *put_cell(char *to, const struct ptx_cell *c, int coloured)
 {
-    static const char empty[2][17] = {"0 0 0 0.5\n", "0 0 0 0.5 0 0 0\n"};
     if (c->intensity < 0) {
-        memcpy(to, empty[coloured != 0], sizeof empty[0]);
+        memcpy(to, ptx_text_empty[coloured != 0], sizeof ptx_text_empty[0]);
         return to + (coloured ? 16 : 10);
     }
     for (int i = 0; i < 3; i++) {

@@ -9,6 +9,9 @@
 
 enum { PTX_ROWS_MAX = 1 << 22 }; /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
 
+/* The line of a shot without echo, without and with colours. */
+extern const char ptx_text_empty[2][17];
+
 struct ptx_text {
     struct outfile *file;
     struct ptx_grid *grid;
@@ -18,7 +21,7 @@ struct ptx_text {
     /* out */
     uint64_t n_points;
     /* inner state */
-    uint64_t n_columns, n_unsaid_rows;
+    uint64_t n_columns, n_rows_unreported; /* so far; since the last report of progress */
 };
 
 /* Puts the grid, whose shots are then gone (ptx_grid_drain). SH_EFORMAT: a coordinate is too long. */

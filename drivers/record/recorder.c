@@ -85,8 +85,8 @@ int recorder_save(struct recorder *rec, struct sh_err *err)
     return rc;
 }
 
-/* After a failed write the file is not completed, even if there is room again: points in its middle would be
- * missing. */
+/* After a failed write the file is not completed, even if there is room again: points in its middle would be missing.
+ * Its header still says so. */
 static int recorder_finish(struct recorder *rec, struct sh_err *err)
 {
     int rc = outfile_check(&rec->file, err);

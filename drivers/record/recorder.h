@@ -55,14 +55,15 @@ struct recorder_options {
     double long_edge;     /* of meshes: leaves out triangles with an edge longer than so many mean edges; 0: none */
     double sparse_per_m2; /* > 0: .ply has points spread over the mesh, so many per square metre */
     uint64_t sparse_seed; /* of the random choice of these points */
-    /* Gets, at the end, what the format had no room for. Its stop gives up a file that is being completed, which may
-     * take long. May be NULL; must live until close. */
+    /* At the end this report gets warnings of what the format had no room for. Its function stop can give up a file
+     * that is being completed, which may take long. May be NULL; must live until close. */
     const struct sh_report *report;
     /* Files of one recording share the limit of empty places. NULL: a file alone; else it must live until close. */
     struct recorder_padding *padding;
 };
 
-/* A scan that is due, as a configuration says it. Places are those of the stream: the scene's, or its CRS's. */
+/* A scan that will be recorded, as its configuration describes it. Places are in the stream's coordinates: the scene
+ * frame, or the CRS. */
 struct recorder_scan {
     uint32_t station;
     int moves, is_geo, in_degrees;
@@ -77,7 +78,7 @@ struct recorder {
     struct outfile file;
     struct track track; /* file.path is its path in messages */
     int has_failed;     /* a write failed: the file is not completed */
-    int is_refused;     /* the first scan was: no file is made */
+    int is_refused;     /* the format can't hold the first scan: no file is made */
 };
 
 /* A format. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
@@ -110,7 +111,7 @@ struct recorder_ops {
 /* Finds the format by the path's ending. NULL: there is none, and err has the list of known endings. */
 const struct recorder_ops *recorder_find(const char *path, struct sh_err *err);
 
-/* Returns the format that these options make of it: a .ply may be a mesh. */
+/* Returns the format that ops becomes with these options: a .ply may be a mesh. */
 const struct recorder_ops *recorder_shape(const struct recorder_ops *ops, const struct recorder_options *options);
 
 /* Opens path for writing. Nothing is written to path itself before close succeeds: the data go to a file
@@ -128,7 +129,7 @@ int recorder_save(struct recorder *rec, struct sh_err *err);
  * failure what reached the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
-/* For formats: reports "PATH: ", n and `what`, unless n is 0. */
+/* Warns of n things: "PATH: N WHAT". n 0: does nothing. For formats. */
 void recorder_report(const struct recorder *rec, uint64_t n, const char *what);
 
 #endif

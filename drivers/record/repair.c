@@ -74,7 +74,7 @@ int repair_cut(struct repair *r, uint64_t end, struct sh_err *err)
     return SH_OK;
 }
 
-/* Is called between blocks: reports progress, and checks whether a stop was asked for. */
+/* Reports progress, and checks whether a stop was asked for; called between blocks. */
 static int go_on(const struct repair *r, uint64_t at, struct sh_err *err)
 {
     sh_progress(r->report, "looking for complete data", (double)at / (double)(r->len + 1));
@@ -84,17 +84,15 @@ static int go_on(const struct repair *r, uint64_t at, struct sh_err *err)
 int repair_rows(const struct repair *r, const struct repair_rows *rows, void (*fn)(void *ctx, const uint8_t *row),
                 void *ctx, struct sh_err *err)
 {
-    const uint64_t from = rows->from, n = rows->n;
-    const size_t row_len = rows->len;
-    const size_t at_once = row_len < BLOCK ? BLOCK / row_len : 1;
-    uint8_t *block = malloc(at_once * row_len);
+    const size_t len = rows->len, at_once = len < BLOCK ? BLOCK / len : 1;
+    uint8_t *block = malloc(at_once * len);
     int rc = block != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "%s: no memory to read it", r->path);
-    for (uint64_t i = 0; rc == SH_OK && i < n; i += at_once) {
-        const size_t k = n - i < at_once ? (size_t)(n - i) : at_once;
-        rc = go_on(r, from + i * row_len, err);
-        if (rc == SH_OK) rc = repair_read(r, from + i * row_len, block, k * row_len, err);
-        for (size_t row = 0; rc == SH_OK && row < k; row++)
-            fn(ctx, block + row * row_len);
+    for (uint64_t i = 0; rc == SH_OK && i < rows->n; i += at_once) {
+        const size_t n = rows->n - i < at_once ? (size_t)(rows->n - i) : at_once;
+        rc = go_on(r, rows->from + i * len, err);
+        if (rc == SH_OK) rc = repair_read(r, rows->from + i * len, block, n * len, err);
+        for (size_t row = 0; rc == SH_OK && row < n; row++)
+            fn(ctx, block + row * len);
     }
     free(block);
     return rc;
@@ -216,7 +214,7 @@ int repair_fail_none(const struct repair *r, const char *format, struct sh_err *
 
 /* ---- the file */
 
-static int is_there(const char *path)
+int repair_exists(const char *path)
 {
     struct stat st;
     return lstat(path, &st) == 0;
@@ -231,8 +229,8 @@ static int choose(const char *path, struct repaired *d, struct sh_err *err)
         d->part = NULL;
         return sh_fail(err, SH_ENOMEM, "%s: no memory", path);
     }
-    d->was_left = named || is_there(d->part);
-    if (!named && d->was_left && is_there(d->path))
+    d->was_left = named || repair_exists(d->part);
+    if (!named && d->was_left && repair_exists(d->path))
         return sh_fail(err, SH_ESTATE,
                        "%s: both this file and %s exist; give %s to repair it (it keeps its name), or move %s away",
                        d->path, d->part, d->part, d->path);
@@ -259,7 +257,7 @@ static int repair_open(struct repair *r, const struct recorder_ops *ops, struct 
 /* Renames a repaired FILE.part to FILE. */
 static int repair_settle(struct repaired *d, int *fd, struct sh_err *err)
 {
-    if (d->was_left && !is_there(d->path)) {
+    if (d->was_left && !repair_exists(d->path)) {
         const int rc = newfile_settle_free(d->path, d->part, *fd, err);
         if (rc == SH_OK) *fd = -1;
         return rc;

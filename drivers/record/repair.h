@@ -2,8 +2,8 @@
 /* Repair: FILE.part, as a killed recorder or a full disk has left it, becomes a whole file of the same format.
  *
  * In: the bytes that reached the disk. Out: the same file, cut after the last whole unit (a frame, a packet, a point,
- * a shot), and with the header, the index or the end that the format needs. Nothing is invented: what the recorder
- * would have learnt from later frames keeps its first value, or is counted again from the data.
+ * a shot), and with the header, the index or the end that the format needs. Nothing is invented: a figure that the
+ * recorder would have learnt from later frames keeps its first value, or is counted again from the data.
  *
  * It works in place, since a full disk has no room for a copy. An interrupted repair can begin again: no byte that it
  * needs is overwritten before the file is whole. One thread. */
@@ -56,6 +56,8 @@ int repair_read(const struct repair *repair, uint64_t at, void *to, size_t len, 
 int repair_write(const struct repair *repair, uint64_t at, const void *from, size_t len, struct sh_err *err);
 /* Returns whether the file has the name FILE.part: its recorder did not complete it. */
 int repair_is_part(const struct repair *repair);
+/* Returns whether there is a file of that name, or a link. */
+int repair_exists(const char *path);
 /* Cuts the file at `end`, and counts the bytes that go. */
 int repair_cut(struct repair *repair, uint64_t end, struct sh_err *err);
 /* Rows of one length lie one after the other. repair_rows calls fn for each; fn may not keep the pointer. */
@@ -68,7 +70,7 @@ int repair_rows(const struct repair *repair, const struct repair_rows *rows, voi
 /* Returns whether all bytes of a row are 0: a power cut leaves zeros at a file's end. */
 int repair_is_zero(const uint8_t *row, size_t len);
 /* Calls fn for each line from `from` on that ends in a newline, without the newline. fn returns 1 for a line of this
- * format, else 0. A line with a NUL, or of 64 KiB and more, is none of any format. *end is where the last good line
+ * format, else 0. A line with a NUL, or of 64 KiB and more, belongs to no format. *end is where the last good line
  * ends. SH_EFORMAT: good lines follow a bad one, which no kill and no full disk causes. */
 int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx, const char *line, size_t len),
                  void *ctx, uint64_t *end, struct sh_err *err);
@@ -85,8 +87,8 @@ int repair_fail_foreign(const struct repair *repair, struct sh_err *err);
 /* SH_EFORMAT: the file is not of that format, or too short to tell. */
 int repair_fail_none(const struct repair *repair, const char *format, struct sh_err *err);
 
-/* Ends a text after its last good line, and sets was_whole. Unless it was whole, its last line then is a comment: the
- * note. is_marked: that line is there already. SH_EFORMAT where it is not whole and not ours. */
+/* Ends a text after its last good line, and sets was_whole. If the text was not whole, the note follows as a comment.
+ * is_marked: this comment is there already. SH_EFORMAT where the text is not whole and not ours. */
 int repair_end_text(struct repair *repair, uint64_t end, int is_marked, int is_ours, struct sh_err *err);
 /* Returns whether a line is that comment. */
 int repair_is_mark(const char *line, size_t len);

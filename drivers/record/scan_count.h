@@ -7,18 +7,14 @@
 
 struct scan_count { /* begins as zeros */
     uint64_t n_scans;
-    int within; /* points of a scan have come, or its descriptor */
+    int within;      /* points of a scan have come, or its descriptor */
+    uint32_t number; /* of the last descriptor's scan; 0: none yet */
+    int64_t t_ns;    /* of the last descriptor */
 };
 
-/* Takes each frame of a .shs or .pcapng, in order. A scan begins with a descriptor that is no repetition, or with
- * points before any descriptor. */
-static inline void scan_count_frame(struct scan_count *count, uint8_t type, uint8_t flags)
-{
-    const int begins = type == NATIVE_DESCRIPTOR && (flags & NATIVE_REPEAT) == 0;
-    if (!begins && (type != NATIVE_POINTS || count->within)) return;
-    count->n_scans++;
-    count->within = 1;
-}
+/* Takes each whole frame of a .shs or .pcapng, in order. A scan begins with a descriptor of another scan, or with points
+ * before any descriptor. A descriptor of the same scan says that settings have changed within it. */
+void scan_count_frame(struct scan_count *count, const uint8_t *frame);
 
 struct point_scans { /* begins as zeros */
     uint64_t n;

@@ -26,7 +26,7 @@ static void take_frames(struct frames *f)
         f->end = f->parser.stats.bytes - (f->parser.end - f->parser.start);
         if (item != NATIVE_FRAME) continue;
         f->n++;
-        scan_count_frame(&f->scans, f->parser.header.type, f->parser.header.flags);
+        scan_count_frame(&f->scans, f->parser.frame);
     }
 }
 

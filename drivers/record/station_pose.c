@@ -6,6 +6,7 @@
 
 #include "core/mat3.h"
 #include "core/vecmath.h"
+#include "drivers/protocol/native.h"
 
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose)
 {
@@ -14,49 +15,49 @@ void station_pose_of(const struct scanhead_info *info, struct station_pose *pose
     memcpy(pose->shift_m, info->geo ? info->anchor : info->station_m, sizeof pose->shift_m);
 }
 
+void station_pose_level(const struct station_pose *pose, double lat_deg, double lon_deg, double east_north_m[2])
+{
+    const double m_deg = EARTH_RADIUS_M * NATIVE_RAD_PER_DEG;
+    east_north_m[0] = remainder(lon_deg - pose->shift_m[1], 360) * m_deg * cos(lat_deg * NATIVE_RAD_PER_DEG);
+    east_north_m[1] = (lat_deg - pose->shift_m[0]) * m_deg;
+}
+
 void station_pose_reverse(const struct station_pose *pose, double p[3])
 {
     const double *s = pose->shift_m, from_station[3] = {p[0] - s[0], p[1] - s[1], p[2] - s[2]};
     mat3_apply_transposed(pose->rotation, from_station, p);
 }
 
-VEC_CLONES static void reverse_all(const double *restrict s, const double *restrict r, int n, double *restrict x,
-                                   double *restrict y, double *restrict z)
+VEC_CLONES void station_pose_reverse_all(const struct station_pose *restrict pose, int n, double *restrict x,
+                                         double *restrict y, double *restrict z)
 {
+    const double *s = pose->shift_m;
     for (int i = 0; i < n; i++) {
         const double from_station[3] = {x[i] - s[0], y[i] - s[1], z[i] - s[2]};
         double p[3];
-        mat3_apply_transposed(r, from_station, p);
+        mat3_apply_transposed(pose->rotation, from_station, p);
         x[i] = p[0];
         y[i] = p[1];
         z[i] = p[2];
     }
 }
 
-void station_pose_reverse_all(const struct station_pose *pose, int n, double *x, double *y, double *z)
+VEC_CLONES void station_pose_forward_all(const struct station_pose *restrict pose, int n, double *restrict x,
+                                         double *restrict y, double *restrict z)
 {
-    reverse_all(pose->shift_m, pose->rotation, n, x, y, z);
-}
-
-VEC_CLONES static void forward_all(const double *restrict s, const double *restrict r, int n, double *restrict x,
-                                   double *restrict y, double *restrict z)
-{
+    const double *s = pose->shift_m;
     for (int i = 0; i < n; i++) {
         const double p[3] = {x[i], y[i], z[i]};
         double turned[3];
-        mat3_apply(r, p, turned);
+        mat3_apply(pose->rotation, p, turned);
         x[i] = s[0] + turned[0];
         y[i] = s[1] + turned[1];
         z[i] = s[2] + turned[2];
     }
 }
 
-void station_pose_forward_all(const struct station_pose *pose, int n, double *x, double *y, double *z)
-{
-    forward_all(pose->shift_m, pose->rotation, n, x, y, z);
-}
-
-/* By the largest of the four components, so that none is the difference of near numbers (Shepperd 1978). */
+/* The quaternion is a row of the matrix of its products, divided by the row's length. The row of the largest component
+ * is taken, so that no figure is the difference of near numbers (Shepperd 1978). */
 void station_pose_quaternion(const struct station_pose *pose, double q[4])
 {
     const double *r = pose->rotation;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the head stands in the frame that a recording's points are in: the stream's CRS (geo layout) or the
- * scene frame (polar layout).
+/* The head's pose in the frame that a recording's points are in: the stream's CRS (geo layout) or the scene frame
+ * (polar layout).
  *
- * Some formats keep points in the scanner's frame beside a pose (PTX, E57). Their recorders write points and
- * pose so that the pose takes each point to its place in the CRS. In the geo layout they take the points back
- * by the same pose that they write. In a local frame and in ECEF that gives the head's own frame. In UTM and
- * UPS it gives that frame with the grid's scale and curvature in it, since a rigid pose can't hold them.
- * Pure; any thread. */
+ * Some formats keep points in the scanner's frame beside a pose (PTX, E57). Their recorders write points and pose so
+ * that the pose takes each point to its place in the CRS. In the geo layout the stream has points in the CRS, so these
+ * recorders apply the inverse of the pose to them. In local coordinates and in ECEF the result is in the head's own
+ * frame. In UTM and UPS the result also holds the grid's scale and curvature, since a rigid pose can't hold them. Pure;
+ * any thread. */
 #ifndef DRIVERS_RECORD_STATION_POSE_H
 #define DRIVERS_RECORD_STATION_POSE_H
 
@@ -23,6 +23,10 @@ struct station_pose {
  * geodetic coordinates the shift is degrees, degrees, metres, and the axes are east, north, up. */
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose);
 
+#define EARTH_RADIUS_M 6371000.0 /* of a sphere, which is accurate enough for angles and colours */
+/* Converts latitude and longitude to metres east and north of a pose in geodetic coordinates. */
+void station_pose_level(const struct station_pose *pose, double lat_deg, double lon_deg, double east_north_m[2]);
+
 /* p = shift + rotation * p, and back. */
 static inline void station_pose_forward(const struct station_pose *pose, double p[3])
 {
@@ -32,12 +36,13 @@ static inline void station_pose_forward(const struct station_pose *pose, double 
         p[i] = pose->shift_m[i] + turned[i];
 }
 void station_pose_reverse(const struct station_pose *pose, double p[3]);
-/* Takes n points back, in columns: the same figures, bit for bit. */
-void station_pose_reverse_all(const struct station_pose *pose, int n, double *x, double *y, double *z);
-/* Takes them forward, likewise. */
-void station_pose_forward_all(const struct station_pose *pose, int n, double *x, double *y, double *z);
+/* These do the same for n points in columns; the results are equal bit for bit. */
+void station_pose_reverse_all(const struct station_pose *restrict pose, int n, double *restrict x, double *restrict y,
+                              double *restrict z);
+void station_pose_forward_all(const struct station_pose *restrict pose, int n, double *restrict x, double *restrict y,
+                              double *restrict z);
 
-/* The unit quaternion w, x, y, z of the rotation; w is not negative. */
+/* Writes the unit quaternion w, x, y, z of the rotation; w is not negative. */
 void station_pose_quaternion(const struct station_pose *pose, double q[4]);
 
 /* SH_EFORMAT, with path in its text, where the stream is broken: the shift or the quaternion is infinite or NaN. For

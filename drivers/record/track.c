@@ -14,7 +14,7 @@ int track_start_gps(const struct track *track, double *gps_s)
     return 1;
 }
 
-/* In steps of this the recording of a moving head holds 200 km in 32 bits. */
+/* With coordinates in steps of this, 32 bits hold the path of a moving head up to 200 km from the anchor. */
 static const double MOVING_SCALE_M = 1e-4;
 
 static int will_have_colours(const struct track *t)
@@ -107,8 +107,8 @@ static uint32_t whole_u32(double v)
     return v <= 0 ? 0 : v < UINT32_MAX ? (uint32_t)llround(v) : UINT32_MAX;
 }
 
-/* A pan sweep has a whole number of lines, and one line where the pan does not turn (core/schedule.h). Lines are of
- * equal length but for a pulse. */
+/* A pan sweep has a whole number of lines, and one line where the pan does not turn (core/schedule.h). The lengths of
+ * lines differ by one pulse at most. */
 static void set_limits(struct track *t, const struct native_descriptor *d)
 {
     const double lines_hz = 1e-6 * (double)d->lines_uhz, prr_hz = 1e-6 * (double)d->prr_uhz;
@@ -122,7 +122,8 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
     t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
 }
 
-/* Limits from the emitter frame, which the descriptor lacks. A turn of beams begins anywhere in a firing sequence. */
+/* Adds what the emitter frame says, and the descriptor does not. A line of beams may begin anywhere in a firing
+ * sequence, so it may have n_beams pulses more. */
 static void set_emitter_limits(struct track *t)
 {
     if (scanhead_get_emitter(t->sh, &t->emitter) != 0) return;

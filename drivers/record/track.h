@@ -40,7 +40,7 @@ struct track_waiting;
 struct track_waves;
 
 struct track_ops {
-    /* Points of a new scan will follow; track->info and pose are its. May be NULL. */
+    /* Points of a new scan will follow; track->info and pose describe this scan. May be NULL. */
     int (*scan)(void *rec, struct sh_err *err);
     /* n points of track->points. In the geo layout they are in the CRS; in the polar layout in the head's
      * frame, or in the scene frame where the head moves. NULL: no points wanted. */
@@ -86,7 +86,7 @@ struct track {
     int no_empty;           /* 1: shots without echo are left out and counted */
     unsigned spared;        /* enum track_column: the recorder reads none of these; may change when a scan begins */
     struct scanhead *sh;    /* of the last frame of any kind */
-    struct scanhead *named; /* heads in a scene have the same labels: the head that names most of them */
+    struct scanhead *named; /* the head that names most labels; heads in one scene have the same labels */
     uint32_t n_named;
     /* of the stream frame that the points at hand are in */
     struct scanhead_info info;
@@ -96,12 +96,12 @@ struct track {
     int64_t t0_ns;  /* of the first point, since the scan's start */
     /* of the stream so far; the members from begun to stops are set by the first points */
     int begun;
-    int crs;  /* enum native_crs; of the recording's points: of the stream in the geo layout, else the scene frame */
+    int crs;  /* enum native_crs of the recording's points: the stream's in the geo layout, else local (scene frame) */
     int epsg; /* 0: none */
     int geoid_heights, moving, stops;
     uint32_t n_scans; /* with points */
     struct track_missing missing;
-    /* By the descriptor a scan has at most so many lines, and a line so many pulses; UINT32_MAX: there is no limit. */
+    /* The most lines of a scan, and pulses of a line, that the descriptor allows; UINT32_MAX: no limit. */
     uint32_t max_lines, max_pulses;
     double cast_share;               /* of a line's pulses, 0..1: those in the blind part are not cast */
     struct scanhead_emitter emitter; /* of the last descriptor */
@@ -111,13 +111,13 @@ struct track {
     double frame[TRACK_BATCH]; /* of each point of a moving head: frame scalar of the trajectory; NaN: lost */
     int has_attributes;        /* wanted, and sent: */
     struct scanhead_attribute attribute[TRACK_BATCH];
-    int has_deviations;            /* attributes, and sent with them: */
+    int has_deviations;            /* sent with the attributes: */
     double deviation[TRACK_BATCH]; /* scanhead_deviations; NaN: lost */
-    int has_colours;               /* wanted, and sent or made here: */
+    int has_colours;               /* wanted, and sent or computed here: */
     uint8_t rgb[TRACK_BATCH][3];
     int has_waves;                                 /* wanted, and sent: */
-    const struct scanhead_wave *wave[TRACK_BATCH]; /* the window that each point lies in; NULL: none. They are there as
-                                                    * long as the batch is */
+    const struct scanhead_wave *wave[TRACK_BATCH]; /* the window that each point lies in; NULL: none. Windows are valid
+                                                    * until the next batch */
     double wave_at[TRACK_BATCH];                   /* the point's place in it, in samples from its first one */
     int waited;                /* 1: the batch's points waited, so later frames may have come; gps_s is set then */
     double gps_s[TRACK_BATCH]; /* scanhead_gps_time of each, as of its own frame; NaN: not known */
@@ -136,8 +136,8 @@ int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_
 /* For recorders: leaves only points index[0..n-1] of the batch in it; the indices rise. */
 void track_pick(struct track *track, const uint16_t *index, int n);
 /* Leaves echoes out whose positions are infinite or NaN, as in a broken stream, and with no_empty shots without echo.
- * Both are counted. Returns how many of the n points of the batch are left. The track has done this before it gives
- * points out; a recorder that has moved them asks again. */
+ * Both are counted. Returns how many of the n points of the batch are left. The track calls this before it gives points
+ * out. A recorder that changes their coordinates calls it again. */
 int track_leave_out(struct track *track, int n);
 /* Writes the times of the n points in seconds, as t_ns / 1e9. */
 void track_seconds(const struct track *track, int n, double *to);

@@ -8,7 +8,7 @@
 
 /* ---- the batch's columns (track_columns.c) */
 
-/* Point i of the batch as a struct, without encoder angles; and the way back. */
+/* Returns point i of the batch as a struct, without encoder angles. track_set_point does the reverse. */
 static inline struct scanhead_point track_get_point(const struct track *track, int i)
 {
     const struct track_points *p = &track->points;
@@ -37,7 +37,7 @@ static inline void track_set_point(struct track *track, int i, const struct scan
     p->echo_count[i] = from->echo_count;
 }
 
-/* Where the library writes points. */
+/* Returns the columns that the library writes points to. */
 struct scanhead_columns track_columns_to(struct track *track);
 /* Numbers the rows of n points. `row` is the number of pulses of the line before them; returns that after them. */
 uint64_t track_number_rows(struct track *track, uint64_t row, int n);
@@ -46,7 +46,7 @@ int track_to_scene(struct track *track, int n);
 
 /* ---- points that wait (track_waiting.c) */
 
-/* Whether frames that follow the points are wanted, and sent. */
+/* Returns whether points wait: frames that follow them are wanted, and sent. */
 int track_waits(const struct track *track);
 /* The caller calls this before the points of a frame, when no points wait any more. first_row: the row of its first
  * pulse. SH_ENOMEM. */
@@ -54,7 +54,7 @@ int track_begin_waiting(struct track *track, const struct scanhead_frame *frame,
                         struct sh_err *err);
 /* Keeps the n points of the batch. */
 void track_keep(struct track *track, int n);
-/* Gives out the n points of the batch, with the colours that are made here. */
+/* Gives out the n points of the batch, with the colours that are computed here. */
 int track_give(struct track *track, int n, struct sh_err *err);
 /* Takes frames of attributes and of colours. With the last one that points wait for, these come out. Attributes and
  * colours of lost points are skipped. */

@@ -11,8 +11,6 @@
  * stream might have more. */
 enum { WAVES_MOST_BYTES = 64 << 20, WAVES_AT_ONCE = 64 };
 
-static const double EARTH_M = 6.371e6;
-
 struct kept_wave {
     struct scanhead_wave wave;
     size_t sample_at;
@@ -46,7 +44,7 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
     if (t->ops->points == NULL) return 0;
-    if (!t->has_waves) { /* of a recorder that wants them, no scan has begun */
+    if (!t->has_waves) { /* where the recorder wants them, no scan has begun yet */
         *(t->ops->wants_waves ? &t->missing.n_waves_unplaced : &t->missing.n_waves_unheld) += frame->n_points;
         return 0;
     }
@@ -70,7 +68,7 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 /* Writes the length of one unit of each axis on the ground, m. */
 static void units_m(const struct scanhead_info *info, double to[3])
 {
-    const double degree_m = EARTH_M * NATIVE_RAD_PER_DEG;
+    const double degree_m = EARTH_RADIUS_M * NATIVE_RAD_PER_DEG;
     const int in_degrees = info->crs == NATIVE_CRS_GEODETIC;
     to[0] = in_degrees ? degree_m : 1;
     to[1] = in_degrees ? degree_m * cos(info->anchor[0] * NATIVE_RAD_PER_DEG) : 1;

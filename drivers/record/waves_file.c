@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* A .waves.csv has the waveforms of all pulses, a row a window, also of pulses without an echo.
+/* A .waves.csv has the waveforms of all pulses, also of those without an echo. Each window is a row.
  *
- * scan and station are as in .poses.csv; pulse is its number in the scan, and t_s its firing time since the scan's
- * start. Sample k of the n lies at range_m + k step_m. Its signal, in units of the detection threshold, is (count -
- * baseline) count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of length one in the head's
- * frame, in the geo layout the change of the CRS's coordinates along a metre of range. The last column has the
+ * scan and station are as in .poses.csv; pulse is the pulse's number in the scan, and t_s its firing time since the
+ * scan's start. Sample k of the n lies at range_m + k * step_m. Its signal, in units of the detection threshold, is
+ * (count - baseline) * count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of length one in the
+ * head's frame, in the geo layout the change of the CRS's coordinates along a metre of range. The last column has the
  * counts, with blanks between. */
 #include <string.h>
 
@@ -97,7 +97,7 @@ static int waves_file_frame(void *rec, struct scanhead *sh, const struct scanhea
                                          : track_frame(&file->base.track, sh, frame, err);
 }
 
-/* Scans of other heads may follow. */
+/* The scans of a file may be of several heads, so one head that sends waveforms is enough to set is_sent. */
 static int waves_file_scan(void *rec, struct sh_err *err)
 {
     struct waves_file *file = rec;

@@ -7,10 +7,11 @@ struct cfg_reader;
 struct config;
 struct fault_list;
 
-/* Injected faults against each other; and against the links of cfg. */
+/* Checks the keys of each injected fault against each other. */
 void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list);
+/* Checks the faults against the links of cfg, its time and its time server. */
 void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
-/* The faults against the head, its noise and its signal. */
+/* Checks the faults against the head, its noise and its signal. */
 void cfg_check_fault_beams(struct cfg_reader *rd, const struct config *cfg, const struct fault_list *list);
 
 #endif

@@ -15,17 +15,17 @@ struct config_profile;
 void cfg_convert_widths(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_check_programs(struct cfg_reader *rd, struct config_profile *profile);
 void cfg_check_rate(struct cfg_reader *rd, const struct config *cfg);
-/* The share of a sweep that the field of view takes. */
+/* Returns the share of a sweep that the field of view takes. */
 double cfg_used_share(const struct config_profile *profile);
 
 /* Checks which keys of a profile belong to its emitter, and derives values from them. */
 void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *profile);
-/* Whether profiles of some emitters need the key; then `words` gets the names of these emitters. */
+/* Returns whether profiles of some emitters need the key; then `words` gets the names of these emitters. */
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len);
-/* Whether line_start and line_stop enclose an angle: start must be below stop. On a sphere any two different angles do,
- * as the line may cross azimuth 0. */
+/* Returns whether line_start and line_stop enclose an angle: start must be below stop. On a sphere any two different
+ * angles do, as the line may cross azimuth 0. */
 int cfg_line_has_width(const struct config *cfg);
-/* The settings of a head whose pulse rate follows from its lines. */
+/* Checks the settings that only some emitters have, and sets the rates that follow from others. */
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg);
 
 /* Checks the geometries of a planar head's profile; chooses the one that the configuration asks for. */

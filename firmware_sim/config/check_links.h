@@ -12,17 +12,17 @@ struct config;
 struct emitter;
 struct link_spec;
 
-/* Keys that only some kinds of link have, and what a link needs. */
+/* Checks keys that only some kinds of link have, and what a link needs. */
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg);
-/* Fills in the USB identity of a usb link from its protocol; and ids and serial number if not given. */
+/* Fills in the USB identity of a usb link from its protocol; ids and serial number only if they are not given. */
 void cfg_set_usb_identity(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item);
-/* Checks which links the protocols are spoken on, and sets what follows from a protocol. */
+/* Checks that each link's kind can have its protocol, and sets what follows from a protocol. */
 void cfg_check_protocols_alone(struct cfg_reader *rd, struct config *cfg);
-/* Checks also their needs of the stream and of the head. */
+/* Does the same, and checks what the protocols need of the stream and of the head. */
 void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg);
-/* Whether the protocol can describe a head of this emitter. */
+/* Returns whether the protocol can describe a head of this emitter. */
 int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter);
-/* The first link whose protocol has this need; -1: none. */
+/* Returns the first link whose protocol has this need; -1: none. */
 int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need);
 
 #endif

@@ -7,10 +7,11 @@ struct cfg_reader;
 struct config;
 struct config_profile;
 
-/* Noise, signal, surfaces, and the keys of a profile that concern them. */
+/* Checks noise, signal and surfaces, and completes them. */
 void cfg_check_signal(struct cfg_reader *rd, struct config *cfg);
 /* Checks waveforms: their keys together, and their needs of signal, noise and profile. */
 void cfg_check_waveform(struct cfg_reader *rd, const struct config *cfg);
+/* Checks the figures of a profile that its signal is computed from. */
 void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The configuration: what load.h makes of a YAML file and --set. One table (keys.c) of key, type, unit, default, range
- * and help gives parsing, defaults, errors and the reference.
+/* The configuration as a struct, which load.h fills from a YAML file and --set. One table (keys.c) of key, type, unit,
+ * default, range and help gives parsing, defaults, errors and the reference.
  *
  * Units: as the key's name says (hz, deg, m). Everything is checked. Unknown keys, duplicate keys, trailing text ("30
  * kHz"), NaN, wrong types and values out of range are errors. Relative paths in a file are relative to that file; in
@@ -70,7 +70,7 @@ struct config_signal {
     int on, sharp;
     double reflectance; /* of surfaces without one of their own */
     double visibility_m, extinction_1_km;
-    int has_extinction; /* 0: by visibility_m; where that is 0, too: the air of the data sheet */
+    int has_extinction; /* 0: visibility_m gives the extinction; if that is 0, too, the profile's visibility does */
 };
 
 /* Waveforms; core/waveform.h. Whether they are sent is a setting of the head. */
@@ -108,8 +108,7 @@ struct config_head {
     uint32_t mta_zones;
     /* of a sphere (core/emitter.h); also copied into the profile's emitter */
     int64_t step_udeg, ring_start_udeg, ring_stop_udeg;
-    double range_min_m,
-        range_max_m; /* nothing nearer or farther is an echo; the profile in this struct has them, too */
+    double range_min_m, range_max_m;     /* nothing nearer or farther is an echo; cfg->profile gets the same limits */
     double profile_min_m, profile_max_m; /* the range limits in the head profile's file */
 };
 
@@ -225,23 +224,24 @@ struct config {
     struct fault_list faults;
 };
 
-/* A configuration is loaded for the scanner of head.station. config_serves: whether station i, from 0, has this
- * scanner. config_is_alone: whether all have it. The stops of a platform have the scanner of the one station. */
+/* A configuration is loaded for the scanner of head.station. config_serves returns whether station i, from 0, has this
+ * scanner, and config_is_alone whether all stations have it. All stops of a trajectory have the scanner of the one
+ * station. */
 int config_serves(const struct config *cfg, uint32_t i);
 int config_is_alone(const struct config *cfg);
-/* Whether a link speaks that protocol, of enum protocol_id. */
+/* Returns whether a link speaks that protocol, of enum protocol_id. */
 int config_speaks(const struct config *cfg, int protocol);
-/* Gives a configuration other ranges, noise and step, as if its keys had them. cfg is a copy of a loaded one; the
+/* Sets ranges, noise and step of a configuration, as if its keys had these values. cfg is a copy of a loaded one; the
  * settings must be allowed for it (command.h). SH_EINPUT: no ring of the sphere is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
 
-/* Whether head.range_min_m or range_max_m leaves less than the profile's range. */
+/* Returns whether head.range_min_m or range_max_m leaves less than the profile's range. */
 static inline int config_limits_range(const struct config *cfg)
 {
     return cfg->head.range_min_m > cfg->head.profile_min_m || cfg->head.range_max_m < cfg->head.profile_max_m;
 }
 
-/* Whether the scene needs texture coordinates and textures. */
+/* Returns whether the scene needs texture coordinates and textures. */
 static inline int config_wants_textures(const struct config *cfg)
 {
     return cfg->signal.on || cfg->output.colour == COLOUR_TEXTURE || cfg->scene.shared_textures;
@@ -257,10 +257,10 @@ static inline int config_has_waves(const struct config *cfg)
 {
     return cfg->head.settings.waves != 0 || cfg->waveform.echoes != WAVE_ECHOES_MODEL;
 }
-/* Pulses per second that are cast with these settings: all but those in the blind part of a sweep. */
+/* Returns the pulses per second that are cast with these settings: all but those in the blind part of a sweep. */
 double config_cast_hz(const struct config *cfg);
 
-/* Threads that cast: loop.threads, or one per processor. */
+/* Returns the number of threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
 /* Says why the beams of a scan do not all begin at one place of a scene that stands still, as an adaptive beam needs;

@@ -45,19 +45,23 @@ void cfg_forget_copies(struct cfg_reader *rd, const struct cfg_key *key, uint32_
     scene->n_copies = n;
 }
 
+void cfg_check_readable(struct cfg_reader *rd, const char *key, uint32_t item, const char *path, const char *kind)
+{
+    const char *why;
+    FILE *file = infile_open(path, &why);
+    if (file != NULL)
+        fclose(file);
+    else
+        cfg_fail_key(rd, key, item, "%.200s: %s; allowed a %s file that can be read", path, why, kind);
+}
+
 void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg)
 {
     static const char path[] = "scene.meshes[].copies";
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++) {
         const struct config_mesh *mesh = &cfg->scene.mesh[i];
-        const char *why;
         if (mesh->copy_labels && !cfg_is_given(rd, path, i))
             cfg_fail_key(rd, "scene.meshes[].copy_labels", i, "on, but the mesh has no copies; allowed with copies");
-        if (mesh->copies[0] == '\0') continue;
-        FILE *file = infile_open(mesh->copies, &why);
-        if (file != NULL)
-            fclose(file);
-        else
-            cfg_fail_key(rd, path, i, "%.200s: %s; allowed a CSV file that can be read", mesh->copies, why);
+        if (mesh->copies[0] != '\0') cfg_check_readable(rd, path, i, mesh->copies, "CSV");
     }
 }

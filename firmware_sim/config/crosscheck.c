@@ -5,7 +5,6 @@
 #include "firmware_sim/config/check_faults.h"
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/check_links.h"
-#include "firmware_sim/config/check_ntp.h"
 #include "firmware_sim/config/check_places.h"
 #include "firmware_sim/config/check_signal.h"
 #include "firmware_sim/config/config.h"
@@ -20,16 +19,15 @@
 #include <string.h>
 #include <strings.h>
 
-#include "core/infile.h"
 #include "firmware_sim/config/epoch.h"
 
-/* The key to name where two contradict each other: the first, unless only the second was given. */
+/* Returns the key to name where two contradict each other: the first, unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
 {
     return !cfg_is_given(rd, first, 0) && cfg_is_given(rd, second, 0) ? second : first;
 }
 
-/* Settings within the head profile: limits that a row of keys.c names by min_key and max_key. */
+/* Checks settings against the limits of the head profile that their rows in keys.c name (min_key, max_key). */
 static void check_limits(struct cfg_reader *rd, const struct config *cfg)
 {
     for (size_t i = 0; i < rd->table.n && cfg_has_profile(rd); i++) {
@@ -79,22 +77,17 @@ static void check_mesh(struct cfg_reader *rd, const struct config_mesh *mesh, ui
     static const char *const endings[] = {".obj", ".ply", ".stl", ".gltf", ".glb",
                                           ".fbx", ".dae", ".ifc", ".tif",  ".tiff"};
     static const char path[] = "scene.meshes[].file";
-    char shown[CFG_SHOW_MAX];
-    const char *dot = strrchr(basename(mesh->file), '.'), *why;
-    size_t known = 0;
-    while (known < CFG_LEN(endings) && (dot == NULL || strcasecmp(dot, endings[known]) != 0))
-        known++;
-    if (known == CFG_LEN(endings)) {
-        cfg_fail_key(rd, path, i,
-                     "\"%s\" has no known ending; allowed .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif .tiff",
-                     cfg_show(mesh->file, shown));
-        return;
+    char shown[CFG_SHOW_MAX], allowed[96] = "";
+    const char *dot = strrchr(basename(mesh->file), '.');
+    int is_known = 0;
+    for (size_t k = 0; k < CFG_LEN(endings); k++) {
+        is_known |= dot != NULL && strcasecmp(dot, endings[k]) == 0;
+        snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), " %s", endings[k]);
     }
-    FILE *file = infile_open(mesh->file, &why);
-    if (file != NULL)
-        fclose(file);
+    if (is_known)
+        cfg_check_readable(rd, path, i, mesh->file, "mesh");
     else
-        cfg_fail_key(rd, path, i, "%.200s: %s; allowed a mesh file that can be read", mesh->file, why);
+        cfg_fail_key(rd, path, i, "\"%s\" has no known ending; allowed%s", cfg_show(mesh->file, shown), allowed);
 }
 
 static void check_names(struct cfg_reader *rd, struct config *cfg)
@@ -185,7 +178,7 @@ const char *config_rays_move(const struct config *cfg)
     return config_head_moves(&cfg->platform) ? "the head moves" : offset_of(cfg);
 }
 
-/* All other checks of it need the loaded scene and the plan (firmware_sim/site/sights.c). */
+/* All other checks of cast.sight need the loaded scene and the plan (firmware_sim/site/sights.c). */
 static void check_sight(struct cfg_reader *rd, const struct config *cfg)
 {
     const char *why = config_rays_move(cfg);

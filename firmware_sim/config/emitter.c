@@ -16,19 +16,9 @@
 
 static const double PRR_MOST_HZ = 1e7;
 
-/* Writes "planar, beams". */
-static const char *words_of(unsigned emitters, char *buf, size_t len)
-{
-    const char *const *names = cfg_find(&cfg_profile_table, "emitter")->names;
-    buf[0] = '\0';
-    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
-        if (emitters & CFG_KIND(kind)) cfg_list_add(buf, len, names[kind]);
-    return buf;
-}
-
 int cfg_needed_by_emitter(const struct cfg_key *key, char *words, size_t len)
 {
-    if (key->needed) words_of(key->of, words, len);
+    if (key->needed) cfg_list_kinds(key->of, emitter_names, words, len);
     return key->needed;
 }
 
@@ -41,7 +31,7 @@ static void check_owners(struct cfg_reader *rd, unsigned emitter)
         const int given = cfg_is_given(rd, key->path, 0), has = (key->of & emitter) != 0;
         if (given && !has)
             cfg_fail_key(rd, key->path, 0, "this emitter has no such key; allowed only with emitter: %s",
-                         words_of(key->of, words, sizeof words));
+                         cfg_list_kinds(key->of, emitter_names, words, sizeof words));
         else if (!given && has && key->needed)
             cfg_fail_missing(rd, key->path, 0);
     }
@@ -148,6 +138,15 @@ void cfg_check_emitter(struct cfg_reader *rd, struct config_profile *p)
     if (kind == EMITTER_DIRECTIONS) set_directions(rd, p);
 }
 
+/* Refuses a key that the head's emitter lacks, if it is given. */
+static void refuse_key_of_other(struct cfg_reader *rd, const struct config *cfg, const char *key, const char *why,
+                                const char *allowed)
+{
+    if (cfg_is_given(rd, key, 0))
+        cfg_fail_key(rd, key, 0, "%shead profile %s has emitter: %s; allowed %s", why, cfg->profile.name,
+                     emitter_names[cfg->profile.emitter.kind], allowed);
+}
+
 /* Refuses keys that are defined only for a mirror and a pan. */
 static void check_instrument(struct cfg_reader *rd, const struct config *cfg)
 {
@@ -157,10 +156,7 @@ static void check_instrument(struct cfg_reader *rd, const struct config *cfg)
         "instrument.mirror_phase_deg",
     };
     for (size_t i = 0; i < CFG_LEN(of_mirror); i++)
-        if (cfg_is_given(rd, of_mirror[i], 0))
-            cfg_fail_key(rd, of_mirror[i], 0,
-                         "an error of a mirror, but head profile %s has emitter: %s; allowed with a line head",
-                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind]);
+        refuse_key_of_other(rd, cfg, of_mirror[i], "an error of a mirror, but ", "with a line head");
 }
 
 static const char *given_line_key(const struct cfg_reader *rd)
@@ -177,8 +173,8 @@ int cfg_line_has_width(const struct config *cfg)
 
 static const char *const of_sphere[] = {"head.step_deg", "head.ring_start_deg", "head.ring_stop_deg"};
 
-/* The step and the rings that the configuration asks for. With many pulses a line the fastest line rate falls, so that
- * the pulse rate stays within what any head may have. */
+/* Sets the step and the rings that the configuration asks for. With many pulses a line the fastest line rate falls, so
+ * that the pulse rate stays within PRR_MOST_HZ. */
 static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct config_profile *p = &cfg->profile;
@@ -213,11 +209,10 @@ static void set_sphere_settings(struct cfg_reader *rd, struct config *cfg)
 
 static void refuse_sphere_settings(struct cfg_reader *rd, const struct config *cfg)
 {
-    for (size_t i = cfg->profile.arrangement.n_geometries > 0; i < CFG_LEN(of_sphere); i++)
-        if (cfg_is_given(rd, of_sphere[i], 0))
-            cfg_fail_key(rd, of_sphere[i], 0, "head profile %s has emitter: %s; allowed only with emitter: sphere%s",
-                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind],
-                         i == 0 ? ", or a planar one with geometries" : "");
+    if (cfg->profile.arrangement.n_geometries == 0)
+        refuse_key_of_other(rd, cfg, of_sphere[0], "", "only with emitter: sphere, or a planar one with geometries");
+    for (size_t i = 1; i < CFG_LEN(of_sphere); i++)
+        refuse_key_of_other(rd, cfg, of_sphere[i], "", "only with emitter: sphere");
 }
 
 /* Other heads have no rotor that runs free of their pulses. */
@@ -225,9 +220,7 @@ static void refuse_rotor_settings(struct cfg_reader *rd, const struct config *cf
 {
     static const char *const of_rotor[] = {"head.phase_lock", "head.phase_deg", "head.motor_ppm"};
     for (size_t i = 0; i < CFG_LEN(of_rotor); i++)
-        if (cfg_is_given(rd, of_rotor[i], 0))
-            cfg_fail_key(rd, of_rotor[i], 0, "head profile %s has emitter: %s; allowed only with emitter: beams",
-                         cfg->profile.name, emitter_names[cfg->profile.emitter.kind]);
+        refuse_key_of_other(rd, cfg, of_rotor[i], "", "only with emitter: beams");
 }
 
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)

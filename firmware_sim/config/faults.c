@@ -117,7 +117,7 @@ static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
     }
 }
 
-/* The longest for_ms of a kind, as text: a late pulse must come before the next one. */
+/* Returns the longest for_ms of a kind, as text: a late pulse must come before the next one. */
 static const char *find_most_ms(enum fault_kind kind)
 {
     return kind == FAULT_PPS_JITTER ? "400" : kind == FAULT_NMEA_LATE ? "5000" : "1e8";
@@ -181,7 +181,7 @@ static int needs_time(enum fault_kind kind)
            kind == FAULT_LEAP_SECOND || (kind >= FAULT_PPS_LOST && kind <= FAULT_NMEA_CHECKSUM);
 }
 
-/* ntp.role is no need: a client may set it later by telegram. */
+/* ntp.role: client is not required here: a client may set it later by telegram. */
 static int can_ask_server(const struct config *cfg)
 {
     return cfg->links_are_not_here || (config_speaks(cfg, PROTOCOL_COLA) && cfg->loop.pace == PACE_REALTIME);
@@ -201,7 +201,7 @@ static void check_needs(struct cfg_reader *rd, const struct config *cfg, const s
                      name);
 }
 
-/* Whether faults of the kind can strike on the link. */
+/* Returns whether faults of the kind can strike on the link. */
 static int link_has_fault(const struct link_spec *link, enum fault_kind kind)
 {
     const int is_of_link = fault_is_act(kind) || fault_place_of(kind) == FAULT_AT_CONNECTION;
@@ -273,7 +273,7 @@ int config_read_fault(const struct config *cfg, const char *text, struct fault *
     struct fault_list list = {0};
     char yaml[TEXT_MAX];
     const int len = snprintf(yaml, sizeof yaml, "faults: [ %s ]\n", text);
-    if (len >= (int)sizeof yaml) return sh_fail(err, SH_EINPUT, "longer than %d characters", TEXT_MAX - 16);
+    if (len >= (int)sizeof yaml) return sh_fail(err, SH_EINPUT, "longer than %d characters", TEXT_MAX - 14);
     cfg_reader_init(&rd, "fault", &fault_table, &list, &diagnostics);
     int code = cfg_open_text(&rd, (const unsigned char *)yaml, (size_t)len, &doc);
     if (code == SH_OK) cfg_close_file(doc);

@@ -5,7 +5,6 @@
 
 #include "drivers/protocol/cola_field.h"
 #include "drivers/protocol/cola_model.h"
-#include "firmware_sim/config/check.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/fields.h"
 #include "firmware_sim/config/table/given.h"
@@ -116,7 +115,7 @@ void cfg_check_fields(struct cfg_reader *rd, const struct config *cfg)
         if (cfg->input[i].until_s <= cfg->input[i].from_s && CFG_SOUND(rd, i, "inputs[]"))
             cfg_fail_key(rd, "inputs[].until_s", i, "%.10g s, but it begins at %.10g s; allowed a later time",
                          cfg->input[i].until_s, cfg->input[i].from_s);
-    if (cfg->n_fields == 0 || cfg->links_are_not_here || !cfg_has_profile(rd)) return; /* fields are of links */
+    if (cfg->n_fields == 0 || cfg->links_are_not_here || !cfg_has_profile(rd)) return; /* fields belong to links */
     const struct cola_model *model = cola_model_find(cfg->profile.model);
     if (model->n_records == 0)
         cfg_fail_key(rd, "fields", 0, "a %s evaluates no fields; allowed with another head.profile",

@@ -39,11 +39,11 @@ struct config_input {
     double from_s, until_s;
 };
 
-/* The checks between their keys. */
+/* Checks the keys of fields and inputs against each other. */
 void cfg_check_fields(struct cfg_reader *rd, const struct config *cfg);
-/* One field with its shape. */
+/* Makes one field with its shape. */
 void config_make_field(const struct config_field *from, struct cola_field *out);
-/* Fields by number, and inputs. The configuration is checked. */
+/* Fills in the fields, by their numbers, and the inputs. The configuration must have been checked. */
 void config_fill_fields(const struct config *cfg, struct cola_fields *out);
 
 #endif

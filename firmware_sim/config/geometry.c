@@ -67,7 +67,7 @@ void cfg_check_geometries(struct cfg_reader *rd, struct config_profile *p)
     config_set_steps(p, c->geometry[0].steps_per_turn);
 }
 
-/* "50 Hz at 0.5 deg, 25 Hz at 0.25 deg" */
+/* Writes "50 Hz at 0.5 deg, 25 Hz at 0.25 deg". */
 static const char *list_of(const struct config_emitter *c, char *buf, size_t len)
 {
     size_t used = 0;

@@ -73,7 +73,7 @@ static const struct cfg_key config_keys[] = {
     {"head.ring_stop_deg", IN_CONFIG(head.ring_stop_udeg), CFG_MICRO, "deg", "90", -90, 90,
      .help = "sphere: elevation of the highest ring. If it equals ring_start_deg there is one ring, a circle."},
     {"head.pan_start_deg", SETTING(pan_start_udeg), CFG_MICRO, "deg", "@pan_min_deg",
-     WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame starts."},
+     WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame (a pan sweep) starts."},
     {"head.pan_stop_deg", SETTING(pan_stop_udeg), CFG_MICRO, "deg", "@pan_max_deg",
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
     {KEY(head.range_min_m), CFG_REAL, "m", "@range_min_m", 0, 1e5,
@@ -250,9 +250,9 @@ static const struct cfg_key config_keys[] = {
     {"loop", .type = CFG_MAP, .help = "The fixed-rate loop."},
     {KEY(loop.tick_hz), CFG_REAL, "Hz", "1000", 100, 10000,
      .allowed = "a divisor of 1e9 from 100 to 10000 Hz, such as 500, 1000, 2000",
-     .help = "Rate of the loop. Its ticks cut the stream into frames: another rate gives another hash of the stream. "
-             "The points are the same, except on a live platform, which has one pose per tick, and with meshes that "
-             "move, which stand still during each tick where they are at its start."},
+     .help = "Rate of the loop. Its ticks cut the stream into stream frames, so another rate gives another hash of the "
+             "stream. The points are the same, with two exceptions. A live platform has one pose per tick. Meshes that "
+             "move stand still during each tick, where they are at its start."},
     {KEY(loop.ahead_ms), CFG_REAL, "ms", "64", 2, 90,
      .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam."},
     {KEY(loop.queue_ms), CFG_REAL, "ms", "250", 10, 10000,

@@ -12,21 +12,17 @@
 #include "firmware_sim/config/table/row.h"
 
 /* The kinds of links that each protocol works on. */
-static const struct {
-    unsigned kinds; /* bit per enum link_type */
-    const char *allowed;
-} ways[PROTOCOL_N] = {
-    [PROTOCOL_NATIVE] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB |
-                             1u << LINK_FD | 1u << LINK_WEB,
-                         "null, file, pty, tcp, usb, web"},
-    [PROTOCOL_NMEA] = {1u << LINK_NULL | 1u << LINK_FILE | 1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_UDP,
-                       "null, file, pty, tcp, udp"},
-    [PROTOCOL_SCIP] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},
-    [PROTOCOL_COLA] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_USB | 1u << LINK_FD, "pty, tcp, usb"},
-    [PROTOCOL_VELODYNE] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
-    [PROTOCOL_VELODYNE_POSITION] = {1u << LINK_UDP | 1u << LINK_FILE | 1u << LINK_NULL, "udp, file, null"},
-    [PROTOCOL_VELODYNE_HTTP] = {1u << LINK_TCP | 1u << LINK_FD, "tcp"},
-    [PROTOCOL_CAPTURE] = {1u << LINK_PTY | 1u << LINK_TCP | 1u << LINK_UDP, "pty, tcp, udp"},
+static const unsigned ways[PROTOCOL_N] = {
+    [PROTOCOL_NATIVE] = CFG_KIND(LINK_NULL) | CFG_KIND(LINK_FILE) | CFG_KIND(LINK_PTY) | CFG_KIND(LINK_TCP) |
+                        CFG_KIND(LINK_USB) | CFG_KIND(LINK_FD) | CFG_KIND(LINK_WEB),
+    [PROTOCOL_NMEA] =
+        CFG_KIND(LINK_NULL) | CFG_KIND(LINK_FILE) | CFG_KIND(LINK_PTY) | CFG_KIND(LINK_TCP) | CFG_KIND(LINK_UDP),
+    [PROTOCOL_SCIP] = CFG_KIND(LINK_PTY) | CFG_KIND(LINK_TCP) | CFG_KIND(LINK_USB) | CFG_KIND(LINK_FD),
+    [PROTOCOL_COLA] = CFG_KIND(LINK_PTY) | CFG_KIND(LINK_TCP) | CFG_KIND(LINK_USB) | CFG_KIND(LINK_FD),
+    [PROTOCOL_VELODYNE] = CFG_KIND(LINK_UDP) | CFG_KIND(LINK_FILE) | CFG_KIND(LINK_NULL),
+    [PROTOCOL_VELODYNE_POSITION] = CFG_KIND(LINK_UDP) | CFG_KIND(LINK_FILE) | CFG_KIND(LINK_NULL),
+    [PROTOCOL_VELODYNE_HTTP] = CFG_KIND(LINK_TCP) | CFG_KIND(LINK_FD),
+    [PROTOCOL_CAPTURE] = CFG_KIND(LINK_PTY) | CFG_KIND(LINK_TCP) | CFG_KIND(LINK_UDP),
 };
 
 _Static_assert((int)HEAD_MAX_RATES == (int)PROTOCOL_MAX_GEOMETRIES, "geometries");
@@ -39,7 +35,7 @@ static const char PROTOCOL_KEY[] = "links[].protocol";
 
 static int is_spoken_on(const struct link_spec *link)
 {
-    return (ways[link->protocol].kinds & 1u << link->type) != 0;
+    return (ways[link->protocol] & CFG_KIND(link->type)) != 0;
 }
 
 static const struct protocol_ops *ops_of(const struct link_spec *link)
@@ -67,7 +63,7 @@ static const char *link_protocol_place_of(const struct cfg_reader *rd, const cha
     return buf;
 }
 
-static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, const struct protocol_ops *ops)
+static void check_stream(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
     char where[40];
     if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && cfg->output.layout != LINE_POLAR &&
@@ -78,14 +74,6 @@ static void check_stream(struct cfg_reader *rd, struct config *cfg, uint32_t i, 
         cfg_fail_key(rd, PROTOCOL_KEY, i,
                      "%s has no first echoes, but beam.echoes is first%s; required is all, last or strongest",
                      ops->name, link_protocol_place_of(rd, "beam.echoes", where));
-    if ((ops->needs & PROTOCOL_NEEDS_ATTRIBUTES) == 0) return;
-    if (!cfg_is_given(rd, "output.attributes", 0))
-        cfg->output.attributes = 1;
-    else if (!cfg->output.attributes && CFG_SOUND(rd, 0, "output.attributes"))
-        cfg_fail_key(rd, PROTOCOL_KEY, i,
-                     "%s needs amplitudes, but output.attributes is off%s; required is on, or no "
-                     "such key",
-                     ops->name, link_protocol_place_of(rd, "output.attributes", where));
 }
 
 static int has_kind(const struct protocol_ops *ops, const struct emitter *emitter)
@@ -103,19 +91,18 @@ int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emit
 static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
     const struct emitter *emitter = &cfg->profile.emitter;
-    char where[40], allowed[64] = "";
+    char where[40], allowed[64];
     if (!cfg_has_profile(rd) || cfg_protocol_fits(ops, emitter)) return;
     if (cfg->link[i].protocol == PROTOCOL_CAPTURE) {
         cfg_fail_key(rd, PROTOCOL_KEY, i, "capture is for `run FILE.pcap`; allowed for a head are all other protocols");
         return;
     }
-    for (int kind = EMITTER_LINE; kind <= EMITTER_DIRECTIONS; kind++)
-        if ((ops->emitters & 1u << kind) != 0) cfg_list_add(allowed, sizeof allowed, emitter_names[kind]);
     link_protocol_place_of(rd, "head.profile", where);
     if (!has_kind(ops, emitter))
         cfg_fail_key(rd, PROTOCOL_KEY, i,
                      "protocol %s does not support head profile %s%s, whose emitter is %s; allowed emitters: %s",
-                     ops->name, cfg->profile.name, where, emitter_names[emitter->kind], allowed);
+                     ops->name, cfg->profile.name, where, emitter_names[emitter->kind],
+                     cfg_list_kinds(ops->emitters, emitter_names, allowed, sizeof allowed));
     else
         cfg_fail_key(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
                      ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
@@ -134,14 +121,17 @@ static void set_source_port(const struct cfg_reader *rd, struct link_spec *link,
 static int check_link_alone(struct cfg_reader *rd, struct link_spec *link, uint32_t i)
 {
     const struct protocol_ops *ops = ops_of(link);
+    char allowed[64];
     if (!CFG_SOUND(rd, i, "links[]")) return 0; /* with all its keys */
     if (ops == NULL) {
         cfg_fail_key(rd, PROTOCOL_KEY, i, "this build does not have it");
         return 0;
     }
     if (!is_spoken_on(link)) {
-        cfg_fail_key(rd, PROTOCOL_KEY, i, "protocol %s is not available on a %s link; allowed %s", ops->name,
-                     cfg_word(rd, "links[].type", (int)link->type), ways[link->protocol].allowed);
+        cfg_fail_key(
+            rd, PROTOCOL_KEY, i, "protocol %s is not available on a %s link; allowed %s", ops->name,
+            cfg_word(rd, "links[].type", (int)link->type),
+            cfg_list_kinds(ways[link->protocol], cfg_find(&rd->table, "links[].type")->names, allowed, sizeof allowed));
         return 0;
     }
     if (link->dialect != PROTOCOL_DIALECT_ANY && link->protocol != PROTOCOL_COLA)

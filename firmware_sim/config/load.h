@@ -18,7 +18,7 @@ enum { CONFIG_MAX_DIAGNOSTICS = 20 };
 struct config_diagnostics {
     uint32_t n; /* all diagnostics that were found; err[] has the first CONFIG_MAX_DIAGNOSTICS */
     struct sh_err err[CONFIG_MAX_DIAGNOSTICS];
-    uint64_t place[CONFIG_MAX_DIAGNOSTICS]; /* they rise with it: file, --set or profile, and the line there */
+    uint64_t place[CONFIG_MAX_DIAGNOSTICS]; /* err[] is sorted by it: file, --set or profile, then the line there */
 };
 
 /* Reads path, then the `key=value` settings of --set, in order, then the profile that they name. The settings are
@@ -26,11 +26,11 @@ struct config_diagnostics {
  * first diagnostic. cfg is large: allocate it. */
 int config_load(const char *path, const char *const *sets, int n_sets, struct config *cfg, struct sh_err *err);
 
-/* The same, with all diagnostics. Returns SH_OK or the code of the first. */
+/* Does the same, and gives all diagnostics. Returns SH_OK or the code of the first. */
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_diagnostics *diagnostics);
 
-/* The same for a text that has only links, loop and faults. Errors call it `name`. The rest of cfg is zero. */
+/* Does the same for a text that has only links, loop and faults. Errors call it `name`. The rest of cfg is zero. */
 int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
                       struct config_diagnostics *diagnostics);
 
@@ -38,7 +38,7 @@ int config_load_links(const char *text, const char *name, const char *const *set
  * scenario that comes with the program. At most once. With diagnostics nothing is added, and the code of the first is
  * returned. */
 int config_add_scenario(struct config *cfg, const char *name, struct config_diagnostics *diagnostics);
-/* "a, b, c": the scenarios that come with the program, as many as buf holds. */
+/* Writes the names of the scenarios that come with the program, "a, b, c", as many as buf holds. */
 void config_name_scenarios(char *buf, size_t len);
 /* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 270 KiB of
  * stack. */

@@ -49,7 +49,7 @@ void cfg_check_reaches(struct cfg_reader *rd, struct config_profile *profile)
 }
 
 /* Members that an entry does not give become NaN, except gloss, which becomes 100. */
-static void mark_unsaid(const struct cfg_reader *rd, uint32_t i, struct surface *s)
+static void mark_not_given(const struct cfg_reader *rd, uint32_t i, struct surface *s)
 {
     const struct {
         const char *path;
@@ -112,6 +112,6 @@ void cfg_check_signal(struct cfg_reader *rd, struct config *cfg)
         cfg_fail_key(rd, "signal.extinction_1_km", 0, "given together with visibility_m; allowed one of them");
     for (uint32_t i = 0; i < cfg->n_surfaces; i++) {
         check_surface(rd, i, &cfg->surface[i].surface);
-        mark_unsaid(rd, i, &cfg->surface[i].surface);
+        mark_not_given(rd, i, &cfg->surface[i].surface);
     }
 }

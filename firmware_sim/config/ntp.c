@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "drivers/protocol/protocol.h"
-#include "firmware_sim/config/check_ntp.h"
+#include "firmware_sim/config/check.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
 

@@ -62,12 +62,14 @@ static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, stru
         cfg_fail_key(rd, "links[].port", i, "0, but the head must connect to this port; allowed 1 to 65535");
 }
 
-/* Whether both listen on one port of one address. */
+/* Returns whether both listen on one port of one address; 0.0.0.0 is all addresses. */
 static int listens_as(const struct link_spec *a, const struct link_spec *b)
 {
     const unsigned tcp = CFG_KIND(LINK_TCP) | CFG_KIND(LINK_WEB);
+    const char *at[] = {a->address[0] != '\0' ? a->address : "127.0.0.1",
+                        b->address[0] != '\0' ? b->address : "127.0.0.1"};
     return (CFG_KIND(a->type) & tcp) != 0 && (CFG_KIND(b->type) & tcp) != 0 && a->port != 0 && a->port == b->port &&
-           strcmp(a->address, b->address) == 0;
+           (strcmp(at[0], at[1]) == 0 || strcmp(at[0], "0.0.0.0") == 0 || strcmp(at[1], "0.0.0.0") == 0);
 }
 
 static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)

@@ -40,19 +40,18 @@ static void check_anchor(struct cfg_reader *rd, struct config *cfg)
         {"scene.anchor.utm_zone", IN_UTM, IN_UTM},
         {"scene.anchor.hemisphere", IN_UTM, IN_UTM},
     };
-    static const char *const has[] = {
-        [ANCHOR_NONE] = "source alone", [ANCHOR_EXPLICIT] = "origin_m, lat_deg, lon_deg, height_m, north_deg",
-        [ANCHOR_IFC] = "height_m",      [ANCHOR_UTM] = "utm_zone, hemisphere",
-        [ANCHOR_ECEF] = "source alone", [ANCHOR_GEOTIFF] = "height_m"};
     const char *source = cfg_word(rd, "scene.anchor.source", (int)cfg->scene.anchor.source);
-    char why[64];
+    char why[64], has[64] = "";
     cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);
     if (!CFG_SOUND(rd, 0, "scene.anchor.source")) return;
+    for (size_t k = 0; k < CFG_LEN(keys); k++)
+        if (keys[k].taken & 1u << cfg->scene.anchor.source)
+            cfg_list_add(has, sizeof has, strrchr(keys[k].path, '.') + 1);
     for (size_t k = 0; k < CFG_LEN(keys); k++) {
         int given = cfg_is_given(rd, keys[k].path, 0);
         if (given && !(keys[k].taken & 1u << cfg->scene.anchor.source))
             cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
-                         has[cfg->scene.anchor.source]);
+                         has[0] != '\0' ? has : "source alone");
         snprintf(why, sizeof why, "the anchor's source is %s", source);
         if (!given && (keys[k].required & 1u << cfg->scene.anchor.source)) fail_required(rd, keys[k].path, 0, why);
     }

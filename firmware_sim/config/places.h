@@ -93,7 +93,7 @@ struct config_platform {
     uint32_t port; /* live, in real time: UDP; 0: the system chooses */
 };
 
-/* The head moves while it scans. */
+/* Returns whether the head moves while it scans. */
 static inline int config_head_moves(const struct config_platform *platform)
 {
     return platform->kind == PLATFORM_TRAJECTORY || platform->kind == PLATFORM_LIVE;

@@ -28,7 +28,8 @@ struct profile_dirs {
     int n;
 };
 
-int cfg_shared_path(int i, const char *name, char *buf)
+/* Writes the i-th of the places of cfg_find_shared, from 0. Returns 0 if there is none. */
+static int shared_path(int i, const char *name, char *buf)
 {
     static const char *const beside[] = {"../share/scanhead", "../config"};
     char program[CONFIG_PATH_LEN];
@@ -44,7 +45,7 @@ int cfg_shared_path(int i, const char *name, char *buf)
 
 int cfg_find_shared(const char *name, char *buf)
 {
-    for (int i = 0; cfg_shared_path(i, name, buf); i++)
+    for (int i = 0; shared_path(i, name, buf); i++)
         if (access(buf, R_OK) == 0) return 1;
     return 0;
 }
@@ -58,7 +59,7 @@ static void find_dirs(const char *config_file, struct profile_dirs *dirs)
     if (config_file != NULL)
         snprintf(dirs->dir[dirs->n++], CONFIG_PATH_LEN, "%.*sheads", CONFIG_PATH_LEN - 6,
                  cfg_dir_of(config_file, base));
-    for (int i = 0; cfg_shared_path(i, "heads", dirs->dir[dirs->n]); i++)
+    for (int i = 0; shared_path(i, "heads", dirs->dir[dirs->n]); i++)
         if (dirs->dir[dirs->n][0] != '\0') dirs->n++;
 }
 

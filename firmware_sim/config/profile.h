@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A head profile: the figures of a kind of head from its file in config/heads, and values that follow from them. In
- * the units of the file's keys; constant once it is loaded. */
+/* A head profile: the figures of a kind of head from its file in config/heads, and values that follow from them. They
+ * have the units that their names say, and are constant once the profile is loaded. */
 #ifndef FIRMWARE_SIM_CONFIG_PROFILE_H
 #define FIRMWARE_SIM_CONFIG_PROFILE_H
 
@@ -86,16 +86,16 @@ struct config_profile {
     double boot_s, spin_up_s, spin_down_s;
 };
 
-/* The program of a pulse rate, as an index; 0 for a head without programs. */
+/* Returns the index of the program with this pulse rate; 0 for a head without programs. */
 uint32_t config_program_of(const struct config_profile *profile, int64_t prr_uhz);
-/* The largest pulse rate that the head has up to prr_uhz; its smallest one where it has none. */
+/* Returns the head's largest pulse rate that is not above prr_uhz; its smallest one if all are above. */
 int64_t config_rate_below(const struct config_profile *profile, int64_t prr_uhz);
 
-/* The signal of one of a profile's programs; members that no profile has (sharp, extinction, seed) are 0. */
+/* Sets the signal of one of a profile's programs; members that no profile has (sharp, extinction, seed) become 0. */
 void config_signal_spec(const struct config_profile *profile, const struct config_program *program,
                         struct detect_signal_spec *spec);
 
-/* The schedule of a head with some settings. A list of directions is left out; site_fill_spec adds it. */
+/* Sets the schedule of a head with these settings. A list of directions is left out; site_fill_spec adds it. */
 void config_fill_spec(const struct config_profile *profile, const struct head_settings *settings,
                       struct schedule_spec *spec);
 

@@ -34,7 +34,7 @@ static const char *const turn_names[] = {
 
 /* clang-format off */
 #define FIGURE .flags = CFG_FIGURE
-/* The default of a key that only some emitters have, which need it. */
+/* The default of a key that only some emitters have. They need it, so no value fits. */
 #define OWNED ""
 #define NEEDED_BY(emitter) .of = CFG_KIND(emitter), .needed = 1
 static const struct cfg_key profile_keys[] = {

@@ -119,13 +119,11 @@ static int has_grade(const struct cfg_reader *rd, size_t row, int grade)
 static void put_figures(const struct cfg_reader *rd, int grade, FILE *out)
 {
     enum { WIDTH = 110, INDENT = 13 };
-    char label[32];
-    int column = 0, n = 0;
+    int n = 0;
     for (size_t row = 0; row < rd->table.n; row++)
         n += has_grade(rd, row, grade);
     if (n == 0) return;
-    snprintf(label, sizeof label, "%s", cfg_from_names[grade]);
-    column = fprintf(out, "  %-10s %d:", label, n);
+    int column = fprintf(out, "  %-10s %d:", cfg_from_names[grade], n);
     for (size_t row = 0, k = 0; row < rd->table.n; row++) {
         const char *path = rd->table.keys[row].path;
         if (!has_grade(rd, row, grade)) continue;

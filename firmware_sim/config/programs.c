@@ -137,13 +137,13 @@ static void check_limits(struct cfg_reader *rd, const struct config_profile *p, 
                      p->range_min_m);
 }
 
-/* The grade of a figure that was read. */
+/* Returns the grade of a figure that was read. */
 static enum config_from grade_of(const struct cfg_reader *rd, const char *path, uint32_t i)
 {
     return (enum config_from)(rd->from[cfg_row(rd, cfg_find(&rd->table, path))][i] - 1);
 }
 
-/* Figures that the file leaves out are those of the head as a whole. */
+/* Sets the figures that the file leaves out to those of the head as a whole. */
 static void complete(const struct cfg_reader *rd, const struct config_profile *p, uint32_t i,
                      struct config_program *program)
 {

@@ -46,8 +46,7 @@ void cfg_limit_range(struct cfg_reader *rd, struct config *cfg)
     }
     const int min_fits = check_one(rd, cfg, "head.range_min_m", head->range_min_m);
     const int max_fits = check_one(rd, cfg, "head.range_max_m", head->range_max_m);
-    if (!min_fits || !max_fits) return;
-    if (!config_limits_range(cfg)) return;
+    if (!min_fits || !max_fits || !config_limits_range(cfg)) return;
     if (head->range_min_m >= head->range_max_m) {
         cfg_fail_key(
             rd, cfg_is_given(rd, "head.range_max_m", 0) ? "head.range_max_m" : "head.range_min_m", 0,
@@ -55,9 +54,8 @@ void cfg_limit_range(struct cfg_reader *rd, struct config *cfg)
             head->range_min_m, head->range_max_m, head->range_max_m, head->range_min_m);
         return;
     }
-    for (uint32_t i = 0; i < p->n_programs; i++)
+    for (uint32_t i = 0; i < (p->n_programs > 0 ? p->n_programs : 1); i++)
         limit_program(rd, cfg, &p->program[i]);
-    if (p->n_programs == 0) limit_program(rd, cfg, &p->program[0]);
     p->range_min_m = head->range_min_m;
     p->range_max_m = head->range_max_m;
 }
@@ -81,8 +79,8 @@ void cfg_take_scan_settings(struct config *cfg)
                                                                : 0;
 }
 
-/* A length of the settings, in metres. Where it wasn't changed it is the configuration's, to the last bit. Else it is
- * the double that the configuration would have read: nm and 1e9 are below 2^53, so their quotient is the nearest
+/* Returns a length of the settings, in metres. Where it wasn't changed it is the configuration's, to the last bit. Else
+ * it is the double that the configuration would have read: nm and 1e9 are below 2^53, so their quotient is the nearest
  * double. */
 static double take_length(int64_t nm, int64_t own_nm, double own_m)
 {

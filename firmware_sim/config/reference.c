@@ -156,7 +156,7 @@ int config_print_section(const char *section, FILE *out, struct sh_err *err)
 
 /* ---- the example */
 
-/* Whether a configuration needs the key. The example comments the others out. */
+/* Returns whether a configuration needs the key. The example comments the others out. */
 static int is_needed(const struct cfg_key *key)
 {
     const int has_value = key->type != CFG_MAP && key->type != CFG_LIST;
@@ -170,7 +170,7 @@ static int has_needed(const char *section)
     return 0;
 }
 
-/* Whether the key is a list that only some heads have, or a key in such a list. */
+/* Returns whether the key is a list that only some heads have, or a key in such a list. */
 static int is_special(const char *path)
 {
     for (size_t i = 0; i < cfg_config_table.n; i++) {
@@ -180,7 +180,7 @@ static int is_special(const char *path)
     return 0;
 }
 
-/* The indent of a key's line: sections and elements of lists each add two blanks. */
+/* Returns the indent of a key's line: sections and elements of lists each add two blanks. */
 static int indent_of(const char *path)
 {
     int n = 0;
@@ -189,7 +189,7 @@ static int indent_of(const char *path)
     return 2 * n;
 }
 
-/* The value in the example: the default, the profile's value, or a typical value. */
+/* Returns the value in the example: the default, the profile's value, or a typical value. */
 static const char *value_of(const struct cfg_key *key, const struct config_profile *profile, char *buf, size_t len)
 {
     const char *text = key->def != NULL && key->def[0] != '\0' ? key->def : key->example;

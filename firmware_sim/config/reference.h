@@ -17,16 +17,16 @@ struct config_key_text {
 };
 /* The keys of a configuration, or those of a head profile. */
 enum config_keys { CONFIG_KEYS, CONFIG_PROFILE_KEYS };
-/* The text above them in the reference. */
+/* Returns the text above these keys in the reference. */
 const char *config_keys_intro(enum config_keys keys);
-/* Key i, in the order of the reference; 0 after the last one. */
+/* Describes key i, in the order of the reference. Returns 0 after the last one. */
 int config_describe_key(enum config_keys keys, size_t i, struct config_key_text *out);
 
-/* The reference: every key with type, unit, default, range and help. */
+/* Prints the reference: every key with type, unit, default, range and help. */
 void config_print_reference(FILE *out);
 
-/* The same for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of head
- * profiles. SH_EINPUT: there is no such section or key; err names the sections. */
+/* Prints the part of the reference for one section ("head", "scene.anchor"), for one key, or for "profile": the keys of
+ * head profiles. SH_EINPUT: there is no such section or key; err names the sections. */
 int config_print_section(const char *section, FILE *out, struct sh_err *err);
 
 /* Prints a configuration that loads and has all keys, each with its help. Keys that need a value have one; the others

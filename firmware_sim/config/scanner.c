@@ -45,7 +45,8 @@ static int is_same_scanner(const struct config *a, const struct config *b)
            IS_SAME(a, b, instrument);
 }
 
-static int copy_text_of(char *text, size_t len, const char *diagnostic)
+/* Copies a diagnostic without ", for stations[N].scanner", so that those of several scanners can be compared. */
+static void copy_text_of(char *text, size_t len, const char *diagnostic)
 {
     static const char mark[] = ", for stations[";
     const char *at = strstr(diagnostic, mark), *end = at != NULL ? strchr(at + 1, ':') : NULL;
@@ -53,17 +54,16 @@ static int copy_text_of(char *text, size_t len, const char *diagnostic)
         snprintf(text, len, "%s", diagnostic);
     else
         snprintf(text, len, "%.*s%s", (int)(at - diagnostic), diagnostic, end);
-    return end != NULL;
 }
 
-/* Whether a diagnostic was reported before: those of the file's own sections were. */
-static int is_told(const struct config_diagnostics *diagnostics, const char *diagnostic)
+/* Returns whether a diagnostic was reported before, as those of the file's own sections were. */
+static int was_reported(const struct config_diagnostics *diagnostics, const char *diagnostic)
 {
-    char text[sizeof diagnostics->err[0].text], told[sizeof text];
+    char text[sizeof diagnostics->err[0].text], reported[sizeof text];
     copy_text_of(text, sizeof text, diagnostic);
     for (uint32_t i = 0; i < diagnostics->n && i < CONFIG_MAX_DIAGNOSTICS; i++) {
-        copy_text_of(told, sizeof told, diagnostics->err[i].text);
-        if (strcmp(told, text) == 0) return 1;
+        copy_text_of(reported, sizeof reported, diagnostics->err[i].text);
+        if (strcmp(reported, text) == 0) return 1;
     }
     return 0;
 }
@@ -71,7 +71,7 @@ static int is_told(const struct config_diagnostics *diagnostics, const char *dia
 static void add_diagnostics(struct config_diagnostics *diagnostics, const struct config_diagnostics *more)
 {
     for (uint32_t i = 0; i < more->n && i < CONFIG_MAX_DIAGNOSTICS; i++)
-        if (!is_told(diagnostics, more->err[i].text))
+        if (!was_reported(diagnostics, more->err[i].text))
             cfg_add_diagnostic(diagnostics, more->place[i], more->err[i].code, more->err[i].text);
 }
 

@@ -11,7 +11,7 @@ struct config_diagnostics;
 /* Loads for the scanner of a station, from 1; 0: of head.station. The list of diagnostics begins anew. */
 int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
                  struct config_diagnostics *diagnostics);
-/* The station, from 0, that head.station's number (from 1) names; n_stations and more: there is none. */
+/* Returns the station, from 0, that head.station's number (from 1) names; n_stations and more: there is none. */
 uint32_t cfg_station_at(const struct config *cfg, uint32_t number);
 /* Loads the scanners of the other stations, adds their diagnostics, and notes in cfg which station has which. */
 void cfg_check_scanners(struct config *cfg, struct config_diagnostics *diagnostics);

@@ -5,18 +5,16 @@
 
 #include <stddef.h>
 
-/* Where a file that comes with the program ("heads", "scenes/x.obj") may be, for i from 0: beside an
- * installed program, beside one in its build folder, in config/ of the working directory. buf holds CONFIG_PATH_LEN.
- * 0: there is no i-th place. */
-int cfg_shared_path(int i, const char *name, char *buf);
-/* The first of these places that has it; 0: none. */
+/* Writes the first place that has a file that comes with the program ("heads", "scenes/x.obj"): beside an installed
+ * program, beside one in its build folder, or in config/ of the working directory. buf holds CONFIG_PATH_LEN. Returns 0
+ * if none has it. */
 int cfg_find_shared(const char *name, char *buf);
-/* Whether a name ends in .yaml and has more than that. */
+/* Returns whether a name ends in .yaml and has more than that. */
 int cfg_is_yaml(const char *name);
 /* Adds the names of a folder's YAML files, without .yaml, to the list "a, b, c" in buf, as far as they fit. */
 void cfg_name_yaml(const char *dir, char *buf, size_t len);
-/* The file of a scenario: a path (with a slash, or an ending), or the name of one that comes with the program. buf
- * holds CONFIG_PATH_LEN. 0: there is none of that name. */
+/* Writes the file of a scenario. name: a path (with a slash, or an ending), or the name of a scenario that comes with
+ * the program. buf holds CONFIG_PATH_LEN. Returns 0 if there is none of that name. */
 int cfg_find_scenario(const char *name, char *buf);
 
 #endif

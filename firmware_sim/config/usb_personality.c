@@ -10,7 +10,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
 
-static enum usb_personality_id look_of(int protocol)
+static enum usb_personality_id personality_of(int protocol)
 {
     switch (protocol) {
     case PROTOCOL_SCIP:
@@ -24,9 +24,10 @@ static enum usb_personality_id look_of(int protocol)
 
 void cfg_set_usb_identity(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item)
 {
-    const struct usb_personality *personality = usb_personality_get(look_of(link->protocol));
+    const enum usb_personality_id id = personality_of(link->protocol);
+    const struct usb_personality *personality = usb_personality_get(id);
     char path[PATH_MAX];
-    link->personality = (int)look_of(link->protocol);
+    link->personality = (int)id;
     if (!cfg_is_given(rd, "links[].vid", item)) link->vid = personality->vid;
     if (!cfg_is_given(rd, "links[].pid", item)) link->pid = personality->pid;
     if (link->serial[0] != '\0') return;

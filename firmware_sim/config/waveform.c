@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Full waveforms: checks that concern more than one key. Limits of single figures of the digitiser and the pulse are in
- * core/waveform, that of the stream's rate is in ../site. */
+/* Full waveforms: checks that concern more than one key. The limits of the digitiser and of the pulse are checked in
+ * core/waveform, and the stream's rate in firmware_sim/site. */
 #include <math.h>
 
 #include "core/digits.h"
@@ -10,7 +10,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
 
-/* Keys that only one shape of the pulse has. */
+/* Checks keys that only one shape of the pulse has. */
 static void check_pulse(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_waveform *w = &cfg->waveform;
@@ -46,7 +46,7 @@ static void check_digits(struct cfg_reader *rd, const struct config_waveform *w)
                      "a dead time, but saturation_db is 0: nothing saturates; allowed with saturation_db above 0");
 }
 
-/* Windows around returns; limits as in core/waveform. */
+/* Checks windows around returns, with the limit of core/waveform. */
 static void check_margins(struct cfg_reader *rd, const struct config_waveform *w)
 {
     const double most_ns = 0.5 * WAVEFORM_MAX_SAMPLES * w->sample_ns;
@@ -56,7 +56,7 @@ static void check_margins(struct cfg_reader *rd, const struct config_waveform *w
                  w->before_ns, w->after_ns, most_ns, WAVEFORM_MAX_SAMPLES / 2);
 }
 
-/* One window of each pulse. */
+/* Checks the window that each pulse has with far_m. */
 static void check_gate(struct cfg_reader *rd, const struct config_waveform *w)
 {
     const double sample_m = 0.5e-9 * LIGHT_SPEED_M_S * w->sample_ns, long_m = w->far_m - w->near_m;

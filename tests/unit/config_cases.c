@@ -248,6 +248,8 @@ const struct bad bad[] = {
     {AT_16("noise: {sigma_m: -0.001}"), 16, "noise.sigma_m", "allowed 0 to 10 m"},
     {AT_16("noise: {sigma_m: 0.001}\nsignal: {model: on}"), 16, "noise.sigma_m", "allowed 0.00295 to 10 m"},
     {"    port: 0\n", "    port: 7000\n  - {type: web, port: 7000}\n", 16, "links[1].port", "links[0] listens on the same port; allowed a port of its own, or 0"},
+    {"    port: 0\n", "    port: 7000\n  - {type: web, port: 7000, address: 127.0.0.1}\n", 16, "links[1].port", "links[0] listens on the same port"},
+    {"    port: 0\n", "    port: 7000\n  - {type: tcp, port: 7000, address: 0.0.0.0}\n", 16, "links[1].port", "links[0] listens on the same port"},
     {AT_16("noise: {sigma_m: 11}"), 16, "noise.sigma_m", "allowed 0 to 10 m"},
     {AT_16("noise: {range: loud}"), 16, "noise.range", "allowed off, on, signal"},
     {AT_16("noise: {range: signal}"), 16, "noise.range", "allowed with signal.model: on"},

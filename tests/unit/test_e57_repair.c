@@ -389,6 +389,40 @@ static void test_absurd(void **state)
     unlink(path);
 }
 
+static int n_asked;
+
+static int count_asked(void *ctx)
+{
+    (void)ctx;
+    n_asked++;
+    return 0;
+}
+
+/* A power cut may leave many pages of zeros. Among these, too, a repair asks whether it has to stop. */
+static void test_many_zeros(void **state)
+{
+    (void)state;
+    enum { PAGES = 20000 };
+    const struct sh_report report = {.stop = count_asked};
+    char part[160];
+    int n[2];
+    snprintf(part, sizeof part, "%s", rig_path("zeros.e57.part"));
+    record_scans();
+    for (int i = 0; i < 2; i++) {
+        struct repaired file;
+        struct sh_err err = {0};
+        n_asked = 0;
+        killed_rig_write(part, left, left_len);
+        if (i == 1) assert_int_equal(truncate(part, (off_t)PAGES * PAGE), 0);
+        if (repair_file(part, &report, &file, &err) != 0) fail_msg("%s", err.text);
+        assert_false(file.was_whole);
+        n[i] = n_asked;
+        unlink(file.path);
+        repair_free(&file);
+    }
+    assert_true(n[1] > n[0]);
+}
+
 static int tear_down(void **state)
 {
     e57rig_free();
@@ -402,7 +436,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cuts),      cmocka_unit_test(test_end),    cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_elsewhere), cmocka_unit_test(test_absurd),
+        cmocka_unit_test(test_elsewhere), cmocka_unit_test(test_absurd), cmocka_unit_test(test_many_zeros),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -111,6 +111,23 @@ static void test_refused(void **state)
     unlink(path);
 }
 
+/* A comment has the names of an object and a material, of 255 bytes each at most. */
+static void test_long_names(void **state)
+{
+    (void)state;
+    char text[600], name[256];
+    struct repair r;
+    struct sh_err err;
+    const char *path = rig_path("cut.obj");
+    memset(name, 'n', 255);
+    name[255] = '\0';
+    const int len = snprintf(text, sizeof text, "# crs local\n# label 65534 %s | %s\nv 1 2 3\n", name, name);
+    killed_rig_write(path, text, (size_t)len);
+    if (killed_rig_repair(path, &r, &err) != 0) fail_msg("%s", err.text);
+    assert_true(r.was_whole && r.n_kept == 1);
+    unlink(path);
+}
+
 /* A .ply is complete, or none of it is kept. */
 static void test_ply(void **state)
 {
@@ -170,6 +187,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_cuts),
         cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_long_names),
         cmocka_unit_test(test_ply),
         cmocka_unit_test(test_ply_without_newlines),
     };

@@ -154,6 +154,63 @@ static void test_stopped(void **state)
     }
 }
 
+static void put_descriptor(uint32_t scan, int64_t t_s, int flags)
+{
+    static uint8_t out[1024];
+    const struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0",
+                                        .profile = "model",
+                                        .scan = scan,
+                                        .prr_uhz = 1000000000,
+                                        .mirror_counts_per_turn = 3600,
+                                        .pan_counts_per_turn = 3600,
+                                        .range_scale_m = 1e-3};
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, t_s * 1000000000, flags));
+}
+
+/* A descriptor of the same scan says that settings have changed (PROTOCOL.md), and begins no other scan. */
+static void test_scans_of_a_stream(void **state)
+{
+    static const char *const names[] = {"s.shs", "s.pcapng"};
+    static const struct rig_point p = {100, 200, 300, -1000, 1, 1, 1};
+    struct repaired file;
+    struct scanhead *sh;
+    struct scanhead_frame frame;
+    struct recorder *rec;
+    (void)state;
+    repair_name(names[0]);
+    rig_stream = fopen(repair_path, "wb");
+    assert_non_null(rig_stream);
+    put_descriptor(4, 1, NATIVE_REPEAT); /* between scans: that of the last one */
+    put_descriptor(5, 2, 0);
+    rig_points(0, 0, 0, &p, 1);
+    put_descriptor(5, 3, 0); /* other settings */
+    put_descriptor(5, 4, NATIVE_REPEAT);
+    put_descriptor(6, 6, NATIVE_REPEAT); /* the descriptor before it was lost */
+    put_descriptor(6, 7, 0);
+    put_descriptor(7, 8, 0);
+    put_descriptor(1, 2, 0); /* the head was started again */
+    put_descriptor(1, 1, 0); /* and once more */
+    fclose(rig_stream);
+    rig_stream = NULL;
+    assert_int_equal(scanhead_open(repair_path, &sh, NULL, 0), 0);
+    repair_name(names[1]);
+    assert_int_equal(recorder_open(recorder_find(repair_path, &repair_err), repair_path, &(struct recorder_options){0},
+                                   &rec, &repair_err),
+                     0);
+    while (scanhead_next(sh, &frame, -1) == 0)
+        assert_int_equal(recorder_frame(rec, sh, &frame, &repair_err), 0);
+    assert_int_equal(recorder_close(rec, 1, &repair_err), 0);
+    scanhead_close(sh);
+    for (int i = 0; i < 2; i++) {
+        repair_name(names[i]);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+        assert_true(file.was_whole);
+        assert_int_equal(file.n_scans, 5);
+        repair_free(&file);
+        assert_int_equal(unlink(repair_path), 0);
+    }
+}
+
 /* Bytes wait for two calls at most. A file that is written anyway is left alone. */
 static void test_save(void **state)
 {
@@ -183,6 +240,6 @@ int main(void)
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_names),        cmocka_unit_test(test_not_ours),
                                        cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_full_for_a_while),
                                        cmocka_unit_test(test_stopped),      cmocka_unit_test(test_save),
-                                       cmocka_unit_test(test_zeros)};
+                                       cmocka_unit_test(test_zeros),        cmocka_unit_test(test_scans_of_a_stream)};
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }

@@ -15,7 +15,7 @@
 #include "firmware_sim/config/table/row.h"
 #include "firmware_sim/config/table/value.h"
 
-/* Where the list is full, the last diagnostic makes room. */
+/* Where the list is full, its last diagnostic is dropped. */
 int cfg_add_diagnostic(struct config_diagnostics *diagnostics, uint64_t place, int code, const char *text)
 {
     uint32_t at = diagnostics->n < CONFIG_MAX_DIAGNOSTICS ? diagnostics->n : CONFIG_MAX_DIAGNOSTICS;
@@ -81,7 +81,7 @@ int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t it
     return code;
 }
 
-/* Whether the key, or a section around it, is bad. */
+/* Returns whether the key, or a section around it, is bad. */
 static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
 {
     char path[CFG_PATH_MAX];
@@ -93,7 +93,8 @@ static int is_bad(const struct cfg_reader *rd, const char *of, uint32_t item)
     return 0;
 }
 
-/* Whether a key below the section is bad. In a list as a whole this is a key of any item, and else of this one. */
+/* Returns whether a key below the section is bad. If the section is a whole list, keys of all its items count; else
+ * only those of this item. */
 static int has_bad(const struct cfg_reader *rd, const char *section, uint32_t item)
 {
     const int is_of_item = strstr(section, "[]") != NULL;
@@ -147,7 +148,7 @@ const char *cfg_show(const char *text, char *buf)
 }
 
 /* Finds the known key that the writer may have meant. In this section it differs in a letter or two, or one of the two
- * words begins the other. In another section it is the same word. NULL: there is none. */
+ * words is the beginning of the other. In another section it is the same word. NULL: there is none. */
 static const struct cfg_key *suggest(const struct cfg_table *table, const char *parent, const char *word)
 {
     const struct cfg_key *best = NULL;

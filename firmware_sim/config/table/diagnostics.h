@@ -18,11 +18,11 @@ int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ..
 /* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
 int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* The same for the value of a key, which is bad from now on. */
+/* Does the same for the value of a key, which is bad from now on. */
 int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *fmt, ...)
     __attribute__((format(printf, 5, 6)));
-/* An unknown key below the section parent ("" for the top): suggests a similar key and lists the known ones. The
- * similar key is marked bad, so that it is not reported as missing, too. */
+/* Reports an unknown key below the section parent ("" for the top), suggests a similar key and lists the known ones.
+ * The similar key is marked bad, so that it is not reported as missing, too. */
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
 /* Adds a diagnostic in the order of its place. */
 int cfg_add_diagnostic(struct config_diagnostics *diagnostics, uint64_t place, int code, const char *text);

@@ -10,12 +10,12 @@
 struct cfg_key;
 struct cfg_reader;
 
-/* SH_OK, or the code of a diagnostic that leaves nothing to check: no file, no YAML, no section. */
+/* Returns SH_OK, or the code of a diagnostic that leaves nothing to check: no file, no YAML, no keys. */
 int cfg_read_file(struct cfg_reader *rd);
-/* The same; the document stays open for the scanner. *doc is NULL after an error. */
+/* Does the same, and leaves the document open, for the scanner. *doc is NULL after an error. */
 struct cfg_document;
 int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc);
-/* The same from a text in memory. */
+/* Does the same with a text in memory. */
 int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);
 void cfg_close_file(struct cfg_document *doc);
 /* Reads the section `scanner` of rd->scanner over the values that were read before. */

@@ -9,16 +9,16 @@
 struct cfg_key;
 struct cfg_reader;
 
-/* Whether a scanner may have the section, or the key in it. */
+/* Returns whether a scanner may have the section, or the key in it. */
 int cfg_is_of_scanner(const char *path);
 extern const char cfg_sections_of_scanner[];
-/* The key is about to be read in a scanner: the file's value of it is dropped. */
+/* Drops the file's value of a key that is about to be read in a scanner. */
 void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key);
-/* The scanner is read completely. With a profile of its own it does not inherit the file's head. */
+/* To be called when the scanner has been read. If it has a profile of its own, the file's head is dropped. */
 void cfg_end_scanner(struct cfg_reader *rd);
 /* Resets a list as if it had not been given. */
 void cfg_forget_list(struct cfg_reader *rd, const char *path);
-/* The same for a list, a section, or an element of a list. */
+/* Does the same for a list, a section, or an element of a list. */
 void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For checks between keys: whether keys were given and read well, and diagnostics of those that were not. */
+/* For checks between keys: whether keys were given and read without a diagnostic; and diagnostics of these checks. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_GIVEN_H
 #define FIRMWARE_SIM_CONFIG_TABLE_GIVEN_H
 
@@ -8,13 +8,14 @@
 
 struct cfg_reader;
 
+/* Returns whether the key was given. item: its element, from 0, where the path has []; else 0. */
 int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
-/* Whether the head profile was read without a diagnostic. */
+/* Returns whether the head profile was read without a diagnostic. */
 int cfg_has_profile(const struct cfg_reader *rd);
-/* The word of a key for its value. */
+/* Returns the word of a key for its value. */
 const char *cfg_word(const struct cfg_reader *rd, const char *path, int value);
-/* Whether all of these keys (of sections: all keys in them) were read without a diagnostic, so that a check can use
- * their values. */
+/* Returns whether all of these keys (of sections: all keys in them) were read without a diagnostic, so that a check can
+ * use their values. */
 int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n);
 #define CFG_SOUND(rd, item, ...)                                    \
     cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
@@ -22,12 +23,12 @@ int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const 
 
 /* Adds a diagnostic, "FILE:LINE: KEY: text", at the key's own line, or at the section's where the key is missing.
  * Returns SH_EINPUT; reading goes on after it. Nothing is added where the key, or a section around it, has a diagnostic
- * already: this one may only follow from that one. */
+ * already: the new one may only be its consequence. */
 int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* The same for a key that is not given and has no default. */
+/* Does the same for a key that is not given and has no default. */
 void cfg_fail_missing(struct cfg_reader *rd, const char *path, uint32_t item);
-/* text made fit for one line of an error: cut, without control characters. buf holds CFG_SHOW_MAX. */
+/* Makes text fit for one line of an error: cuts it, and replaces control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);
 

@@ -38,10 +38,10 @@ void cfg_reader_init(struct cfg_reader *rd, const char *file, const struct cfg_t
 size_t cfg_row(const struct cfg_reader *rd, const struct cfg_key *key);
 uint32_t *cfg_list_count(const struct cfg_reader *rd, const struct cfg_key *list);
 void *cfg_address(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
-/* The name of a key (cfg_name), with "stations[1].scanner." before it where the row was given there. buf holds
+/* Writes the name of a key (cfg_name), with "stations[1].scanner." before it where the row was given there. buf holds
  * 2 * CFG_PATH_MAX. */
 const char *cfg_full_name(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, char *buf);
-/* The line of a key, or of the nearest section around it that was given. */
+/* Returns the line of a key, or of the nearest section around it that was given. */
 int cfg_where(const struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 /* Fills in defaults for keys that were not given or are bad; reports required keys that are missing. profile may be
  * NULL. */

@@ -55,6 +55,14 @@ void cfg_list_add(char *buf, size_t len, const char *word)
     snprintf(buf + used, len - used, "%s%s", used > 0 ? ", " : "", word);
 }
 
+const char *cfg_list_kinds(unsigned kinds, const char *const *names, char *buf, size_t len)
+{
+    buf[0] = '\0';
+    for (int kind = 0; names[kind] != NULL; kind++)
+        if (kinds & CFG_KIND(kind)) cfg_list_add(buf, len, names[kind]);
+    return buf;
+}
+
 int cfg_list_has(const char *list, const char *word)
 {
     const size_t len = strlen(word);

@@ -67,23 +67,25 @@ struct cfg_table {
 #define CFG_MEMBER(type, member) offsetof(type, member), sizeof(((type *)0)->member)
 
 const struct cfg_key *cfg_find(const struct cfg_table *table, const char *path);
-/* The list a row's elements belong to, NULL for a row outside lists. */
+/* Returns the list that a row belongs to; NULL for a row outside lists. */
 const struct cfg_key *cfg_list_of(const struct cfg_table *table, const struct cfg_key *key);
 /* "stations[].name", 2 -> "stations[2].name". buf holds CFG_PATH_MAX. */
 const char *cfg_name(const char *path, uint32_t item, char *buf);
-/* The section around a path, in place: "links[].type" -> "links[]" -> "links" -> "". */
+/* Cuts a path to the section around it: "links[].type" -> "links[]" -> "links" -> "". */
 void cfg_cut_to_parent(char *path);
-/* Whether path is the section, or a key in it. */
+/* Returns whether path is the section, or a key in it. */
 int cfg_is_in(const char *path, const char *section);
-/* The last word of path, when path is a key directly below parent ("": the top); NULL otherwise. */
+/* Returns the last word of path, if path is a key directly below parent ("": the top); else NULL. */
 const char *cfg_word_below(const char *path, const char *parent);
 
 /* Appends a word to the list "a, b, c" in buf, as far as it fits. */
 void cfg_list_add(char *buf, size_t len, const char *word);
-/* Whether the list has the word. A list of NULL has none. */
+/* Writes the names of the kinds whose bits are set (CFG_KIND), "a, b". NULL ends the names. */
+const char *cfg_list_kinds(unsigned kinds, const char *const *names, char *buf, size_t len);
+/* Returns whether the list has the word. A list of NULL has none. */
 int cfg_list_has(const char *list, const char *word);
 
-/* How many numbers a key of CFG_VEC3 or CFG_PAIR has. */
+/* Returns how many numbers a key of CFG_VEC3 or CFG_PAIR has. */
 static inline int cfg_axes(const struct cfg_key *key)
 {
     return key->type == CFG_PAIR ? 2 : 3;

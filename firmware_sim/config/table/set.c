@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A name that is written anew with its element's number, "[127]" for ".1", still fits. */
+/* The longest name. It is below CFG_PATH_MAX, since errors may write it with more characters: "[1]" for ".1". */
 enum { NAME_MAX_LEN = CFG_PATH_MAX - 8 };
 
 struct set {
@@ -130,8 +130,8 @@ static int take_name(struct cfg_reader *rd, const char *text, const char *equals
 
 static const char SCANNER[] = "stations[].scanner";
 
-/* "stations[].scanner.head.prr_hz": returns 1 if this scanner is being read; the path is then the key's own,
- * "head.prr_hz". */
+/* Takes a path like "stations[].scanner.head.prr_hz". Returns 1 if this scanner is being read; the path is then the
+ * key's own, "head.prr_hz". */
 static int enter_scanner(struct cfg_reader *rd, struct set *set)
 {
     const size_t len = strlen(SCANNER);
@@ -180,8 +180,8 @@ static void apply_set(struct cfg_reader *rd, struct cfg_document *doc, const cha
 {
     struct set set = {.item = 0};
     const char *equals = strchr(text, '=');
-    const int told = rd->in_scanner; /* wrong names were reported when the file's own keys were read */
-    if (told && (equals == NULL || equals == text || strncmp(text, "stations", 8) != 0)) return;
+    /* wrong names were reported when the file's own keys were read */
+    if (rd->in_scanner && (equals == NULL || equals == text || strncmp(text, "stations", 8) != 0)) return;
     if (take_name(rd, text, equals, &set) != SH_OK) return;
     const int is_scanners = strncmp(set.path, SCANNER, strlen(SCANNER)) == 0 && set.path[strlen(SCANNER)] == '.';
     if (is_scanners ? !enter_scanner(rd, &set) : rd->in_scanner) return;

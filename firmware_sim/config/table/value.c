@@ -154,7 +154,7 @@ struct place {
     int line;
 };
 
-/* `"TEXT" is WHAT; allowed ...` for a key's value. */
+/* Reports `"TEXT" is WHAT; allowed ...` for a key's value. */
 static int refuse(const struct place *at, const char *text, const char *what)
 {
     char shown[CFG_SHOW_MAX], allowed[CFG_ALLOWED_MAX];
@@ -225,7 +225,7 @@ static int store_word(const struct place *at, void *dst, const char *text)
     return refuse(at, text, "not known");
 }
 
-/* libyaml checks files; this is for values of the command line. */
+/* Returns whether a value of the command line is UTF-8; libyaml checks those of files. */
 static int is_utf8(const char *text)
 {
     yaml_document_t doc;

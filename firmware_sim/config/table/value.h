@@ -11,7 +11,7 @@ struct cfg_reader;
 struct config_profile;
 
 enum cfg_number { CFG_NUMBER_OK, CFG_NOT_A_NUMBER, CFG_TOO_FINE, CFG_TOO_LARGE };
-/* Exact: text * 10^decimals as a whole number. Grammar: [+-] digits [. digits] [e [+-] digits], no leading
+/* Computes text * 10^decimals exactly, as a whole number. Grammar: [+-] digits [. digits] [e [+-] digits], no leading
  * zeros, which YAML 1.1 reads as octal. */
 enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out);
 /* Stores one scalar; base_dir (with its '/', may be empty) is put before relative paths. */
@@ -20,19 +20,19 @@ int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, i
 /* Stores one number of a key of CFG_VEC3, CFG_PAIR or CFG_POINTS into dst. */
 int cfg_store_number(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, double *dst,
                      const char *text);
-/* The values that a row takes: "allowed 1 to 5 Hz". profile gives the limits that depend on it; NULL: those of all
- * profiles. */
+/* Writes the values that a row takes: "allowed 1 to 5 Hz". profile gives the limits that depend on it; NULL: those of
+ * all profiles. */
 enum { CFG_ALLOWED_MAX = 900 }; /* room for the longest lists, the kinds of faults and the keys of a profile */
 const char *cfg_allowed(const struct cfg_key *key, const struct config_profile *profile, char *buf);
-/* Directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
+/* Writes the directory part of a path, with its '/'; empty for a bare name. buf holds CONFIG_PATH_LEN. */
 const char *cfg_dir_of(const char *path, char *buf);
 
-/* A figure of a profile that is written in 1e-6 units. */
+/* Return a figure of a profile: one of type CFG_MICRO, in 1e-6 units; or one of type CFG_REAL. */
 int64_t cfg_figure(const struct config_profile *profile, const char *path);
 double cfg_real_figure(const struct config_profile *profile, const char *path);
 
-/* A figure of CFG_MICRO in its unit: the double nearest to the written number, so that errors and lists print that
- * number. */
+/* Converts a figure of CFG_MICRO to its unit: the double nearest to the written number, so that errors and lists print
+ * that number. */
 static inline double from_micro(int64_t micro)
 {
     return (double)micro / 1e6;

@@ -68,7 +68,7 @@ static int wrong_kind(const struct walk *w, const struct cfg_key *key, uint32_t 
                           cfg_allowed(key, w->rd->profile, allowed));
 }
 
-/* A scalar that may stand for a value of this type, or an error. */
+/* Checks that the node is a scalar that may stand for a value of this type. */
 static int check_scalar(const struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char allowed[CFG_ALLOWED_MAX], shown[CFG_SHOW_MAX];
@@ -90,25 +90,30 @@ static void read_scalar(struct walk *w, const struct cfg_key *key, uint32_t item
         cfg_store(w->rd, key, item, line_of(w, node), text_of(node), w->base_dir);
 }
 
+/* Reads the n numbers of a list. */
+static void read_numbers(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_item_t *first, int n,
+                         double *to)
+{
+    for (int i = 0; i < n; i++) {
+        const yaml_node_t *number = yaml_document_get_node(w->doc, first[i]);
+        if (check_scalar(w, key, item, number) == SH_OK)
+            cfg_store_number(w->rd, key, item, line_of(w, number), to + i, text_of(number));
+    }
+}
+
 static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
-    double *dst = cfg_address(w->rd, key, item);
     char allowed[CFG_ALLOWED_MAX];
     if (node->type != YAML_SEQUENCE_NODE) {
         wrong_kind(w, key, item, node);
         return;
     }
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
-    if (top - first != cfg_axes(key)) {
+    if (top - first != cfg_axes(key))
         cfg_fail_value(w->rd, key, item, line_of(w, node), "has %td numbers instead of %d; %s", top - first,
                        cfg_axes(key), cfg_allowed(key, w->rd->profile, allowed));
-        return;
-    }
-    for (int axis = 0; axis < cfg_axes(key); axis++) {
-        const yaml_node_t *number = yaml_document_get_node(w->doc, first[axis]);
-        if (check_scalar(w, key, item, number) == SH_OK)
-            cfg_store_number(w->rd, key, item, line_of(w, number), dst + axis, text_of(number));
-    }
+    else
+        read_numbers(w, key, item, first, cfg_axes(key), cfg_address(w->rd, key, item));
 }
 
 static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
@@ -133,15 +138,11 @@ static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item
                            cfg_allowed(key, w->rd->profile, allowed));
             return;
         }
-        for (uint32_t axis = 0; axis < 2; axis++) {
-            const yaml_node_t *number = yaml_document_get_node(w->doc, pair->data.sequence.items.start[axis]);
-            if (check_scalar(w, key, item, number) == SH_OK)
-                cfg_store_number(w->rd, key, item, line_of(w, number), &points->at[i][axis], text_of(number));
-        }
+        read_numbers(w, key, item, pair->data.sequence.items.start, 2, points->at[i]);
     }
 }
 
-/* The number of a word among names; -1: none of them. */
+/* Returns the number of a word among names; -1: none of them. */
 static int word_of(const yaml_node_t *node, const char *const *names)
 {
     for (int i = 0; names[i] != NULL && node->type == YAML_SCALAR_NODE; i++)
@@ -165,7 +166,7 @@ static void refuse_part(struct walk *w, const struct cfg_key *key, uint32_t item
     cfg_fail_value(w->rd, key, item, line_of(w, node), "\"%s\" must say %s; allowed %s", figure_parts[part],
                    part == FIGURE_FROM         ? "where the figure is from"
                    : part == FIGURE_DEFINITION ? "how the width is defined"
-                                               : "it in words",
+                                               : "something in words",
                    words != NULL ? allowed : "a text in one line");
 }
 
@@ -318,7 +319,8 @@ static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item,
     }
 }
 
-/* The row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is not accepted for a key in a section. */
+/* Returns the row of a key below path, or NULL. A dotted key ("head.prr_hz: 1") is not accepted for a key in a
+ * section. */
 static const struct cfg_key *row_below(const struct walk *w, const char *path, const yaml_node_t *word)
 {
     char full[CFG_PATH_MAX];

@@ -14,7 +14,7 @@ struct cfg_document {
     struct cfg_document *values;                    /* values of --set, which live as long as this document */
 };
 
-/* The place of a mark, from 1: in a file its line, in a value of --set its character. */
+/* Returns the place of a mark, from 1: in a file its line, in a value of --set its character. */
 static inline int cfg_line_of(const struct cfg_reader *rd, yaml_mark_t mark)
 {
     return (int)(rd->set != NULL ? mark.index : mark.line) + 1;

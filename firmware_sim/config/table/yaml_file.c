@@ -32,7 +32,7 @@ static int read_bytes(struct cfg_reader *rd, unsigned char **bytes, size_t *len)
     return code;
 }
 
-/* Whether a line, counted from 1, begins with a tab after blanks. */
+/* Returns whether a line, counted from 1, begins with a tab after blanks. */
 static int indented_by_tab(const unsigned char *bytes, size_t len, int line)
 {
     const unsigned char *p = bytes, *end = bytes + len;

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+#include "drivers/record/scan_count.h"
+
+/* A repetition alone begins no scan: between scans it is that of the last one. If it has another number than the
+ * descriptor before, that of a new scan was lost. A head that was started again counts from 1 again, and so does its
+ * time. */
+static int scan_count_begins(const struct scan_count *count, const struct native_descriptor *d,
+                             const struct native_header *header)
+{
+    const int is_other = d->scan != count->number;
+    if ((header->flags & NATIVE_REPEAT) != 0) return count->within && is_other && count->number != 0 && d->scan != 0;
+    return !count->within || is_other || header->t_ns < count->t_ns;
+}
+
+void scan_count_frame(struct scan_count *count, const uint8_t *frame)
+{
+    struct native_header header;
+    struct native_descriptor d;
+    native_read_header(frame, &header);
+    int begins = header.type == NATIVE_POINTS && !count->within;
+    if (header.type == NATIVE_DESCRIPTOR &&
+        native_decode_descriptor(frame + NATIVE_HEADER_LEN, header.length, &d) == 0) {
+        begins = scan_count_begins(count, &d, &header);
+        count->number = d.scan;
+        count->t_ns = header.t_ns;
+    }
+    if (!begins) return;
+    count->n_scans++;
+    count->within = 1;
+}
