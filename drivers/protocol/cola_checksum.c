@@ -66,7 +66,7 @@ static size_t hex_of(const uint8_t *digits, size_t len)
     return v;
 }
 
-/* Bits of a hexadecimal digit; after any change of these it is still one. */
+/* Returns the bits of a hexadecimal digit that may change in any way: the character is still such a digit. */
 static uint8_t digit_bits(uint8_t c)
 {
     return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' || (c >= 'B' && c <= 'E') ? 1 : 0;

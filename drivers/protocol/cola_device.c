@@ -49,7 +49,7 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     for (const char *c = name; *c != '\0'; c++)
-        if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* a stored one is a line of the settings' file */
+        if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* mEEwriteall makes a line of the settings file of it */
     memcpy(self->set.location, name, sizeof name);
     return COLA_OK;
 }
@@ -172,7 +172,7 @@ int cola_start_scan(struct cola *self)
     const enum cola_head_state head = cola_ask_state(self);
     int refused = head == COLA_HEAD_FAULT || head == COLA_HEAD_UNKNOWN;
     if (head == COLA_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
-    self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before, or just now */
+    self->wants_scan = !refused; /* until the first scan has come, since somebody may stop the head before that */
     if (!refused) return 0;
     for (uint32_t i = 0; i < self->n_waiting; i++)
         cola_refuse(self, (enum cola_form)self->waiting_form[i], COLA_CONDITION);
@@ -198,12 +198,12 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
     if (error != COLA_OK) return error;
     self->measures = self->started = 0;
     self->wants_scan = self->n_waiting != 0; /* a poll is answered also where nothing is measured */
-    cola_ports_select(self);                 /* results of before would hide that nothing is watched */
+    cola_ports_select(self);                 /* old results would hide that nothing is watched now */
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }
 
-/* ---- forgetting */
+/* ---- defaults and reboot */
 
 enum cola_error cola_load_defaults(struct cola *self, struct cola_args *args, struct cola_out *out)
 {

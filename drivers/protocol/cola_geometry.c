@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* LMPscancfg and mLMPsetscancfg: line rate and step. They are the head's, so all its readers see another one. */
+/* LMPscancfg and mLMPsetscancfg: line rate and step. They belong to the head, so all its readers see a change. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -35,7 +35,7 @@ static double ask(struct cola *self, const char *query)
     return self->host.command(self->host.ctx, query, reply, sizeof reply) == 0 ? strtod(reply, NULL) : 0.0;
 }
 
-/* A head that scans reports its settings in the stream. A head at rest reports nothing there when it is set. */
+/* A head that scans reports its settings in the stream. A head at rest does not, so it is asked for them. */
 void cola_look_at_head(struct cola *self)
 {
     if (self->identity->n_geometries == 0) return;

@@ -127,7 +127,7 @@ NUMBERS(time_zone, zone, 1, 1)
 NUMBERS(time_update, update_s, 1, 4)
 NUMBERS(time_address, address, 4, 1)
 
-/* One of the times, in ns, of TIME:SERVer? STATe: 0 the limit, 1 the offset, 2 the delay. float, s */
+/* Writes one of the times of TIME:SERVer? STATe as a float, s: 0 the limit, 1 the offset, 2 the delay. */
 static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
 {
     char reply[PROTOCOL_REPLY];
@@ -151,7 +151,7 @@ enum cola_error cola_read_time_delay(struct cola *self, struct cola_args *args, 
     return put_answered(self, 2, args, out);
 }
 
-/* u16 year, 5 x u8, u32 us; u8 1: set. A clock that a time server sets can't be set so. */
+/* u16 year, 5 x u8, u32 us; u8 1: set. A client can't set the clock while a time server sets it. */
 enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     struct cola_date d = {.year = cola_arg_u(args, 2)};

@@ -11,7 +11,7 @@
 struct cola_way {
     uint32_t scan;
     int have_pose;
-    int64_t t0_ns, t1_ns; /* from the frame before to the last pose */
+    int64_t t0_ns, t1_ns; /* from the last pose of the frame before to the last pose */
     double at_m[3], path0_m, path1_m;
 };
 

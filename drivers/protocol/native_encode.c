@@ -9,7 +9,7 @@
 #include "drivers/protocol/native_rows.h"
 #include "drivers/protocol/native_waves.h"
 
-/* Header in front of the payload that already stands at dst + NATIVE_HEADER_LEN. */
+/* Writes the header before the payload that already stands at dst + NATIVE_HEADER_LEN. */
 static size_t put_header(uint8_t *dst, enum native_type type, int flags, size_t payload_len, int64_t t_ns)
 {
     dst[0] = NATIVE_SYNC;
@@ -133,13 +133,13 @@ size_t native_waves_bound(uint32_t n_points, uint32_t n_windows, uint32_t n_samp
     return (frames_bound(n_points) + windows / least) * (NATIVE_HEADER_LEN + NATIVE_WAVES_HEAD_LEN) + windows;
 }
 
-/* Every pulse has an entry whose echo number is 0 or 1, and it is its first. */
+/* The first entry of each pulse has the echo number 0 or 1, and no other entry has. */
 static int starts_pulse(uint8_t echo)
 {
     return (echo & 15) <= 1;
 }
 
-/* How many points from `first` on go into one frame. 0: a pulse of more echoes than a frame holds. */
+/* How many points from `first` on go into one frame. 0: a pulse has more echoes than a frame holds. */
 static uint32_t points_that_fit(const struct line_block *block, uint32_t first)
 {
     uint32_t n = block->n_points - first;
@@ -158,7 +158,7 @@ static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
     return pulses;
 }
 
-/* The entries of a block that go into one points frame, and what follows it. */
+/* The entries of a block that go into one points frame, and into the frames that follow it. */
 struct encode_cut {
     const struct line_block *block;
     struct native_points head;
@@ -166,7 +166,7 @@ struct encode_cut {
     uint32_t pulse0; /* after the block's */
     uint32_t dt0_ns; /* after the block's t0_ns */
     uint32_t wave;   /* first window that was not sent yet */
-    uint32_t n_lost; /* samples, to be said by the next frame of waveforms */
+    uint32_t n_lost; /* samples lost, which the next frame of waveforms reports */
     int is_last;
     int64_t t_ns; /* in the headers */
 };
@@ -195,7 +195,7 @@ static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *
     return put_header(dst, NATIVE_ATTRIBUTES, 0, payload_len, cut->t_ns);
 }
 
-/* Colours likewise. */
+/* Writes colours. */
 static size_t put_colours(uint8_t *dst, size_t cap, const struct encode_cut *cut)
 {
     const size_t len = (size_t)cut->head.n_points * NATIVE_COLOUR_LEN, payload_len = NATIVE_COLOURS_HEAD_LEN + len;
@@ -303,7 +303,7 @@ size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *b
     return done;
 }
 
-/* A name with its length in front; 0 when it is too long for either. */
+/* Writes a name with its length in front. Returns 0 where it is longer than 255 bytes, or than the room. */
 static size_t put_name(uint8_t *dst, size_t room, const char *name)
 {
     size_t len = strnlen(name, 256);

@@ -32,7 +32,7 @@ static int has_come(const struct native_sequence *s, const struct native_seen *f
     return 0;
 }
 
-/* The oldest range makes room. */
+/* Remembers a range of missing frames, in place of the oldest one where there is no room. */
 static void add_gap(struct native_sequence *s, uint32_t first, uint32_t n)
 {
     if (n == 0 || n > NATIVE_GAP_MOST) return;

@@ -27,7 +27,7 @@ enum {
     NATIVE_SEEN = 256,       /* frames that a repeated one is compared with */
     NATIVE_GAPS = 64,        /* ranges of missing frames that a late one may be of */
     NATIVE_GAP_MOST = 65536, /* frames in such a range: a larger one is not remembered */
-    NATIVE_LATE_RUN = 256,   /* so many late frames with consecutive numbers are another sequence */
+    NATIVE_LATE_RUN = 256,   /* late frames with consecutive numbers, which together are another sequence */
 };
 
 struct native_seen {
@@ -37,8 +37,8 @@ struct native_seen {
 };
 
 struct native_sequence {
-    int have;  /* a counted frame has come: */
-    int fresh; /* another connection has begun, and none has come on it yet */
+    int have;  /* 1: a counted frame has come. The members below are valid only then */
+    int fresh; /* 1: another connection has begun, and no counted frame has come on it yet */
     uint32_t next;
     uint32_t last_late, late_run; /* the last late frame, and how many came in a row up to it */
     uint32_t n_seen, n_gaps;      /* since the start; the last NATIVE_SEEN and NATIVE_GAPS of them are kept */

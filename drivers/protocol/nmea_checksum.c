@@ -6,7 +6,7 @@
 
 enum { TAIL_LEN = 3 }; /* "*hh" */
 
-/* The next sentence from *at on: from its "$" to its "*", which has two digits after it. Returns 0: there is none. */
+/* Finds the next sentence from *at on: *at is its "$", *star its "*", which two bytes follow. 0: there is none. */
 static int next_sentence(const uint8_t *bytes, size_t len, size_t *at, size_t *star)
 {
     while (*at < len) {
@@ -22,7 +22,7 @@ static int next_sentence(const uint8_t *bytes, size_t len, size_t *at, size_t *s
     return 0;
 }
 
-/* Bits of a digit; after any change of these it is still a digit. */
+/* Returns the bits of a digit that may change in any way: the character is still a digit. */
 static uint8_t digit_bits(uint8_t c)
 {
     return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' ? 1 : 0;

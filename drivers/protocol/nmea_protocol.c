@@ -19,7 +19,7 @@ static int nmea_protocol_create(const struct protocol_spec *spec, void **protoco
     return SH_OK;
 }
 
-/* The time of day may not be known yet: a file is opened before power-up. */
+/* The next fix is asked for later: a link of type file opens before power-up, when the time of day is not known. */
 static void open_at(void *protocol, int64_t t_ns)
 {
     struct receiver *self = protocol;

@@ -75,7 +75,7 @@ static int same_steps(const struct native_emitter *a, const struct native_emitte
            a->last_step == b->last_step && a->front_step == b->front_step && a->turn == b->turn;
 }
 
-/* Another speed leaves the turn at hand as it is. */
+/* An emitter frame that comes with another speed has the same steps, and leaves the turn at hand as it is. */
 static void take_emitter(struct planar_scan *s, const struct native_emitter *e)
 {
     if (same_steps(e, &s->emitter)) return;
@@ -97,7 +97,8 @@ static uint32_t planar_scan_place_of(const struct planar_scan *s, uint32_t pan)
 
 /* ---- turns */
 
-/* The turn that a frame belongs to. from_start: the frame has the pulse that is the turn's first. */
+/* Begins the turn that a frame belongs to, unless it is the one at hand. from_start: the frame has the first pulse of
+ * its turn. */
 static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, int64_t line_t0_ns, int from_start,
                     struct planar_news *news)
 {
@@ -183,7 +184,7 @@ static void planar_scan_take_points(struct planar_scan *s, const struct native_h
     end_if_whole(s, news);
 }
 
-/* Attributes of other points are ignored. Then the next frame finds that these points still lack theirs. */
+/* Attributes of other points are ignored. The next frame then breaks the turn, since these points still lack theirs. */
 static void take_attributes(struct planar_scan *s, const uint8_t *payload, const struct native_attributes *head,
                             struct planar_news *news)
 {

@@ -40,7 +40,7 @@ struct planar_echo {
 struct planar_turn {
     int64_t t0_ns;               /* device time of step 0 */
     uint32_t number;             /* of turns since the head's scan began; goes on over scans, and over lost turns */
-    uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, to PLANAR_ECHOES; PLANAR_UNSEEN */
+    uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, PLANAR_ECHOES at most; PLANAR_UNSEEN: no pulse came */
     struct planar_echo echo[PLANAR_MAX_STEPS][PLANAR_ECHOES]; /* in order of range */
 };
 
@@ -48,7 +48,7 @@ struct planar_scan {
     struct planar_head head;
     const struct planar_turn *whole; /* the last one; NULL: none yet, of these steps */
     int64_t t0_ns;                   /* of step 0 of the turn at hand or the last one; INT64_MIN: none yet */
-    /* inside */
+    /* the members below are for planar_scan.c alone */
     struct planar_turn *now; /* being filled: the one that is not `whole` */
     struct native_emitter emitter;
     uint32_t scan, line, number0; /* number0: turns of the scans before */
@@ -57,9 +57,9 @@ struct planar_scan {
     uint32_t n_seen;       /* places that have their pulse */
     double pan_counts, steps_per_count;
     uint32_t pan0_place; /* where pan count 0 is, 0..steps-1 */
-    /* the points frame before, for its attributes */
+    /* the last points frame, whose attributes come next */
     uint64_t pulse0;
-    uint32_t n_waiting;             /* points that have none yet */
+    uint32_t n_waiting;             /* points that have no attributes yet */
     uint16_t at[NATIVE_MAX_POINTS]; /* place * PLANAR_ECHOES + echo; UINT16_MAX: no place */
     struct planar_turn turn[2];     /* last: large, and not touched before a turn begins */
 };

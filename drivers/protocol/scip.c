@@ -103,8 +103,8 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
     if (news.whole || news.broken != 0) scip_scans_came(s, news);
 }
 
-/* The second RB was a second ago. The power cycle ends this session, too. Where there can't be one, as with a
- * recording, only this session begins anew. */
+/* Reboots a second after the second RB. The head's power cycle ends this session, too. Where there can't be one, as
+ * with a recording, only this session ends and begins anew. */
 static void reboot(struct scip *s)
 {
     const int refused = s->host.command(s->host.ctx, "HEAD:REBOOT", NULL, 0) != 0;

@@ -64,7 +64,7 @@ static const char *reboot(struct scip *s)
         s->reboot_ns = s->now_ns + SECOND_NS;
         return "00";
     }
-    scip_reply_begin(&s->reply, s->line, s->n_line, "01"); /* to the first of two it is no error */
+    scip_reply_begin(&s->reply, s->line, s->n_line, "01"); /* the first of two is not counted as wrong */
     scip_send(s);
     return NULL;
 }
@@ -206,7 +206,7 @@ static const char *check_tag(const char *tag, size_t len)
     return NULL;
 }
 
-/* NULL, or what is wrong with the line as such; n: its length without the tag and the ';' before it. */
+/* Checks name, tag and length of the line. n: its length without the tag and the ';' before it. NULL, or the status. */
 static const char *check_line(const struct scip *s, const struct command *c, size_t n)
 {
     const int time_alone = s->time_mode && (s->features & SCIP_TIME_ALONE) != 0;

@@ -36,7 +36,7 @@ void scip_laser_off(struct scip *s)
     scip_answer(s, s->single.echo, s->single.echo_len, "10");
 }
 
-/* Numbers first, then what they say: 01 start, 02 end, 03 cluster, 06 skip, 07 count. */
+/* First all must be numbers: 01 start, 02 end, 03 cluster, 06 skip, 07 count. Then their values are checked. */
 static const char *read_request(struct scip_request *q, const char *line, int streams, int32_t last)
 {
     q->start = scip_number(line + 2, 4);
@@ -97,8 +97,8 @@ const char *scip_measure(struct scip *s)
     return "00";
 }
 
-/* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. After the
- * first scan a stop is meant, and is left alone. */
+/* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. Once a scan
+ * has come, somebody who stops the head means it, and it is not started again. */
 static void wake_head(struct scip *s)
 {
     const int waits = s->single.active || (s->stream.active && s->stream.sent == 0);
@@ -114,12 +114,12 @@ void scip_measure_time(struct scip *s)
     scip_answer(s, s->single.echo, s->single.echo_len, "0A");
 }
 
-/* A scan to be sent. */
+/* A scan that is being sent. */
 struct measured {
     const struct planar_head *head;
     const struct planar_turn *turn;
     double mm_per_count;
-    uint32_t min_mm; /* what is less is an error */
+    uint32_t min_mm; /* smaller ranges are sent as an error */
 };
 
 static uint32_t range_mm(const struct measured *m, const struct planar_echo *echo)
@@ -128,8 +128,8 @@ static uint32_t range_mm(const struct measured *m, const struct planar_echo *ech
     return mm < 4e9 ? (uint32_t)(mm + 0.5) : UINT32_MAX;
 }
 
-/* The root of the power: 100 at the detection threshold or, without amplitudes, 1000 for a matt white surface at
- * zero incidence. */
+/* An intensity is proportional to the root of the power. With amplitudes it is 100 at the detection threshold, else
+ * 1000 for a matt white surface at zero incidence. */
 static uint32_t intensity_of(const struct measured *m, const struct planar_echo *echo)
 {
     const int amplitudes = m->head->attributes;

@@ -97,8 +97,8 @@ void scip_measure_time(struct scip *s);
 
 /* scip_simulate.c */
 scip_handler scip_simulate;
-/* To be called before a scan of the stream. NULL: it is sent; "": it is not; else the status that is sent in its
- * place, of which 50 ends the stream. */
+/* Is called before each scan of the stream. NULL: the scan is sent; "": nothing is sent; else this status is sent in
+ * its place, and 50 ends the stream. */
 const char *scip_simulated(struct scip *s);
 
 #endif

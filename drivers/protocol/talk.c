@@ -71,8 +71,8 @@ static void talk_begin(struct capture_session *s, int run, int request)
     }
 }
 
-/* A request waits while no place is free. From a device that speaks in turns it also waits for the beginning of the
- * answer to the one before, which it would end. */
+/* A request waits while no place is free. If the device speaks in turns, it also waits until the answer to the request
+ * before has begun: it would end that answer. */
 static int must_wait(const struct capture_session *s)
 {
     const int takes_turns = s->talk->kind->stops == NULL;

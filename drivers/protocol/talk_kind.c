@@ -67,7 +67,7 @@ static int cola_answers(const uint8_t *request, size_t request_len, const uint8_
     return 0;
 }
 
-/* 1: "sEN name 1" or 0, of which `on` says which. */
+/* Whether it is "sEN name 1" (on 1) or "sEN name 0" (on 0). */
 static int is_event(const struct telegram *t, int on)
 {
     const size_t n = words_len(t, 2);
@@ -75,7 +75,7 @@ static int is_event(const struct telegram *t, int on)
     return (t->text[n + 1] & 1) == on; /* 0 or 1 as a digit or as a byte */
 }
 
-/* Whether these, as "sMN LMCstopmeas", are the telegram's first two words. */
+/* Whether the telegram's first two words are these, such as "sMN LMCstopmeas". */
 static int begins(const struct telegram *t, const char *words)
 {
     const size_t n = strlen(words);
@@ -106,7 +106,7 @@ static int cola_stops(const uint8_t *request, size_t len, const uint8_t *began, 
     return words_len(&then, 2) == n && memcmp(now.text, then.text, n) == 0;
 }
 
-/* sFA, and that the variable, the method or the event is not known. */
+/* Writes sFA with the error of an unknown variable, method or event. */
 static size_t cola_error(const uint8_t *request, size_t len, uint8_t *to)
 {
     const struct telegram t = cola_inside(request, len);
@@ -157,7 +157,7 @@ static size_t scip_answer_len(const uint8_t *bytes, size_t len)
     return 0;
 }
 
-/* Without its end. */
+/* Length of the first line, without its end. */
 static size_t scip_line(const uint8_t *bytes, size_t len)
 {
     size_t n = 0;
@@ -203,7 +203,7 @@ static int scip_stops(const uint8_t *request, size_t len, const uint8_t *began, 
     return scip_count_at(request, len) != 0;
 }
 
-/* The request again, and 0E with its checksum: the command is not known. */
+/* Repeats the request, and adds 0E with its checksum: the command is not known. */
 static size_t scip_error(const uint8_t *request, size_t len, uint8_t *to)
 {
     static const char status[] = "\n0Ee\n\n"; /* ('0' + 'E') & 0x3f, and 0x30 more */

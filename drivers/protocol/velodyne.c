@@ -97,7 +97,7 @@ static void take_descriptor(struct velodyne *v, const uint8_t *payload, size_t l
     v->azimuth_per_count = 36000.0 / (d.pan_counts_per_turn > 0.0 ? d.pan_counts_per_turn : 4294967296.0);
 }
 
-/* Models by the elevations of their beams in the order of firing, which is the order in a packet. 0: none of them. */
+/* Finds the model by the elevations of the beams in the order of firing, as packets have it. 0: none has them. */
 static uint8_t model_of(const struct native_beam *beam)
 {
     static const struct {

@@ -9,7 +9,7 @@
 #include "drivers/protocol/velodyne.h"
 #include "drivers/protocol/velodyne_settings.h"
 
-/* Being written. */
+/* A document that is being written. */
 struct page {
     const struct protocol_spec *spec;
     struct velodyne_state state;

@@ -182,7 +182,7 @@ static int set_phase(const struct posted *p, const char *value, int apply)
     return apply ? command(p, line) : 200;
 }
 
-/* Only offset counts; but what the device doesn't take is refused. */
+/* offsetInput has no effect, but a value that the device doesn't take is refused. */
 static int check_phase_input(const struct posted *p, const char *value, int apply)
 {
     double deg;
@@ -190,14 +190,14 @@ static int check_phase_input(const struct posted *p, const char *value, int appl
     return read_decimal(value, 360.0, &deg) ? 200 : refuse(p, 400, "offsetInput: allowed are 0 to 359.99, in degrees");
 }
 
-/* A head without a place for settings takes it, too: clients expect that a device does. */
+/* A head without a settings file takes it, too, and stores nothing: clients expect that a device takes it. */
 static int save(const struct posted *p, const char *value, int apply)
 {
     if (strcasecmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");
     return apply && p->spec->keeps ? command(p, "HEAD:STORE") : 200;
 }
 
-/* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */
+/* Sets what power-up sets, and starts the scan. The device is silent for some seconds then; this head is not. */
 static int reset(const struct posted *p, const char *value, int apply)
 {
     if (strcasecmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
@@ -272,7 +272,7 @@ static const struct setting *find_setting(const char *path, const char *key)
     return NULL;
 }
 
-/* One key=value of len characters, with room for a NUL behind it. */
+/* Reads one key=value of len characters, with room for a NUL after it. */
 static int read_pair(const struct posted *p, const char *path, char *s, size_t len, struct pair *out)
 {
     char *equals = memchr(s, '=', len);
