@@ -30,7 +30,7 @@ struct http_request {
     char method[8], path[64]; /* the path without its query; one that is too long is cut, and so unknown */
     int minor;                /* of HTTP/1.x */
     int keep_alive;
-    int foreign;      /* it has an Origin that is not this server: a browser sends it for a page from elsewhere */
+    int foreign;      /* it has an Origin that is, or may be, another server: a browser sends it for a page from there */
     const char *body; /* body_len bytes */
     size_t body_len;
 };
