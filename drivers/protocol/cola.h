@@ -197,17 +197,6 @@ cola_handler cola_set_clock, cola_read_time_role, cola_write_time_role, cola_rea
 
 /* cola_device.c: identity, states and log-in. */
 
-enum cola_head_state {
-    COLA_HEAD_UNKNOWN = -1,
-    COLA_HEAD_OFF,
-    COLA_HEAD_BOOT,
-    COLA_HEAD_IDLE,
-    COLA_HEAD_SPIN_UP,
-    COLA_HEAD_SCANNING,
-    COLA_HEAD_SPIN_DOWN,
-    COLA_HEAD_FAULT
-};
-enum cola_head_state cola_ask_state(struct cola *self);
 /* Starts the head's scan if it rests. Returns 1 where that is not possible; polls that wait are then refused. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,

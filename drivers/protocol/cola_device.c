@@ -56,24 +56,14 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
 
 /* ---- states */
 
-enum cola_head_state cola_ask_state(struct cola *self)
-{
-    static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
-    char state[PROTOCOL_REPLY] = "";
-    if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return COLA_HEAD_UNKNOWN;
-    for (int i = COLA_HEAD_OFF; i <= COLA_HEAD_FAULT; i++)
-        if (strcmp(names[i], state) == 0) return (enum cola_head_state)i;
-    return COLA_HEAD_UNKNOWN;
-}
-
 enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     enum { BUSY, READY, ERROR };
-    const enum cola_head_state head = cola_ask_state(self);
-    if (head == COLA_HEAD_FAULT)
+    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    if (head == PROTOCOL_HEAD_FAULT)
         cola_put_u(out, 1, ERROR);
     else
-        cola_put_u(out, 1, head <= COLA_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
+        cola_put_u(out, 1, head <= PROTOCOL_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
     return cola_args_end(args);
 }
 
@@ -83,8 +73,8 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
     enum { UNDEFINED, INITIALISATION, CONFIGURATION, REST, ROTATES, PREPARATION, READY, MEASURES };
     static const uint8_t states[] = {INITIALISATION, INITIALISATION, REST, PREPARATION, MEASURES, ROTATES, UNDEFINED};
     const struct cola_date d = cola_date_of(cola_clock_ns(self, self->now_ns));
-    const enum cola_head_state head = cola_ask_state(self);
-    uint32_t state = head == COLA_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
+    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    uint32_t state = head == PROTOCOL_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
     char text[40];
     if (state == MEASURES && !self->measures) state = READY;
     cola_put_u(out, 2, state);
@@ -169,9 +159,9 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 
 int cola_start_scan(struct cola *self)
 {
-    const enum cola_head_state head = cola_ask_state(self);
-    int refused = head == COLA_HEAD_FAULT || head == COLA_HEAD_UNKNOWN;
-    if (head == COLA_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
+    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    int refused = head == PROTOCOL_HEAD_FAULT || head == PROTOCOL_HEAD_UNKNOWN;
+    if (head == PROTOCOL_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
     self->wants_scan = !refused; /* until the first scan has come, since somebody may stop the head before that */
     if (!refused) return 0;
     for (uint32_t i = 0; i < self->n_waiting; i++)

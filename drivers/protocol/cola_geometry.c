@@ -40,7 +40,7 @@ void cola_look_at_head(struct cola *self)
 {
     if (self->identity->n_geometries == 0) return;
     self->head = self->scan.head;
-    if (!self->head.known || cola_ask_state(self) == COLA_HEAD_SCANNING) return;
+    if (!self->head.known || protocol_ask_state(&self->host) == PROTOCOL_HEAD_SCANNING) return;
     const double lines_hz = ask(self, "HEAD:LINes?"), step_deg = ask(self, "SCAN:STEP?");
     if (lines_hz > 0.0 && step_deg > 0.0)
         take_geometry(&self->head, (int64_t)(lines_hz * 1e6 + 0.5), (uint32_t)(360.0 / step_deg + 0.5));
@@ -117,10 +117,10 @@ static enum cola_error set_head(struct cola *self)
     return COLA_OK;
 }
 
-static int is_turning(struct cola *self)
+static int is_turning(const struct cola *self)
 {
-    const enum cola_head_state state = cola_ask_state(self);
-    return state == COLA_HEAD_SPIN_UP || state == COLA_HEAD_SCANNING;
+    const enum protocol_head_state state = protocol_ask_state(&self->host);
+    return state == PROTOCOL_HEAD_SPIN_UP || state == PROTOCOL_HEAD_SCANNING;
 }
 
 /* A scanner takes another geometry only before it was told to measure, or after it was stopped. */

@@ -4,11 +4,6 @@
 #include <string.h>
 #include <strings.h>
 
-void http_reader_init(struct http_reader *r)
-{
-    memset(r, 0, sizeof *r);
-}
-
 size_t http_reader_add(struct http_reader *r, const uint8_t *bytes, size_t len)
 {
     const size_t room = sizeof r->bytes - 1 - r->len;

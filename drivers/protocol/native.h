@@ -54,17 +54,6 @@ enum native_flags {
     NATIVE_LOCAL = 1 << 1,  /* made for this reader alone: seq is 0 and not counted */
 };
 
-/* Frame header, 28 bytes:
- *  0 u8  sync 0xd5      1 u8 type     2 u8 version    3 u8 flags
- *  4 u32 payload length 8 u32 seq    12 u32 CRC-32C of the payload
- * 16 i64 device time, ns since power-up (of the first pulse, for points)
- * 24 u32 CRC-32C of bytes 0..23 */
-struct native_header {
-    uint8_t type, version, flags;
-    uint32_t length, seq, payload_crc;
-    int64_t t_ns;
-};
-
 /* The header of the whole frame at `frame`. */
 void native_read_header(const uint8_t *frame, struct native_header *header);
 /* Bytes of that frame: header and payload. The one place that knows where its length stands. */

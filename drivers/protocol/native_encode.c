@@ -172,7 +172,7 @@ struct encode_cut {
 };
 
 /* Attributes and colours begin alike. */
-static void put_beside_head(uint8_t *dst, const struct encode_cut *cut)
+static void put_attributes_head(uint8_t *dst, const struct encode_cut *cut)
 {
     const struct native_attributes head = {cut->head.pulse0, cut->head.line, cut->head.n_points};
     fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
@@ -187,7 +187,7 @@ static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *
     const size_t payload_len = NATIVE_ATTRIBUTES_HEAD_LEN + n * each;
     uint8_t *at = dst + NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
-    put_beside_head(dst, cut);
+    put_attributes_head(dst, cut);
     for (uint32_t i = cut->first; i < end; i++, at += NATIVE_ATTRIBUTE_LEN)
         le_put32(at, (uint16_t)block->amplitude_cdb[i] | (uint32_t)block->width_cns[i] << 16);
     for (uint32_t i = cut->first; block->deviation != NULL && i < end; i++, at += NATIVE_DEVIATION_LEN)
@@ -200,7 +200,7 @@ static size_t put_colours(uint8_t *dst, size_t cap, const struct encode_cut *cut
 {
     const size_t len = (size_t)cut->head.n_points * NATIVE_COLOUR_LEN, payload_len = NATIVE_COLOURS_HEAD_LEN + len;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
-    put_beside_head(dst, cut);
+    put_attributes_head(dst, cut);
     memcpy(dst + NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN, cut->block->rgb + cut->first, len);
     return put_header(dst, NATIVE_COLOURS, 0, payload_len, cut->t_ns);
 }
@@ -259,7 +259,7 @@ static size_t put_waves(uint8_t *dst, size_t cap, struct encode_cut *cut)
 }
 
 /* Writes what follows a points frame: *len bytes. SH_ENOMEM: there is no room. */
-static int put_beside(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *len)
+static int put_following(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *len)
 {
     size_t done = 0, more = 1;
     if (cut->block->width_cns != NULL) done += more = put_attributes(dst, cap, cut);
@@ -272,7 +272,7 @@ static int put_beside(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *
 
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns)
 {
-    size_t done = 0, beside;
+    size_t done = 0, following;
     struct encode_cut cut = {.block = block};
     do {
         const uint32_t n = points_that_fit(block, cut.first);
@@ -295,8 +295,8 @@ size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *b
         if (native_put_rows(payload + NATIVE_POINTS_HEAD_LEN, block, cut.first, n, cut.dt0_ns) != 0) return 0;
         done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, cut.t_ns);
         if (cut.is_last && block->waves != NULL) cut.n_lost = block->waves->n_left_out;
-        if (put_beside(dst + done, cap - done, &cut, &beside) != SH_OK) return 0;
-        done += beside;
+        if (put_following(dst + done, cap - done, &cut, &following) != SH_OK) return 0;
+        done += following;
         cut.pulse0 += cut.head.n_pulses;
         cut.first += n;
     } while (cut.first < block->n_points);

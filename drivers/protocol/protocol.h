@@ -55,6 +55,18 @@ enum protocol_dialect {
     PROTOCOL_COLA_B,
 };
 
+/* States of the head, in the order of telemetry. */
+enum protocol_head_state {
+    PROTOCOL_HEAD_UNKNOWN = -1,
+    PROTOCOL_HEAD_OFF,
+    PROTOCOL_HEAD_BOOT,
+    PROTOCOL_HEAD_IDLE,
+    PROTOCOL_HEAD_SPIN_UP,
+    PROTOCOL_HEAD_SCANNING,
+    PROTOCOL_HEAD_SPIN_DOWN,
+    PROTOCOL_HEAD_FAULT
+};
+
 /* Counts of a session, besides the frames it lost. */
 enum protocol_count {
     PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
@@ -201,9 +213,16 @@ struct protocol_ops {
     int64_t (*next_ns)(const void *protocol);
 };
 
+/* Asks the head for its state (HEAD:STATe?). */
+enum protocol_head_state protocol_ask_state(const struct protocol_host *host);
+
 /* protocol_ops.input of a protocol that takes no bytes: counts them as lost. Its session begins with its struct
  * protocol_host. */
 void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len);
+
+/* For protocol_ops.content: the bits of a hexadecimal digit that may change in any way. The character is then still a
+ * digit, of 0 to 9 if it was. */
+uint8_t protocol_digit_bits(uint8_t c);
 
 /* From the one list, in protocol.c. NULL for an unknown id. */
 const struct protocol_ops *protocol_ops_get(enum protocol_id id);

@@ -18,10 +18,10 @@ const char *scip_laser_on(struct scip *s)
 {
     enum { LATELY_NS = 500000000 };
     const int scans = s->scan.t0_ns != INT64_MIN && native_since_ns(s->now_ns, s->scan.t0_ns) < LATELY_NS;
-    const enum scip_head head = scans ? SCIP_HEAD_WORKS : scip_head_state(s);
-    if (head == SCIP_HEAD_HAS_FAILED) return "50";
-    if (head == SCIP_HEAD_BOOTS) return "10";
-    if (head == SCIP_HEAD_IS_IDLE && s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
+    const enum protocol_head_state head = scans ? PROTOCOL_HEAD_SCANNING : protocol_ask_state(&s->host);
+    if (head == PROTOCOL_HEAD_FAULT) return "50";
+    if (scip_boots(head)) return "10";
+    if (head == PROTOCOL_HEAD_IDLE && s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
     if (!s->laser) s->laser_ns = s->now_ns;
     s->laser = 1;
     s->asleep = 0;

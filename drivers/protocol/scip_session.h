@@ -71,9 +71,11 @@ typedef const char *scip_handler(struct scip *s);
 int32_t scip_number(const char *text, size_t len);
 
 /* scip_info.c: VV, PP, II, %ST. */
-enum scip_head { SCIP_HEAD_WORKS, SCIP_HEAD_IS_IDLE, SCIP_HEAD_BOOTS, SCIP_HEAD_HAS_FAILED };
-/* The head is asked for its state. */
-enum scip_head scip_head_state(struct scip *s);
+/* Whether the head boots, or has no power. */
+static inline int scip_boots(enum protocol_head_state head)
+{
+    return head == PROTOCOL_HEAD_BOOT || head == PROTOCOL_HEAD_OFF;
+}
 scip_handler scip_info_version, scip_info_parameters, scip_info_state, scip_info_state_number;
 /* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
 uint64_t scip_lines_uhz(struct scip *s, const char *query);

@@ -249,7 +249,7 @@ static void open_at(void *protocol, int64_t t_ns)
 }
 
 /* Requests are taken with the next tick: all the pieces of one that came together are there by then. */
-static void input(void *protocol, const uint8_t *bytes, size_t len)
+static void talk_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct capture_session *s = protocol;
     const uint32_t n = (uint32_t)len;
@@ -301,7 +301,7 @@ const struct protocol_ops protocol_capture = {
     .destroy = free,
     .open = open_at,
     .time = talk_time,
-    .input = input,
+    .input = talk_input,
     .takes = takes,
     .owes = owes,
     .next_ns = talk_next_ns,

@@ -143,13 +143,6 @@ const struct talk_kind talk_bytes = {.name = "bytes"};
 
 /* ---- Hokuyo SCIP: a line, and an answer that begins with it and ends with an empty line (SCIP.md) */
 
-static size_t scip_request_len(const uint8_t *bytes, size_t len)
-{
-    for (size_t i = 0; i < len; i++)
-        if (bytes[i] == '\n' || bytes[i] == '\r') return i + 1;
-    return 0;
-}
-
 static size_t scip_answer_len(const uint8_t *bytes, size_t len)
 {
     for (size_t i = 1; i < len; i++)
@@ -164,6 +157,12 @@ static size_t scip_line(const uint8_t *bytes, size_t len)
     while (n < len && bytes[n] != '\n' && bytes[n] != '\r')
         n++;
     return n;
+}
+
+static size_t scip_request_len(const uint8_t *bytes, size_t len)
+{
+    const size_t n = scip_line(bytes, len);
+    return n < len ? n + 1 : 0;
 }
 
 static int is_scan(const uint8_t *message, size_t len)

@@ -260,7 +260,7 @@ static void velodyne_take_event(struct velodyne *v, const uint8_t *payload, size
     if (e.code == NATIVE_EV_SCAN_END || e.code == NATIVE_EV_SCAN_START) fall_out_of_step(v);
 }
 
-static void frame(void *protocol, const uint8_t *bytes, size_t len)
+static void velodyne_take_frame(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct velodyne *v = protocol;
     const uint8_t *payload = bytes + NATIVE_HEADER_LEN;
@@ -273,7 +273,7 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
     if (header.type == NATIVE_EVENT) velodyne_take_event(v, payload, len);
 }
 
-static void gap(void *protocol, uint32_t n_frames)
+static void velodyne_take_gap(void *protocol, uint32_t n_frames)
 {
     struct velodyne *v = protocol;
     (void)n_frames;
@@ -337,8 +337,8 @@ const struct protocol_ops protocol_velodyne = {
     .create = velodyne_create,
     .destroy = free,
     .open = nothing_at,
-    .frame = frame,
-    .gap = gap,
+    .frame = velodyne_take_frame,
+    .gap = velodyne_take_gap,
     .time = nothing_at,
     .input = protocol_lose_input,
     .next_ns = never,

@@ -28,7 +28,6 @@ static int velodyne_http_create(const struct protocol_spec *spec, void **protoco
     struct server *s = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne settings");
     s->spec = *spec;
-    http_reader_init(&s->reader);
     *protocol = s;
     return SH_OK;
 }
@@ -136,7 +135,7 @@ static void serve(struct server *s)
     }
 }
 
-static void input(void *protocol, const uint8_t *bytes, size_t len)
+static void velodyne_http_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct server *s = protocol;
     while (len > 0 && !s->over) {
@@ -194,7 +193,7 @@ const struct protocol_ops protocol_velodyne_http = {
     .destroy = free,
     .open = open_at,
     .time = at_time,
-    .input = input,
+    .input = velodyne_http_input,
     .owes = owes,
     .next_ns = next_ns,
 };

@@ -57,9 +57,8 @@ static int read_switch(const char *s, int *on)
 
 static int is_scanning(const struct protocol_spec *spec)
 {
-    char state[16];
-    ask(spec, "HEAD:STATE?", state, sizeof state);
-    return strcasecmp(state, "scanning") == 0 || strcasecmp(state, "spin-up") == 0;
+    const enum protocol_head_state state = protocol_ask_state(&spec->host);
+    return state == PROTOCOL_HEAD_SCANNING || state == PROTOCOL_HEAD_SPIN_UP;
 }
 
 static int set_laser(const struct posted *p, const char *value, int apply)

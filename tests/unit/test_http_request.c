@@ -156,11 +156,8 @@ static void test_pages_from_elsewhere(void **state)
     static const struct {
         const char *host; /* also that of the Origin */
         int status;
-    } same[] = {{"localhost:80", 200},
-                {"[::1]:8080", 200},
-                {"lidar", 200},
-                {"10.0.0.7", 200},
-                {"evil.example", 403}, /* its name may point to this machine: DNS rebinding */
+    } same[] = {{"localhost:80", 200}, {"[::1]:8080", 200},   {"lidar", 200},
+                {"10.0.0.7", 200},     {"evil.example", 403}, /* its name may point to this machine: DNS rebinding */
                 {"10.0.0.7.evil", 403}};
     char text[256];
     for (size_t i = 0; i < sizeof same / sizeof same[0]; i++) {
