@@ -72,7 +72,7 @@ struct cola {
     int64_t now_ns;
     int64_t power_ns; /* device time of power-up: its clock begins there */
     uint32_t power_ons;
-    uint32_t near_wrap;         /* counters begin so many below their wrap */
+    uint32_t near_wrap;         /* how far below their wrap counters begin; 0: they begin at 0 */
     int streams;                /* sEN LMDscandata 1 */
     enum cola_form stream_form; /* of telegrams without a request */
     int pending;                /* a scan is done and not yet looked at */

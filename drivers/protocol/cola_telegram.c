@@ -66,7 +66,7 @@ uint32_t cola_arg_u(struct cola_args *args, unsigned bytes)
     return v;
 }
 
-/* Two's complement of so many bytes. */
+/* The value of v as two's complement of 1, 2 or 4 bytes. */
 static int32_t extend(uint32_t v, unsigned bytes)
 {
     const uint32_t half = most(bytes) / 2 + 1;

@@ -147,7 +147,7 @@ struct native_anchor {
     uint32_t station; /* number, from 1 */
     uint32_t moving;  /* enum native_moving */
     double anchor[3]; /* of the station in the CRS, metres; geodetic: degrees, degrees, metres */
-    double scale_m;   /* geo: a count is at most so many metres on the ground */
+    double scale_m;   /* geo: upper bound of a count's length on the ground, metres */
     double lat_deg, lon_deg, height_m;
     double station_m[3]; /* of the station in the scene frame */
     double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */

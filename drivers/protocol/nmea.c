@@ -8,7 +8,7 @@
 
 static const double KNOT_M_S = 1852.0 / 3600.0;
 
-/* A sentence being written. Text without room is left out, and the length counts it all the same. */
+/* A sentence being written. Text without room is left out, but the length counts it. */
 struct sentence {
     char *dst;
     size_t cap, len;

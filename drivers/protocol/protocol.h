@@ -101,7 +101,7 @@ struct protocol_host {
      * ahead may still change: asked again, the answer may be a later time. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
     /* Returns the state of the receiver's pulses per second at a device time. *hour_ns is the head's time since the top
-     * of the hour at that time. What pulses and sentences have not set of it counts from power-up. */
+     * of the hour at that time. The part that pulses and sentences have not set counts from power-up. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
     /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has
      * set it, it is UTC, or the time since power-up. */
@@ -145,7 +145,7 @@ struct protocol_spec {
     struct protocol_host host;
     int64_t power_ns;         /* device time of the last power-up, from which the device's counters count */
     uint32_t power_ons;       /* how often power has come, by power cycles and reboots, with the first time */
-    uint32_t near_wrap;       /* counters begin so many below their wrap; 0: at 0 */
+    uint32_t near_wrap;       /* how far below their wrap counters begin; 0: they begin at 0 */
     int keeps;                /* 1: store() and HEAD:STORe work; else the device forgets all settings without power */
     const char *stored;       /* what store() has kept; "": nothing. NULL: as "". Valid during create */
     int dialect;              /* enum protocol_dialect: the one that the link is configured for */
@@ -206,7 +206,7 @@ struct protocol_ops {
     /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
      * takes time. 0: its session ends. May be NULL: they come without being asked for. */
     int (*owes)(const void *protocol);
-    /* The client has gone. What it asked for may still have to be done, such as a reboot. May be NULL. */
+    /* The client has gone. Something that it asked for may still be due, such as a reboot. May be NULL. */
     void (*gone)(void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
      * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */

@@ -147,7 +147,7 @@ static int n_echoes(const struct measured *m, int32_t number)
     return n < SCIP_MAX_ECHOES ? n : SCIP_MAX_ECHOES;
 }
 
-/* The step that stands for a cluster: the one of the least range, or its first where there is none. */
+/* The step that stands for a cluster: that with the smallest range, or the first one where no step has a range. */
 static int32_t nearest(const struct measured *m, int32_t from, int32_t to)
 {
     int32_t best = -1;

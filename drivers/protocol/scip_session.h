@@ -79,7 +79,7 @@ static inline int scip_boots(enum protocol_head_state head)
 scip_handler scip_info_version, scip_info_parameters, scip_info_state, scip_info_state_number;
 /* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
 uint64_t scip_lines_uhz(struct scip *s, const char *query);
-/* Rounded; 0 where there is no such range. */
+/* A range in whole millimetres, rounded; 0 where it is not above 0, or not below 4000 km. */
 uint32_t scip_millimetres(double range_m);
 
 /* scip_measure.c */

@@ -1173,7 +1173,7 @@ local function new_flow()
           line = {pulses = 0, whole = false}}
 end
 
--- What the first look at each packet found, by packet number and content. Positions can't be the key, since Wireshark
+-- Results of the first look at each packet, by packet number and content. Positions can't be the key, since Wireshark
 -- may cut the same bytes otherwise at the next look. Equal contents share a list, which is taken in turns.
 local memo
 
@@ -1365,8 +1365,8 @@ function Search:look_text()
 end
 
 -- Returns nothing if all bytes are used. Else the place where it waits, the number of bytes that it waits for (nil: not
--- known), and whether TCP must not join them. It must not where items before the place were found with bytes from
--- beyond it, or where the place lies within the bytes that the last search has kept.
+-- known), and whether TCP must not join them. TCP must not in two cases: items before the place were found with bytes
+-- from beyond it, or the place lies within bytes that the last search has kept.
 function Search:run()
   local waits, more
   while self.at < self.len and not waits do
