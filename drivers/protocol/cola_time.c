@@ -37,7 +37,8 @@ static int set_clock(struct cola *self, int64_t ns)
     if (self->host.command(self->host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
         sscanf(reply, "%" SCNd64, &shift_ns) != 1)
         return 0;
-    shift_ns += ns - cola_clock_ns(self, self->now_ns);
+    /* In this order each difference has room: the second operand is the clock's time without a shift. */
+    shift_ns = ns - (cola_clock_ns(self, self->now_ns) - shift_ns);
     snprintf(line, sizeof line, "TIME:SHIFt %" PRId64, shift_ns);
     return self->host.command(self->host.ctx, line, NULL, 0) == 0;
 }

@@ -234,7 +234,9 @@ static void take_requests(struct capture_session *s)
         talk_lose(s, s->len);
         s->len = 0;
     }
-    if (s->is_over) s->len = 0;
+    if (!s->is_over) return;
+    s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->len);
+    s->len = 0;
 }
 
 /* ---- the protocol */
