@@ -67,7 +67,7 @@ struct cola {
     } ports;
     struct cola_fields fields;
     struct cola_watch watch;
-    int wants_scan; /* measurement was asked for, and no scan has come yet; try_ns: when to look at the head next */
+    int wants_scan; /* a scan was asked for, and none has come yet; try_ns: when to look at the head next */
     int64_t try_ns;
     int64_t now_ns;
     int64_t power_ns; /* device time of power-up: its clock begins there */

@@ -49,7 +49,7 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     for (const char *c = name; *c != '\0'; c++)
-        if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* mEEwriteall makes a line of the settings file of it */
+        if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* mEEwriteall writes it as a line of the settings file */
     memcpy(self->set.location, name, sizeof name);
     return COLA_OK;
 }

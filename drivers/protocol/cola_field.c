@@ -171,7 +171,7 @@ enum cola_error cola_record_shape(const struct cola_record *r, const struct plan
 
 /* ---- a shape as a record */
 
-/* The scale is such that the farthest place has a count. */
+/* A length in counts of the record's scale. The farthest place of the shape still fits (scale_of). */
 static uint16_t counts_of(const struct cola_record *r, double um)
 {
     return (uint16_t)lround(um / MM_UM / (double)r->scale);

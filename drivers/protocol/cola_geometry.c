@@ -15,7 +15,7 @@ const struct planar_head *cola_head(const struct cola *self)
     return self->identity->n_geometries != 0 ? &self->head : &self->scan.head;
 }
 
-/* The same beams with other steps: one geometry divides the other evenly. */
+/* Gives a head another line rate and step at the same angles: one number of steps divides the other, so ends stay. */
 static void take_geometry(struct planar_head *h, int64_t lines_uhz, uint32_t steps)
 {
     const int64_t had = h->steps;

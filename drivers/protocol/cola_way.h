@@ -16,11 +16,11 @@ struct cola_way {
 };
 
 struct cola_encoder {
-    int32_t path_mm; /* since the head's scan began, or the client came; 0: a head that stands */
+    int32_t path_mm; /* since the head's scan began, or the client came; 0 where the head does not move */
     int16_t speed_mm_s;
 };
 
-/* A payload of poses. Where the scan has another number, the way begins anew. */
+/* A payload of poses. Where the scan has another number, the path begins at 0 again. */
 void cola_way_add(struct cola_way *w, uint32_t scan, const uint8_t *payload, size_t len);
 struct cola_encoder cola_way_at(const struct cola_way *w, uint32_t scan, int64_t t_ns);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The head of a request of HTTP/1.x: its lines, as RFC 9112 has them. For the web link and the settings of a VLP-16.
+/* The head of a request of HTTP/1.x: its lines, as RFC 9112 has them. The web link and the settings of a VLP-16 use it.
  *
  * Bytes from a client go in. Texts within these bytes come out, or the status that answers a broken head. A bare LF
  * ends a line, too. Pure; allocates nothing; any thread. */
@@ -53,7 +53,7 @@ struct http_field {
 /* "Host: localhost": 0 or 400. */
 int http_read_field(struct http_text line, struct http_field *out);
 
-/* Decimal digits alone; a number above a million becomes some number above a million. 0 or 400. */
+/* Reads decimal digits. Numbers above a million stay above a million, but are not exact. 0 or 400. */
 int http_read_length(struct http_text text, size_t *out);
 
 struct http_place {

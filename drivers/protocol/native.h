@@ -394,7 +394,7 @@ enum native_item native_parser_next(struct native_parser *parser);
  * one come out at the end of a recording, too. */
 void native_parser_finish(struct native_parser *parser);
 /* After native_parser_finish() and all its items: bytes of another connection to the same head will follow.
- * Counters and sequence go on; native_sequence_resume(). Items that were not taken are bad bytes. */
+ * Counters and sequence go on (native_sequence_resume). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
 /* Returns 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points,

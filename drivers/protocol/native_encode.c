@@ -127,7 +127,7 @@ size_t native_colours_bound(uint32_t n_points)
 
 size_t native_waves_bound(uint32_t n_points, uint32_t n_windows, uint32_t n_samples)
 {
-    /* a frame ends where the next window doesn't fit, so it is filled up to the longest one */
+    /* a frame ends where the next window doesn't fit, so less than the longest window stays free in it */
     const size_t least = NATIVE_MAX_PAYLOAD - NATIVE_WAVES_HEAD_LEN - native_wave_len(NATIVE_MAX_SAMPLES);
     const size_t windows = n_windows * native_wave_len(1) + (size_t)n_samples * NATIVE_SAMPLE_LEN;
     return (frames_bound(n_points) + windows / least) * (NATIVE_HEADER_LEN + NATIVE_WAVES_HEAD_LEN) + windows;

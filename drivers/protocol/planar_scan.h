@@ -46,7 +46,7 @@ struct planar_turn {
 
 struct planar_scan {
     struct planar_head head;
-    const struct planar_turn *whole; /* the last one; NULL: none yet, of these steps */
+    const struct planar_turn *whole; /* the last whole turn; NULL: none with these steps came yet */
     int64_t t0_ns;                   /* of step 0 of the turn at hand or the last one; INT64_MIN: none yet */
     /* the members below are for planar_scan.c alone */
     struct planar_turn *now; /* being filled: the one that is not `whole` */

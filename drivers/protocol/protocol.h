@@ -128,7 +128,7 @@ struct protocol_identity {
     char firmware[32];
     char serial[32];
     char name[32]; /* of the device, as its user calls it */
-    /* The line rates that a planar head can be set to, with the steps of a turn at each. n_geometries 0: it can't. */
+    /* The line rates that a planar head can be set to, with the steps of a turn at each. n_geometries 0: none. */
     struct protocol_geometry {
         int64_t lines_uhz;
         uint32_t steps;

@@ -75,7 +75,7 @@ static const char *scip_measure_begin(struct scip *s, struct scip_request *q, in
 }
 
 /* A second M or N replaces the first, unless it is refused. A second G or H before the first is answered
- * repeats the request that is being processed. */
+ * gets 0B: the sensor is still busy with a request. */
 const char *scip_measure(struct scip *s)
 {
     enum { WAIT_NS = 2000000000 };
@@ -98,7 +98,7 @@ const char *scip_measure(struct scip *s)
 }
 
 /* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. Once a scan
- * has come, somebody who stops the head means it, and it is not started again. */
+ * has come, a stop is intended, and the head is left alone. */
 static void wake_head(struct scip *s)
 {
     const int waits = s->single.active || (s->stream.active && s->stream.sent == 0);

@@ -111,7 +111,7 @@ static void talk_send(const struct capture_session *s, const struct talk_message
     }
 }
 
-/* Sends what is due, in the order of time. The rest goes out with the next tick where it is very much. */
+/* Sends what is due, in the order of time. Beyond MOST_AT_ONCE messages the rest waits for the next tick. */
 static void send_due(struct capture_session *s)
 {
     enum { MOST_AT_ONCE = 10000 };

@@ -224,7 +224,7 @@ static const struct talk_kind talk_scip = {.name = "SCIP",
 
 /* ---- which it is */
 
-/* Two letters are no proof: what follows a name is its first digit, or the end of a command without digits. */
+/* Two letters alone are no proof. A digit must follow the name, or the line's end after a command without digits. */
 static int is_scip(const uint8_t *bytes, size_t len)
 {
     static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "%SL", "%ST", "SCIP2.0"};
