@@ -426,25 +426,25 @@ local function look_at_jump(s, h)
     return GAP, s.next, missing
   end
   for i = 1, math.min(SEEN, s.n_seen) do
-    if s.seen[(s.n_seen - i) % SEEN] == h.look then return REPEATED end
+    if s.seen[(s.n_seen - i) % SEEN] == h.raw then return REPEATED end
   end
   if fills_gap(s, h.seq) and not is_run(s, h.seq) then return LATE end
   s.n_seen, s.n_gaps, s.gap = 0, 0, {}
   return RESTARTED
 end
 
--- Frames are compared by h.look. Returns the notice: kind, first missing frame, how many.
+-- Frames are compared by h.raw, bytes 1 to 23 of their headers. Returns the notice: kind, first missing frame, number.
 local function take_sequence(s, h)
   if h.is_local then
-    if s.last_local == h.look then return REPEATED end
-    s.last_local = h.look
+    if s.last_local == h.raw then return REPEATED end
+    s.last_local = h.raw
     return nil
   end
   s.last_local = nil
   local kind, first, n
   if s.next and h.seq ~= s.next then kind, first, n = look_at_jump(s, h) end
   if kind == REPEATED then return kind end
-  s.seen[s.n_seen % SEEN] = h.look
+  s.seen[s.n_seen % SEEN] = h.raw
   s.n_seen = s.n_seen + 1
   if kind == LATE then return kind end
   s.late_run, s.next = 0, (h.seq + 1) % MODULUS
@@ -581,7 +581,7 @@ local function begin_scan(flow, scan)
 end
 
 -- The device time's eight bytes.
-local function time_in(h) return h.look:sub(16, 23) end
+local function time_in(h) return h.raw:sub(16, 23) end
 
 local ABSORB = {
   [DESCRIPTOR] = function(flow, h, bytes, at, m)
@@ -787,7 +787,7 @@ end
 
 -- The fields of points that are needed, by the name after their dot. Others are not worked out, since a frame has
 -- thousands of points.
-local function looked_at(tree)
+local function fields_needed(tree)
   local wanted, any = {}, false
   for _, name in ipairs({"pulse", "t_s", "echo", "echo_count", "label", "reflectance_db", "range_m", "line_deg",
                          "pan_deg", "x", "y", "z"}) do
@@ -852,7 +852,7 @@ local function put_points(tree, tvb, bytes, at, _, m)
   elseif m.notice ~= REPEATED and m.notice ~= LATE then
     tree:add_proto_expert_info(E.no_anchor)
   end
-  local wanted, is_shown = looked_at(tree), tree.visible
+  local wanted, is_shown = fields_needed(tree), tree.visible
   if not wanted then return end
   local t0 = tvb(at + 16, 8):le_int64()
   local t0_s, t0_ns = (t0 / 1000000000):tonumber(), (t0 % 1000000000):tonumber()
@@ -1153,7 +1153,7 @@ local function header_at(bytes, at)
   local _, kind, version, flags, length, seq, payload_crc = unpack_bytes("<BBBBI4I4I4", bytes, at + 1)
   if length > MOST_PAYLOAD or crc32c(bytes, at, 24) ~= number_at(bytes, at + 24) then return nil end
   return {type = kind, version = version, flags = flags, length = length, seq = seq, payload_crc = payload_crc,
-          is_repeat = flags % 2 == 1, is_local = floor(flags / 2) % 2 == 1, look = bytes:sub(at + 2, at + 24)}
+          is_repeat = flags % 2 == 1, is_local = floor(flags / 2) % 2 == 1, raw = bytes:sub(at + 2, at + 24)}
 end
 
 -- Where the next correct header begins, from `at` on and before `last`. A sync byte counts, too, if too few bytes
@@ -1277,7 +1277,7 @@ end
 
 function Search:show_frame(at, h)
   local tvb, payload = self.tvb, at + HEADER_LEN
-  local m = find(self.pinfo, h.look, function(m) absorb(self.flow, h, self.bytes, payload, m) end)
+  local m = find(self.pinfo, h.raw, function(m) absorb(self.flow, h, self.bytes, payload, m) end)
   local words = summary(h, self.bytes, payload, m)
   local item = self.tree:add(scanhead, tvb(at, HEADER_LEN + h.length), "Scan head, " .. words)
   put_header(item, tvb, at, true, true)
