@@ -51,13 +51,16 @@ static void take_head(struct planar_scan *s)
 }
 
 /* A scan that begins ends the turn at hand. A repeated descriptor may be of the scan that this turn belongs to. */
-static void take_descriptor(struct planar_scan *s, const struct native_descriptor *d, int repeated)
+static void take_descriptor(struct planar_scan *s, const struct native_descriptor *d, uint8_t flags)
 {
     struct planar_head *h = &s->head;
+    const int repeated = (flags & NATIVE_REPEAT) != 0;
     if (d->scan != s->scan && !repeated) {
         s->done = 1;
         s->scan_t0_ns = INT64_MIN;
     }
+    /* A recording that is replayed jumps within the scan: the turns between are no loss. */
+    if ((flags & NATIVE_LOCAL) != 0 && !repeated) s->fresh = s->done = 1;
     s->scan = d->scan;
     s->pan_counts = d->pan_counts_per_turn;
     h->lines_uhz = d->lines_uhz;
@@ -109,7 +112,8 @@ static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, in
         if (!s->done) news->broken++;
         if (line > next) news->broken += line - next;
     }
-    if (s->seen && !same_scan) s->number0 += s->line + 1;
+    /* Turns that are no loss are not counted as turns either. */
+    if (s->seen && !same_scan) s->number0 += s->line + 1 - (s->fresh ? line : 0);
     s->done = s->fresh && !from_start;
     s->fresh = 0;
     s->seen = news->begun = 1;
@@ -222,8 +226,7 @@ struct planar_news planar_scan_frame(struct planar_scan *s, const uint8_t *frame
     struct native_header h;
     native_read_header(frame, &h);
     if (h.type == NATIVE_DESCRIPTOR) {
-        if (native_decode_descriptor(payload, h.length, &u.descriptor) == 0)
-            take_descriptor(s, &u.descriptor, (h.flags & NATIVE_REPEAT) != 0);
+        if (native_decode_descriptor(payload, h.length, &u.descriptor) == 0) take_descriptor(s, &u.descriptor, h.flags);
     } else if (h.type == NATIVE_EMITTER) {
         if (native_decode_emitter(payload, h.length, &u.emitter) == 0) take_emitter(s, &u.emitter);
     } else if (s->head.known) {

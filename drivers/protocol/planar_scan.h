@@ -6,7 +6,7 @@
  *
  * A turn is whole once each place has its pulse, and its attributes where the head sends them: that is when the
  * beam has passed the last step. A turn with something missing is broken: it never comes out, and is counted. Turns
- * within which the first frame came, the scan ended or the steps changed are not counted.
+ * within which the first frame came, the scan ended, the steps changed or a replay jumped are not counted.
  *
  * Pure. Nothing is allocated; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_PLANAR_SCAN_H
@@ -39,7 +39,7 @@ struct planar_echo {
 
 struct planar_turn {
     int64_t t0_ns;               /* device time of step 0 */
-    uint32_t number;             /* of turns since the head's scan began; goes on over scans, and over lost turns */
+    uint32_t number;             /* of turns since the head's scan began; goes on over scans, jumps over lost turns */
     uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, PLANAR_ECHOES at most; PLANAR_UNSEEN: no pulse came */
     struct planar_echo echo[PLANAR_MAX_STEPS][PLANAR_ECHOES]; /* in order of range */
 };
