@@ -185,7 +185,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
     if (e->steps < COLA_MIN_STEPS)
         return sh_fail(err, SH_EINPUT, "%u steps a turn; allowed are %d and more, of 6.5535 degrees at most", e->steps,
                        (int)COLA_MIN_STEPS);
-    return planar_scan_check(d, e, PLANAR_MAX_TURN, err);
+    return planar_scan_check(d->pan_counts_per_turn, e, PLANAR_MAX_TURN, err);
 }
 
 const struct protocol_ops protocol_cola = {

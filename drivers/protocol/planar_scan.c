@@ -16,8 +16,7 @@ void planar_scan_init(struct planar_scan *s)
 
 /* ---- the head */
 
-int planar_scan_check(const struct native_descriptor *d, const struct native_emitter *e, uint32_t max_steps,
-                      struct sh_err *err)
+int planar_scan_check(double pan_counts, const struct native_emitter *e, uint32_t max_steps, struct sh_err *err)
 {
     const int64_t n = (int64_t)e->last_step - e->first_step + 1;
     if (e->steps == 0 || e->steps > max_steps || e->last_step < 0 || (uint32_t)e->last_step >= e->steps)
@@ -26,20 +25,19 @@ int planar_scan_check(const struct native_descriptor *d, const struct native_emi
     if (e->first_step < 0 || n < 1 || n > PLANAR_MAX_STEPS)
         return sh_fail(err, SH_EINPUT, "a field of view of steps %d to %d; allowed are 1 to %d steps of a turn",
                        e->first_step, e->last_step, (int)PLANAR_MAX_STEPS);
-    if (e->front_step < 0 || (uint32_t)e->front_step >= e->steps || !(d->pan_counts_per_turn >= 1))
+    if (e->front_step < 0 || (uint32_t)e->front_step >= e->steps || !(pan_counts >= 1))
         return sh_fail(err, SH_EINPUT,
                        "step %d in front, and %.10g encoder counts a turn; allowed are a step of the "
                        "turn, and 1 count and more",
-                       e->front_step, d->pan_counts_per_turn);
+                       e->front_step, pan_counts);
     return SH_OK;
 }
 
 static void take_head(struct planar_scan *s)
 {
     const struct native_emitter *e = &s->emitter;
-    const struct native_descriptor d = {.pan_counts_per_turn = s->pan_counts};
     struct planar_head *h = &s->head;
-    h->known = e->kind == NATIVE_EMIT_PLANAR && planar_scan_check(&d, e, PLANAR_MAX_TURN, NULL) == SH_OK;
+    h->known = e->kind == NATIVE_EMIT_PLANAR && planar_scan_check(s->pan_counts, e, PLANAR_MAX_TURN, NULL) == SH_OK;
     if (!h->known) return;
     h->steps = e->steps;
     h->n = (uint32_t)(e->last_step - e->first_step) + 1;

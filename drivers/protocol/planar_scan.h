@@ -70,9 +70,8 @@ struct planar_news {
     uint32_t broken;  /* turns */
 };
 
-/* protocol_ops.check_head for devices whose steps are numbered up to max_steps - 1. */
-int planar_scan_check(const struct native_descriptor *d, const struct native_emitter *e, uint32_t max_steps,
-                      struct sh_err *err);
+/* For protocol_ops.check_head of devices whose steps are numbered up to max_steps - 1. pan_counts: of a turn. */
+int planar_scan_check(double pan_counts, const struct native_emitter *e, uint32_t max_steps, struct sh_err *err);
 void planar_scan_init(struct planar_scan *s);
 /* One frame of the stream. */
 struct planar_news planar_scan_frame(struct planar_scan *s, const uint8_t *frame);

@@ -147,7 +147,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
                       struct sh_err *err)
 {
     (void)beams;
-    return planar_scan_check(d, e, SCIP_MAX_STEPS, err);
+    return planar_scan_check(d->pan_counts_per_turn, e, SCIP_MAX_STEPS, err);
 }
 
 const struct protocol_ops protocol_scip = {
