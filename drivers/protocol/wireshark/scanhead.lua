@@ -406,6 +406,7 @@ local function fills_gap(s, seq)
     if gap and before < gap.n then
       local n = gap.n
       gap.n = before
+      if s.n_gaps % GAPS == i then s.n_gaps = s.n_gaps + 1 end -- the next place is that of the first part, which stays
       add_gap(s, (seq + 1) % MODULUS, n - before - 1)
       return true
     end
