@@ -42,7 +42,7 @@ struct cola {
     struct cola_settings set;
     char stored[PROTOCOL_STORED]; /* what mEEwriteall has kept */
     int keeps, dialect;           /* of the spec */
-    uint8_t power_framing;        /* the same at power-up, as configured or stored */
+    uint8_t power_framing;        /* EIHstCola at power-up, as configured or stored */
     _Atomic uint32_t *shared;
     enum cola_level level;
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
