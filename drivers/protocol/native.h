@@ -384,10 +384,10 @@ struct native_parser {
 void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
-/* Gives the parser whole items that this process made in memory, without a copy; it takes the place of these two. The
- * items stay there until the parser has given them all and the last one is no longer used. CRCs of payloads are not
- * checked, since nothing can have changed them. It is called after NATIVE_MORE; or at any time with n 0, which drops
- * the items that were not given yet. A parser gets all its bytes in one of the two ways. */
+/* Gives the parser whole items that this process made in memory, without a copy, in place of native_parser_room() and
+ * native_parser_added(). The items stay there until the parser has given them all and the last one is no longer used.
+ * CRCs of payloads are not checked, since nothing can have changed them. It is called after NATIVE_MORE; or at any time
+ * with n 0, which drops the items that were not given yet. A parser gets all its bytes in one of the two ways. */
 void native_parser_lend(struct native_parser *parser, const uint8_t *items, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
 /* Nothing more will be added. An incomplete frame is then searched as garbage, so that whole frames after a cut
