@@ -97,7 +97,7 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
     native_read_header(frame, &h);
     if (h.type == NATIVE_POINTS) {
         if (h.t_ns > self->now_ns) self->now_ns = h.t_ns;
-        cola_deliver(self); /* this scan's place may be needed */
+        cola_deliver(self); /* the points may overwrite the scan that waits to be sent */
     }
     const struct planar_news news = planar_scan_frame(&self->scan, frame);
     if (h.type == NATIVE_POSES) cola_way_add(&self->way, self->scan.scan, frame + NATIVE_HEADER_LEN, h.length);
@@ -185,7 +185,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
     if (e->steps < COLA_MIN_STEPS)
         return sh_fail(err, SH_EINPUT, "%u steps a turn; allowed are %d and more, of 6.5535 degrees at most", e->steps,
                        (int)COLA_MIN_STEPS);
-    return planar_scan_check(d, e, PLANAR_MAX_TURN, err);
+    return planar_scan_check(d->pan_counts_per_turn, e, PLANAR_MAX_TURN, err);
 }
 
 const struct protocol_ops protocol_cola = {

@@ -32,7 +32,7 @@ struct cola_settings {
     uint8_t filter; /* FREchoFilter: enum cola_echoes */
     uint32_t scale; /* LMDscandatascalefactor; 0: the geometry's */
     char location[COLA_MAX_NAME];
-    uint8_t framing; /* EIHstCola, as it was written or stored */
+    uint8_t framing; /* EIHstCola, as written or stored: enum cola_form */
 };
 
 struct cola {
@@ -48,7 +48,7 @@ struct cola {
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
     int started;             /* LMCstartmeas was called after the last LMCstopmeas */
     int reboots;             /* it reboots once the answer is sent */
-    struct planar_head head; /* a head with geometries: the geometry of its next scan */
+    struct planar_head head; /* where the head has several geometries: that of its next scan */
     struct {
         int is_due; /* mLMPsetscancfg is to be done and answered once the head's scan has ended */
         enum cola_form form;
@@ -67,12 +67,12 @@ struct cola {
     } ports;
     struct cola_fields fields;
     struct cola_watch watch;
-    int wants_scan; /* measurement was asked for, and no scan has come yet; try_ns: when to look at the head next */
+    int wants_scan; /* a scan was asked for, and none has come yet; try_ns: when to look at the head next */
     int64_t try_ns;
     int64_t now_ns;
     int64_t power_ns; /* device time of power-up: its clock begins there */
     uint32_t power_ons;
-    uint32_t near_wrap;         /* counters begin so many below their wrap */
+    uint32_t near_wrap;         /* how far below their wrap counters begin; 0: they begin at 0 */
     int streams;                /* sEN LMDscandata 1 */
     enum cola_form stream_form; /* of telegrams without a request */
     int pending;                /* a scan is done and not yet looked at */
@@ -87,12 +87,12 @@ struct cola {
     uint8_t unit[COLA_MAX_UNIT];
 };
 
-/* A request: reads its values, and writes those of the answer. An error, or COLA_OK, or COLA_LATER. */
+/* Carries out a request: reads its values, and writes those of the answer. Returns COLA_OK, COLA_LATER or an error. */
 typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, struct cola_out *out);
 
 /* cola.c */
 
-/* Sends a scan that is done, if the client waits for it. */
+/* Sends a scan that is done, if the client polled for it or streams, and evaluates the fields. */
 void cola_deliver(struct cola *self);
 /* sRN LMDscandata: answers with the last scan. Where there is none in the present geometry, the next scan answers. */
 cola_handler cola_read_scan;
@@ -141,11 +141,11 @@ cola_handler cola_keep;
 
 /* cola_dialect.c */
 
-/* EIHstCola as it is now, and as configured (CoLa-A where no dialect is chosen): enum cola_form. */
+/* The value of EIHstCola now, and as configured (CoLa-A where no dialect is chosen): enum cola_form. */
 uint32_t cola_framing(const struct cola *self);
 uint32_t cola_configured_framing(const struct cola *self);
 int cola_understands(const struct cola *self, enum cola_form form);
-/* Another session may have changed it: streamed telegrams have its form. */
+/* Gives telegrams without a request the link's dialect, which another session may have changed. */
 void cola_follow_dialect(struct cola *self);
 cola_handler cola_read_framing, cola_write_framing;
 
@@ -163,8 +163,8 @@ cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
 
 /* 12 of "field012"; UINT32_MAX: another name. */
 uint32_t cola_field_number(const char *name);
-/* The field whose number is in `field` is answered as a record; beyond the model's records the answer is a single 0
- * (n_records). */
+/* They read and write the field whose number is in `field`. Reading answers with a record, or with a single 0 for a
+ * field beyond the model's n_records. */
 cola_handler cola_read_field, cola_write_field;
 cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_set_method, cola_write_set_method,
     cola_read_set, cola_write_set, cola_set_results_event, cola_set_outputs_event, cola_set_inputs_event;
@@ -172,9 +172,9 @@ cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_
 void cola_send_outputs(struct cola *self, enum cola_form form);
 /* The active outputs, a bit each. */
 uint32_t cola_outputs(const struct cola *self);
-/* Fields as the configuration gives them. */
+/* Sets the fields as the configuration gives them. */
 void cola_fields_load(struct cola *self);
-/* The same, and no events, and outputs off. */
+/* Loads the fields likewise, and switches events and outputs off. */
 void cola_ports_reset(struct cola *self);
 /* Begins the evaluation anew: results are invalid until the next scan. */
 void cola_ports_select(struct cola *self);
@@ -197,18 +197,7 @@ cola_handler cola_set_clock, cola_read_time_role, cola_write_time_role, cola_rea
 
 /* cola_device.c: identity, states and log-in. */
 
-enum cola_head_state {
-    COLA_HEAD_UNKNOWN = -1,
-    COLA_HEAD_OFF,
-    COLA_HEAD_BOOT,
-    COLA_HEAD_IDLE,
-    COLA_HEAD_SPIN_UP,
-    COLA_HEAD_SCANNING,
-    COLA_HEAD_SPIN_DOWN,
-    COLA_HEAD_FAULT
-};
-enum cola_head_state cola_ask_state(struct cola *self);
-/* Lets the head scan if it rests. 1: it does not; then polls that wait are refused. */
+/* Starts the head's scan if it rests. Returns 1 where that is not possible; polls that wait are then refused. */
 int cola_start_scan(struct cola *self);
 cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_location, cola_write_location,
     cola_read_state, cola_read_lms_state, cola_read_hours, cola_read_power_ons, cola_read_contamination, cola_log_in,
@@ -216,7 +205,7 @@ cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_lo
 
 /* cola_commands.c: one request, and its answer. */
 
-/* The value of an event's request: u8 1 on, 0 off. */
+/* Reads the value of an event's request: u8 1 on, 0 off. */
 enum cola_error cola_read_switch(struct cola_args *args, int *on);
 void cola_carry_out(struct cola *self, const struct cola_request *request);
 /* sFA with that error. */

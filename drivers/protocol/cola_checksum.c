@@ -66,12 +66,6 @@ static size_t hex_of(const uint8_t *digits, size_t len)
     return v;
 }
 
-/* Bits of a hexadecimal digit; after any change of these it is still one. */
-static uint8_t digit_bits(uint8_t c)
-{
-    return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' || (c >= 'B' && c <= 'E') ? 1 : 0;
-}
-
 static int is_channel(const uint8_t *text)
 {
     return memcmp(text, "DIST", 4) == 0 || memcmp(text, "RSSI", 4) == 0;
@@ -89,7 +83,7 @@ static void mark_a(const uint8_t *unit, size_t len, uint8_t *mask)
         size_t n = hex_of(unit + word.at, word.len);
         for (; n > 0 && next_word(unit, len, &word); n--)
             for (size_t i = word.at; i < word.at + word.len; i++)
-                mask[i] = digit_bits(unit[i]);
+                mask[i] = protocol_digit_bits(unit[i]);
     }
 }
 

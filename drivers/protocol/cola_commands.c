@@ -98,7 +98,7 @@ static enum cola_error set_scan_event(struct cola *self, struct cola_args *args,
     return COLA_OK;
 }
 
-/* An answer may be under way in self->unit, where a poll of before is refused. */
+/* It has a buffer of its own: where polls from before are refused, self->unit may hold an unfinished answer. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error)
 {
     uint8_t unit[32];

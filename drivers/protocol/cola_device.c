@@ -49,31 +49,21 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     for (const char *c = name; *c != '\0'; c++)
-        if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* a stored one is a line of the settings' file */
+        if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* mEEwriteall writes it as a line of the settings file */
     memcpy(self->set.location, name, sizeof name);
     return COLA_OK;
 }
 
 /* ---- states */
 
-enum cola_head_state cola_ask_state(struct cola *self)
-{
-    static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
-    char state[PROTOCOL_REPLY] = "";
-    if (self->host.command(self->host.ctx, "HEAD:STATE?", state, sizeof state) != 0) return COLA_HEAD_UNKNOWN;
-    for (int i = COLA_HEAD_OFF; i <= COLA_HEAD_FAULT; i++)
-        if (strcmp(names[i], state) == 0) return (enum cola_head_state)i;
-    return COLA_HEAD_UNKNOWN;
-}
-
 enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     enum { BUSY, READY, ERROR };
-    const enum cola_head_state head = cola_ask_state(self);
-    if (head == COLA_HEAD_FAULT)
+    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    if (head == PROTOCOL_HEAD_FAULT)
         cola_put_u(out, 1, ERROR);
     else
-        cola_put_u(out, 1, head <= COLA_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
+        cola_put_u(out, 1, head <= PROTOCOL_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
     return cola_args_end(args);
 }
 
@@ -83,8 +73,8 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
     enum { UNDEFINED, INITIALISATION, CONFIGURATION, REST, ROTATES, PREPARATION, READY, MEASURES };
     static const uint8_t states[] = {INITIALISATION, INITIALISATION, REST, PREPARATION, MEASURES, ROTATES, UNDEFINED};
     const struct cola_date d = cola_date_of(cola_clock_ns(self, self->now_ns));
-    const enum cola_head_state head = cola_ask_state(self);
-    uint32_t state = head == COLA_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
+    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    uint32_t state = head == PROTOCOL_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
     char text[40];
     if (state == MEASURES && !self->measures) state = READY;
     cola_put_u(out, 2, state);
@@ -169,10 +159,10 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 
 int cola_start_scan(struct cola *self)
 {
-    const enum cola_head_state head = cola_ask_state(self);
-    int refused = head == COLA_HEAD_FAULT || head == COLA_HEAD_UNKNOWN;
-    if (head == COLA_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
-    self->wants_scan = !refused; /* until the first scan has come: somebody may stop the head before, or just now */
+    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    int refused = head == PROTOCOL_HEAD_FAULT || head == PROTOCOL_HEAD_UNKNOWN;
+    if (head == PROTOCOL_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
+    self->wants_scan = !refused; /* until the first scan has come, since somebody may stop the head before that */
     if (!refused) return 0;
     for (uint32_t i = 0; i < self->n_waiting; i++)
         cola_refuse(self, (enum cola_form)self->waiting_form[i], COLA_CONDITION);
@@ -198,12 +188,12 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
     if (error != COLA_OK) return error;
     self->measures = self->started = 0;
     self->wants_scan = self->n_waiting != 0; /* a poll is answered also where nothing is measured */
-    cola_ports_select(self);                 /* results of before would hide that nothing is watched */
+    cola_ports_select(self);                 /* old results would hide that nothing is watched now */
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }
 
-/* ---- forgetting */
+/* ---- defaults and reboot */
 
 enum cola_error cola_load_defaults(struct cola *self, struct cola_args *args, struct cola_out *out)
 {

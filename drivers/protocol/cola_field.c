@@ -67,7 +67,7 @@ static void take_no_part(struct cola_args *args)
     if (take_flag(args)) args->error = COLA_INVALID_DATA;
 }
 
-/* A record without a part erases its field; a model's record of an empty field has none. */
+/* A record may lack the part of its type: that erases its field, and real scanners describe an empty field so. */
 static int has_part_of_type(const struct cola_record *r)
 {
     if (r->type == COLA_FIELD_RECTANGLE) return !r->is_segmented;
@@ -171,13 +171,13 @@ enum cola_error cola_record_shape(const struct cola_record *r, const struct plan
 
 /* ---- a shape as a record */
 
-/* The scale is such that the farthest place has a count. */
+/* A length in counts of the record's scale. The farthest place of the shape still fits (scale_of). */
 static uint16_t counts_of(const struct cola_record *r, double um)
 {
     return (uint16_t)lround(um / MM_UM / (double)r->scale);
 }
 
-/* A direction of the shape at a beam. Points of the same beam are joined. */
+/* Adds a direction of the shape at a beam. Several points of one beam become one. */
 static void add_point(struct cola_record *r, uint32_t beam, int32_t near_um, int32_t far_um)
 {
     uint32_t i = r->n;
@@ -213,7 +213,7 @@ static double beam_turns(const struct planar_head *head, uint32_t beam)
     return (double)cola_beam_quarters(head, beam) / (4.0 * head->steps);
 }
 
-/* A shape that is wider than the view ends with it. */
+/* Adds the first and the last beam: a shape that is wider than the head's view ends there. */
 static void add_ends(struct cola_record *r, const struct cola_shape *shape, const struct planar_head *head)
 {
     add_direction(r, shape, head, beam_turns(head, 0));

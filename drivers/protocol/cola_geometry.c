@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* LMPscancfg and mLMPsetscancfg: line rate and step. They are the head's, so all its readers see another one. */
+/* LMPscancfg and mLMPsetscancfg: line rate and step. They belong to the head, so all its readers see a change. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -15,7 +15,7 @@ const struct planar_head *cola_head(const struct cola *self)
     return self->identity->n_geometries != 0 ? &self->head : &self->scan.head;
 }
 
-/* The same beams with other steps: one geometry divides the other evenly. */
+/* Gives a head another line rate and step at the same angles: one number of steps divides the other, so ends stay. */
 static void take_geometry(struct planar_head *h, int64_t lines_uhz, uint32_t steps)
 {
     const int64_t had = h->steps;
@@ -35,12 +35,12 @@ static double ask(struct cola *self, const char *query)
     return self->host.command(self->host.ctx, query, reply, sizeof reply) == 0 ? strtod(reply, NULL) : 0.0;
 }
 
-/* A head that scans reports its settings in the stream. A head at rest reports nothing there when it is set. */
+/* A head that scans reports its settings in the stream. A head at rest does not, so it is asked for them. */
 void cola_look_at_head(struct cola *self)
 {
     if (self->identity->n_geometries == 0) return;
     self->head = self->scan.head;
-    if (!self->head.known || cola_ask_state(self) == COLA_HEAD_SCANNING) return;
+    if (!self->head.known || protocol_ask_state(&self->host) == PROTOCOL_HEAD_SCANNING) return;
     const double lines_hz = ask(self, "HEAD:LINes?"), step_deg = ask(self, "SCAN:STEP?");
     if (lines_hz > 0.0 && step_deg > 0.0)
         take_geometry(&self->head, (int64_t)(lines_hz * 1e6 + 0.5), (uint32_t)(360.0 / step_deg + 0.5));
@@ -117,10 +117,10 @@ static enum cola_error set_head(struct cola *self)
     return COLA_OK;
 }
 
-static int is_turning(struct cola *self)
+static int is_turning(const struct cola *self)
 {
-    const enum cola_head_state state = cola_ask_state(self);
-    return state == COLA_HEAD_SPIN_UP || state == COLA_HEAD_SCANNING;
+    const enum protocol_head_state state = protocol_ask_state(&self->host);
+    return state == PROTOCOL_HEAD_SPIN_UP || state == PROTOCOL_HEAD_SCANNING;
 }
 
 /* A scanner takes another geometry only before it was told to measure, or after it was stopped. */

@@ -7,9 +7,9 @@
 
 /* Forms of LIDinputstate and LIDoutputstate. */
 enum cola_ports {
-    COLA_PORTS_TIM, /* version 0, no time of day; no event comes */
-    COLA_PORTS_LMS, /* version 1, ports that are not used say so, outputs have a time of day; asked for, it sends one
-                     * event */
+    COLA_PORTS_TIM, /* version 0, no time of day; an event comes only with a change */
+    COLA_PORTS_LMS, /* version 1, unused ports are marked, outputs have a time of day; sEN LIDoutputstate 1 brings one
+                     * event at once */
 };
 
 struct cola_model {
@@ -21,7 +21,7 @@ struct cola_model {
     uint8_t rssi_16bit;   /* 0: 8 bit */
     uint8_t n_fields;     /* field000 and on are answered */
     uint8_t n_records;    /* the first of them have a record, the others say that there is none */
-    uint8_t named;        /* 1: a record has a number, a name and segments; 0: none of these is configured */
+    uint8_t named;        /* 1: the record of an empty field has number, name and a segmented part; 0: none of them */
     uint8_t n_results;    /* of LFErec */
     uint8_t n_outputs;    /* of LIDoutputstate */
     uint8_t ports;        /* enum cola_ports */

@@ -289,6 +289,7 @@ void cola_ports_time(struct cola *self)
     self->ports.seen = now;
     self->ports.changed_us = cola_time_us(self, self->now_ns);
     if (!cola_ports_is_lms(self) && !self->ports.by_telegram) take_set(self, now + 1);
+    cola_follow_dialect(self);
     if (self->ports.inputs) send_event(self, self->stream_form, "sSN LIDinputstate", put_inputs);
 }
 

@@ -154,7 +154,7 @@ enum cola_error cola_write_scale(struct cola *self, struct cola_args *args, stru
     memcpy(&scale, &bits, sizeof scale);
     if (error != COLA_OK) return error;
     if (!cola_head(self)->known) return COLA_CONDITION;
-    /* 1 would cut off what the head reaches over 65.535 m */
+    /* with 1, ranges over 65.535 m that the head reaches would have no number */
     if (scale != 2.0f && !(scale == 1.0f && cola_head_scale(cola_head(self)) == 1)) return COLA_INVALID_DATA;
     self->set.scale = (uint32_t)scale;
     return COLA_OK;

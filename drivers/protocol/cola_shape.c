@@ -23,7 +23,7 @@ static int is_between(int32_t v, int32_t a, int32_t b)
 }
 
 /* The winding number counts edges that cross the ray to the right of p: upward ones with p at their left, downward ones
- * with p at their right. An edge has its lower end and not its upper one, so a corner on the ray counts once. */
+ * with p at their right. An edge includes its lower end, not its upper one, so a corner on the ray counts once. */
 static int polygon_has(const struct cola_shape *s, const struct cola_point *p)
 {
     int winding = 0;
@@ -40,7 +40,7 @@ static int polygon_has(const struct cola_shape *s, const struct cola_point *p)
     return winding != 0;
 }
 
-/* Angles are compared in the unit (1/10000 deg) / steps: both are whole numbers of it. */
+/* Angles are compared in the unit (1/10000 deg) / steps, in which the beam's and the sector's are whole numbers. */
 static int sector_has(const struct cola_shape *s, const struct cola_measured *m)
 {
     if (m->range_um < s->sector.inner_um || m->range_um > s->sector.outer_um) return 0;
@@ -56,7 +56,7 @@ static int64_t chain_turn(const struct cola_measured *m, const struct cola_link 
     return (int64_t)m->step * link->steps - (int64_t)link->step * m->steps;
 }
 
-/* The beam's step with whole turns added or taken away, up to less than a turn from the first link on. */
+/* Moves the beam's step by whole turns, so that it lies less than a turn beyond the first link. */
 static int32_t chain_step(const struct cola_measured *m, const struct cola_link *first)
 {
     const int64_t turn = (int64_t)m->steps * first->steps, beyond = chain_turn(m, first);
@@ -119,7 +119,7 @@ int cola_shape_cut(const struct cola_shape *s, double turns, int32_t *near_um, i
         double after_e4 = fmod(turns * COLA_TURN_E4 - s->sector.start_e4, COLA_TURN_E4);
         if (after_e4 < 0.0) after_e4 += COLA_TURN_E4;
         if (after_e4 > s->sector.span_e4 + 0.5 && after_e4 < COLA_TURN_E4 - 0.5)
-            return 0; /* 0.5: it is a rounded angle */
+            return 0; /* 0.5: the sector's angles are rounded */
         *near_um = s->sector.inner_um;
         *far_um = s->sector.outer_um;
         return 1;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* mEEwriteall: settings of the session that last without power, a line each, as a request in CoLa-A writes them but
- * with decimal numbers. Line rate, step and time server are the head's, and HEAD:STORe keeps them. */
+/* mEEwriteall stores the session's settings, which then outlast a power cycle. Each is a line, as a request in CoLa-A
+ * writes it but with decimal numbers. Line rate, step and time server are the head's, and HEAD:STORe stores them. */
 #include <stdio.h>
 #include <string.h>
 
@@ -26,7 +26,7 @@ enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola
 {
     char text[PROTOCOL_STORED];
     const enum cola_error error = cola_args_end(args);
-    int kept = 1; /* a head without a file answers 1, too, but keeps nothing */
+    int kept = 1; /* a head without a file answers 1, too, but stores nothing */
     if (error != COLA_OK) return error;
     if (self->keeps) {
         put_lines(self, text, sizeof text);

@@ -66,7 +66,7 @@ uint32_t cola_arg_u(struct cola_args *args, unsigned bytes)
     return v;
 }
 
-/* Two's complement of so many bytes. */
+/* The value of v as two's complement of 1, 2 or 4 bytes. */
 static int32_t extend(uint32_t v, unsigned bytes)
 {
     const uint32_t half = most(bytes) / 2 + 1;
@@ -90,18 +90,11 @@ void cola_arg_text(struct cola_args *args, char *dst, size_t cap)
     dst[0] = 0;
     if (args->error != COLA_OK) return;
     if (args->form == COLA_A && len != 0 && args->at < args->end) args->at++; /* the blank after the length */
-    if ((size_t)(args->end - args->at) < len) {
-        cola_telegram_fail(args, COLA_TOO_SHORT);
-        return;
-    }
-    if (len >= cap) {
-        cola_telegram_fail(args, COLA_OVERFLOW);
-        return;
-    }
-    if (memchr(args->at, 0, len) != NULL) {
-        cola_telegram_fail(args, COLA_INVALID_DATA);
-        return;
-    }
+    args->error = (size_t)(args->end - args->at) < len ? COLA_TOO_SHORT
+                  : len >= cap                         ? COLA_OVERFLOW
+                  : memchr(args->at, 0, len) != NULL   ? COLA_INVALID_DATA
+                                                       : COLA_OK;
+    if (args->error != COLA_OK) return;
     memcpy(dst, args->at, len);
     dst[len] = 0;
     args->at += len;

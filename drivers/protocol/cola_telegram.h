@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa telegrams: numbers and texts of both forms, and the frames around them.
+/* CoLa telegrams: numbers and texts of both forms, and the marks around them.
  *
  * CoLa-A:  02  sRA Name value value ...                03
  *              numbers as hexadecimal without 0x, or as decimal with a sign; blanks between
@@ -62,11 +62,11 @@ void cola_put_i(struct cola_out *out, unsigned bytes, int32_t v);
 void cola_put_float(struct cola_out *out, float v);
 void cola_put_text(struct cola_out *out, const char *text); /* length and characters */
 void cola_put_word(struct cola_out *out, const char *word); /* characters alone */
-/* Closes the telegram. Its length, or 0: it has no room. */
+/* Closes the telegram. Returns its length, or 0: it had no room. */
 size_t cola_end(struct cola_out *out);
 
 /* ---- bytes of a client into telegrams, in both forms as they come. */
-enum { COLA_MAX_REQUEST = 1024 }; /* bytes between the frame's marks */
+enum { COLA_MAX_REQUEST = 1024 }; /* bytes between the telegram's marks */
 struct cola_input {
     uint8_t buf[COLA_MAX_REQUEST + 9];
     size_t len, used; /* used: by the telegram found last */
@@ -79,8 +79,8 @@ struct cola_request {
 /* Takes as many of the bytes as there is room for; at least one after cola_input_next() has returned 0. */
 size_t cola_input_add(struct cola_input *in, const uint8_t *bytes, size_t len);
 /* 1: a telegram, valid until the next call; 0: more bytes are needed; -1: one in CoLa-A was too long, and is gone.
- * Bytes that were thrown away are added to *lost. Bytes outside of frames are skipped; a frame with a wrong check byte
- * is searched for another one that begins in it. */
+ * Bytes that were thrown away are added to *lost. Bytes outside of telegrams are skipped. Where a check byte is
+ * wrong, the search for a telegram goes on at the second byte. */
 int cola_input_next(struct cola_input *in, struct cola_request *out, uint64_t *lost);
 
 #endif

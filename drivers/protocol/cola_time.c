@@ -37,7 +37,8 @@ static int set_clock(struct cola *self, int64_t ns)
     if (self->host.command(self->host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
         sscanf(reply, "%" SCNd64, &shift_ns) != 1)
         return 0;
-    shift_ns += ns - cola_clock_ns(self, self->now_ns);
+    /* In this order each difference has room: the second operand is the clock's time without a shift. */
+    shift_ns = ns - (cola_clock_ns(self, self->now_ns) - shift_ns);
     snprintf(line, sizeof line, "TIME:SHIFt %" PRId64, shift_ns);
     return self->host.command(self->host.ctx, line, NULL, 0) == 0;
 }
@@ -127,7 +128,7 @@ NUMBERS(time_zone, zone, 1, 1)
 NUMBERS(time_update, update_s, 1, 4)
 NUMBERS(time_address, address, 4, 1)
 
-/* One of the times, in ns, of TIME:SERVer? STATe: 0 the limit, 1 the offset, 2 the delay. float, s */
+/* Writes one of the times of TIME:SERVer? STATe as a float, s: 0 the limit, 1 the offset, 2 the delay. */
 static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
 {
     char reply[PROTOCOL_REPLY];
@@ -151,7 +152,7 @@ enum cola_error cola_read_time_delay(struct cola *self, struct cola_args *args, 
     return put_answered(self, 2, args, out);
 }
 
-/* u16 year, 5 x u8, u32 us; u8 1: set. A clock that a time server sets can't be set so. */
+/* u16 year, 5 x u8, u32 us; u8 1: set. A client can't set the clock while a time server sets it. */
 enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     struct cola_date d = {.year = cola_arg_u(args, 2)};

@@ -27,7 +27,7 @@ void cola_watch_select(struct cola_watch *watch, const struct cola_fields *field
 
 /* ---- one beam */
 
-/* The echoes of a beam that count: the first of `n` from *first on. */
+/* Chooses the echoes of a beam that count. Returns how many there are, from *first on. */
 static uint32_t choose(const struct planar_turn *turn, uint32_t beam, enum cola_echoes echoes, uint32_t *first)
 {
     const uint32_t n = turn->n[beam] == PLANAR_UNSEEN ? 0 : turn->n[beam];
@@ -35,7 +35,7 @@ static uint32_t choose(const struct planar_turn *turn, uint32_t beam, enum cola_
     return echoes == COLA_ECHOES_ALL || n == 0 ? n : 1;
 }
 
-/* Points of the echoes that count. */
+/* Computes the points of the echoes that count. */
 static uint32_t measure(const struct planar_head *head, const struct planar_turn *turn, uint32_t beam,
                         enum cola_echoes echoes, struct cola_measured out[PLANAR_ECHOES])
 {

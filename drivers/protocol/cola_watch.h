@@ -5,8 +5,8 @@
  * nearer than the head's least range or farther than COLA_SHAPE_REACH_UM. The echo filter chooses which echoes of a
  * beam count: the first, the last, or each of them.
  *
- * Response time: a beam counts once it has seen an object in so many scans in a row, the number of scans that is
- * nearest to the time, at least one. It no longer counts with the first scan in which it sees none.
+ * Response time: it is rounded to a whole number of scans, at least one. A beam counts once it has seen an object in so
+ * many scans in a row. It no longer counts with the first scan in which it sees none.
  *
  * Blanking: neighbouring beams that count are one object, as wide as their number times the step times the least of
  * their ranges. The field is infringed where an object is at least as wide as its blanking size.
@@ -27,7 +27,7 @@ enum { COLA_NEW_RESULT = 1, COLA_NEW_OUTPUT = 2 };
 struct cola_watch {
     uint32_t n;              /* slots */
     int on;                  /* a slot's field has a shape, or `other` */
-    int other;               /* results or active outputs of before are not valid any more: the next scan is news */
+    int other;               /* other fields were chosen while results or outputs were there: the next scan is news */
     uint32_t steps, n_beams; /* of the turns so far */
     struct cola_slot {
         uint32_t field;

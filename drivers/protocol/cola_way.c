@@ -11,7 +11,8 @@ void cola_way_add(struct cola_way *w, uint32_t scan, const uint8_t *payload, siz
     struct native_pose p;
     uint32_t n;
     if (native_decode_poses(payload, len, &n) != 0) return;
-    if (scan != w->scan) *w = (struct cola_way){.scan = scan};
+    native_decode_pose(payload, n - 1, &p);
+    if (scan != w->scan || p.t_ns < w->t1_ns) *w = (struct cola_way){.scan = scan};
     for (uint32_t i = 0; i < n; i++) {
         native_decode_pose(payload, i, &p);
         const double *a = w->at_m, *b = p.position_m;

@@ -11,16 +11,17 @@
 struct cola_way {
     uint32_t scan;
     int have_pose;
-    int64_t t0_ns, t1_ns; /* from the frame before to the last pose */
+    int64_t t0_ns, t1_ns; /* from the last pose of the frame before to the last pose */
     double at_m[3], path0_m, path1_m;
 };
 
 struct cola_encoder {
-    int32_t path_mm; /* since the head's scan began, or the client came; 0: a head that stands */
+    int32_t path_mm; /* since the head's scan began, or the client came; 0 where the head does not move */
     int16_t speed_mm_s;
 };
 
-/* A payload of poses. Where the scan has another number, the way begins anew. */
+/* A payload of poses. The path begins at 0 again where the scan has another number, or where its last pose is
+ * from before: a replayed recording goes back within a scan. */
 void cola_way_add(struct cola_way *w, uint32_t scan, const uint8_t *payload, size_t len);
 struct cola_encoder cola_way_at(const struct cola_way *w, uint32_t scan, int64_t t_ns);
 

@@ -99,7 +99,7 @@ static void put_ipv6(uint8_t *to, const struct ethernet_end *from, const struct 
     memcpy(to + 24, dest->address, 16);
 }
 
-/* Where the transport's header begins; len: of what is in the IP packet. */
+/* Writes the headers of link and network. len: bytes after them. Returns where the transport's header begins. */
 static uint8_t *put_front(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest, int protocol,
                           size_t len)
 {
@@ -135,7 +135,7 @@ size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const stru
     return (size_t)(udp - to) + len;
 }
 
-/* The largest segment; nothing, for whole words; the shift of windows. */
+/* The options are the largest segment, a no-operation that fills the word, and the shift of windows. */
 static void put_syn_options(uint8_t *to)
 {
     static const uint8_t options[SYN_OPTIONS_LEN] = {2, 4, 0, 0, 1, 3, 3, WINDOW_SHIFT};

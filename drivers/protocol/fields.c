@@ -19,9 +19,11 @@
     {                                                                                         \
         offsetof(struct type, member), kind, sizeof(((struct type *)0)->member) / UNIT_##kind \
     }
-#define TABLE(rows, type, wire, frame)                                         \
-    {                                                                          \
-        rows, sizeof(rows) / sizeof(rows)[0], wire, sizeof(struct type), frame \
+#define TABLE(rows, type, wire, frame) PART(rows, 0, type, wire, frame)
+/* A table without its last `less` rows. */
+#define PART(rows, less, type, wire, frame)                                             \
+    {                                                                                   \
+        rows, sizeof(rows) / sizeof(rows)[0] - (less), wire, sizeof(struct type), frame \
     }
 
 #define DESC(member, kind) ROW(native_descriptor, member, kind)
@@ -138,8 +140,8 @@ static const struct field pose[] = {
 };
 
 enum { N_CONTENT_FIELDS = 2 };
-const struct field_table fields_descriptor = {descriptor, sizeof descriptor / sizeof descriptor[0] - N_CONTENT_FIELDS,
-                                              272, sizeof(struct native_descriptor), NATIVE_DESCRIPTOR};
+const struct field_table fields_descriptor =
+    PART(descriptor, N_CONTENT_FIELDS, native_descriptor, 272, NATIVE_DESCRIPTOR);
 const struct field_table fields_descriptor_content = TABLE(descriptor, native_descriptor, 280, NATIVE_DESCRIPTOR);
 const struct field_table fields_anchor = TABLE(anchor, native_anchor, 280, NATIVE_ANCHOR);
 const struct field_table fields_emitter = TABLE(emitter, native_emitter, NATIVE_EMITTER_HEAD_LEN, NATIVE_EMITTER);
@@ -148,10 +150,9 @@ const struct field_table fields_attributes =
     TABLE(attributes, native_attributes, NATIVE_ATTRIBUTES_HEAD_LEN, NATIVE_ATTRIBUTES);
 const struct field_table fields_waves = TABLE(waves, native_waves, NATIVE_WAVES_HEAD_LEN, NATIVE_WAVES);
 const struct field_table fields_line_end = TABLE(line_end, line_end, 68, NATIVE_LINE_END);
-const struct field_table fields_telemetry = {telemetry, sizeof telemetry / sizeof telemetry[0] - N_PTP_FIELDS - 1, 96,
-                                             sizeof(struct native_telemetry), NATIVE_TELEMETRY};
-const struct field_table fields_telemetry_lines = {telemetry, sizeof telemetry / sizeof telemetry[0] - N_PTP_FIELDS,
-                                                   104, sizeof(struct native_telemetry), NATIVE_TELEMETRY};
+const struct field_table fields_telemetry = PART(telemetry, N_PTP_FIELDS + 1, native_telemetry, 96, NATIVE_TELEMETRY);
+const struct field_table fields_telemetry_lines =
+    PART(telemetry, N_PTP_FIELDS, native_telemetry, 104, NATIVE_TELEMETRY);
 const struct field_table fields_telemetry_ptp = TABLE(telemetry, native_telemetry, 152, NATIVE_TELEMETRY);
 const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);

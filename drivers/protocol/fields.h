@@ -14,7 +14,7 @@ enum field_kind {
     FIELD_16,    /* uint16_t */
     FIELD_32,    /* uint32_t */
     FIELD_64,    /* uint64_t, int64_t */
-    FIELD_FLOAT, /* float; a value that is not finite is refused on decoding, also of the next kind */
+    FIELD_FLOAT, /* float; decoding refuses NaN and infinities, here and in the next kind */
     FIELD_REAL,  /* double */
     FIELD_TEXT,  /* char array: NUL-terminated, padded with NUL */
 };
@@ -27,11 +27,11 @@ struct field {
 struct field_table {
     const struct field *field;
     size_t n_fields, wire_len, struct_len;
-    uint8_t type; /* enum native_type of the frame it is the payload of, or the beginning of it */
+    uint8_t type; /* enum native_type of the frame whose payload is such a struct, or begins with one */
 };
 
-/* The descriptor has two lengths: its last two fields are sent only where content is not 0. Telemetry has three: lines
- * that files lack, and the PTP follower, are sent only where they are there. */
+/* The descriptor has two lengths: its last two fields are sent only where content is not 0. Telemetry has three: the
+ * count of lines that files lack, and the state of a PTP follower, are sent only where there are such. */
 extern const struct field_table fields_descriptor, fields_descriptor_content, fields_anchor, fields_emitter,
     fields_points, fields_attributes, fields_waves, fields_line_end, fields_telemetry, fields_telemetry_lines,
     fields_telemetry_ptp, fields_event, fields_pose;

@@ -53,7 +53,7 @@ static int is_text(struct http_text t)
     return 1;
 }
 
-/* The text before a mark, and what follows it; without the mark 0. */
+/* Cuts a text at a mark, which neither part has. Returns 0 where there is no mark. */
 static int cut(struct http_text t, char mark, struct http_text *before, struct http_text *after)
 {
     const char *at = t.len > 0 ? memchr(t.s, mark, t.len) : NULL;
@@ -91,7 +91,7 @@ struct http_text http_next_line(const char *head, size_t len, size_t *at)
     return (struct http_text){begin, n > 0 && begin[n - 1] == '\r' ? n - 1 : n};
 }
 
-/* Whether more bytes can make a right line of a line's beginning. */
+/* Whether a line's beginning can still become a correct line. */
 static int may_become_line(struct http_text begin, int is_first)
 {
     struct http_text name, rest;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The head of a request of HTTP/1.x: its lines, as RFC 9112 has them. For the web link and the settings of a VLP-16.
+/* The head of a request of HTTP/1.x: its lines, as RFC 9112 has them. The web link and the settings of a VLP-16 use it.
  *
  * Bytes from a client go in. Texts within these bytes come out, or the status that answers a broken head. A bare LF
  * ends a line, too. Pure; allocates nothing; any thread. */
@@ -14,7 +14,7 @@ struct http_text {
     size_t len;
 };
 
-/* The value of a digit of %41 is 0 to 15; -1: it is no hexadecimal digit. */
+/* Value of a hexadecimal digit, as in %41: 0 to 15; -1: it is none. */
 static inline int http_hex_digit(char c)
 {
     return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
@@ -34,7 +34,7 @@ struct http_scan {
 };
 
 /* Looks at what has come since the last call. bytes: all of the head so far, from its request line on. A wrong line is
- * found as soon as its wrong byte is there. An http_scan_result. */
+ * found as soon as its wrong byte is there. Returns an http_scan_result. */
 int http_scan_head(struct http_scan *scan, const char *bytes, size_t len);
 
 /* The line at *at of a whole head, without its end, and *at after it. Empty: the head's end. */
@@ -53,7 +53,7 @@ struct http_field {
 /* "Host: localhost": 0 or 400. */
 int http_read_field(struct http_text line, struct http_field *out);
 
-/* Decimal digits alone; a number above a million becomes some number above a million. 0 or 400. */
+/* Reads decimal digits. Numbers above a million stay above a million, but are not exact. 0 or 400. */
 int http_read_length(struct http_text text, size_t *out);
 
 struct http_place {

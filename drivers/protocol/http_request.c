@@ -4,11 +4,6 @@
 #include <string.h>
 #include <strings.h>
 
-void http_reader_init(struct http_reader *r)
-{
-    memset(r, 0, sizeof *r);
-}
-
 size_t http_reader_add(struct http_reader *r, const uint8_t *bytes, size_t len)
 {
     const size_t room = sizeof r->bytes - 1 - r->len;
@@ -88,11 +83,22 @@ static int read_field(struct head *h, struct http_text line)
     return 0;
 }
 
-static int is_foreign(const struct head *h)
+/* A site may let its own name point to this machine (DNS rebinding). It can't do so with addresses, nor with names
+ * without a dot, which are local. */
+static int may_be_rebound(struct http_text host)
+{
+    size_t i = 0;
+    while (i < host.len && ((host.s[i] >= '0' && host.s[i] <= '9') || host.s[i] == '.'))
+        i++;
+    return i < host.len && host.s[0] != '[' && memchr(host.s, '.', host.len) != NULL;
+}
+
+static int is_foreign(const struct head *h, struct http_text host)
 {
     static const char http[] = "http://";
     const size_t n = sizeof http - 1;
     if (h->origin.s == NULL) return 0;
+    if (host.len == 0 || may_be_rebound(host)) return 1;
     return h->origin.len != n + h->host.len || strncasecmp(h->origin.s, http, n) != 0 ||
            strncasecmp(h->origin.s + n, h->host.s, h->host.len) != 0;
 }
@@ -117,7 +123,7 @@ static int read_head(struct http_reader *r, struct head *h)
     if (h->length > HTTP_MAX_BODY) return 413;
     if (h->expects_other) return 417;
     q->keep_alive = !h->close && (q->minor > 0 || h->keep_alive);
-    q->foreign = is_foreign(h);
+    q->foreign = is_foreign(h, place.host);
     q->body_len = h->length;
     return 0;
 }

@@ -30,12 +30,12 @@ struct http_request {
     char method[8], path[64]; /* the path without its query; one that is too long is cut, and so unknown */
     int minor;                /* of HTTP/1.x */
     int keep_alive;
-    int foreign;      /* it has an Origin that is not this server: a browser sends it for a page from elsewhere */
+    int foreign; /* it has an Origin that is, or may be, another server: a browser sends it for a page from there */
     const char *body; /* body_len bytes */
     size_t body_len;
 };
 
-struct http_reader {
+struct http_reader { /* begins as zeros */
     char bytes[HTTP_MAX_HEAD + HTTP_MAX_BODY + 1];
     size_t len;      /* in bytes */
     size_t head_len; /* 0: the end of the head has not come */
@@ -44,7 +44,6 @@ struct http_reader {
     struct http_request request;
 };
 
-void http_reader_init(struct http_reader *r);
 /* Takes what there is room for, and returns how much. After HTTP_MORE or HTTP_CONTINUE that is at least one
  * byte. */
 size_t http_reader_add(struct http_reader *r, const uint8_t *bytes, size_t len);

@@ -5,18 +5,16 @@
 
 #include "core/bytes.h"
 
-/* Link types, from https://www.tcpdump.org/linktypes.html */
-enum {
-    LINK_NULL_BSD = 0,
-    LINK_ETHERNET = 1,
-    LINK_RAW_BSD = 12,
-    LINK_RAW = 101,
-    LINK_LOOP = 108,
-    LINK_SLL = 113,
-    LINK_IPV4 = 228,
-    LINK_IPV6 = 229,
-    LINK_SLL2 = 276,
+/* Link types, from https://www.tcpdump.org/linktypes.html, and the bytes before the IP packet. */
+static const struct {
+    uint16_t link;
+    uint8_t skip;
+} links[] = {
+    {0, 4},    {108, 4},                      /* loopback of BSD, and of OpenBSD */
+    {12, 0},   {101, 0},  {228, 0}, {229, 0}, /* raw IP: of BSD, any, IPv4, IPv6 */
+    {113, 16}, {276, 20},                     /* Linux' SLL, SLL2 */
 };
+enum { LINK_ETHERNET = 1 };
 enum { TYPE_IPV4 = 0x0800, TYPE_IPV6 = 0x86dd, TYPE_VLAN = 0x8100, TYPE_QINQ = 0x88a8 };
 enum { PROTOCOL_HOP = 0, PROTOCOL_TCP = 6, PROTOCOL_UDP = 17, PROTOCOL_FRAGMENT = 44, PROTOCOL_OPTIONS = 60 };
 enum { IPV4_LEN = 20, IPV6_LEN = 40, UDP_LEN = 8, TCP_LEN = 20 };
@@ -41,24 +39,10 @@ static int skip_ethernet(const uint8_t *data, size_t len)
 /* Bytes before the IP packet; -1: it has none; -2: another link type. */
 static int skip_link(uint16_t link, const uint8_t *data, size_t len)
 {
-    switch (link) {
-    case LINK_ETHERNET:
-        return skip_ethernet(data, len);
-    case LINK_NULL_BSD:
-    case LINK_LOOP:
-        return 4;
-    case LINK_SLL:
-        return 16;
-    case LINK_SLL2:
-        return 20;
-    case LINK_RAW_BSD:
-    case LINK_RAW:
-    case LINK_IPV4:
-    case LINK_IPV6:
-        return 0;
-    default:
-        return -2;
-    }
+    if (link == LINK_ETHERNET) return skip_ethernet(data, len);
+    for (size_t i = 0; i < sizeof links / sizeof links[0]; i++)
+        if (links[i].link == link) return links[i].skip;
+    return -2;
 }
 
 static enum ip_packet_found read_ipv4(struct rest *r, struct ip_packet *out, unsigned *protocol)

@@ -54,17 +54,6 @@ enum native_flags {
     NATIVE_LOCAL = 1 << 1,  /* made for this reader alone: seq is 0 and not counted */
 };
 
-/* Frame header, 28 bytes:
- *  0 u8  sync 0xd5      1 u8 type     2 u8 version    3 u8 flags
- *  4 u32 payload length 8 u32 seq    12 u32 CRC-32C of the payload
- * 16 i64 device time, ns since power-up (of the first pulse, for points)
- * 24 u32 CRC-32C of bytes 0..23 */
-struct native_header {
-    uint8_t type, version, flags;
-    uint32_t length, seq, payload_crc;
-    int64_t t_ns;
-};
-
 /* The header of the whole frame at `frame`. */
 void native_read_header(const uint8_t *frame, struct native_header *header);
 /* Bytes of that frame: header and payload. The one place that knows where its length stands. */
@@ -73,7 +62,7 @@ static inline size_t native_frame_len(const uint8_t *frame)
     return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
 }
 
-/* Adds to the device time of the whole frame at `frame`. Its checksums are as before, and so wrong. */
+/* Adds to the device time of the whole frame at `frame`. The header's checksum is then wrong. */
 static inline void native_shift_time(uint8_t *frame, int64_t by_ns)
 {
     le_put64(frame + 16, le_get64(frame + 16) + (uint64_t)by_ns);
@@ -85,7 +74,7 @@ struct native_descriptor {
     char idn[96]; /* what *IDN? answers */
     char profile[32];
     uint32_t layout;                         /* enum native_layout */
-    uint32_t isa;                            /* packet width the stream was cast with: 1, 4, 8, 16 */
+    uint32_t isa;                            /* rays that the caster takes at once: 1, 4, 8, 16 */
     uint64_t prr_uhz, lines_uhz, pan_udeg_s; /* micro-hertz, micro-degrees per second */
     int64_t fov_min_udeg, sweep_udeg;        /* whole sweep: where it starts, how far it goes */
     int64_t line_start_udeg, line_stop_udeg; /* pulses outside are fired, counted, not cast */
@@ -93,7 +82,7 @@ struct native_descriptor {
     double mirror_counts_per_turn, pan_counts_per_turn; /* encoder counts; angle = 2 pi count / counts_per_turn */
     double range_scale_m;                               /* polar: metres per count */
     double range_min_m, range_max_m;
-    uint32_t max_echoes, n_surfaces, frames, scan; /* frames per scan (0: endless); scan number from 1 */
+    uint32_t max_echoes, n_surfaces, frames, scan; /* pan sweeps of a scan (0: endless); scan number from 1 */
     uint64_t seed;
     uint32_t content, reserved; /* enum native_content; where content is 0, neither is sent */
 };
@@ -106,9 +95,9 @@ enum native_emitter_kind {
     NATIVE_EMIT_PLANAR = 1, /* one plane, elevation 0: `steps` a turn; a line is a turn, from step 0 on */
     NATIVE_EMIT_BEAMS = 2,  /* a firing sequence of beams spins about the vertical; a line is a turn, from azimuth 0 */
     NATIVE_EMIT_SPHERE =
-        3, /* rings of one elevation each, `steps` a turn; a line is a ring, a frame is all rings. The first and the
-            * last ring are poles, where one pulse is cast */
-    NATIVE_EMIT_DIRECTIONS = 4, /* a list; a line and a frame are the list once */
+        3, /* rings of one elevation each, `steps` a turn; a line is a ring, a pan sweep is all rings. The first and
+            * the last ring are poles, where one pulse is cast */
+    NATIVE_EMIT_DIRECTIONS = 4, /* a list; a line and a pan sweep are the list once */
 };
 struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams of 12 */
     uint32_t kind, n_beams;
@@ -138,7 +127,7 @@ enum native_content {
     NATIVE_HAS_ATTRIBUTES = 1, /* a frame of attributes follows each one of points */
     NATIVE_HAS_COLOURS = 2,    /* a frame of colours follows it, after that of the attributes */
     NATIVE_HAS_WAVES = 4,      /* frames of waveforms follow it, after these */
-    NATIVE_HAS_DEVIATIONS = 8, /* attributes have deviations behind their records */
+    NATIVE_HAS_DEVIATIONS = 8, /* attributes have deviations after their records */
 };
 
 /* Geodetic coordinates and the angles of the descriptor are in degrees. */
@@ -158,7 +147,7 @@ struct native_anchor {
     uint32_t station; /* number, from 1 */
     uint32_t moving;  /* enum native_moving */
     double anchor[3]; /* of the station in the CRS, metres; geodetic: degrees, degrees, metres */
-    double scale_m;   /* a count is at most this on the ground */
+    double scale_m;   /* geo: upper bound of a count's length on the ground, metres */
     double lat_deg, lon_deg, height_m;
     double station_m[3]; /* of the station in the scene frame */
     double rotation[9];  /* socs -> scene frame, row by row: p_prcs = station_m + rotation * p_socs */
@@ -170,8 +159,8 @@ struct native_anchor {
     double frame;   /* at a stop: frame scalar of the trajectory */
 };
 
-struct native_points { /* begin of a points payload, 40 bytes; then n points of 20 */
-    uint32_t frame, line;
+struct native_points {    /* begin of a points payload, 40 bytes; then n points of 20 */
+    uint32_t frame, line; /* numbers of the pan sweep and of the line, from 0 */
     uint64_t pulse0;
     int64_t t0_ns, line_t0_ns; /* since the scan's start */
     uint32_t n_pulses, n_points;
@@ -360,14 +349,14 @@ struct native_notice {
 };
 #define NATIVE_NO_TIME INT64_MIN
 
-/* Bytes that belong to no item, one after the other, and for which there is no notice yet. */
+/* A run of bytes that belong to no item. Its notice is given once it ends. */
 struct native_bad {
-    enum native_notice_kind kind; /* NATIVE_NO_NOTICE: none */
-    int has_header;               /* they begin with a header that is right: */
+    enum native_notice_kind kind; /* NATIVE_NO_NOTICE: there is no such run now */
+    int has_header;               /* the run begins with a correct header, whose values follow: */
     int is_local;
     uint32_t seq;
     int64_t t_ns;
-    uint64_t at_byte, n, most; /* n: so far; most: what belongs to that frame at most */
+    uint64_t at_byte, n, most; /* n: bytes so far; most: those that the frame of that header has */
 };
 
 struct native_parser {
@@ -395,17 +384,17 @@ struct native_parser {
 void native_parser_init(struct native_parser *parser);
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room is never 0 after NATIVE_MORE */
 void native_parser_added(struct native_parser *parser, size_t n);
-/* In place of these two, for whole items that this process made in memory. They stay there until the parser has given
- * them all and the last one is no longer used. Their payloads are right, so CRCs of payloads are not checked. It is
- * called after NATIVE_MORE; or at any time with n 0, which drops the items that were not given yet. A parser gets all
- * its bytes in one way. */
+/* Gives the parser whole items that this process made in memory, without a copy, in place of native_parser_room() and
+ * native_parser_added(). The items stay there until the parser has given them all and the last one is no longer used.
+ * CRCs of payloads are not checked, since nothing can have changed them. It is called after NATIVE_MORE; or at any time
+ * with n 0, which drops the items that were not given yet. A parser gets all its bytes in one of the two ways. */
 void native_parser_lend(struct native_parser *parser, const uint8_t *items, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
 /* Nothing more will be added. An incomplete frame is then searched as garbage, so that whole frames after a cut
  * one come out at the end of a recording, too. */
 void native_parser_finish(struct native_parser *parser);
 /* After native_parser_finish() and all its items: bytes of another connection to the same head will follow.
- * Counters and sequence go on; native_sequence_resume(). Items that were not taken are bad bytes. */
+ * Counters and sequence go on (native_sequence_resume). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
 /* Returns 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points,

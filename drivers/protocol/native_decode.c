@@ -54,7 +54,7 @@ int native_decode_points(const uint8_t *payload, size_t len, struct native_point
     return rc == 0 && out->n_points > (len - NATIVE_POINTS_HEAD_LEN) / NATIVE_POINT_LEN ? SH_EFORMAT : rc;
 }
 
-/* It has no branches, and one load per point: some readers decode nothing else. */
+/* It has no branches, and one load per point, since some readers decode nothing else of millions a second. */
 void native_count_points(const uint8_t *payload, uint32_t n, uint32_t *n_empty, uint32_t *n_reflectances)
 {
     const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + 12;
@@ -70,7 +70,7 @@ void native_count_points(const uint8_t *payload, uint32_t n, uint32_t *n_empty, 
 }
 
 /* Attributes and colours begin alike. each: the bytes of a record. */
-static int decode_beside(const uint8_t *payload, size_t len, size_t each, struct native_attributes *out)
+static int decode_of_points(const uint8_t *payload, size_t len, size_t each, struct native_attributes *out)
 {
     const int rc = fields_decode(&fields_attributes, payload, len, out);
     return rc == 0 && out->n_points > (len - NATIVE_ATTRIBUTES_HEAD_LEN) / each ? SH_EFORMAT : rc;
@@ -78,12 +78,12 @@ static int decode_beside(const uint8_t *payload, size_t len, size_t each, struct
 
 int native_decode_attributes(const uint8_t *payload, size_t len, struct native_attributes *out)
 {
-    return decode_beside(payload, len, NATIVE_ATTRIBUTE_LEN, out);
+    return decode_of_points(payload, len, NATIVE_ATTRIBUTE_LEN, out);
 }
 
 int native_decode_colours(const uint8_t *payload, size_t len, struct native_attributes *out)
 {
-    return decode_beside(payload, len, NATIVE_COLOUR_LEN, out);
+    return decode_of_points(payload, len, NATIVE_COLOUR_LEN, out);
 }
 
 int native_check_deviations(size_t len, uint32_t n_points)

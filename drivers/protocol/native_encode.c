@@ -9,7 +9,7 @@
 #include "drivers/protocol/native_rows.h"
 #include "drivers/protocol/native_waves.h"
 
-/* Header in front of the payload that already stands at dst + NATIVE_HEADER_LEN. */
+/* Writes the header before the payload that already stands at dst + NATIVE_HEADER_LEN. */
 static size_t put_header(uint8_t *dst, enum native_type type, int flags, size_t payload_len, int64_t t_ns)
 {
     dst[0] = NATIVE_SYNC;
@@ -127,19 +127,19 @@ size_t native_colours_bound(uint32_t n_points)
 
 size_t native_waves_bound(uint32_t n_points, uint32_t n_windows, uint32_t n_samples)
 {
-    /* a frame ends where the next window doesn't fit, so it is filled up to the longest one */
+    /* a frame ends where the next window doesn't fit, so less than the longest window stays free in it */
     const size_t least = NATIVE_MAX_PAYLOAD - NATIVE_WAVES_HEAD_LEN - native_wave_len(NATIVE_MAX_SAMPLES);
     const size_t windows = n_windows * native_wave_len(1) + (size_t)n_samples * NATIVE_SAMPLE_LEN;
     return (frames_bound(n_points) + windows / least) * (NATIVE_HEADER_LEN + NATIVE_WAVES_HEAD_LEN) + windows;
 }
 
-/* Every pulse has an entry whose echo number is 0 or 1, and it is its first. */
+/* The first entry of each pulse has the echo number 0 or 1, and no other entry has. */
 static int starts_pulse(uint8_t echo)
 {
     return (echo & 15) <= 1;
 }
 
-/* How many points from `first` on go into one frame. 0: a pulse of more echoes than a frame holds. */
+/* How many points from `first` on go into one frame. 0: a pulse has more echoes than a frame holds. */
 static uint32_t points_that_fit(const struct line_block *block, uint32_t first)
 {
     uint32_t n = block->n_points - first;
@@ -158,7 +158,7 @@ static uint32_t count_pulses(const uint8_t *echo, uint32_t n)
     return pulses;
 }
 
-/* The entries of a block that go into one points frame, and what follows it. */
+/* The entries of a block that go into one points frame, and into the frames that follow it. */
 struct encode_cut {
     const struct line_block *block;
     struct native_points head;
@@ -166,13 +166,13 @@ struct encode_cut {
     uint32_t pulse0; /* after the block's */
     uint32_t dt0_ns; /* after the block's t0_ns */
     uint32_t wave;   /* first window that was not sent yet */
-    uint32_t n_lost; /* samples, to be said by the next frame of waveforms */
+    uint32_t n_lost; /* samples lost, which the next frame of waveforms reports */
     int is_last;
     int64_t t_ns; /* in the headers */
 };
 
 /* Attributes and colours begin alike. */
-static void put_beside_head(uint8_t *dst, const struct encode_cut *cut)
+static void put_attributes_head(uint8_t *dst, const struct encode_cut *cut)
 {
     const struct native_attributes head = {cut->head.pulse0, cut->head.line, cut->head.n_points};
     fields_encode(&fields_attributes, &head, dst + NATIVE_HEADER_LEN);
@@ -187,7 +187,7 @@ static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *
     const size_t payload_len = NATIVE_ATTRIBUTES_HEAD_LEN + n * each;
     uint8_t *at = dst + NATIVE_HEADER_LEN + NATIVE_ATTRIBUTES_HEAD_LEN;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
-    put_beside_head(dst, cut);
+    put_attributes_head(dst, cut);
     for (uint32_t i = cut->first; i < end; i++, at += NATIVE_ATTRIBUTE_LEN)
         le_put32(at, (uint16_t)block->amplitude_cdb[i] | (uint32_t)block->width_cns[i] << 16);
     for (uint32_t i = cut->first; block->deviation != NULL && i < end; i++, at += NATIVE_DEVIATION_LEN)
@@ -195,12 +195,12 @@ static size_t put_attributes(uint8_t *dst, size_t cap, const struct encode_cut *
     return put_header(dst, NATIVE_ATTRIBUTES, 0, payload_len, cut->t_ns);
 }
 
-/* Colours likewise. */
+/* Writes colours. */
 static size_t put_colours(uint8_t *dst, size_t cap, const struct encode_cut *cut)
 {
     const size_t len = (size_t)cut->head.n_points * NATIVE_COLOUR_LEN, payload_len = NATIVE_COLOURS_HEAD_LEN + len;
     if (cap < NATIVE_HEADER_LEN + payload_len) return 0;
-    put_beside_head(dst, cut);
+    put_attributes_head(dst, cut);
     memcpy(dst + NATIVE_HEADER_LEN + NATIVE_COLOURS_HEAD_LEN, cut->block->rgb + cut->first, len);
     return put_header(dst, NATIVE_COLOURS, 0, payload_len, cut->t_ns);
 }
@@ -259,7 +259,7 @@ static size_t put_waves(uint8_t *dst, size_t cap, struct encode_cut *cut)
 }
 
 /* Writes what follows a points frame: *len bytes. SH_ENOMEM: there is no room. */
-static int put_beside(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *len)
+static int put_following(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *len)
 {
     size_t done = 0, more = 1;
     if (cut->block->width_cns != NULL) done += more = put_attributes(dst, cap, cut);
@@ -272,7 +272,7 @@ static int put_beside(uint8_t *dst, size_t cap, struct encode_cut *cut, size_t *
 
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns)
 {
-    size_t done = 0, beside;
+    size_t done = 0, following;
     struct encode_cut cut = {.block = block};
     do {
         const uint32_t n = points_that_fit(block, cut.first);
@@ -295,15 +295,15 @@ size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *b
         if (native_put_rows(payload + NATIVE_POINTS_HEAD_LEN, block, cut.first, n, cut.dt0_ns) != 0) return 0;
         done += put_header(dst + done, NATIVE_POINTS, 0, payload_len, cut.t_ns);
         if (cut.is_last && block->waves != NULL) cut.n_lost = block->waves->n_left_out;
-        if (put_beside(dst + done, cap - done, &cut, &beside) != SH_OK) return 0;
-        done += beside;
+        if (put_following(dst + done, cap - done, &cut, &following) != SH_OK) return 0;
+        done += following;
         cut.pulse0 += cut.head.n_pulses;
         cut.first += n;
     } while (cut.first < block->n_points);
     return done;
 }
 
-/* A name with its length in front; 0 when it is too long for either. */
+/* Writes a name with its length in front. Returns 0 where it is longer than 255 bytes, or than the room. */
 static size_t put_name(uint8_t *dst, size_t room, const char *name)
 {
     size_t len = strnlen(name, 256);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From the head's data to native frames: descriptor, anchor, lines, poses, names. native.h has the way back.
+/* Writes native frames from the head's data: descriptor, anchor, lines, poses, names. native.h reads them.
  *
  * Each function writes one whole frame at dst (points: as many frames as needed) and returns the length. It
  * returns 0 when cap is too small, or when the input breaks a limit of the wire: a block's dt_ns of 2^24 or

@@ -14,7 +14,7 @@ void native_parser_init(struct native_parser *parser)
     parser->last_t_ns = NATIVE_NO_TIME;
 }
 
-/* Returns the bytes that start and end count in. */
+/* The buffer in which start and end are offsets. */
 static const uint8_t *bytes_of(const struct native_parser *parser)
 {
     return parser->lent != NULL ? parser->lent : parser->buf;
@@ -73,8 +73,8 @@ static void count_bad_payload(struct native_parser *parser)
     parser->stats.bad_unseen += (uint64_t)!parser->bad.is_local;
 }
 
-/* An item follows, or at_end: nothing does. A frame that seemed to be cut by the end is a broken one if others stood
- * within its length. */
+/* Ends the run of bad bytes, because an item follows or (at_end) the bytes are over. A run that seemed to be a frame
+ * cut by the end is a broken frame instead if an item stood within its length. */
 static void end_bad(struct native_parser *parser, int at_end)
 {
     struct native_bad *bad = &parser->bad;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The native protocol on a link: the stream as it is, and command lines with their replies (PROTOCOL.md).
  *
- * There is no module to call. The loop copies whole ticks of frames to the client without looking into them, up to
+ * No function here does that work. The loop copies whole ticks of frames to the client without looking into them, up to
  * millions of pulses per second. It also carries out the command lines (firmware_sim/loop/session.c, pump_commands.c):
  * the reply to TIME:STEP comes after the frames of that time, lines wait for it, and a client keeps control between its
  * lines. */

@@ -3,36 +3,21 @@
 
 #include "drivers/protocol/native.h"
 
-static struct native_seen look_of(const struct native_header *header)
-{
-    return (struct native_seen){.t_ns = header->t_ns,
-                                .seq = header->seq,
-                                .payload_crc = header->payload_crc,
-                                .length = header->length,
-                                .type = header->type,
-                                .flags = header->flags};
-}
-
-static int native_sequence_is_same(const struct native_seen *a, const struct native_seen *b)
+static int native_sequence_is_same(const struct native_header *a, const struct native_header *b)
 {
     return a->seq == b->seq && a->t_ns == b->t_ns && a->payload_crc == b->payload_crc && a->type == b->type &&
            a->length == b->length && a->flags == b->flags;
 }
 
-static void remember(struct native_sequence *s, const struct native_seen *frame)
-{
-    s->seen[s->n_seen++ % NATIVE_SEEN] = *frame;
-}
-
-/* Whether it is among the last `most` frames. */
-static int has_come(const struct native_sequence *s, const struct native_seen *frame, uint32_t most)
+/* Whether the frame is among the last `most` ones. */
+static int has_come(const struct native_sequence *s, const struct native_header *frame, uint32_t most)
 {
     for (uint32_t i = 1; i <= most && i <= s->n_seen; i++)
         if (native_sequence_is_same(&s->seen[(s->n_seen - i) % NATIVE_SEEN], frame)) return 1;
     return 0;
 }
 
-/* The oldest range makes room. */
+/* Remembers a range of missing frames, in place of the oldest one where there is no room. */
 static void add_gap(struct native_sequence *s, uint32_t first, uint32_t n)
 {
     if (n == 0 || n > NATIVE_GAP_MOST) return;
@@ -47,6 +32,7 @@ static int fills_gap(struct native_sequence *s, uint32_t seq)
         const uint32_t first = s->gap[i].first, n = s->gap[i].n, before = seq - first;
         if (before >= n) continue;
         s->gap[i].n = before;
+        if (s->n_gaps % NATIVE_GAPS == i) s->n_gaps++; /* the next place is that of the first part, which stays */
         add_gap(s, seq + 1, n - before - 1);
         return 1;
     }
@@ -70,7 +56,7 @@ static int is_run(struct native_sequence *s, uint32_t seq)
 }
 
 /* The kind of notice for a frame that is not the next one. */
-static enum native_notice_kind look_at_jump(struct native_sequence *s, const struct native_seen *frame, int fresh,
+static enum native_notice_kind look_at_jump(struct native_sequence *s, const struct native_header *frame, int fresh,
                                             uint32_t *first, uint32_t *n)
 {
     const uint32_t missing = frame->seq - s->next;
@@ -87,30 +73,29 @@ static enum native_notice_kind look_at_jump(struct native_sequence *s, const str
 }
 
 /* LOCAL frames are not numbered, and a head may send equal ones, but never two in a row. */
-static enum native_notice_kind look_at_local(struct native_sequence *s, const struct native_seen *frame)
+static enum native_notice_kind look_at_local(struct native_sequence *s, const struct native_header *frame)
 {
     if (native_sequence_is_same(&s->local, frame)) return NATIVE_REPEATED;
     s->local = *frame;
     return NATIVE_NO_NOTICE;
 }
 
-enum native_notice_kind native_sequence_take(struct native_sequence *s, const struct native_header *header,
+enum native_notice_kind native_sequence_take(struct native_sequence *s, const struct native_header *frame,
                                              uint32_t *first, uint32_t *n)
 {
-    const struct native_seen frame = look_of(header);
     enum native_notice_kind kind = NATIVE_NO_NOTICE;
-    *first = frame.seq;
+    *first = frame->seq;
     *n = 1;
-    if ((frame.flags & NATIVE_LOCAL) != 0) return look_at_local(s, &frame);
+    if ((frame->flags & NATIVE_LOCAL) != 0) return look_at_local(s, frame);
     s->local.type = 0;
     const int fresh = s->fresh;
     s->fresh = 0;
-    if (s->have && frame.seq != s->next) kind = look_at_jump(s, &frame, fresh, first, n);
+    if (s->have && frame->seq != s->next) kind = look_at_jump(s, frame, fresh, first, n);
     if (kind == NATIVE_REPEATED) return kind;
-    remember(s, &frame);
+    s->seen[s->n_seen++ % NATIVE_SEEN] = *frame;
     if (kind == NATIVE_LATE) return kind;
     s->late_run = 0;
-    s->next = frame.seq + 1;
+    s->next = frame->seq + 1;
     s->have = 1;
     return kind;
 }

@@ -9,7 +9,16 @@
 
 #include <stdint.h>
 
-struct native_header;
+/* Frame header, 28 bytes:
+ *  0 u8  sync 0xd5      1 u8 type     2 u8 version    3 u8 flags
+ *  4 u32 payload length 8 u32 seq    12 u32 CRC-32C of the payload
+ * 16 i64 device time, ns since power-up (of the first pulse, for points)
+ * 24 u32 CRC-32C of bytes 0..23 */
+struct native_header {
+    uint8_t type, version, flags;
+    uint32_t length, seq, payload_crc;
+    int64_t t_ns;
+};
 
 /* Kinds of notices. The values are those of enum scanhead_notice_kind, which explains each. */
 enum native_notice_kind {
@@ -27,26 +36,20 @@ enum {
     NATIVE_SEEN = 256,       /* frames that a repeated one is compared with */
     NATIVE_GAPS = 64,        /* ranges of missing frames that a late one may be of */
     NATIVE_GAP_MOST = 65536, /* frames in such a range: a larger one is not remembered */
-    NATIVE_LATE_RUN = 256,   /* so many late frames with consecutive numbers are another sequence */
-};
-
-struct native_seen {
-    int64_t t_ns;
-    uint32_t seq, payload_crc, length;
-    uint8_t type, flags;
+    NATIVE_LATE_RUN = 256,   /* late frames with consecutive numbers, which together are another sequence */
 };
 
 struct native_sequence {
-    int have;  /* a counted frame has come: */
-    int fresh; /* another connection has begun, and none has come on it yet */
+    int have;  /* 1: a counted frame has come. The members below are valid only then */
+    int fresh; /* 1: another connection has begun, and no counted frame has come on it yet */
     uint32_t next;
     uint32_t last_late, late_run; /* the last late frame, and how many came in a row up to it */
     uint32_t n_seen, n_gaps;      /* since the start; the last NATIVE_SEEN and NATIVE_GAPS of them are kept */
-    struct native_seen seen[NATIVE_SEEN];
+    struct native_header seen[NATIVE_SEEN];
     struct {
         uint32_t first, n;
     } gap[NATIVE_GAPS];
-    struct native_seen local; /* the frame before, if it was LOCAL; else type 0 */
+    struct native_header local; /* the frame before, if it was LOCAL; else type 0 */
 };
 
 /* All zero: nothing has come yet. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* This decodes waveforms on the wire (WAVEFORMS.md): payloads of type 12 into windows of samples, and the deviations of
- * attributes.
+/* Decodes waveforms (WAVEFORMS.md): payloads of type 12 into windows of samples, and the deviations that attributes
+ * have.
  *
  * native_encode.h writes them. Pure; allocates nothing; any thread. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_WAVES_H
@@ -66,7 +66,7 @@ static inline size_t native_decode_wave(const uint8_t *payload, size_t at, struc
     return at + native_wave_len(out->n);
 }
 
-/* An attributes payload of n_points has room for their deviations behind its records: 0, or SH_EFORMAT. */
+/* Checks that an attributes payload has the deviations of its n_points after its records. 0, or SH_EFORMAT. */
 int native_check_deviations(size_t len, uint32_t n_points);
 /* Returns the deviation of point i < n_points of such a payload, in 1/1000; 65535: that much or more. */
 static inline uint16_t native_decode_deviation(const uint8_t *payload, uint32_t n_points, uint32_t i)

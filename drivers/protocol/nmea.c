@@ -8,7 +8,7 @@
 
 static const double KNOT_M_S = 1852.0 / 3600.0;
 
-/* A sentence being written. Text without room is left out, and the length counts it all the same. */
+/* A sentence being written. Text without room is left out, but the length counts it. */
 struct sentence {
     char *dst;
     size_t cap, len;
@@ -52,7 +52,7 @@ static void put_time(struct sentence *s, const struct nmea_fix *fix)
     nmea_put(s, ",%02d%02d%02d.%02d", fix->hour, fix->minute, fix->second, fix->hundredth);
 }
 
-/* ddmm.mmmmmmm and its letter. Rounded as a whole, so that the minutes never read 60. */
+/* Writes ddmm.mmmmmmm and its letter. The angle is rounded before it is divided, so that the minutes never read 60. */
 static void put_angle(struct sentence *s, double deg, int degree_digits, char positive, char negative)
 {
     const long long degree = 600000000; /* in 1e-7 minutes */
@@ -96,9 +96,9 @@ size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
     put_place(&s, fix);
     if (fix->quality == 0)
         nmea_put(&s, ",,");
-    else if (isnan(fix->course_deg)) /* readers by sscanf read no sentence with an empty field */
+    else if (isnan(fix->course_deg)) /* readers that use sscanf refuse an empty field */
         nmea_put(&s, ",%.3f,000.0", fix->speed_m_s / KNOT_M_S);
-    else /* cut, so that it never reads 360 */
+    else /* rounded down, so that it never reads 360 */
         nmea_put(&s, ",%.3f,%.2f", fix->speed_m_s / KNOT_M_S, floor(fix->course_deg * 100.0) / 100.0);
     nmea_put(&s, ",%02d%02d%02d,,,%c", fix->day, fix->month, fix->year % 100,
              mode[fix->quality >= 0 && fix->quality <= 5 ? fix->quality : 0]);

@@ -2,11 +2,11 @@
 /* For injected faults: marks the decimals of sentences, and corrects their checksums. */
 #include <string.h>
 
-#include "drivers/protocol/nmea.h"
+#include "drivers/protocol/protocol.h"
 
 enum { TAIL_LEN = 3 }; /* "*hh" */
 
-/* The next sentence from *at on: from its "$" to its "*", which has two digits after it. Returns 0: there is none. */
+/* Finds the next sentence from *at on: *at is its "$", *star its "*", which two bytes follow. 0: there is none. */
 static int next_sentence(const uint8_t *bytes, size_t len, size_t *at, size_t *star)
 {
     while (*at < len) {
@@ -22,19 +22,13 @@ static int next_sentence(const uint8_t *bytes, size_t len, size_t *at, size_t *s
     return 0;
 }
 
-/* Bits of a digit; after any change of these it is still a digit. */
-static uint8_t digit_bits(uint8_t c)
-{
-    return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' ? 1 : 0;
-}
-
 void nmea_content(const uint8_t *bytes, size_t len, uint8_t *mask)
 {
     for (size_t at = 0, star; next_sentence(bytes, len, &at, &star); at = star) {
         int is_decimal = 0;
         for (size_t i = at; i < star; i++) {
             is_decimal = bytes[i] == '.' || (is_decimal && bytes[i] >= '0' && bytes[i] <= '9');
-            if (is_decimal) mask[i] = digit_bits(bytes[i]);
+            if (is_decimal) mask[i] = protocol_digit_bits(bytes[i]);
         }
     }
 }

@@ -19,7 +19,7 @@ static int nmea_protocol_create(const struct protocol_spec *spec, void **protoco
     return SH_OK;
 }
 
-/* The time of day may not be known yet: a file is opened before power-up. */
+/* The next fix is asked for later: a link of type file opens before power-up, when the time of day is not known. */
 static void open_at(void *protocol, int64_t t_ns)
 {
     struct receiver *self = protocol;
@@ -36,7 +36,7 @@ static void nmea_protocol_say(struct receiver *self, int64_t t_ns)
     if (len != 0) self->host.send(self->host.ctx, text, len);
 }
 
-static void pass(void *protocol, int64_t t_ns)
+static void nmea_protocol_time(void *protocol, int64_t t_ns)
 {
     struct receiver *self = protocol;
     if (self->next_ns >= t_ns) return;
@@ -46,7 +46,7 @@ static void pass(void *protocol, int64_t t_ns)
     }
 }
 
-static int64_t next(const void *protocol)
+static int64_t nmea_protocol_next_ns(const void *protocol)
 {
     const struct receiver *self = protocol;
     return self->next_ns;
@@ -61,7 +61,7 @@ const struct protocol_ops protocol_nmea = {
     .create = nmea_protocol_create,
     .destroy = free,
     .open = open_at,
-    .time = pass,
+    .time = nmea_protocol_time,
     .input = protocol_lose_input,
-    .next_ns = next,
+    .next_ns = nmea_protocol_next_ns,
 };

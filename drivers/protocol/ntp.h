@@ -23,7 +23,7 @@ enum { NTP_LEN = 48, NTP_PORT = 123 };
 enum ntp_kind {
     NTP_GOOD,
     NTP_FOREIGN,        /* no answer to this request: shorter, of another mode or version, or with another T1 */
-    NTP_UNSYNCHRONISED, /* the server says that it has no time, or its times can't be: RFC 4330, section 5 */
+    NTP_UNSYNCHRONISED, /* the server says that it has no time, or sends impossible times: RFC 4330, section 5 */
     NTP_KISS,
 };
 

@@ -16,7 +16,7 @@ struct pcap_reader { /* begins as zeros */
 
 /* 1: the bytes, 4 at least, begin such a file. */
 int pcap_is(const uint8_t *bytes);
-/* As pcapng_read. PCAPNG_MORE: they have no whole record yet. */
+/* As pcapng_read. PCAPNG_MORE: the bytes have no whole record yet. */
 int pcap_read(struct pcap_reader *reader, const uint8_t *bytes, size_t len, struct pcapng_packet *packet, size_t *used,
               struct sh_err *err);
 

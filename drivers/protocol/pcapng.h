@@ -30,7 +30,7 @@ enum {
 
 /* ---- writing; all return how many bytes they put. Texts may be NULL: none. */
 
-/* At the beginning of a file. */
+/* Begins a file. */
 size_t pcapng_put_section(uint8_t *to, const char *application);
 /* Interfaces count from 0. snap_len: no packet of it is longer. */
 size_t pcapng_put_interface(uint8_t *to, enum pcapng_link link, uint32_t snap_len, const char *name,

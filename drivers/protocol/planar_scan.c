@@ -16,8 +16,7 @@ void planar_scan_init(struct planar_scan *s)
 
 /* ---- the head */
 
-int planar_scan_check(const struct native_descriptor *d, const struct native_emitter *e, uint32_t max_steps,
-                      struct sh_err *err)
+int planar_scan_check(double pan_counts, const struct native_emitter *e, uint32_t max_steps, struct sh_err *err)
 {
     const int64_t n = (int64_t)e->last_step - e->first_step + 1;
     if (e->steps == 0 || e->steps > max_steps || e->last_step < 0 || (uint32_t)e->last_step >= e->steps)
@@ -26,20 +25,19 @@ int planar_scan_check(const struct native_descriptor *d, const struct native_emi
     if (e->first_step < 0 || n < 1 || n > PLANAR_MAX_STEPS)
         return sh_fail(err, SH_EINPUT, "a field of view of steps %d to %d; allowed are 1 to %d steps of a turn",
                        e->first_step, e->last_step, (int)PLANAR_MAX_STEPS);
-    if (e->front_step < 0 || (uint32_t)e->front_step >= e->steps || !(d->pan_counts_per_turn >= 1))
+    if (e->front_step < 0 || (uint32_t)e->front_step >= e->steps || !(pan_counts >= 1))
         return sh_fail(err, SH_EINPUT,
                        "step %d in front, and %.10g encoder counts a turn; allowed are a step of the "
                        "turn, and 1 count and more",
-                       e->front_step, d->pan_counts_per_turn);
+                       e->front_step, pan_counts);
     return SH_OK;
 }
 
 static void take_head(struct planar_scan *s)
 {
     const struct native_emitter *e = &s->emitter;
-    const struct native_descriptor d = {.pan_counts_per_turn = s->pan_counts};
     struct planar_head *h = &s->head;
-    h->known = e->kind == NATIVE_EMIT_PLANAR && planar_scan_check(&d, e, PLANAR_MAX_TURN, NULL) == SH_OK;
+    h->known = e->kind == NATIVE_EMIT_PLANAR && planar_scan_check(s->pan_counts, e, PLANAR_MAX_TURN, NULL) == SH_OK;
     if (!h->known) return;
     h->steps = e->steps;
     h->n = (uint32_t)(e->last_step - e->first_step) + 1;
@@ -51,13 +49,16 @@ static void take_head(struct planar_scan *s)
 }
 
 /* A scan that begins ends the turn at hand. A repeated descriptor may be of the scan that this turn belongs to. */
-static void take_descriptor(struct planar_scan *s, const struct native_descriptor *d, int repeated)
+static void take_descriptor(struct planar_scan *s, const struct native_descriptor *d, uint8_t flags)
 {
     struct planar_head *h = &s->head;
+    const int repeated = (flags & NATIVE_REPEAT) != 0;
     if (d->scan != s->scan && !repeated) {
         s->done = 1;
         s->scan_t0_ns = INT64_MIN;
     }
+    /* A recording that is replayed jumps within the scan: the turns between are no loss. */
+    if ((flags & NATIVE_LOCAL) != 0 && !repeated) s->fresh = s->done = 1;
     s->scan = d->scan;
     s->pan_counts = d->pan_counts_per_turn;
     h->lines_uhz = d->lines_uhz;
@@ -75,7 +76,7 @@ static int same_steps(const struct native_emitter *a, const struct native_emitte
            a->last_step == b->last_step && a->front_step == b->front_step && a->turn == b->turn;
 }
 
-/* Another speed leaves the turn at hand as it is. */
+/* An emitter frame that comes with another speed has the same steps, and leaves the turn at hand as it is. */
 static void take_emitter(struct planar_scan *s, const struct native_emitter *e)
 {
     if (same_steps(e, &s->emitter)) return;
@@ -97,7 +98,8 @@ static uint32_t planar_scan_place_of(const struct planar_scan *s, uint32_t pan)
 
 /* ---- turns */
 
-/* The turn that a frame belongs to. from_start: the frame has the pulse that is the turn's first. */
+/* Begins the turn that a frame belongs to, unless it is the one at hand. from_start: the frame has the first pulse of
+ * its turn. */
 static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, int64_t line_t0_ns, int from_start,
                     struct planar_news *news)
 {
@@ -108,7 +110,8 @@ static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, in
         if (!s->done) news->broken++;
         if (line > next) news->broken += line - next;
     }
-    if (s->seen && !same_scan) s->number0 += s->line + 1;
+    /* Turns that are no loss are not counted as turns either. */
+    if (s->seen && !same_scan) s->number0 += s->line + 1 - (s->fresh ? line : 0);
     s->done = s->fresh && !from_start;
     s->fresh = 0;
     s->seen = news->begun = 1;
@@ -183,7 +186,7 @@ static void planar_scan_take_points(struct planar_scan *s, const struct native_h
     end_if_whole(s, news);
 }
 
-/* Attributes of other points are ignored. Then the next frame finds that these points still lack theirs. */
+/* Attributes of other points are ignored. The next frame then breaks the turn, since these points still lack theirs. */
 static void take_attributes(struct planar_scan *s, const uint8_t *payload, const struct native_attributes *head,
                             struct planar_news *news)
 {
@@ -221,8 +224,7 @@ struct planar_news planar_scan_frame(struct planar_scan *s, const uint8_t *frame
     struct native_header h;
     native_read_header(frame, &h);
     if (h.type == NATIVE_DESCRIPTOR) {
-        if (native_decode_descriptor(payload, h.length, &u.descriptor) == 0)
-            take_descriptor(s, &u.descriptor, (h.flags & NATIVE_REPEAT) != 0);
+        if (native_decode_descriptor(payload, h.length, &u.descriptor) == 0) take_descriptor(s, &u.descriptor, h.flags);
     } else if (h.type == NATIVE_EMITTER) {
         if (native_decode_emitter(payload, h.length, &u.emitter) == 0) take_emitter(s, &u.emitter);
     } else if (s->head.known) {

@@ -6,7 +6,7 @@
  *
  * A turn is whole once each place has its pulse, and its attributes where the head sends them: that is when the
  * beam has passed the last step. A turn with something missing is broken: it never comes out, and is counted. Turns
- * within which the first frame came, the scan ended or the steps changed are not counted.
+ * within which the first frame came, the scan ended, the steps changed or a replay jumped are not counted.
  *
  * Pure. Nothing is allocated; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_PLANAR_SCAN_H
@@ -39,16 +39,16 @@ struct planar_echo {
 
 struct planar_turn {
     int64_t t0_ns;               /* device time of step 0 */
-    uint32_t number;             /* of turns since the head's scan began; goes on over scans, and over lost turns */
-    uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, to PLANAR_ECHOES; PLANAR_UNSEEN */
+    uint32_t number;             /* of turns since the head's scan began; goes on over scans, jumps over lost turns */
+    uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, PLANAR_ECHOES at most; PLANAR_UNSEEN: no pulse came */
     struct planar_echo echo[PLANAR_MAX_STEPS][PLANAR_ECHOES]; /* in order of range */
 };
 
 struct planar_scan {
     struct planar_head head;
-    const struct planar_turn *whole; /* the last one; NULL: none yet, of these steps */
+    const struct planar_turn *whole; /* the last whole turn; NULL: none with these steps came yet */
     int64_t t0_ns;                   /* of step 0 of the turn at hand or the last one; INT64_MIN: none yet */
-    /* inside */
+    /* the members below are for planar_scan.c alone */
     struct planar_turn *now; /* being filled: the one that is not `whole` */
     struct native_emitter emitter;
     uint32_t scan, line, number0; /* number0: turns of the scans before */
@@ -57,9 +57,9 @@ struct planar_scan {
     uint32_t n_seen;       /* places that have their pulse */
     double pan_counts, steps_per_count;
     uint32_t pan0_place; /* where pan count 0 is, 0..steps-1 */
-    /* the points frame before, for its attributes */
+    /* the last points frame, whose attributes come next */
     uint64_t pulse0;
-    uint32_t n_waiting;             /* points that have none yet */
+    uint32_t n_waiting;             /* points that have no attributes yet */
     uint16_t at[NATIVE_MAX_POINTS]; /* place * PLANAR_ECHOES + echo; UINT16_MAX: no place */
     struct planar_turn turn[2];     /* last: large, and not touched before a turn begins */
 };
@@ -70,9 +70,8 @@ struct planar_news {
     uint32_t broken;  /* turns */
 };
 
-/* protocol_ops.check_head for devices whose steps are numbered up to max_steps - 1. */
-int planar_scan_check(const struct native_descriptor *d, const struct native_emitter *e, uint32_t max_steps,
-                      struct sh_err *err);
+/* For protocol_ops.check_head of devices whose steps are numbered up to max_steps - 1. pan_counts: of a turn. */
+int planar_scan_check(double pan_counts, const struct native_emitter *e, uint32_t max_steps, struct sh_err *err);
 void planar_scan_init(struct planar_scan *s);
 /* One frame of the stream. */
 struct planar_news planar_scan_frame(struct planar_scan *s, const uint8_t *frame);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/protocol.h"
 
+#include <string.h>
+
 /* The one list of protocols. A new one is a file of this folder that defines its protocol_ops, an id in protocol.h, and
  * two rows here. */
 extern const struct protocol_ops protocol_native;
@@ -23,11 +25,26 @@ static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_CAPTURE] = &protocol_capture,
 };
 
+enum protocol_head_state protocol_ask_state(const struct protocol_host *host)
+{
+    static const char *const names[] = {"off", "boot", "idle", "spin-up", "scanning", "spin-down", "fault"};
+    char state[PROTOCOL_REPLY];
+    if (host->command(host->ctx, "HEAD:STATE?", state, sizeof state) != 0) return PROTOCOL_HEAD_UNKNOWN;
+    for (int i = PROTOCOL_HEAD_OFF; i <= PROTOCOL_HEAD_FAULT; i++)
+        if (strcmp(names[i], state) == 0) return (enum protocol_head_state)i;
+    return PROTOCOL_HEAD_UNKNOWN;
+}
+
 void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     const struct protocol_host *host = protocol;
     (void)bytes;
     host->count(host->ctx, PROTOCOL_INPUT_LOST, len);
+}
+
+uint8_t protocol_digit_bits(uint8_t c)
+{
+    return c >= '0' && c <= '7' ? 7 : c == '8' || c == '9' || (c >= 'B' && c <= 'E') ? 1 : 0;
 }
 
 const struct protocol_ops *protocol_ops_get(enum protocol_id id)

@@ -40,7 +40,7 @@ enum protocol_needs {
     PROTOCOL_NEEDS_LAST = 1 << 4,       /* beam.echoes is not first */
 };
 
-/* Pulses per second that the head's clock follows, as a VLP-16 numbers their states. */
+/* States of the pulses per second that the head's clock follows. The values are those of a VLP-16. */
 enum protocol_pps {
     PROTOCOL_PPS_ABSENT,
     PROTOCOL_PPS_SYNCHRONISING,
@@ -55,10 +55,22 @@ enum protocol_dialect {
     PROTOCOL_COLA_B,
 };
 
-/* Counts of a session, beside the frames it lost. */
+/* States of the head, in the order of telemetry. */
+enum protocol_head_state {
+    PROTOCOL_HEAD_UNKNOWN = -1,
+    PROTOCOL_HEAD_OFF,
+    PROTOCOL_HEAD_BOOT,
+    PROTOCOL_HEAD_IDLE,
+    PROTOCOL_HEAD_SPIN_UP,
+    PROTOCOL_HEAD_SCANNING,
+    PROTOCOL_HEAD_SPIN_DOWN,
+    PROTOCOL_HEAD_FAULT
+};
+
+/* Counts of a session, besides the frames it lost. */
 enum protocol_count {
     PROTOCOL_UNITS_LOST,    /* units that were not sent: no room, or parts of them were missing */
-    PROTOCOL_INPUT_LOST,    /* bytes from the client that were thrown away: overlong, out of frame, garbage */
+    PROTOCOL_INPUT_LOST,    /* bytes from the client that were thrown away: overlong, outside of telegrams, garbage */
     PROTOCOL_WRONG,         /* requests that were answered with an error */
     PROTOCOL_POINTS_LOST,   /* echoes sent as "no echo": the protocol has no number for their range */
     PROTOCOL_PULSES_UNSENT, /* pulses that went into no unit, though the reader was not too slow: their unit never got
@@ -78,7 +90,7 @@ struct protocol_host {
      * line without its end. Returns 0, or the SCPI error number. */
     int (*command)(void *ctx, const char *line, char *reply, size_t cap);
     /* The last fix of the GNSS receiver at or before a device time. Returns 1, or 0: there is none (no time, or no fix
-     * since power-up). Quality 0 where the head is nowhere on the Earth. */
+     * since power-up). Quality 0 where the head has no place on the Earth. */
     int (*fix)(void *ctx, int64_t t_ns, struct nmea_fix *fix);
     /* Counts n. */
     void (*count)(void *ctx, enum protocol_count what, uint64_t n);
@@ -88,16 +100,16 @@ struct protocol_host {
     /* Device time at which the receiver's first fix at or after t_ns is known; INT64_MAX: it has none. A time that lies
      * ahead may still change: asked again, the answer may be a later time. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
-    /* State of the receiver's pulses per second at a device time, and the head's time since the top of the hour then,
-     * as far as pulses and sentences have set it; else since power-up. */
+    /* Returns the state of the receiver's pulses per second at a device time. *hour_ns is the head's time since the top
+     * of the hour at that time. The part that pulses and sentences have not set counts from power-up. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
     /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has
      * set it, it is UTC, or the time since power-up. */
     int64_t (*date_ns)(void *ctx, int64_t t_ns);
-    /* Keeps this protocol's settings without power, in place of those from before: lines of printable ASCII with their
-     * '\n', at most PROTOCOL_STORED bytes with the NUL; "": none. From then on each new session gets them
-     * (spec.stored). 0; or 1: the head keeps none (spec.keeps is 0), or they are no such lines. May be NULL: it keeps
-     * none. Settings of the head itself, which native commands set, are kept by the command HEAD:STORe. */
+    /* Stores this protocol's settings, which then outlast a power cycle. They replace those stored before, and each new
+     * session gets them (spec.stored). lines: printable ASCII with '\n' at each end, at most PROTOCOL_STORED bytes with
+     * the NUL; "": none. 0; or 1: the head stores none (spec.keeps is 0), or these are no such lines. May be NULL: it
+     * stores none. The command HEAD:STORe stores settings of the head itself, which native commands set. */
     int (*store)(void *ctx, const char *lines);
     /* Loss of optical power at the window, both ways together, dB. May be NULL: 0. */
     double (*window_loss_db)(void *ctx);
@@ -116,7 +128,7 @@ struct protocol_identity {
     char firmware[32];
     char serial[32];
     char name[32]; /* of the device, as its user calls it */
-    /* The line rates that a planar head can be set to, with the steps of a turn at each; 0: the head is no such one. */
+    /* The line rates that a planar head can be set to, with the steps of a turn at each. n_geometries 0: none. */
     struct protocol_geometry {
         int64_t lines_uhz;
         uint32_t steps;
@@ -133,13 +145,13 @@ struct protocol_spec {
     struct protocol_host host;
     int64_t power_ns;         /* device time of the last power-up, from which the device's counters count */
     uint32_t power_ons;       /* how often power has come, by power cycles and reboots, with the first time */
-    uint32_t near_wrap;       /* counters begin so many below their wrap; 0: at 0 */
+    uint32_t near_wrap;       /* how far below their wrap counters begin; 0: they begin at 0 */
     int keeps;                /* 1: store() and HEAD:STORe work; else the device forgets all settings without power */
     const char *stored;       /* what store() has kept; "": nothing. NULL: as "". Valid during create */
-    int dialect;              /* enum protocol_dialect: the one of the link at first */
+    int dialect;              /* enum protocol_dialect: the one that the link is configured for */
     _Atomic uint32_t *shared; /* a word of the link that all of its sessions share; 0 at first. NULL: there is none */
     int waits;                /* 1: paces fast and step: device time says nothing of how long a client takes */
-    /* velodyne_http: where the settings say that data go, and so on; empty: not known */
+    /* velodyne_http: address and port of the link `velodyne`, to which the data go; "" and 0: not known */
     char address[64];
     int port;
     /* capture: what to say; outlive the instance. NULL for all others */
@@ -159,14 +171,14 @@ struct protocol_ops {
     int brief;         /* 1: clients come for one request, and a silent one may have to make room for another */
     /* For the injected fault that checksums can't show: bits of a unit are changed, then its checksums are made right
      * again. Both functions are pure, and take any bytes.
-     * content: sets the bits of mask (len bytes, all 0 before) that may be changed: what is measured. Marks, lengths,
-     * names and checksums are left out, so that the unit stays one. NULL: all bits may be changed.
+     * content: sets the bits of mask (len bytes, all 0 before) that may be changed: those of measured values. Marks,
+     * lengths, names and checksums are left out, so that the unit stays well-formed. NULL: all bits may be changed.
      * reseal: makes the checksums right. NULL: units have none. */
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
-    /* Whether the device can be a head: SH_OK, or SH_EINPUT with what it can't have, and what it can. The emitter is of
-     * a kind and a number of beams that are allowed above; beams are those of its payload. NULL: it can be any such
-     * head. Pure. */
+    /* Checks whether the protocol can speak for a head: SH_OK, or SH_EINPUT with what is not allowed, and what is. Kind
+     * and number of beams of the emitter are allowed already (emitters, n_beams); beams are those of its payload.
+     * NULL: it can speak for each such head. Pure. */
     int (*check_head)(const struct native_descriptor *descriptor, const struct native_emitter *emitter,
                       const uint8_t *beams, struct sh_err *err);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
@@ -194,16 +206,23 @@ struct protocol_ops {
     /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
      * takes time. 0: its session ends. May be NULL: they come without being asked for. */
     int (*owes)(const void *protocol);
-    /* The client has gone. It may still have asked for something that comes later, as a reboot. May be NULL. */
+    /* The client has gone. Something that it asked for may still be due, such as a reboot. May be NULL. */
     void (*gone)(void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
      * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);
 };
 
+/* Asks the head for its state (HEAD:STATe?). */
+enum protocol_head_state protocol_ask_state(const struct protocol_host *host);
+
 /* protocol_ops.input of a protocol that takes no bytes: counts them as lost. Its session begins with its struct
  * protocol_host. */
 void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len);
+
+/* For protocol_ops.content: the bits of a hexadecimal digit that may change in any way. The character is then still a
+ * digit, of 0 to 9 if it was. */
+uint8_t protocol_digit_bits(uint8_t c);
 
 /* From the one list, in protocol.c. NULL for an unknown id. */
 const struct protocol_ops *protocol_ops_get(enum protocol_id id);

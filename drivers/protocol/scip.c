@@ -75,7 +75,7 @@ static void scip_take_line(struct scip *s)
 }
 
 /* Bytes without room are counted as they come, since the end of such a line may never come. */
-static void input(void *protocol, const uint8_t *bytes, size_t len)
+static void scip_take_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct scip *s = protocol;
     uint64_t n_over = 0;
@@ -95,7 +95,7 @@ static void input(void *protocol, const uint8_t *bytes, size_t len)
     if (n_over != 0) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, n_over);
 }
 
-static void frame(void *protocol, const uint8_t *bytes, size_t len)
+static void scip_take_frame(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct scip *s = protocol;
     (void)len;
@@ -103,21 +103,21 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
     if (news.whole || news.broken != 0) scip_scans_came(s, news);
 }
 
-/* The second RB was a second ago. The power cycle ends this session, too. Where there can't be one, as with a
- * recording, only this session begins anew. */
-static void reboot(struct scip *s)
+/* Reboots a second after the second RB. The head's power cycle ends this session, too. Where there can't be one, as
+ * with a recording, only this session ends and begins anew. */
+static void scip_reboot(struct scip *s)
 {
     const int refused = s->host.command(s->host.ctx, "HEAD:REBOOT", NULL, 0) != 0;
     scip_power_up(s);
     if (refused) s->host.hang_up(s->host.ctx);
 }
 
-static void time_is(void *protocol, int64_t t_ns)
+static void scip_pass_time(void *protocol, int64_t t_ns)
 {
     struct scip *s = protocol;
     s->now_ns = t_ns;
     scip_measure_time(s);
-    if (s->reboot_ns != INT64_MIN && t_ns >= s->reboot_ns) reboot(s);
+    if (s->reboot_ns != INT64_MIN && t_ns >= s->reboot_ns) scip_reboot(s);
 }
 
 static int owes(const void *protocol)
@@ -130,7 +130,7 @@ static int owes(const void *protocol)
 static void gone(void *protocol)
 {
     struct scip *s = protocol;
-    if (s->reboot_ns != INT64_MIN) reboot(s);
+    if (s->reboot_ns != INT64_MIN) scip_reboot(s);
 }
 
 /* Scans are looked for at each tick; without a request it is enough to keep up with the stream. */
@@ -147,7 +147,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
                       struct sh_err *err)
 {
     (void)beams;
-    return planar_scan_check(d, e, SCIP_MAX_STEPS, err);
+    return planar_scan_check(d->pan_counts_per_turn, e, SCIP_MAX_STEPS, err);
 }
 
 const struct protocol_ops protocol_scip = {
@@ -161,9 +161,9 @@ const struct protocol_ops protocol_scip = {
     .create = scip_create,
     .destroy = free,
     .open = open_session,
-    .frame = frame, /* and no gap: the times and steps of the turns show what is missing */
-    .time = time_is,
-    .input = input,
+    .frame = scip_take_frame, /* and no gap: the times and steps of the turns show what is missing */
+    .time = scip_pass_time,
+    .input = scip_take_input,
     .owes = owes,
     .gone = gone,
     .next_ns = next_ns,

@@ -12,7 +12,7 @@ struct line {
     size_t number;
 };
 
-/* The next line that has its end. Returns 0: there is none. */
+/* Finds the next line that has its end. Returns 0: there is none. */
 static int next_line(const uint8_t *unit, size_t len, struct line *line)
 {
     const size_t at = line->number == SIZE_MAX ? 0 : line->at + line->len + 1;
@@ -22,14 +22,14 @@ static int next_line(const uint8_t *unit, size_t len, struct line *line)
     return 1;
 }
 
-/* Whether the reply is a scan: G, H, M, N, also with % before it. It has a line, so at least two bytes. */
+/* Whether the reply is a scan: G, H, M, N, also with % before it. A reply has a whole line, so a byte follows a %. */
 static int is_scan(const uint8_t *unit)
 {
     const uint8_t first = unit[unit[0] == '%'];
     return strchr("GHMN", first) != NULL && first != 0;
 }
 
-/* A character of data is six bits above 0x30. Its lower four may change, whichever they are. */
+/* A character of data is 0x30 plus six bits. Any change of the lower four gives another such character. */
 void scip_content(const uint8_t *unit, size_t len, uint8_t *mask)
 {
     struct line line = {.number = SIZE_MAX};

@@ -16,7 +16,7 @@ int32_t scip_number(const char *text, size_t len)
     return value;
 }
 
-static const char *laser(struct scip *s)
+static const char *switch_laser_on(struct scip *s)
 {
     if (s->simulation.broken) return "01";
     if (s->laser) return "02";
@@ -54,7 +54,7 @@ static const char *reset(struct scip *s)
     return "00";
 }
 
-static const char *reboot(struct scip *s)
+static const char *ask_reboot(struct scip *s)
 {
     enum { SECOND_NS = 1000000000 };
     const int again = s->rb_ns != INT64_MIN && s->now_ns - s->rb_ns <= SECOND_NS;
@@ -64,14 +64,14 @@ static const char *reboot(struct scip *s)
         s->reboot_ns = s->now_ns + SECOND_NS;
         return "00";
     }
-    scip_reply_begin(&s->reply, s->line, s->n_line, "01"); /* to the first of two it is no error */
+    scip_reply_begin(&s->reply, s->line, s->n_line, "01"); /* the first of two is not counted as wrong */
     scip_send(s);
     return NULL;
 }
 
 static const char *time_mode(struct scip *s, char code)
 {
-    if (code == '0' && scip_head_state(s) == SCIP_HEAD_BOOTS) return "10";
+    if (code == '0' && scip_boots(protocol_ask_state(&s->host))) return "10";
     if (code == '0' && s->time_mode) return "02";
     if (code == '0' && (s->stream.active || s->single.active)) return "10";
     if (code == '2' && !s->time_mode) return "03";
@@ -152,16 +152,16 @@ static const struct command {
     char name[4];
     uint8_t n_params;  /* characters after the name */
     uint32_t features; /* all of them, or the command is not there */
-    scip_handler *run;
+    scip_handler *carry_out;
 } commands[] = {
     {"VV", 0, 0, scip_info_version},
     {"PP", 0, 0, scip_info_parameters},
     {"II", 0, 0, scip_info_state},
-    {"BM", 0, 0, laser},
+    {"BM", 0, 0, switch_laser_on},
     {"QT", 0, 0, quit},
     {"RS", 0, 0, reset},
     {"RT", 0, SCIP_REBOOT, reset},
-    {"RB", 0, SCIP_REBOOT, reboot},
+    {"RB", 0, SCIP_REBOOT, ask_reboot},
     {"TM", 1, 0, adjust_time},
     {"SS", 6, 0, bit_rate},
     {"CR", 2, 0, motor_speed},
@@ -206,11 +206,11 @@ static const char *check_tag(const char *tag, size_t len)
     return NULL;
 }
 
-/* NULL, or what is wrong with the line as such; n: its length without the tag and the ';' before it. */
+/* Checks name, tag and length of the line. n: its length without the tag and the ';' before it. NULL, or the status. */
 static const char *check_line(const struct scip *s, const struct command *c, size_t n)
 {
     const int time_alone = s->time_mode && (s->features & SCIP_TIME_ALONE) != 0;
-    if (c == NULL || (time_alone && c->run != adjust_time)) return "0E";
+    if (c == NULL || (time_alone && c->carry_out != adjust_time)) return "0E";
     const char *wrong = n < s->n_line ? check_tag(s->line + n + 1, s->n_line - n - 1) : NULL;
     if (wrong != NULL) return wrong;
     const size_t wanted = strlen(c->name) + c->n_params;
@@ -224,6 +224,6 @@ void scip_command(struct scip *s)
     const size_t n = tag == NULL ? s->n_line : (size_t)(tag - s->line);
     const struct command *c = scip_command_find(s, n);
     const char *status = check_line(s, c, n);
-    if (status == NULL) status = c->run(s);
+    if (status == NULL) status = c->carry_out(s);
     if (status != NULL) scip_answer(s, s->line, s->n_line, status);
 }

@@ -62,28 +62,19 @@ const char *scip_info_parameters(struct scip *s)
     return NULL;
 }
 
-enum scip_head scip_head_state(struct scip *s)
+static const char *mode(const struct scip *s, enum protocol_head_state head)
 {
-    char reply[PROTOCOL_REPLY];
-    if (s->host.command(s->host.ctx, "HEAD:STATE?", reply, sizeof reply) != 0) return SCIP_HEAD_WORKS;
-    if (strcmp(reply, "fault") == 0) return SCIP_HEAD_HAS_FAILED;
-    if (strcmp(reply, "boot") == 0 || strcmp(reply, "off") == 0) return SCIP_HEAD_BOOTS;
-    return strcmp(reply, "idle") == 0 ? SCIP_HEAD_IS_IDLE : SCIP_HEAD_WORKS;
-}
-
-static const char *mode(const struct scip *s, enum scip_head head)
-{
-    if (head == SCIP_HEAD_BOOTS) return s->model->mode_booting;
-    if (head == SCIP_HEAD_HAS_FAILED) return s->model->mode_fault;
+    if (scip_boots(head)) return s->model->mode_booting;
+    if (head == PROTOCOL_HEAD_FAULT) return s->model->mode_fault;
     if (s->stream.active) return s->model->mode_streaming;
     return s->laser ? s->model->mode_single : s->model->mode_idle;
 }
 
-static const char *status(const struct scip *s, enum scip_head head)
+static const char *status(const struct scip *s, enum protocol_head_state head)
 {
     if (s->simulation.broken) return "Malfunction, played by DB";
-    if (head == SCIP_HEAD_BOOTS) return s->model->boots;
-    return head == SCIP_HEAD_HAS_FAILED ? s->model->has_failed : s->model->works;
+    if (scip_boots(head)) return s->model->boots;
+    return head == PROTOCOL_HEAD_FAULT ? s->model->has_failed : s->model->works;
 }
 
 static void put_speed(struct scip *s)
@@ -110,7 +101,7 @@ const char *scip_info_state(struct scip *s)
 {
     struct scip_reply *r = &s->reply;
     const struct scip_model *m = s->model;
-    const enum scip_head head = scip_head_state(s);
+    const enum protocol_head_state head = protocol_ask_state(&s->host);
     scip_reply_begin(r, s->line, s->n_line, "00");
     scip_reply_key(r, "MODL", "%s", or_else(m->model, s->identity->model));
     scip_reply_key(r, "LASR", "%s", s->laser ? "ON" : "OFF");
@@ -129,11 +120,11 @@ const char *scip_info_state(struct scip *s)
 /* Numbers as in MESM of a UTM-30LX-EW. */
 const char *scip_info_state_number(struct scip *s)
 {
-    const enum scip_head head = scip_head_state(s);
+    const enum protocol_head_state head = protocol_ask_state(&s->host);
     const char *number = "000";
-    if (head == SCIP_HEAD_BOOTS)
+    if (scip_boots(head))
         number = "001";
-    else if (head == SCIP_HEAD_HAS_FAILED || s->simulation.broken)
+    else if (head == PROTOCOL_HEAD_FAULT || s->simulation.broken)
         number = "900";
     else if (s->time_mode)
         number = "002";

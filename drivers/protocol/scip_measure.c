@@ -18,10 +18,10 @@ const char *scip_laser_on(struct scip *s)
 {
     enum { LATELY_NS = 500000000 };
     const int scans = s->scan.t0_ns != INT64_MIN && native_since_ns(s->now_ns, s->scan.t0_ns) < LATELY_NS;
-    const enum scip_head head = scans ? SCIP_HEAD_WORKS : scip_head_state(s);
-    if (head == SCIP_HEAD_HAS_FAILED) return "50";
-    if (head == SCIP_HEAD_BOOTS) return "10";
-    if (head == SCIP_HEAD_IS_IDLE && s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
+    const enum protocol_head_state head = scans ? PROTOCOL_HEAD_SCANNING : protocol_ask_state(&s->host);
+    if (head == PROTOCOL_HEAD_FAULT) return "50";
+    if (scip_boots(head)) return "10";
+    if (head == PROTOCOL_HEAD_IDLE && s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
     if (!s->laser) s->laser_ns = s->now_ns;
     s->laser = 1;
     s->asleep = 0;
@@ -36,7 +36,7 @@ void scip_laser_off(struct scip *s)
     scip_answer(s, s->single.echo, s->single.echo_len, "10");
 }
 
-/* Numbers first, then what they say: 01 start, 02 end, 03 cluster, 06 skip, 07 count. */
+/* First all must be numbers: 01 start, 02 end, 03 cluster, 06 skip, 07 count. Then their values are checked. */
 static const char *read_request(struct scip_request *q, const char *line, int streams, int32_t last)
 {
     q->start = scip_number(line + 2, 4);
@@ -75,7 +75,7 @@ static const char *scip_measure_begin(struct scip *s, struct scip_request *q, in
 }
 
 /* A second M or N replaces the first, unless it is refused. A second G or H before the first is answered
- * repeats the request that is being processed. */
+ * gets 0B: the sensor is still busy with a request. */
 const char *scip_measure(struct scip *s)
 {
     enum { WAIT_NS = 2000000000 };
@@ -97,8 +97,8 @@ const char *scip_measure(struct scip *s)
     return "00";
 }
 
-/* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. After the
- * first scan a stop is meant, and is left alone. */
+/* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. Once a scan
+ * has come, a stop is intended, and the head is left alone. */
 static void wake_head(struct scip *s)
 {
     const int waits = s->single.active || (s->stream.active && s->stream.sent == 0);
@@ -114,12 +114,12 @@ void scip_measure_time(struct scip *s)
     scip_answer(s, s->single.echo, s->single.echo_len, "0A");
 }
 
-/* A scan to be sent. */
+/* A scan that is being sent. */
 struct measured {
     const struct planar_head *head;
     const struct planar_turn *turn;
     double mm_per_count;
-    uint32_t min_mm; /* what is less is an error */
+    uint32_t min_mm; /* smaller ranges are sent as an error */
 };
 
 static uint32_t range_mm(const struct measured *m, const struct planar_echo *echo)
@@ -128,8 +128,8 @@ static uint32_t range_mm(const struct measured *m, const struct planar_echo *ech
     return mm < 4e9 ? (uint32_t)(mm + 0.5) : UINT32_MAX;
 }
 
-/* The root of the power: 100 at the detection threshold or, without amplitudes, 1000 for a matt white surface at
- * zero incidence. */
+/* An intensity is proportional to the root of the power. With amplitudes it is 100 at the detection threshold, else
+ * 1000 for a matt white surface at zero incidence. */
 static uint32_t intensity_of(const struct measured *m, const struct planar_echo *echo)
 {
     const int amplitudes = m->head->attributes;
@@ -147,7 +147,7 @@ static int n_echoes(const struct measured *m, int32_t number)
     return n < SCIP_MAX_ECHOES ? n : SCIP_MAX_ECHOES;
 }
 
-/* The step that stands for a cluster: the one of the least range, or its first where there is none. */
+/* The step that stands for a cluster: that with the smallest range, or the first one where no step has a range. */
 static int32_t nearest(const struct measured *m, int32_t from, int32_t to)
 {
     int32_t best = -1;

@@ -17,7 +17,7 @@ enum scip_feature {
     SCIP_TIME_ALONE = 1 << 7,     /* in the time mode nothing but TM is taken, and TM1 is taken only there */
     SCIP_TIME_HEX = 1 << 8,       /* TIME of II is six hexadecimal digits; else four characters */
     SCIP_STATE = 1 << 9,          /* %ST */
-    SCIP_TIME_US = 1 << 10,       /* %TM %MD %ME: times in microseconds; with some firmware alone */
+    SCIP_TIME_US = 1 << 10,       /* %TM %MD %ME: times in microseconds; only with some firmware */
     SCIP_FIRST_AT_ONCE = 1 << 11, /* no turn is left out before the first scan of a stream */
 };
 

@@ -71,13 +71,15 @@ typedef const char *scip_handler(struct scip *s);
 int32_t scip_number(const char *text, size_t len);
 
 /* scip_info.c: VV, PP, II, %ST. */
-enum scip_head { SCIP_HEAD_WORKS, SCIP_HEAD_IS_IDLE, SCIP_HEAD_BOOTS, SCIP_HEAD_HAS_FAILED };
-/* The head is asked for its state. */
-enum scip_head scip_head_state(struct scip *s);
+/* Whether the head boots, or has no power. */
+static inline int scip_boots(enum protocol_head_state head)
+{
+    return head == PROTOCOL_HEAD_BOOT || head == PROTOCOL_HEAD_OFF;
+}
 scip_handler scip_info_version, scip_info_parameters, scip_info_state, scip_info_state_number;
 /* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
 uint64_t scip_lines_uhz(struct scip *s, const char *query);
-/* Rounded; 0 where there is no such range. */
+/* A range in whole millimetres, rounded; 0 where it is not above 0, or not below 4000 km. */
 uint32_t scip_millimetres(double range_m);
 
 /* scip_measure.c */
@@ -97,8 +99,8 @@ void scip_measure_time(struct scip *s);
 
 /* scip_simulate.c */
 scip_handler scip_simulate;
-/* To be called before a scan of the stream. NULL: it is sent; "": it is not; else the status that is sent in its
- * place, of which 50 ends the stream. */
+/* Is called before each scan of the stream. NULL: the scan is sent; "": nothing is sent; else this status is sent in
+ * its place, and 50 ends the stream. */
 const char *scip_simulated(struct scip *s);
 
 #endif

@@ -3,15 +3,7 @@
 
 #include "drivers/protocol/scip_session.h"
 
-/* DB: malfunctions that the sensor plays, to test its clients.
- *
- *   02         BM answers 01, G H M N answer 50, a stream ends with 50
- *   03         a stream of more than 20 scans, or an endless one: normal, error (21), normal again (98)
- *   04         the same: normal, error (21), then 50 and as 02
- *   05         the same: normal, then 50 and as 02
- *   10         the end of it
- *
- * Each phase lasts ten scans. */
+/* DB: malfunctions that the sensor plays, to test its clients. SCIP.md lists the modes 02 to 05, and 10, their end. */
 enum { PHASE_SCANS = 10, LONG_STREAM = 20 };
 
 static const char *order(struct scip *s, int32_t mode)

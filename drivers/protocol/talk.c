@@ -71,8 +71,8 @@ static void talk_begin(struct capture_session *s, int run, int request)
     }
 }
 
-/* A request waits while no place is free. From a device that speaks in turns it also waits for the beginning of the
- * answer to the one before, which it would end. */
+/* A request waits while no place is free. If the device speaks in turns, it also waits until the answer to the request
+ * before has begun: it would end that answer. */
 static int must_wait(const struct capture_session *s)
 {
     const int takes_turns = s->talk->kind->stops == NULL;
@@ -111,7 +111,7 @@ static void talk_send(const struct capture_session *s, const struct talk_message
     }
 }
 
-/* Sends what is due, in the order of time. The rest goes out with the next tick where it is very much. */
+/* Sends what is due, in the order of time. Beyond MOST_AT_ONCE messages the rest waits for the next tick. */
 static void send_due(struct capture_session *s)
 {
     enum { MOST_AT_ONCE = 10000 };
@@ -234,7 +234,9 @@ static void take_requests(struct capture_session *s)
         talk_lose(s, s->len);
         s->len = 0;
     }
-    if (s->is_over) s->len = 0;
+    if (!s->is_over) return;
+    s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->len);
+    s->len = 0;
 }
 
 /* ---- the protocol */
@@ -249,7 +251,7 @@ static void open_at(void *protocol, int64_t t_ns)
 }
 
 /* Requests are taken with the next tick: all the pieces of one that came together are there by then. */
-static void input(void *protocol, const uint8_t *bytes, size_t len)
+static void talk_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct capture_session *s = protocol;
     const uint32_t n = (uint32_t)len;
@@ -301,7 +303,7 @@ const struct protocol_ops protocol_capture = {
     .destroy = free,
     .open = open_at,
     .time = talk_time,
-    .input = input,
+    .input = talk_input,
     .takes = takes,
     .owes = owes,
     .next_ns = talk_next_ns,

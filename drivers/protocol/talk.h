@@ -27,7 +27,7 @@ struct talk_message {
 
 struct talk_run {
     uint32_t first, n;  /* messages */
-    uint32_t loop_from; /* index in the run from which on it may be repeated; TALK_NO_LOOP */
+    uint32_t loop_from; /* index of the message from which on the run may be repeated; TALK_NO_LOOP: it may not */
 };
 
 struct talk_request {
@@ -70,10 +70,10 @@ struct talk_kind {
     int (*stops)(const uint8_t *request, size_t len, const uint8_t *began, size_t began_len);
     /* Writes the device's error into 64 bytes, and returns its length. NULL: the protocol has none. */
     size_t (*error)(const uint8_t *request, size_t len, uint8_t *to);
-    int n_words; /* of a request, that name its kind; 0: it has no words */
+    int n_words; /* how many words at a request's beginning name its kind; 0: it has no words */
 };
 
-/* A protocol whose messages nobody knows. */
+/* A protocol that is not known, so that its messages can't be told apart. */
 extern const struct talk_kind talk_bytes;
 
 /* The kind of a connection, by the first bytes that a client sent in it. */

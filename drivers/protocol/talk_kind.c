@@ -67,7 +67,7 @@ static int cola_answers(const uint8_t *request, size_t request_len, const uint8_
     return 0;
 }
 
-/* 1: "sEN name 1" or 0, of which `on` says which. */
+/* Whether it is "sEN name 1" (on 1) or "sEN name 0" (on 0). */
 static int is_event(const struct telegram *t, int on)
 {
     const size_t n = words_len(t, 2);
@@ -75,7 +75,7 @@ static int is_event(const struct telegram *t, int on)
     return (t->text[n + 1] & 1) == on; /* 0 or 1 as a digit or as a byte */
 }
 
-/* Whether these, as "sMN LMCstopmeas", are the telegram's first two words. */
+/* Whether the telegram's first two words are these, such as "sMN LMCstopmeas". */
 static int begins(const struct telegram *t, const char *words)
 {
     const size_t n = strlen(words);
@@ -106,7 +106,7 @@ static int cola_stops(const uint8_t *request, size_t len, const uint8_t *began, 
     return words_len(&then, 2) == n && memcmp(now.text, then.text, n) == 0;
 }
 
-/* sFA, and that the variable, the method or the event is not known. */
+/* Writes sFA with the error of an unknown variable, method or event. */
 static size_t cola_error(const uint8_t *request, size_t len, uint8_t *to)
 {
     const struct telegram t = cola_inside(request, len);
@@ -143,13 +143,6 @@ const struct talk_kind talk_bytes = {.name = "bytes"};
 
 /* ---- Hokuyo SCIP: a line, and an answer that begins with it and ends with an empty line (SCIP.md) */
 
-static size_t scip_request_len(const uint8_t *bytes, size_t len)
-{
-    for (size_t i = 0; i < len; i++)
-        if (bytes[i] == '\n' || bytes[i] == '\r') return i + 1;
-    return 0;
-}
-
 static size_t scip_answer_len(const uint8_t *bytes, size_t len)
 {
     for (size_t i = 1; i < len; i++)
@@ -157,13 +150,19 @@ static size_t scip_answer_len(const uint8_t *bytes, size_t len)
     return 0;
 }
 
-/* Without its end. */
+/* Length of the first line, without its end. */
 static size_t scip_line(const uint8_t *bytes, size_t len)
 {
     size_t n = 0;
     while (n < len && bytes[n] != '\n' && bytes[n] != '\r')
         n++;
     return n;
+}
+
+static size_t scip_request_len(const uint8_t *bytes, size_t len)
+{
+    const size_t n = scip_line(bytes, len);
+    return n < len ? n + 1 : 0;
 }
 
 static int is_scan(const uint8_t *message, size_t len)
@@ -203,7 +202,7 @@ static int scip_stops(const uint8_t *request, size_t len, const uint8_t *began, 
     return scip_count_at(request, len) != 0;
 }
 
-/* The request again, and 0E with its checksum: the command is not known. */
+/* Repeats the request, and adds 0E with its checksum: the command is not known. */
 static size_t scip_error(const uint8_t *request, size_t len, uint8_t *to)
 {
     static const char status[] = "\n0Ee\n\n"; /* ('0' + 'E') & 0x3f, and 0x30 more */
@@ -225,7 +224,7 @@ static const struct talk_kind talk_scip = {.name = "SCIP",
 
 /* ---- which it is */
 
-/* Two letters are no proof: what follows a name is its first digit, or the end of a command without digits. */
+/* Two letters alone are no proof. A digit must follow the name, or the line's end after a command without digits. */
 static int is_scip(const uint8_t *bytes, size_t len)
 {
     static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "%SL", "%ST", "SCIP2.0"};

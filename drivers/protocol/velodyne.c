@@ -97,7 +97,7 @@ static void take_descriptor(struct velodyne *v, const uint8_t *payload, size_t l
     v->azimuth_per_count = 36000.0 / (d.pan_counts_per_turn > 0.0 ? d.pan_counts_per_turn : 4294967296.0);
 }
 
-/* Models by the elevations of their beams in the order of firing, which is the order in a packet. 0: none of them. */
+/* Finds the model by the elevations of the beams in the order of firing, as packets have it. 0: none has them. */
 static uint8_t model_of(const struct native_beam *beam)
 {
     static const struct {
@@ -260,7 +260,7 @@ static void velodyne_take_event(struct velodyne *v, const uint8_t *payload, size
     if (e.code == NATIVE_EV_SCAN_END || e.code == NATIVE_EV_SCAN_START) fall_out_of_step(v);
 }
 
-static void frame(void *protocol, const uint8_t *bytes, size_t len)
+static void velodyne_take_frame(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct velodyne *v = protocol;
     const uint8_t *payload = bytes + NATIVE_HEADER_LEN;
@@ -273,7 +273,7 @@ static void frame(void *protocol, const uint8_t *bytes, size_t len)
     if (header.type == NATIVE_EVENT) velodyne_take_event(v, payload, len);
 }
 
-static void gap(void *protocol, uint32_t n_frames)
+static void velodyne_take_gap(void *protocol, uint32_t n_frames)
 {
     struct velodyne *v = protocol;
     (void)n_frames;
@@ -337,8 +337,8 @@ const struct protocol_ops protocol_velodyne = {
     .create = velodyne_create,
     .destroy = free,
     .open = nothing_at,
-    .frame = frame,
-    .gap = gap,
+    .frame = velodyne_take_frame,
+    .gap = velodyne_take_gap,
     .time = nothing_at,
     .input = protocol_lose_input,
     .next_ns = never,

@@ -33,7 +33,7 @@ uint32_t velodyne_hour_us(const struct protocol_host *host, int64_t t_ns);
 enum protocol_pps velodyne_pps(const struct protocol_host *host, int64_t t_ns);
 
 /* Calibrated reflectivity of a reflectance in 0.01 dB (struct native_point): 0..100 for 0..100 % of a white
- * Lambertian target; above it 101..255 in steps of 0.2 dB, ended by 255 from 30.8 dB on. 0 where it is not
+ * Lambertian target; above it 101..255 in steps of 0.2 dB, with 255 from 30.8 dB on. 0 where it is not
  * modelled. */
 uint8_t velodyne_reflectivity(int refl_cdb);
 

@@ -28,7 +28,6 @@ static int velodyne_http_create(const struct protocol_spec *spec, void **protoco
     struct server *s = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne settings");
     s->spec = *spec;
-    http_reader_init(&s->reader);
     *protocol = s;
     return SH_OK;
 }
@@ -62,7 +61,7 @@ static const struct status *status_of(int number)
     return &statuses[i];
 }
 
-/* One answer, with a body of len bytes. No answer has anything that came from the client. */
+/* Sends one answer, with a body of len bytes. No answer has anything that came from the client. */
 static void answer(struct server *s, int number, const char *type, const char *body, size_t len, const char *more)
 {
     const struct status *status = status_of(number);
@@ -78,7 +77,7 @@ static void answer(struct server *s, int number, const char *type, const char *b
 
 static const char plain[] = "text/plain; charset=us-ascii";
 
-/* A line of plain text; NULL: that of the table. */
+/* Answers with a line of plain text; NULL: that of the table. */
 static void answer_error(struct server *s, int number, const char *text, const char *more)
 {
     const int n = snprintf(s->body, sizeof s->body, "%s\n", text != NULL ? text : status_of(number)->text);
@@ -114,7 +113,7 @@ static void give_time(struct server *s)
     s->until_ns = s->spec.waits ? INT64_MAX : s->t_ns + IDLE_NS;
 }
 
-/* All requests that are whole. */
+/* Answers all requests that are whole. */
 static void serve(struct server *s)
 {
     static const char go_on[] = "HTTP/1.1 100 Continue\r\n\r\n";
@@ -136,7 +135,7 @@ static void serve(struct server *s)
     }
 }
 
-static void input(void *protocol, const uint8_t *bytes, size_t len)
+static void velodyne_http_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct server *s = protocol;
     while (len > 0 && !s->over) {
@@ -194,7 +193,7 @@ const struct protocol_ops protocol_velodyne_http = {
     .destroy = free,
     .open = open_at,
     .time = at_time,
-    .input = input,
+    .input = velodyne_http_input,
     .owes = owes,
     .next_ns = next_ns,
 };

@@ -9,7 +9,7 @@
 #include "drivers/protocol/velodyne.h"
 #include "drivers/protocol/velodyne_settings.h"
 
-/* Being written. */
+/* A document that is being written. */
 struct page {
     const struct protocol_spec *spec;
     struct velodyne_state state;
@@ -68,7 +68,7 @@ static void put_info(struct page *p)
     put_string(p, id->serial);
     velodyne_pages_put(p, ",\"firmware\":");
     put_string(p, id->firmware);
-    velodyne_pages_put(p, ",\"mac_addr\":\"02-00-00-00-00-00\"}"); /* locally administered: nobody's */
+    velodyne_pages_put(p, ",\"mac_addr\":\"02-00-00-00-00-00\"}"); /* locally administered: no maker's */
 }
 
 static void put_status(struct page *p)

@@ -12,6 +12,7 @@
 struct posted {
     const struct protocol_spec *spec;
     char *text; /* of an error */
+    int apply;  /* 0: the form is only checked */
 };
 
 static int refuse(const struct posted *p, int status, const char *why)
@@ -20,12 +21,13 @@ static int refuse(const struct posted *p, int status, const char *why)
     return status;
 }
 
-/* 200, or the status for what the head refuses: another session has control, out of range, not now. */
+/* 200, or the status for what the head refuses: another session has control, out of range, not now. While the form is
+ * checked nothing is done. */
 static int command(const struct posted *p, const char *line)
 {
     char reply[PROTOCOL_REPLY];
     const struct protocol_host *host = &p->spec->host;
-    const int error = host->command(host->ctx, line, reply, sizeof reply);
+    const int error = p->apply ? host->command(host->ctx, line, reply, sizeof reply) : 0;
     if (error == 0) return 200;
     snprintf(p->text, VELODYNE_TEXT, "the head refuses %s: %s", line, reply);
     return error == -203 ? 409 : error == -222 ? 400 : 503;
@@ -53,46 +55,43 @@ static int read_switch(const char *s, int *on)
     return *on || strcasecmp(s, "off") == 0;
 }
 
-/* ---- the keys. Each is called with apply 0 first, and returns 200 or an error. */
+/* ---- the keys. Each is called first to check its value, then to carry it out, and returns 200 or an error. */
 
 static int is_scanning(const struct protocol_spec *spec)
 {
-    char state[16];
-    ask(spec, "HEAD:STATE?", state, sizeof state);
-    return strcasecmp(state, "scanning") == 0 || strcasecmp(state, "spin-up") == 0;
+    const enum protocol_head_state state = protocol_ask_state(&spec->host);
+    return state == PROTOCOL_HEAD_SCANNING || state == PROTOCOL_HEAD_SPIN_UP;
 }
 
-static int set_laser(const struct posted *p, const char *value, int apply)
+static int set_laser(const struct posted *p, const char *value)
 {
     int on;
     if (!read_switch(value, &on)) return refuse(p, 400, "laser: allowed are on and off");
-    if (!apply || is_scanning(p->spec) == on) return 200;
-    return command(p, on ? "SCAN:START" : "SCAN:STOP");
+    return is_scanning(p->spec) == on ? 200 : command(p, on ? "SCAN:START" : "SCAN:STOP");
 }
 
 static const struct {
     const char *name, *word; /* of the device, of SCAN:ECHOES */
 } returns[] = {{"Strongest", "STRONGEST"}, {"Last", "LAST"}, {"Dual", "ALL"}};
 
-static int set_returns(const struct posted *p, const char *value, int apply)
+static int set_returns(const struct posted *p, const char *value)
 {
     for (size_t i = 0; i < sizeof returns / sizeof returns[0]; i++) {
         char line[32];
         if (strcasecmp(value, returns[i].name) != 0) continue;
         snprintf(line, sizeof line, "SCAN:ECHOES %s", returns[i].word);
-        return apply ? command(p, line) : 200;
+        return command(p, line);
     }
     return refuse(p, 400, "returns: allowed are Strongest, Last and Dual");
 }
 
 /* The head takes turns per second in steps of 1e-6 Hz. A speed that 3 does not divide is rounded to that step. */
-static int set_rpm(const struct posted *p, const char *value, int apply)
+static int set_rpm(const struct posted *p, const char *value)
 {
     char line[40];
     long rpm;
     if (!read_number(value, &rpm) || (rpm != 0 && (rpm < 300 || rpm > 1200)))
         return refuse(p, 400, "rpm: allowed are whole numbers from 300 to 1200, and 0: the motor stops");
-    if (!apply) return 200;
     if (rpm == 0) return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 200;
     const long uhz = (rpm * 1000000 + 30) / 60;
     snprintf(line, sizeof line, "HEAD:LINES %ld.%06ld", uhz / 1000000, uhz % 1000000);
@@ -107,21 +106,18 @@ static int set_fov(const struct posted *p, const char *value, long whole, const 
     return deg == whole ? 200 : refuse(p, 409, why);
 }
 
-static int set_fov_start(const struct posted *p, const char *value, int apply)
+static int set_fov_start(const struct posted *p, const char *value)
 {
-    (void)apply;
     return set_fov(p, value, 0, "start: allowed is 0; this head sends the whole turn");
 }
 
-static int set_fov_end(const struct posted *p, const char *value, int apply)
+static int set_fov_end(const struct posted *p, const char *value)
 {
-    (void)apply;
     return set_fov(p, value, 359, "end: allowed is 359; this head sends the whole turn");
 }
 
-static int set_address(const struct posted *p, const char *value, int apply)
+static int set_address(const struct posted *p, const char *value)
 {
-    (void)apply;
     if (strcmp(value, velodyne_host_address(p->spec)) == 0) return 200;
     return refuse(p, 409, "addr: can't be changed here; the head's configuration sets it (links)");
 }
@@ -135,30 +131,27 @@ static int set_port(const struct posted *p, const char *value, int present)
     return refuse(p, 409, "dport, tport: can't be changed here; the head's configuration sets them (links)");
 }
 
-static int set_data_port(const struct posted *p, const char *value, int apply)
+static int set_data_port(const struct posted *p, const char *value)
 {
-    (void)apply;
     return set_port(p, value, velodyne_host_port(p->spec));
 }
 
-static int set_position_port(const struct posted *p, const char *value, int apply)
+static int set_position_port(const struct posted *p, const char *value)
 {
-    (void)apply;
     return set_port(p, value, VELODYNE_POSITION_PORT);
 }
 
-static int set_network(const struct posted *p, const char *value, int apply)
+static int set_network(const struct posted *p, const char *value)
 {
     (void)value;
-    (void)apply;
     return refuse(p, 409, "the head's own address can't be changed here; its configuration sets it (links)");
 }
 
-static int set_phase_lock(const struct posted *p, const char *value, int apply)
+static int set_phase_lock(const struct posted *p, const char *value)
 {
     int on;
     if (!read_switch(value, &on)) return refuse(p, 400, "enabled: allowed are on and off");
-    return apply ? command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF") : 200;
+    return command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF");
 }
 
 /* A decimal from 0 to below a limit: 1, or 0. */
@@ -172,36 +165,35 @@ static int read_decimal(const char *s, double limit, double *out)
 
 /* The device's page multiplies its field offsetInput by 100, so that the product may have many decimals, and sends
  * both. */
-static int set_phase(const struct posted *p, const char *value, int apply)
+static int set_phase(const struct posted *p, const char *value)
 {
     char line[40];
     double cdeg;
     if (!read_decimal(value, 36000.0, &cdeg)) return refuse(p, 400, "offset: allowed are 0 to 35999, in 0.01 degree");
     const long whole = (long)(cdeg + 0.5) % 36000;
     snprintf(line, sizeof line, "HEAD:PHASE %ld.%02ld", whole / 100, whole % 100);
-    return apply ? command(p, line) : 200;
+    return command(p, line);
 }
 
-/* Only offset counts; but what the device doesn't take is refused. */
-static int check_phase_input(const struct posted *p, const char *value, int apply)
+/* offsetInput has no effect, but a value that the device doesn't take is refused. */
+static int check_phase_input(const struct posted *p, const char *value)
 {
     double deg;
-    (void)apply;
     return read_decimal(value, 360.0, &deg) ? 200 : refuse(p, 400, "offsetInput: allowed are 0 to 359.99, in degrees");
 }
 
-/* A head without a place for settings takes it, too: clients expect that a device does. */
-static int save(const struct posted *p, const char *value, int apply)
+/* A head without a settings file takes it, too, and stores nothing: clients expect that a device takes it. */
+static int save(const struct posted *p, const char *value)
 {
     if (strcasecmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");
-    return apply && p->spec->keeps ? command(p, "HEAD:STORE") : 200;
+    return p->spec->keeps ? command(p, "HEAD:STORE") : 200;
 }
 
-/* The settings of power-up, and it measures. The device is silent for some seconds then; this head is not. */
-static int reset(const struct posted *p, const char *value, int apply)
+/* Sets what power-up sets, and starts the scan. The device is silent for some seconds then; this head is not. */
+static int reset(const struct posted *p, const char *value)
 {
     if (strcasecmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
-    if (!apply) return 200;
+    if (!p->apply) return 200;
     int status = command(p, "HEAD:LINES DEF");
     if (status == 200) status = command(p, "SCAN:ECHOES DEF");
     if (status == 200) status = command(p, "HEAD:PHASE DEF");
@@ -212,7 +204,7 @@ static int reset(const struct posted *p, const char *value, int apply)
 
 static const struct setting {
     const char *path, *key;
-    int (*set)(const struct posted *p, const char *value, int apply);
+    int (*set)(const struct posted *p, const char *value);
 } settings[] = {
     {"/cgi/setting", "laser", set_laser},
     {"/cgi/setting", "returns", set_returns},
@@ -272,7 +264,7 @@ static const struct setting *find_setting(const char *path, const char *key)
     return NULL;
 }
 
-/* One key=value of len characters, with room for a NUL behind it. */
+/* Reads one key=value of len characters, with room for a NUL after it. */
 static int read_pair(const struct posted *p, const char *path, char *s, size_t len, struct pair *out)
 {
     char *equals = memchr(s, '=', len);
@@ -302,16 +294,16 @@ static int read_form(const struct posted *p, const char *path, char *form, size_
 int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text)
 {
     struct pair pairs[N_SETTINGS + 1];
-    const struct posted posted = {spec, text};
+    struct posted posted = {spec, text, 0};
     char copy[HTTP_MAX_BODY + 1];
     memcpy(copy, form, len);
     if (len == 0 && strcmp(path, "/cgi/save") == 0) /* a published client posts no body to it */
         len = (size_t)snprintf(copy, sizeof copy, "data=submit");
     const int n = read_form(&posted, path, copy, len, pairs);
     int status = n < 0 ? -n : 200;
-    for (int apply = 0; apply < 2; apply++)
+    for (; posted.apply < 2; posted.apply++)
         for (int i = 0; i < n && status == 200; i++)
-            status = pairs[i].setting->set(&posted, pairs[i].value, apply);
+            status = pairs[i].setting->set(&posted, pairs[i].value);
     return status;
 }
 

@@ -26,7 +26,7 @@ struct velodyne_state {
     const char *returns;             /* "Strongest", "Last", "Dual"; "" for the head's other selection */
     int phase_lock;                  /* it is asked for */
     int is_locked;                   /* at the last pulse per second the rotor was where the lock wants it */
-    uint32_t offset_cdeg, edge_cdeg; /* azimuth at a pulse, 0.01 degree: asked for; at the last one, 0 without any */
+    uint32_t offset_cdeg, edge_cdeg; /* azimuth at pulses, 0.01 degree: as asked for; at the last one, or 0 */
 };
 /* Asks the head for its present state. */
 void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out);

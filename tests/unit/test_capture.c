@@ -75,8 +75,9 @@ static void test_loop_and_unknown(void **state)
     assert_string_equal(client_ask(&c, "\x02sMN Z\x03", 2), "54:\x02sFA 2\x03|");
     client_close(&c);
     client_open(&c, &m, 0, &close);
-    assert_string_equal(client_ask(&c, "\x02sRN Z\x03", 20), "");
+    assert_string_equal(client_ask(&c, "\x02sRN Z\x03\x02sRN Y\x03", 20), "");
     assert_int_equal(c.ended, 1);
+    assert_int_equal(c.lost, 7); /* the second request: the connection is over */
     client_close(&c);
 }
 

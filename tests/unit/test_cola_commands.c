@@ -362,6 +362,11 @@ static void the_clock_can_be_set(void **state)
     cola_expect("sMN LSPsetdatetime 834 2 1C 17 3B 3B 0", "sAN LSPsetdatetime 1");
     cola.ops->time(cola.protocol, INT64_C(3600000000000) * 12 + INT64_C(3000000000));
     cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.03.2100 0 0 0");
+    /* From the smallest shift to 2199: that is more than 2^63 ns, but the new shift is not. */
+    const int64_t want_ns = cola.shift_ns + INT64_C(3121286400) * 1000000000; /* 98 years and 333 days */
+    cola.shift_ns = INT64_C(-4600000000000000000);
+    cola_expect("sMN LSPsetdatetime 897 1 1B 0 0 0 0", "sAN LSPsetdatetime 1");
+    assert_int_equal(cola.shift_ns, want_ns);
 }
 
 int main(void)

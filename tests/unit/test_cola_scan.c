@@ -277,6 +277,11 @@ static void the_encoder_counts_the_way(void **state)
     cola_read_lmd(2, &lmd);
     assert_in_range(lmd.position, 233, 234);
     assert_int_equal(lmd.speed, 1000);
+    give_poses(10.0, 10.2, 0, 100000000); /* a replayed recording begins anew, in the same scan */
+    cola_turn(1, 1.0);
+    cola_read_lmd(3, &lmd);
+    assert_in_range(lmd.position, 133, 134);
+    assert_int_equal(lmd.speed, 2000);
 }
 
 /* The longest telegram has all channels, 16 bits, hexadecimal, and everything in the tail. */

@@ -2,6 +2,7 @@
 /* CoLa: settings that mEEwriteall keeps, and the one dialect of a link. */
 #include <stdatomic.h>
 
+#include "drivers/protocol/cola_field.h"
 #include "tests/unit/cola_rig.h"
 
 /* Another session of the same head, after what the rig's spec says now. Returns what create does. */
@@ -222,6 +223,23 @@ static void the_stream_follows(void **state)
     assert_memory_equal(cola.bytes, "\2\2\2\2", 4);
 }
 
+/* So do events that come without a scan: an input changes at 1 ms. */
+static void events_follow(void **state)
+{
+    (void)state;
+    static struct cola_fields fields = {.n_windows = 1, .window = {{0, 1000000, 2000000}}};
+    struct sh_err err;
+    open_strict(PROTOCOL_COLA_A);
+    cola.identity.fields = &fields;
+    assert_int_equal(open_again(&err), 0);
+    cola_expect("sEN LIDinputstate 1", "sEA LIDinputstate 1");
+    atomic_store(&word, cola.spec.power_ons << 2 | 2);
+    protocol_rig_clear(&cola);
+    cola.ops->time(cola.protocol, 1000000);
+    assert_int_equal(cola.n_units, 1);
+    assert_memory_equal(cola.bytes, "\2\2\2\2", 4);
+}
+
 /* Overlong telegrams of the other dialect get no answer either. */
 static void garbage_of_the_other_dialect(void **state)
 {
@@ -247,6 +265,7 @@ int main(void)
         CASE(one_dialect_at_a_time),
         CASE(storing_keeps_the_dialect),
         CASE(the_stream_follows),
+        CASE(events_follow),
         CASE(garbage_of_the_other_dialect),
     };
     return cmocka_run_group_tests_name("cola stored", tests, NULL, NULL);

@@ -153,8 +153,22 @@ static void test_pages_from_elsewhere(void **state)
         int status;
     } cases[] = {
         {"http://evil.example", 403}, {"null", 403}, {"https://127.0.0.1:8080", 403}, {"http://127.0.0.1:8080", 200}};
+    static const struct {
+        const char *host; /* also that of the Origin */
+        int status;
+    } same[] = {{"localhost:80", 200}, {"[::1]:8080", 200},   {"lidar", 200},
+                {"10.0.0.7", 200},     {"evil.example", 403}, /* its name may point to this machine: DNS rebinding */
+                {"10.0.0.7.evil", 403}};
+    char text[256];
+    for (size_t i = 0; i < sizeof same / sizeof same[0]; i++) {
+        snprintf(text, sizeof text,
+                 "POST /cgi/setting HTTP/1.1\r\nHost: %s\r\nOrigin: http://%s\r\nContent-Length: 7\r\n\r\nrpm=600",
+                 same[i].host, same[i].host);
+        http_send(text);
+        assert_int_equal(http_status(), same[i].status);
+        http_assert_command(same[i].status == 200 ? "HEAD:LINES 10.000000" : NULL);
+    }
     for (int i = 0; i < 4; i++) {
-        char text[256];
         snprintf(text, sizeof text,
                  "POST /cgi/setting HTTP/1.1\r\nHost: 127.0.0.1:8080\r\nOrigin: %s\r\nContent-Length: 7\r\n\r\nrpm=600",
                  cases[i].origin);
@@ -162,6 +176,11 @@ static void test_pages_from_elsewhere(void **state)
         assert_int_equal(http_status(), cases[i].status);
         http_assert_command(cases[i].status == 200 ? "HEAD:LINES 10.000000" : NULL);
     }
+    /* HTTP/1.0 may come without a Host, which an origin could be that of. */
+    http_renew();
+    http_send("POST /cgi/setting HTTP/1.0\r\nOrigin: http://\r\nContent-Length: 7\r\n\r\nrpm=600");
+    assert_int_equal(http_status(), 403);
+    http_assert_command(NULL);
 }
 
 /* No bytes of a client come back. */

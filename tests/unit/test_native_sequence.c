@@ -104,6 +104,14 @@ static void test_memory(void **state)
     for (uint32_t i = 1; i <= NATIVE_GAPS; i++)
         expect(900 - 3 * i, NATIVE_LATE, 900 - 3 * i, 1);
     expect(900 - 3 * (NATIVE_GAPS + 1), NATIVE_RESTARTED, 900 - 3 * (NATIVE_GAPS + 1), 1);
+    /* The oldest gap that is remembered is cut in two by a late frame. Both parts stay. */
+    memset(&sequence, 0, sizeof sequence);
+    expect(0, NATIVE_NO_NOTICE, 0, 1);
+    for (uint32_t i = 0; i < NATIVE_GAPS; i++)
+        expect(4 + 2 * i, NATIVE_GAP, i == 0 ? 1 : 3 + 2 * i, i == 0 ? 3 : 1);
+    expect(2, NATIVE_LATE, 2, 1);
+    expect(1, NATIVE_LATE, 1, 1);
+    expect(3, NATIVE_LATE, 3, 1);
 }
 
 static void test_long_gaps(void **state)

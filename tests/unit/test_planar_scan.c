@@ -297,6 +297,27 @@ static void parts_of_two_turns_make_none(void **state)
     assert_int_equal(scan.whole->n[0], 2);
 }
 
+/* A replayed recording goes to line 50 of the scan that it is in, and back to its beginning. */
+static void a_jump_within_a_scan_is_no_loss(void **state)
+{
+    (void)state;
+    uint8_t bytes[1024];
+    open_head(-1, 0);
+    turn(0);
+    part(1, 0, 3);
+    expect(2, 1, 0);
+    for (uint32_t line = 50; line != UINT32_MAX; line = line == 50 ? 0 : UINT32_MAX) {
+        assert_true(native_encode_descriptor(bytes, sizeof bytes, &rig.descriptor, 0, NATIVE_LOCAL) != 0);
+        frame(NULL, bytes, 0);
+        rig.scan_t0_ns += 7000000000;
+        turn(line);
+        assert_int_equal(scan.whole->number, line == 50 ? 2 : 6); /* the device's own count goes on */
+        turn(line + 2);                                           /* one is missing after it */
+        part(line + 3, 0, 3);
+        expect(3, 2, 1);
+    }
+}
+
 /* Descriptor and emitter are repeated at a change of speed, and for readers that join. The turn goes on. */
 static void repeated_descriptors(void **state)
 {
@@ -382,6 +403,7 @@ int main(void)
         cmocka_unit_test(turns_are_missing),
         cmocka_unit_test(what_is_no_loss),
         cmocka_unit_test(parts_of_two_turns_make_none),
+        cmocka_unit_test(a_jump_within_a_scan_is_no_loss),
         cmocka_unit_test(repeated_descriptors),
         cmocka_unit_test(other_steps),
         cmocka_unit_test(heads_that_it_can_t_read),

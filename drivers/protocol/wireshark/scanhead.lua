@@ -114,7 +114,8 @@ local function time_of(ns)
   return NSTime.new(s:tonumber(), (ns - s * 1000000000):tonumber())
 end
 
--- A kind: its length on the wire, its field in Wireshark, and its value if Wireshark reads another one.
+-- A kind: its length on the wire, its field in Wireshark, and a function that reads its value where Wireshark's own
+-- reading would not do.
 local function micro(range) return range:le_uint64():tonumber() / 1e6 end
 local function signed_micro(range) return range:le_int64():tonumber() / 1e6 end
 local KINDS = {
@@ -145,8 +146,8 @@ local KINDS = {
   text = {nil, ProtoField.string},
 }
 
--- A table of the protocol's pages: {name, kind, title, unit or names of values, count}. The fourth is the width for a
--- text; for `hex` and `zero` it gives the known bits: the bits above them are reserved.
+-- A table of the protocol's pages: {name, kind, title, unit or names of values, count}. The fourth entry of a text is
+-- its width; that of `hex` is the lowest value with a reserved bit.
 local function rows_of(prefix, rows)
   local at = 0
   for _, row in ipairs(rows) do
@@ -173,7 +174,7 @@ local PTP_SERVOS = {[0] = "s0, unlocked", "s1, jump", "s2, locked"}
 local ROWS = {
   [DESCRIPTOR] = rows_of("descriptor.", {
     {"idn", "text", "Identity", 96}, {"profile", "text", "Profile", 32},
-    {"layout", "u32", "Layout of points", {[0] = "polar", "geo"}}, {"isa", "u32", "Packet width of the cast", "rays"},
+    {"layout", "u32", "Layout of points", {[0] = "polar", "geo"}}, {"isa", "u32", "Rays cast at once", "rays"},
     {"prr_hz", "hz", "Pulse rate"}, {"lines_hz", "hz", "Lines per second"}, {"pan_deg_s", "deg_s", "Pan speed"},
     {"fov_min_deg", "deg", "Sweep starts at"}, {"sweep_deg", "deg", "Whole sweep"},
     {"line_start_deg", "deg", "Cast from line angle"}, {"line_stop_deg", "deg", "Cast up to line angle"},
@@ -181,7 +182,7 @@ local ROWS = {
     {"mirror_counts_per_turn", "f64", "Mirror counts per turn"}, {"pan_counts_per_turn", "f64", "Pan counts per turn"},
     {"range_scale_m", "f64", "Range per count", "m"}, {"range_min_m", "f64", "Smallest range", "m"},
     {"range_max_m", "f64", "Largest range", "m"}, {"max_echoes", "u32", "Most echoes of a pulse"},
-    {"n_surfaces", "u32", "Surfaces"}, {"frames", "u32", "Frames of the scan (0: endless)"},
+    {"n_surfaces", "u32", "Surfaces"}, {"frames", "u32", "Pan sweeps of the scan (0: endless)"},
     {"scan", "u32", "Scan"}, {"seed", "u64", "Seed of random numbers"}}),
   content = rows_of("descriptor.", {{"content", "hex", "Content", 16}, {"reserved", "zero", "Reserved"}}),
   [ANCHOR] = rows_of("anchor.", {
@@ -201,12 +202,12 @@ local ROWS = {
     {"axes", "f64", "Axes, scene to CRS, row by row (all 0: the same)", nil, 9},
     {"frame", "f64", "Frame scalar of the stop"}}),
   [POINTS] = rows_of("points.", {
-    {"frame", "u32", "Frame"}, {"line", "u32", "Line"}, {"pulse0", "u64", "First pulse"},
+    {"frame", "u32", "Pan sweep"}, {"line", "u32", "Line"}, {"pulse0", "u64", "First pulse"},
     {"t0_s", "s", "First pulse fires, since the scan's start"},
     {"line_t0_s", "s", "The line's first pulse fires, since the scan's start"}, {"n_pulses", "u32", "Pulses"},
     {"n_points", "u32", "Points"}}),
   [LINE_END] = rows_of("line_end.", {
-    {"frame", "u32", "Frame"}, {"line", "u32", "Line"}, {"pulse0", "u64", "First pulse"},
+    {"frame", "u32", "Pan sweep"}, {"line", "u32", "Line"}, {"pulse0", "u64", "First pulse"},
     {"t0_s", "s", "First pulse fired, since the scan's start"}, {"t1_s", "s", "The next line's first pulse"},
     {"n_fired", "u32", "Fired pulses"}, {"n_cast", "u32", "Cast pulses"}, {"n_echoes", "u32", "Echoes"},
     {"mirror_count", "u32", "Mirror count at the end"}, {"pan_count", "u32", "Pan count at the end"},
@@ -245,7 +246,7 @@ local ROWS = {
     {"kind", "u32", "Kind", {[0] = "line", "planar", "beams", "sphere", "directions"}}, {"n_beams", "u32", "Beams"},
     {"steps", "u32", "Steps of a line"}, {"first_step", "i32", "First step that is cast"},
     {"last_step", "i32", "Last step that is cast"}, {"front_step", "i32", "Step that looks along y"},
-    {"turn", "i32", "Turn", {[1] = "clockwise", [-1] = "counter-clockwise"}}, {"rings", "u32", "Rings of a frame"},
+    {"turn", "i32", "Turn", {[1] = "clockwise", [-1] = "counter-clockwise"}}, {"rings", "u32", "Rings of a pan sweep"},
     {"sequence_num", "u64", "Firing sequence, numerator", "ns"},
     {"sequence_den", "u64", "Firing sequence, denominator"},
     {"first_ring_deg", "deg", "Elevation of ring 0"},
@@ -277,7 +278,7 @@ bits(ROWS.content, "descriptor.", "content",
 bits(ROWS[ANCHOR], "anchor.", "moving",
      {{"moves", "The head moves", 1}, {"stop", "It stands at a stop of a trajectory", 2}})
 bits(ROWS[LINE_END], "line_end.", "status",
-     {{"last", "Last line of the frame", 1}, {"stopped", "The scan was stopped within the line", 2}})
+     {{"last", "Last line of the pan sweep", 1}, {"stopped", "The scan was stopped within the line", 2}})
 bits(ROWS.pose, "pose.", "flags",
      {{"extrapolated", "Extrapolated", 1}, {"late", "Late: taken to stand", 2}, {"none", "None had come yet", 4}})
 
@@ -360,7 +361,7 @@ add_expert("bad_payload", "The payload's CRC is wrong", "CHECKSUM", "ERROR")
 add_expert("garbage", "Bytes that belong to no frame and no line", "MALFORMED", "ERROR")
 add_expert("joined", "Bytes before the first frame: the capture began within one", "SEQUENCE", "NOTE")
 add_expert("cut", "The frame is not complete", "MALFORMED", "ERROR")
-add_expert("wrong", "The payload is not as its type has it", "MALFORMED", "ERROR")
+add_expert("wrong", "The payload is not one of its type", "MALFORMED", "ERROR")
 add_expert("version_unknown", "Another version of the protocol", "UNDECODED", "WARN")
 add_expert("type_unknown", "A type that version 1 does not have yet", "UNDECODED", "NOTE")
 add_expert("longer", "Longer than version 1 has it", "UNDECODED", "NOTE")
@@ -405,6 +406,7 @@ local function fills_gap(s, seq)
     if gap and before < gap.n then
       local n = gap.n
       gap.n = before
+      if s.n_gaps % GAPS == i then s.n_gaps = s.n_gaps + 1 end -- the next place is that of the first part, which stays
       add_gap(s, (seq + 1) % MODULUS, n - before - 1)
       return true
     end
@@ -425,25 +427,25 @@ local function look_at_jump(s, h)
     return GAP, s.next, missing
   end
   for i = 1, math.min(SEEN, s.n_seen) do
-    if s.seen[(s.n_seen - i) % SEEN] == h.look then return REPEATED end
+    if s.seen[(s.n_seen - i) % SEEN] == h.raw then return REPEATED end
   end
   if fills_gap(s, h.seq) and not is_run(s, h.seq) then return LATE end
   s.n_seen, s.n_gaps, s.gap = 0, 0, {}
   return RESTARTED
 end
 
--- Frames are compared by h.look. Returns the notice: kind, first missing frame, how many.
+-- Frames are compared by h.raw, bytes 1 to 23 of their headers. Returns the notice: kind, first missing frame, number.
 local function take_sequence(s, h)
   if h.is_local then
-    if s.last_local == h.look then return REPEATED end
-    s.last_local = h.look
+    if s.last_local == h.raw then return REPEATED end
+    s.last_local = h.raw
     return nil
   end
   s.last_local = nil
   local kind, first, n
   if s.next and h.seq ~= s.next then kind, first, n = look_at_jump(s, h) end
   if kind == REPEATED then return kind end
-  s.seen[s.n_seen % SEEN] = h.look
+  s.seen[s.n_seen % SEEN] = h.raw
   s.n_seen = s.n_seen + 1
   if kind == LATE then return kind end
   s.late_run, s.next = 0, (h.seq + 1) % MODULUS
@@ -580,7 +582,7 @@ local function begin_scan(flow, scan)
 end
 
 -- The device time's eight bytes.
-local function time_in(h) return h.look:sub(16, 23) end
+local function time_in(h) return h.raw:sub(16, 23) end
 
 local ABSORB = {
   [DESCRIPTOR] = function(flow, h, bytes, at, m)
@@ -698,7 +700,7 @@ end
 
 -- ---- items of the tree
 
--- Whether these fields are needed: the tree is shown, or a filter or a column uses one of them.
+-- Says whether these fields are needed: the tree is shown, or a filter or a column uses one of them.
 local function is_wanted(tree, fields)
   if tree.visible then return true end
   for _, field in ipairs(fields) do
@@ -707,7 +709,7 @@ local function is_wanted(tree, fields)
   return false
 end
 
--- Up to its NUL; all of it where there is none, which is an error of its own.
+-- The text up to its NUL. A text without NUL is taken whole; wrong_row reports it.
 local function text_of(range)
   local n = range:bytes():raw():find("\0", 1, true)
   n = n and n - 1 or range:len()
@@ -757,7 +759,8 @@ local function fields_of(rows)
   return rows.fields
 end
 
--- n records from `at` on, a hundred in a group; put(group, range, i) adds one. Where there is too much, that is said.
+-- Adds n records of len bytes from `at` on, a hundred in a group; put(group, position, i) adds one. Records beyond the
+-- preference are only counted.
 local GROUP = 100
 local function put_records(tree, tvb, at, len, n, what, put)
   local shown = math.min(n, scanhead.prefs.most)
@@ -783,8 +786,9 @@ local function geocentric(lat_deg, lon_deg, height)
     (n * (1 - e2) + height) * s
 end
 
--- The fields of points that are needed, by the name after their dot; a frame has thousands of points.
-local function looked_at(tree)
+-- The fields of points that are needed, by the name after their dot. Others are not worked out, since a frame has
+-- thousands of points.
+local function fields_needed(tree)
   local wanted, any = {}, false
   for _, name in ipairs({"pulse", "t_s", "echo", "echo_count", "label", "reflectance_db", "range_m", "line_deg",
                          "pan_deg", "x", "y", "z"}) do
@@ -838,7 +842,7 @@ local function put_polar(item, wanted, m, tvb, at, a, b, c, has_echo)
   return string.format("%s, line %.4f°, pan %.4f°", words, line_deg, pan_deg)
 end
 
--- Points show where they are once descriptor and anchor have come; before that, what needs neither.
+-- Points show range and place once descriptor and anchor have come. Before that they show what needs neither.
 local function put_points(tree, tvb, bytes, at, _, m)
   local pulse, n = number64(bytes, at + 8) - 1, number_at(bytes, at + 36)
   local can_place = m.descriptor and m.anchor
@@ -849,7 +853,7 @@ local function put_points(tree, tvb, bytes, at, _, m)
   elseif m.notice ~= REPEATED and m.notice ~= LATE then
     tree:add_proto_expert_info(E.no_anchor)
   end
-  local wanted, is_shown = looked_at(tree), tree.visible
+  local wanted, is_shown = fields_needed(tree), tree.visible
   if not wanted then return end
   local t0 = tvb(at + 16, 8):le_int64()
   local t0_s, t0_ns = (t0 / 1000000000):tonumber(), (t0 % 1000000000):tonumber()
@@ -1017,7 +1021,7 @@ local EVENTS = {
   {nil, "device time", "its GPS time"}, {"station", "warnings of its place"},
   {"port + 256 * servo", "device time", "grandmaster"},
 }
--- These of them are in nanoseconds, and shown in seconds.
+-- Which of a, b and c are in nanoseconds; they are shown in seconds.
 local IN_SECONDS = {[2] = {false, true, true}, [9] = {false, false, true}, [10] = {false, true, false},
                     [11] = {false, true, true}, [13] = {false, true, false}}
 local TROUBLE = {[4] = "event_warning", [5] = "event_warning", [9] = "event_warning", [7] = "event_note",
@@ -1052,7 +1056,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
     tree:add_proto_expert_info(E.type_unknown)
     return
   end
-  -- At the first look it was not there.
+  -- The packet's first look found no such frame, so that absorb has not checked it.
   if m.wrong == nil then m.wrong = wrong_payload(h, bytes, at, m) end
   put_rows(tree, rows, tvb, at, h.length)
   if h.type == DESCRIPTOR and h.length >= 280 then put_rows(tree, ROWS.content, tvb, at + 272, 8) end
@@ -1070,7 +1074,7 @@ local function put_payload(tree, tvb, bytes, at, h, m)
   end
 end
 
--- Findings that link it to earlier or later frames.
+-- Adds findings that concern a frame's neighbours: its sequence number, its points, its counts.
 local function put_findings(tree, h, m)
   if m.notice then
     tree:add(F["seq.notice"], m.notice):set_generated()
@@ -1150,11 +1154,11 @@ local function header_at(bytes, at)
   local _, kind, version, flags, length, seq, payload_crc = unpack_bytes("<BBBBI4I4I4", bytes, at + 1)
   if length > MOST_PAYLOAD or crc32c(bytes, at, 24) ~= number_at(bytes, at + 24) then return nil end
   return {type = kind, version = version, flags = flags, length = length, seq = seq, payload_crc = payload_crc,
-          is_repeat = flags % 2 == 1, is_local = floor(flags / 2) % 2 == 1, look = bytes:sub(at + 2, at + 24)}
+          is_repeat = flags % 2 == 1, is_local = floor(flags / 2) % 2 == 1, raw = bytes:sub(at + 2, at + 24)}
 end
 
--- Where the next correct header begins, from `at` on and before `last`; or a sync byte with too few bytes after it to
--- know.
+-- Where the next correct header begins, from `at` on and before `last`. A sync byte counts, too, if too few bytes
+-- follow it to know.
 local function next_header(bytes, at, last)
   while true do
     local found = bytes:find("\xd5", at + 1, true)
@@ -1170,8 +1174,8 @@ local function new_flow()
           line = {pulses = 0, whole = false}}
 end
 
--- Findings of a packet's first look. Wireshark may cut the same bytes otherwise at the next look, so the content is the
--- key. Equal contents share a list, which is taken in turns.
+-- Results of the first look at each packet, by packet number and content. Positions can't be the key, since Wireshark
+-- may cut the same bytes otherwise at the next look. Equal contents share a list, which is taken in turns.
 local memo
 
 local function memo_of(pinfo)
@@ -1238,7 +1242,7 @@ function Search:say(words)
   if self.said <= 6 then note_info(self.pinfo, words) elseif self.said == 7 then note_info(self.pinfo, "...") end
 end
 
--- Bytes up to `to` that belong to nothing. Where they look like a frame, its header is shown.
+-- Shows bytes up to `to` that belong to nothing. Where they look like a frame, its header is shown.
 function Search:show_garbage(from, to, is_join)
   local tvb, n = self.tvb, to - from
   local item = self.tree:add(scanhead, tvb(from, n),
@@ -1274,7 +1278,7 @@ end
 
 function Search:show_frame(at, h)
   local tvb, payload = self.tvb, at + HEADER_LEN
-  local m = find(self.pinfo, h.look, function(m) absorb(self.flow, h, self.bytes, payload, m) end)
+  local m = find(self.pinfo, h.raw, function(m) absorb(self.flow, h, self.bytes, payload, m) end)
   local words = summary(h, self.bytes, payload, m)
   local item = self.tree:add(scanhead, tvb(at, HEADER_LEN + h.length), "Scan head, " .. words)
   put_header(item, tvb, at, true, true)
@@ -1302,7 +1306,8 @@ function Search:show_broken(at, h, to, is_cut)
   if not self.pinfo.visited then self.flow.line.whole = false end
 end
 
--- A correct header, and what follows is not its payload, or not all of it. What stands within its length is searched.
+-- Takes a frame whose header is correct, but whose payload is wrong or not complete. Other frames may stand within its
+-- length, so it ends at the next header.
 function Search:take_broken(h, is_cut)
   local last = math.min(self.at + HEADER_LEN + h.length, self.len)
   local to = next_header(self.bytes, self.at + 1, last) or last
@@ -1361,8 +1366,8 @@ function Search:look_text()
 end
 
 -- Returns nothing if all bytes are used. Else the place where it waits, the number of bytes that it waits for (nil: not
--- known), and whether TCP must not join them. It must not where items before the place were found with bytes from
--- beyond it, or where the place lies within the bytes that the last search has kept.
+-- known), and whether TCP must not join them. TCP must not in two cases: items before the place were found with bytes
+-- from beyond it, or the place lies within bytes that the last search has kept.
 function Search:run()
   local waits, more
   while self.at < self.len and not waits do
@@ -1386,7 +1391,7 @@ end
 
 local function run_search(...) return new_search(...):run() end
 
--- Commands of the host: lines, ended by LF, CR or CR LF. Gives the same as Search:run.
+-- Commands of the host: lines, ended by LF, CR or CR LF. Returns the place where it waits for more, if it does.
 local function run_commands(tvb, pinfo, tree, conn, can_wait)
   local bytes, at = tvb:raw(0, tvb:len()), 0
   while at < #bytes do
@@ -1442,8 +1447,9 @@ local function begin_packet(pinfo)
   pinfo.cols.info:clear()
 end
 
--- Frames that go on in the next packet are joined here, unless `ask` has TCP do it: ask(at, more). They are joined here
--- also where TCP would give bytes again that were taken already, or cut them otherwise at the next look.
+-- Frames that go on in the next packet are joined here, or by TCP where `ask` is given: ask(at, more) tells TCP where
+-- to begin. Even then they are joined here if TCP would give bytes again that were taken already, or would cut them
+-- otherwise at the next look.
 local function dissect_joined(tvb, pinfo, tree, conn, is_down, can_wait, ask)
   local side, packet, first_time = is_down and "in" or "out", memo_of(pinfo), not pinfo.visited
   local key = side .. tvb:offset()
