@@ -64,12 +64,14 @@ class Reach:
 
     def tests_of(self, name, line):
         """Returns the tests that reach a line. A test of few lines is likelier to look at this one, so quick tests of few lines come
-        first. A line without code of its own, such as one of a table, counts as reached by the tests that reach its file. A line of
-        a header counts as reached by those that reach a file with it."""
+        first. A line without code of its own, such as one of a table, counts as reached by the tests that reach its file, or its
+        folder where the file is all tables. A line of a header counts as reached by those that reach a file with it."""
         if (name, line) in self.code:
             found = self.lines.get((name, line), set())
         else:
             users = [name] if not name.endswith(".h") else [name, *self.shipped.deps.get(name, ())]
+            if all(user not in self.files for user in users):
+                users = [user for user in self.files if os.path.dirname(user) == os.path.dirname(name)]
             found = set().union(*(self.files.get(user, set()) for user in users))
         return sorted(found, key=lambda test: (START_S + self.tests[test]) * self.sizes[test])
 
