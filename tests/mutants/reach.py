@@ -15,6 +15,7 @@ import tree as trees
 from build import LIBRARY, Build
 
 LONGEST_S = 900
+START_S = 0.02  # to start any test
 MARKS = "-fprofile-instr-generate -fcoverage-mapping"
 SETTINGS = f"WERROR= CC='ccache clang' CXX='ccache clang++' SAN='{MARKS}' OPT=-O0 CORE_OPT=-O1 CFLAGS='-g1 -w' CXXFLAGS='-g1 -w'"
 
@@ -27,11 +28,11 @@ def hash_of(folder, names):
 
 
 class Reach:
-    """`tests` has the seconds of each program."""
+    """`tests` has the seconds of each program, and `sizes` the number of lines that it reaches."""
 
     def __init__(self, shipped, say):
         self.shipped, self.tree, self.say = shipped, shipped.tree, say
-        self.folder, self.tests, self.lines, self.code, self.files = f"{self.tree.work}/lines", {}, {}, set(), {}
+        self.folder, self.tests, self.sizes, self.lines, self.code, self.files = f"{self.tree.work}/lines", {}, {}, {}, set(), {}
         os.makedirs(self.folder, exist_ok=True)
         product = hash_of(self.tree.path, [name for name in sorted(shipped.deps) if name.startswith(trees.PRODUCT)] + self.tree.common())
         keys = {program: product + hash_of(self.tree.path, self.tree.sources_of(program)) for program in self.tree.programs()}
@@ -55,21 +56,24 @@ class Reach:
             return None
 
     def add(self, program, found):
-        self.tests[program] = found["took_s"]
+        self.tests[program], self.sizes[program] = found["took_s"], sum(map(len, found["lines"].values()))
         for name, lines in found["lines"].items():
             self.files.setdefault(name, set()).add(program)
             for line in lines:
                 self.lines.setdefault((name, line), set()).add(program)
 
     def tests_of(self, name, line):
-        """Returns the tests that reach a line, the quickest first. A line without code of its own, such as one of a table, counts as
-        reached by the tests that reach its file. A line of a header counts as reached by those that reach a file with it."""
+        """Returns the tests that reach a line. A test of few lines is likelier to look at this one, so quick tests of few lines come
+        first. A line without code of its own, such as one of a table, counts as reached by the tests that reach its file, or its
+        folder where the file is all tables. A line of a header counts as reached by those that reach a file with it."""
         if (name, line) in self.code:
             found = self.lines.get((name, line), set())
         else:
             users = [name] if not name.endswith(".h") else [name, *self.shipped.deps.get(name, ())]
+            if all(user not in self.files for user in users):
+                users = [user for user in self.files if os.path.dirname(user) == os.path.dirname(name)]
             found = set().union(*(self.files.get(user, set()) for user in users))
-        return sorted(found, key=self.tests.get)
+        return sorted(found, key=lambda test: (START_S + self.tests[test]) * self.sizes[test])
 
     # ---- the run
 

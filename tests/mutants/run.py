@@ -21,6 +21,7 @@ import re
 import shutil
 import signal
 import sys
+import time
 
 import draw
 import tree as trees
@@ -28,6 +29,7 @@ from build import Build
 from reach import Reach
 
 LEAST = 0.9
+AHEAD = 16  # draws for each worker, as one that survives takes as long as fifty that are found
 LIMIT_S, LIMIT_TIMES = 30, 10  # for a test, beside and times its usual time, as only an endless one must reach that
 JUDGED = ("found", "survived", "unreached")
 
@@ -51,12 +53,13 @@ class Judge:
             self.workers.put(f"{self.tree.path}/build/worker-{i}")
 
     def __call__(self, mutant):
-        worker = self.workers.get()
+        worker, begin = self.workers.get(), time.monotonic()
         try:
             shutil.rmtree(worker, ignore_errors=True)
             os.makedirs(worker)
             os.symlink("../ifc", f"{worker}/ifc")  # a program finds the readers of IFC above its own folder
             mutant["is"], mutant["by"] = self.judge(mutant, worker)
+            mutant["took_s"] = round(time.monotonic() - begin, 1)
         finally:
             shutil.rmtree(worker, ignore_errors=True)
             self.workers.put(worker)
@@ -129,7 +132,7 @@ def judged(judge, mutants, n):
     with concurrent.futures.ThreadPoolExecutor(judge.tree.jobs) as pool:
         try:
             while counted < n:
-                todo.extend(pool.submit(judge, mutant) for mutant in itertools.islice(mutants, 2 * judge.tree.jobs - len(todo)))
+                todo.extend(pool.submit(judge, mutant) for mutant in itertools.islice(mutants, AHEAD * judge.tree.jobs - len(todo)))
                 if not todo:
                     return
                 mutant = todo.popleft().result()

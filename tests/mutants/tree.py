@@ -151,7 +151,7 @@ class Tree:
         begin = time.monotonic()
         with open(log, "w", encoding="utf-8") as file:
             status, _ = self.children.run(
-                ["prlimit", "--core=0", f"--data={data}", f"--fsize={MOST_FILE}", program], limit_s, file, cwd=self.path,
+                ["prlimit", "--core=0", f"--data={data}", f"--fsize={MOST_FILE}:", program], limit_s, file, cwd=self.path,
                 env={**self.env, "SCANHEAD": "build/test/scanhead", "READERS": "build/readers", "CMOCKA_MESSAGE_OUTPUT": "TAP",
                      "TEST_LIMIT_S": "0", **env})
         return status, time.monotonic() - begin

@@ -26,6 +26,9 @@ static const struct deviation_hit HEAD_ON = {100.0, {0, 1, 0}, {0, -1, 0}, -1};
 static const struct deviation_hit LEANING = {100.0, {0, 1, 0}, {0, -0.5, 0.86602540378443865}, -1};
 static const struct deviation_hit TURNED = {100.0, {0, 1, 0}, {0.86602540378443865, -0.5, 0}, -1};
 
+/* A head that lies on its side: its axis points along x of the scene. */
+static const double ON_ITS_SIDE[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
+
 static double sigma(const struct deviation_head *head, const struct deviation_hit *hit)
 {
     double counts_m;
@@ -65,6 +68,10 @@ static void sigma_of_angles(void **state)
     const double over[9] = {-1, 0, 0, 0, 1, 0, 0, 0, -1};
     memcpy(head.setup.rotation, over, sizeof over);
     near_to(sigma(&head, &LEANING), 100.0 * 1e-5 * sqrt(3.0));
+    /* The pan of one on its side moves the beam up and down. */
+    memcpy(head.setup.rotation, ON_ITS_SIDE, sizeof ON_ITS_SIDE);
+    near_to(sigma(&head, &LEANING), 100.0 * 3e-5 * sqrt(3.0));
+    near_to(sigma(&head, &TURNED), 100.0 * 1e-5 * sqrt(3.0));
 }
 
 /* A uniform ball has a variance of r^2 / 5 along any line. */
@@ -84,6 +91,9 @@ static void sigma_of_a_ball(void **state)
     near_to(sigma(&head, &HEAD_ON), 0.02 / sqrt(5.0));
     near_to(sigma(&head, &TURNED), 0.04 / sqrt(5.0) * sqrt(0.25 + 0.75 * 9.0));
     near_to(deviation_bound_m(&head, 100.0), 0.06);
+    memcpy(head.setup.rotation, ON_ITS_SIDE, sizeof ON_ITS_SIDE); /* the head's right is down */
+    near_to(sigma(&head, &LEANING), 0.04 / sqrt(5.0) * sqrt(0.25 + 0.75 * 9.0));
+    near_to(sigma(&head, &TURNED), 0.04 / sqrt(5.0));
 }
 
 static void counts_and_bounds(void **state)

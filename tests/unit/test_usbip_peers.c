@@ -5,7 +5,7 @@
 #include <poll.h>
 
 /* MANY requests have 48 MB without the replies: more than the sockets' buffers and the back end together. */
-enum { EREMOTEIO_WIRE = -121, GET_STATUS = 0, MANY = 1000000 };
+enum { EREMOTEIO_WIRE = -121, ECONNRESET_WIRE = -104, GET_STATUS = 0, MANY = 1000000 };
 
 static struct reply r;
 
@@ -270,6 +270,11 @@ static void test_bytes_pending(void **state)
     client_import(&c, &bench);
     client_configure(&c);
     client_open_stream(&c);
+    for (int i = 0; i < 5; i++) { /* an unlinked request gives its bytes back */
+        client_unlink(&c, client_submit(&c, 1, 3, NULL, NULL, 16 * MIB));
+        assert_true(client_reply(&c, &r, 0));
+        assert_int_equal(r.status, ECONNRESET_WIRE);
+    }
     for (size_t i = 0; i < sizeof lens / sizeof lens[0]; i++)
         client_submit(&c, 1, 3, NULL, NULL, lens[i]);
     assert_int_equal(client_control(&c, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0); /* these are given back */

@@ -196,21 +196,41 @@ static void test_power_does_not_wait_for_what_is_held(void **state)
     }
 }
 
+/* Runs a VLP-16 whose packets go to out.bin. */
+static void write_packets(struct wire *wire, const char *more, const char *option, const char *value)
+{
+    char config[352], stats[352], text[512];
+    room_write(wire);
+    snprintf(text, sizeof text,
+             "head: {profile: velodyne-vlp16}\nscene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
+             "stations: [{position_m: [0, 0, 0]}]\nlinks: [{type: file, protocol: velodyne, path: out.bin}]\n%s",
+             more);
+    wire_write_text(wire, "config.yaml", text);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    const char *const args[] = {"run", config, "--start", option, value, "--stats", stats, "--quiet", NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+}
+
+/* A packet of the dual return mode has 12 firing sequences of 16 pulses. The last pulses of a scan fill none, and are
+ * counted. */
+static void test_each_pulse_is_in_a_packet_or_counted(void **state)
+{
+    struct wire *wire = *state;
+    write_packets(wire, "", "--frames", "2");
+    const uint64_t unsent = stats_link_uint(wire, "unsent_pulses");
+    assert_in_range(unsent, 1, 12 * 16 - 1);
+    assert_int_equal(stats_uint(wire, "pulses"), 12 * 16 * stats_link_uint(wire, "sent_units") + unsent);
+}
+
 /* Packets that a fault holds back when power goes are neither sent nor counted as sent. Those in the file are. */
 static void test_what_power_takes_is_not_sent(void **state)
 {
     enum { PACKET_BYTES = 1206 };
     struct wire *wire = *state;
-    char config[352], stats[352];
-    room_write(wire);
-    wire_write_text(wire, "config.yaml",
-                    "head: {profile: velodyne-vlp16}\nscene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
-                    "stations: [{position_m: [0, 0, 0]}]\nlinks: [{type: file, protocol: velodyne, path: out.bin}]\n"
-                    "faults: [{kind: delay, for_ms: 9000, from: 20}, {kind: power_cycle, for_ms: 1, from_s: 0.3}]\n");
-    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
-    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
-    const char *const args[] = {"run", config, "--start", "--duration", "0.3", "--stats", stats, "--quiet", NULL};
-    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 0);
+    write_packets(wire,
+                  "faults: [{kind: delay, for_ms: 9000, from: 20}, {kind: power_cycle, for_ms: 1, from_s: 0.3}]\n",
+                  "--duration", "0.3");
     size_t len;
     free(wire_read(wire_path(wire, "out.bin"), &len));
     assert_true(len > 0);
@@ -226,6 +246,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_a_stall_makes_a_slow_reader, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_the_end_waits_for_what_is_on_its_way, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_power_does_not_wait_for_what_is_held, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_each_pulse_is_in_a_packet_or_counted, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_what_power_takes_is_not_sent, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("faults in time", tests, NULL, NULL);

@@ -4,6 +4,8 @@
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
 
+#include <ctype.h>
+#include <glob.h>
 #include <sys/resource.h>
 
 enum { MOST_WORDS = 11 };
@@ -238,6 +240,63 @@ static void test_help(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
+/* Cuts a text into words that end at a comma or a blank, and returns whether one of them is a key, or begins with it
+ * and a bracket. */
+static int names_key(const char *words, const char *key)
+{
+    const size_t len = strlen(key);
+    for (const char *at = words; (at = strstr(at, key)) != NULL; at++)
+        if (strchr(" \n", at[-1]) != NULL && strchr(",[\n", at[len]) != NULL) return 1;
+    return 0;
+}
+
+/* Each key of a profile's file stands in the list below the grade that the file gives it. */
+static void expect_grades(const char *list, const char *path)
+{
+    char head[64], begin[80], grade[32] = "", key[64] = "";
+    assert_int_equal(sscanf(path, "config/heads/%63[^.]", head), 1);
+    snprintf(begin, sizeof begin, "\n%s: ", head);
+    const char *at = strstr(list, begin);
+    if (at == NULL) fail_msg("no %s", head);
+    const size_t len = strcspn(at + 1, ":") + 1;
+    char *of_head = strdup(at + len), *end = of_head, *text = wire_read(path, NULL), *rest = text;
+    while ((end = strchr(end + 1, '\n')) != NULL && end[1] == ' ')
+        continue;
+    if (end != NULL) end[1] = '\0';
+    for (char *line; (line = strsep(&rest, "\n")) != NULL;) {
+        if (isalpha((unsigned char)*line)) assert_int_equal(sscanf(line, "%63[^:]", key), 1);
+        const char *from = strstr(line, "from: ");
+        if (from == NULL || *line == '#') continue;
+        assert_int_equal(sscanf(from, "from: %31[a-z ]", grade), 1);
+        snprintf(begin, sizeof begin, "\n  %.*s", (int)strcspn(grade, ",}"), grade);
+        char *block = strstr(of_head, begin);
+        if (block == NULL) fail_msg("%s: no figures from %s", path, grade);
+        char *last = strchr(block + 1, '\n');
+        while (last != NULL && strncmp(last, "\n   ", 4) == 0)
+            last = strchr(last + 1, '\n');
+        char *words = strndup(block, last != NULL ? (size_t)(last - block) + 1 : strlen(block));
+        if (!names_key(words, key)) fail_msg("%s: %s from %s is not in:%s", path, key, grade, words);
+        free(words);
+    }
+    free(text);
+    free(of_head);
+}
+
+static void test_grades(void **state)
+{
+    struct wire *wire = *state;
+    glob_t profiles;
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, (const char *const[]){"list", NULL}, "out", "err", -1)), 0);
+    char *list = wire_read(wire_path(wire, "out"), NULL), *whole;
+    assert_true(asprintf(&whole, "\n%s", list) > 0); /* also the first head comes after the end of a line */
+    assert_int_equal(glob("config/heads/*.yaml", 0, NULL, &profiles), 0);
+    for (size_t i = 0; i < profiles.gl_pathc; i++)
+        expect_grades(whole, profiles.gl_pathv[i]);
+    globfree(&profiles);
+    free(whole);
+    free(list);
+}
+
 static void test_list(void **state)
 {
     static const char *const links[] = {" pty ", " tcp", " udp", " usb ", " web ", " file", " null"};
@@ -257,6 +316,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_list, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_grades, wire_setup, wire_teardown),
     };
     setrlimit(RLIMIT_CORE, &(struct rlimit){0, 0});
     return cmocka_run_group_tests(tests, NULL, NULL);
