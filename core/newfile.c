@@ -13,7 +13,7 @@
 #include <sys/sysmacros.h>
 #include <unistd.h>
 
-enum { TRIES = 100 }; /* each lost to another writer that ended at that moment */
+enum { TRIES = 100 }; /* a try fails only where another writer ends at that moment */
 
 static int code_of(int error)
 {
@@ -39,7 +39,7 @@ static int newfile_fail(const char *path, const char *what, struct sh_err *err)
     return sh_fail(err, code_of(error), "%s: cannot %s: %s", path, what, strerror(error));
 }
 
-/* ---- what may not be written to */
+/* ---- files that must not be written to */
 
 static int fail_link(const char *path, struct sh_err *err)
 {
@@ -136,7 +136,7 @@ static int is_named(const char *name, int fd)
            open_st.st_ino == named.st_ino;
 }
 
-/* Locks a file that is written in place. What is written to a file without a name is lost. */
+/* Locks a file that is written in place. It must still have its name, since bytes in a file without a name are lost. */
 static int lock_named(const char *path, int fd, int code, struct sh_err *err)
 {
     if (!has_locked(fd)) return fail_locked(path, fd, code, err);
@@ -229,7 +229,7 @@ static int check_left(const char *part, int fd, struct sh_err *err)
     return st.st_nlink > 1 ? fail_hard_link(part, &st, err) : SH_OK;
 }
 
-/* 1: part is open. 0: it came or went in between, try again. Negative: it can't be. */
+/* 1: part is open. 0: it appeared or vanished between two calls, try again. Negative: it can't be opened. */
 static int open_part(const char *part, int *fd, struct sh_err *err)
 {
     const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
@@ -245,7 +245,7 @@ static int open_part(const char *part, int *fd, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
-/* newfile_part, for a path that may be replaced. */
+/* Does the work of newfile_part once path is known to be replaceable. */
 static int lock_part(const char *part, int *out, struct sh_err *err)
 {
     for (int fd, i = 0; i < TRIES; i++) {
@@ -357,7 +357,7 @@ int newfile_settle(const char *path, const char *part, int fd, struct sh_err *er
     return rc == SH_OK ? close_renamed(path, fd) : rc;
 }
 
-/* Some file systems can't rename without replacing; a link is never in the place of another name. */
+/* Some file systems can't rename without replacing. There link() gives the new name, since it never replaces a file. */
 static int rename_free(const char *path, const char *part)
 {
     if (renameat2(AT_FDCWD, part, AT_FDCWD, path, RENAME_NOREPLACE) == 0) return 0;

@@ -180,7 +180,7 @@ struct utc_gps utc_gps_week(int64_t tai_ns)
 
 /* ---- text */
 
-/* Does the text begin like the form? 0 in it stands for any digit. */
+/* Whether the text begins as the form does. A 0 of the form stands for any digit. */
 static int begins_like(const char *text, const char *form)
 {
     for (; *form != '\0'; form++, text++)

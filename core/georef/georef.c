@@ -12,12 +12,13 @@
 #include "core/mat3.h"
 #include "core/vec3.h"
 
-/* Polynomials are fitted within this. Where longitude is one of their outputs it is 1/64 of the distance
- * from the axis: the series of longitude converges within that distance. */
+/* Polynomials are fitted within FIT_MAX_M. Where longitude is one of their outputs, the limit is FIT_OF_AXIS of the
+ * distance from the Earth's axis, since the series of longitude converges only within that distance. Below FIT_LEAST_M
+ * there are no polynomials. */
 #define FIT_MAX_M   20000.0
 #define FIT_OF_AXIS (1.0 / 64.0)
 #define FIT_LEAST_M 1.0
-/* Nearer to a pole there is no longitude to begin with. */
+/* A centre nearer to the axis than this is at the pole, and has no longitude. */
 #define AXIS_LEAST_M 1.0
 
 static int check_spec(const struct georef_spec *spec, struct sh_err *err)
@@ -35,7 +36,7 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     return rc;
 }
 
-/* Refuses a matrix that is no rotation by more than rounding. */
+/* Refuses a matrix that differs from a rotation by more than rounding. */
 static int check_rotation(const double r[9], struct sh_err *err)
 {
     for (int i = 0; i < 9; i++) {
@@ -47,7 +48,7 @@ static int check_rotation(const double r[9], struct sh_err *err)
     return SH_OK;
 }
 
-/* How the scene frame lies: a grid, or turned; a rotation of zeros stands for the unit matrix. */
+/* Checks how the scene frame lies, and puts the unit matrix in the place of a rotation of zeros. */
 static int set_up_frame(struct georef_spec *spec, struct sh_err *err)
 {
     static const double none[9];

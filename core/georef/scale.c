@@ -18,7 +18,7 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
         unit[i] = 1.0;
     }
     if (!georef_has_map(georef)) return;
-    if (georef->crs == GEOREF_ECEF) { /* from a grid, whose lengths differ by less than this */
+    if (georef->crs == GEOREF_ECEF) { /* prcs is a grid, whose lengths differ from true ones by less than 10 % */
         for (int i = 0; i < 3; i++)
             span[i] *= 1.1;
         return;

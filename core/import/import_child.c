@@ -27,8 +27,7 @@ _Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written i
 
 static int note_fd; /* the pipe, before and after it is moved to its place */
 
-/* Errors are reported by the pipe alone. Where that fails, the exit status still shows that something
- * did. */
+/* Only the pipe reports errors. Where a write to it fails, the exit status still shows that reading failed. */
 static void send_note(const struct import_note *note)
 {
     while (write(note_fd, note, sizeof *note) < 0 && errno == EINTR)
@@ -54,8 +53,7 @@ static void send_progress(void *ctx, const char *what, double fraction)
     send_text(IMPORT_PROGRESS, 0, fraction, what);
 }
 
-/* Sets signals as they are in a new program. Ctrl-C reaches both processes: the parent decides what it
- * means. */
+/* Resets signals as in a new program, but ignores those that the parent handles, since Ctrl-C reaches both. */
 static void set_signals(void)
 {
     static const int parents[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXFSZ};
@@ -102,8 +100,8 @@ static void offer_to_the_oom_killer(void)
     close(fd);
 }
 
-/* The parent watches the memory in use, and the clock. The kernel's limits are the second line: processor time, for
- * a parent that is stopped, and in a fork the address space. That limit is twice the one of memory, since a process has
+/* The parent watches the memory in use, and the clock. The kernel's limits also work while the parent is stopped:
+ * processor time, and in a fork the address space. That limit is twice the one of memory, since a process has
  * more address space than memory. The address sanitizer takes terabytes of it. */
 static int set_limits(const struct import_task *task)
 {
@@ -118,7 +116,7 @@ static int set_limits(const struct import_task *task)
         done = done && set_limit(RLIMIT_AS, import_memory_of(getpid(), IMPORT_ADDRESSES) + 2 * bytes);
 #endif
     offer_to_the_oom_killer();
-    return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* no core dump by a pipe either, which ignores the limit */
+    return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* a core dump into a pipe ignores RLIMIT_CORE */
 }
 
 static int prepare(const struct import_task *task, struct sh_err *err)

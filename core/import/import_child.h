@@ -13,8 +13,8 @@ struct scene_build;
 enum import_note_kind { IMPORT_WARNING = 1, IMPORT_PROGRESS, IMPORT_ERROR };
 
 struct import_note {
-    int32_t kind, code; /* code: of an error */
-    double fraction;    /* of a progress */
+    int32_t kind, code; /* code: of IMPORT_ERROR */
+    double fraction;    /* of IMPORT_PROGRESS */
     char text[512];
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The process that reads writes its scene into a file. The other one reads it, and checks it. */
+/* The process that reads a mesh writes its scene into a file. Its parent reads that file, and checks it. */
 #ifndef CORE_IMPORT_IMPORT_RESULT_H
 #define CORE_IMPORT_IMPORT_RESULT_H
 

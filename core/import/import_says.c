@@ -46,7 +46,7 @@ static int axis_of(const struct aiScene *in, const char *key, const char *sign_k
 static int is_left_handed(int right, int up, int front)
 {
     const int a = right < 0 ? -right : right, b = up < 0 ? -up : up, c = front < 0 ? -front : front;
-    if (a * b * c != 6 || a + b + c != 6) return 0; /* they are not three axes: nothing follows */
+    if (a * b * c != 6 || a + b + c != 6) return 0; /* they are not three different axes */
     return (b == a % 3 + 1) == ((right < 0) + (up < 0) + (front < 0)) % 2;
 }
 

@@ -40,7 +40,8 @@ static const struct ply_lost *find_lost(const struct ply *y, uint32_t number)
     return NULL;
 }
 
-/* A vertex that is not finite is an error only where a face uses it. Its number stays taken. */
+/* A vertex that is not finite is an error only where a face uses it. It keeps its number, so that the others keep
+ * theirs. */
 static int lose_vertex(struct ply *y, const double v[3], struct sh_err *err)
 {
     static const double nowhere[3] = {0.0, 0.0, 0.0};
@@ -76,7 +77,7 @@ static int take_vertex(struct ply *y, struct sh_err *err)
 
 /* ---- faces */
 
-/* Corner `to` of the next polygon is the one at `from` of the row. */
+/* Sets corner `to` of the next polygon to corner `from` of the row. */
 static int set_corner(struct ply *y, size_t to, size_t from, struct sh_err *err)
 {
     const uint32_t *number = y->weld.number, n = y->b->scene->n_vertices - y->b->vertex0 + y->b->n_welded;
@@ -163,8 +164,8 @@ static int note_rounding(const struct ply *y, struct sh_err *err)
     return build_single(y->b, largest, largest * BUILD_SINGLE_ROUNDING, false, err);
 }
 
-/* With more vertices than faces, faces hardly share vertices. Where they share them, there are half as
- * many vertices as faces. */
+/* Whether faces hardly share vertices: there are more vertices than faces. A closed mesh of triangles that shares them
+ * has half as many vertices as faces. */
 static bool is_torn(const struct ply *y, uint64_t vertices)
 {
     for (int i = 0; i < y->r.h.n_elements; i++)

@@ -20,7 +20,7 @@ static int stands(const struct trajectory *tr, size_t i)
                   sizeof tr->sample[i].pose.position_m) == 0;
 }
 
-/* Derivative at sample i of the parabola through it and its neighbours (at an end: its two nearest). */
+/* Derivative at sample i of the parabola through it and its neighbours (at an end: through the nearest three). */
 static double velocity(const struct trajectory *tr, size_t i, int axis)
 {
     size_t last = tr->n - 1;

@@ -32,7 +32,7 @@ struct reader {
     struct geotiff *g;
     double key[4 * MOST_KEYS];
     size_t n_key;
-    double map[16];           /* rows: easting, northing and height, in the file's units, of column, row, value, 1 */
+    double map[16];           /* rows: easting, northing, height in the file's units; columns: column, row, value, 1 */
     double z_scale, z_offset; /* of heights, by scale and tie point */
     struct sh_err *err;
 };
@@ -189,7 +189,8 @@ static int read_place(struct reader *r)
 
 /* ---- heights */
 
-/* GDAL writes this into its metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. NULL: it isn't there. */
+/* Finds the value of an item of GDAL's metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. NULL: it isn't
+ * there. */
 static const char *item(const char *metadata, const char *role)
 {
     char mark[40];
@@ -265,7 +266,7 @@ static int read_heights(struct reader *r)
     if (rc == SH_OK) {
         r->g->no_data = strtod(text, &end);
         if (end == text) r->g->no_data = NAN;
-        /* As GDAL has it: scale and tie point count where the heights have a system. */
+        /* As in GDAL, scale and tie point change heights only where these have a system or a unit. */
         const int is_vertical = key(r, VERTICAL) != 0 || key(r, VERTICAL_UNIT) != 0;
         double offset = is_vertical ? r->z_offset : 0.0, scale = is_vertical ? r->z_scale : 1.0;
         rc = read_item(r, metadata, "offset", &offset);

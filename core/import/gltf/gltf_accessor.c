@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that
- * sums and products of them stay within 64 bits. */
+/* Accessors and buffer views. Offsets in the file are up to 2^53, counts below 2^32 and strides up to 2^16. So sums and
+ * products of them stay within 64 bits. */
 #include "core/import/gltf/gltf_accessor.h"
 
 #include <math.h>

@@ -53,7 +53,7 @@ static int find_json(struct gltf *g, struct gltf_bytes *json)
     return gltf_fail(g, "it is a .glb of version %u; allowed are 1 and 2", version);
 }
 
-/* 1.0 has objects by name in place of lists, and need not say its version. */
+/* glTF 1.0 has objects by name in place of lists, and need not state its version. */
 static int check_version(struct gltf *g)
 {
     const json_t *asset = json_object_get(g->root, "asset");
@@ -142,7 +142,7 @@ static char *beside(const struct gltf *g, const char *name)
     return asprintf(&path, "%.*s%s", folder, mesh, name) >= 0 ? path : NULL;
 }
 
-/* Tries the unescaped name, too, for writers that escape nothing. */
+/* Tries the URI as it is written, too, for writers that escape nothing. */
 static int read_file(struct gltf *g, const char *uri, struct gltf_kept *out)
 {
     struct text t = {0};

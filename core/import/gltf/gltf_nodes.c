@@ -215,7 +215,7 @@ static int draw_roots(struct gltf *g, const json_t *roots, const char *at, uint3
     return rc;
 }
 
-/* Without scenes all nodes count; of several without a default the first. */
+/* Without scenes all nodes are drawn. Where there are several scenes and no default, the first one is drawn. */
 static int draw_default(struct gltf *g, uint32_t *stack)
 {
     const json_t *nodes = json_object_get(g->root, "nodes");

@@ -43,7 +43,7 @@ static void say_counts(const struct gltf *g)
                    g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
 }
 
-/* The error of whole numbers is the writer's choice: it is never refused. */
+/* Warns of the error of whole numbers. The file is not refused for it, since its writer chose these steps. */
 static int say_errors(struct gltf *g)
 {
     struct scene_build *b = g->b;

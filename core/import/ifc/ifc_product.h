@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The records of an IFC file say this of a product, and marks say what its geometry consists of. */
+/* A product of an IFC file, as its records describe it. Marks say what its geometry consists of. */
 #ifndef CORE_IMPORT_IFC_IFC_PRODUCT_H
 #define CORE_IMPORT_IFC_IFC_PRODUCT_H
 
@@ -23,7 +23,7 @@ struct ifc_product {
     double points_m;               /* largest coordinate of its points */
     bool is_far;                   /* it has points beyond 1 km of their own origin */
     struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
-    uint32_t *style;               /* [n_styles] of its items, places in the records' style */
+    uint32_t *style;               /* [n_styles] styles of its items, as indices into ifc_records.style */
     size_t n_styles, room_styles;
 };
 

@@ -12,7 +12,7 @@
 #include "core/scene/build_surfaces.h"
 
 enum { LEAST_SEGMENTS = 24, MOST_SEGMENTS = 360 };
-#define FAR_LEVEL_SEGMENTS 48 /* from here on ifc-lite, too, is asked for finer facets */
+#define FINE_LEVEL_SEGMENTS 48 /* from this number on, ifc-lite is asked for its level "high" */
 
 struct reading {
     struct scene_build *b;
@@ -31,7 +31,7 @@ static struct ifc_fineness fineness_for(const struct ifc_records *records, doubl
     double segments = radius_m > 0.0 && share < 1.0 ? ceil(M_PI / acos(1.0 - share)) + 1.0 : LEAST_SEGMENTS;
     segments = fmin(fmax(segments, LEAST_SEGMENTS), MOST_SEGMENTS);
     return (struct ifc_fineness){.segments = (int)segments,
-                                 .level = segments >= FAR_LEVEL_SEGMENTS ? "high" : "medium",
+                                 .level = segments >= FINE_LEVEL_SEGMENTS ? "high" : "medium",
                                  .deviation_m = radius_m * (1.0 - cos(M_PI / (segments - 1.0)))};
 }
 

@@ -15,7 +15,7 @@ struct ifc_records;
 struct ifc_fineness {
     int segments;
     const char *level;
-    double deviation_m; /* of the largest circle's facets; 0: there is none */
+    double deviation_m; /* of the largest circle from its facets; 0: there is no circle */
 };
 
 /* The bodies that each reader has made. */
