@@ -98,10 +98,10 @@ struct cast_colour {
 struct cast_disturbance {
     int dark;         /* the laser does not fire: shots are empty, except for echoes that noise makes in waveforms */
     double slip_turn; /* the beam's pan is this much more than the encoder reads */
-    /* The share of the optical power that a clean window lets through, both ways together. With a signal model each
-     * return is so much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by 1 /
-     * share. That is the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik). The
-     * voltage goes with the optical power, and a receiver's thermal noise is the same without light. */
+    /* The optical power that the window lets through, both ways together; 1: as a clean window. With a signal model
+     * each return is so much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by
+     * 1 / share. That is the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik).
+     * The voltage goes with the optical power, and a receiver's thermal noise is the same without light. */
     double share;
     uint32_t n_wobbles; /* each adds turn * sin(2 pi hz (t - begin)) to the axes, t since the scan's start */
     struct cast_wobble {

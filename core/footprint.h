@@ -12,7 +12,7 @@
  * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit
  * plane, with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a
  * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc;
- * equal areas of energy in the disc are equal areas of energy in every footprint. Its range counts along
+ * parts of the disc with equal energy have equal energy in every footprint. The range of a sub-ray counts along
  * itself from the exit plane.
  * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same
  * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the

@@ -14,6 +14,8 @@
 #include <unistd.h>
 
 enum { TRIES = 100 }; /* a try fails only where another writer ends at that moment */
+/* Opening neither follows a link nor waits, and takes no terminal. */
+enum { PLAIN = O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC };
 
 static int code_of(int error)
 {
@@ -147,8 +149,8 @@ static int lock_named(const char *path, int fd, int code, struct sh_err *err)
  * name. */
 static int check_unlocked(const char *path, struct sh_err *err)
 {
-    const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-    if (fd < 0) return SH_OK; /* none is there, or it can't be asked */
+    const int fd = open(path, O_RDONLY | PLAIN);
+    if (fd < 0) return SH_OK; /* there is no file, or it can't be opened to ask for its lock */
     const int rc =
         flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, SH_EINPUT, err) : SH_OK;
     close(fd);
@@ -180,13 +182,13 @@ static int empty_it(const char *path, int fd, struct sh_err *err)
 
 int newfile_open(const char *path, int *out, struct sh_err *err)
 {
-    const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* a FIFO can't hold us in open */
+    const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* opening a FIFO must not wait */
     int fd = open(path, flags | O_NOFOLLOW, 0666), is_shared = 0;
     if (fd < 0 && errno == ELOOP) {
         struct stat st;
         const int n = number_of(path);
         if (n < 0) return fail_link(path, err);
-        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode); /* a shell goes on where we end */
+        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode); /* a shell writes on at the same offset */
         fd = is_shared ? fcntl(n, F_DUPFD_CLOEXEC, 0) : open(path, flags, 0666);
     }
     if (fd < 0 && errno == ENXIO)
@@ -205,7 +207,7 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
     struct stat st;
     int rc = check_target(path, err), fd;
     if (rc != SH_OK) return rc;
-    fd = open(path, O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
+    fd = open(path, O_RDWR | O_CREAT | O_APPEND | PLAIN, 0666);
     if (fd < 0) return newfile_fail(path, "be opened for writing", err);
     if (fstat(fd, &st) != 0) rc = newfile_fail(path, "be opened for writing", err);
     if (rc == SH_OK && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
@@ -232,11 +234,10 @@ static int check_left(const char *part, int fd, struct sh_err *err)
 /* 1: part is open. 0: it appeared or vanished between two calls, try again. Negative: it can't be opened. */
 static int open_part(const char *part, int *fd, struct sh_err *err)
 {
-    const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
-    *fd = open(part, flags | O_CREAT | O_EXCL, 0666);
+    *fd = open(part, O_RDWR | PLAIN | O_CREAT | O_EXCL, 0666);
     if (*fd >= 0) return 1;
     if (errno != EEXIST) return newfile_fail(part, "create", err);
-    *fd = open(part, flags);
+    *fd = open(part, O_RDWR | PLAIN);
     if (*fd < 0 && errno == ENOENT) return 0;
     if (*fd < 0 && errno == ELOOP) return fail_link(part, err);
     if (*fd < 0) return newfile_fail(part, "create", err);
@@ -271,7 +272,7 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
 {
     int rc = check_target(part, err);
     if (rc != SH_OK) return rc;
-    const int fd = open(part, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    const int fd = open(part, O_RDWR | PLAIN);
     if (fd < 0) return newfile_fail(part, "be opened for reading and writing", err);
     rc = check_left(part, fd, err);
     if (rc == SH_OK && !has_locked(fd))
@@ -283,13 +284,12 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
 
 int newfile_whole(const char *path, int *out, struct sh_err *err)
 {
-    const int flags = O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
     int rc = check_target(path, err);
     if (rc != SH_OK) return rc;
-    int fd = open(path, O_RDWR | flags);
+    int fd = open(path, O_RDWR | PLAIN);
     if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && has_locked(fd)) return hand_out(SH_OK, fd, out);
     if (fd >= 0) close(fd);
-    *out = open(path, O_RDONLY | flags);
+    *out = open(path, O_RDONLY | PLAIN);
     return *out >= 0 ? SH_OK : newfile_fail(path, "be opened", err);
 }
 
@@ -297,7 +297,7 @@ long long newfile_left_len(const char *part)
 {
     struct stat st;
     long long len = 0;
-    const int fd = open(part, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    const int fd = open(part, O_RDONLY | PLAIN);
     if (fd < 0) return 0;
     if (fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && (flock(fd, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK))
         len = st.st_size;

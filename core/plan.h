@@ -4,7 +4,7 @@
  * reasons.
  *
  * Each stage takes the cheapest option whose bounds hold the tolerance. Where none does, it takes the one
- * with the least error, and the row says so. Bounds are proven (order, georeferencing) or found by sampling:
+ * with the least error, and the row says so. Bounds are proven (georeferencing) or found by sampling:
  * some thousands of the head's own pulses, drawn with a fixed key, are cast with the option and with the
  * reference. Costs are rounded figures (core/plan/cost.h). They are not measured while planning, so that the
  * same scene, head and tolerance always have the same plan. No clock, no files. */

@@ -54,7 +54,8 @@ VEC_INLINE uint64_t rng_key(uint64_t seed, enum rng_purpose purpose)
 }
 
 /* Returns a number that is XORed into keys, so that each scan draws other numbers. It depends on the station and the
- * number of its scan, both counted from 1. It is 0 for the first scan at the first station. Once per scan. */
+ * number of its scan, both counted from 1. It is 0 for the first scan at the first station. It is computed once per
+ * scan. */
 VEC_INLINE uint64_t rng_scan(uint32_t station, uint32_t scan)
 {
     return rng_mix((uint64_t)(station - 1) << 32 | (scan - 1));

@@ -96,7 +96,7 @@ struct surface_colours {
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
 void surface_colours_free(struct surface_colours *colours);
-/* Each entry is set first. */
+/* Sets an entry from the mesh's own colours. It is called once for each entry, before surface_colours_texture. */
 void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named);
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#include <strings.h>
 
 #include "core/err.h"
 
@@ -27,6 +28,13 @@ static inline struct text_span text_span_of(const char *text)
 bool text_is(struct text_span span, const char *text);
 /* The same word, whatever its case? */
 bool text_is_word(struct text_span span, const char *word);
+
+/* Whether a file's name ends so, whatever its case; the ending alone is not such a name. */
+static inline bool text_has_ending(const char *file, const char *ending)
+{
+    const size_t len = strlen(file), n = strlen(ending);
+    return len > n && strcasecmp(file + len - n, ending) == 0;
+}
 
 /* Whether the list has the text. NULL ends the list. */
 bool text_is_one_of(struct text_span span, const char *const *list);

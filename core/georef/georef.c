@@ -2,6 +2,7 @@
 #include "core/georef.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -99,14 +100,15 @@ static void set_up_centre(struct georef *georef)
 
 static int fail_map(const struct georef_spec *spec, const char *why, struct sh_err *err)
 {
+    char name[32] = "UPS";
+    if (spec->utm_zone != GEOREF_UPS) snprintf(name, sizeof name, "UTM zone %d", spec->utm_zone);
     if (spec->prcs_is_grid)
         return sh_fail(err, SH_EINPUT,
                        "georef: the grid of the scene or of the output does not reach latitude %g, longitude %g (%s)",
                        spec->lat_deg, spec->lon_deg, why);
     if (spec->crs == GEOREF_UTM)
-        return sh_fail(err, SH_EINPUT,
-                       "georef: UTM zone %d does not reach latitude %g, longitude %g (%s); 0: by position",
-                       spec->utm_zone, spec->lat_deg, spec->lon_deg, why);
+        return sh_fail(err, SH_EINPUT, "georef: %s does not reach latitude %g, longitude %g (%s); zone 0: by position",
+                       name, spec->lat_deg, spec->lon_deg, why);
     return sh_fail(err, SH_EINPUT, "georef: %s", why);
 }
 

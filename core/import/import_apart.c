@@ -60,7 +60,7 @@ void import_close(struct import_apart *a)
     }
 }
 
-/* Signals are blocked until the child has handlers of its own: this process's must not run there. */
+/* Forks with all signals blocked, so that this process's handlers don't run in the child. The child unblocks them. */
 static int start_child(struct import_apart *a, struct sh_err *err)
 {
     sigset_t all, before;

@@ -8,7 +8,6 @@
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #include <assimp/config.h>
@@ -256,9 +255,7 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
 static struct aiNode root_of(const struct aiScene *in, const char *file)
 {
     struct aiNode root = *in->mRootNode;
-    const char *dot = strrchr(file, '.');
-    if (dot != NULL && strcasecmp(dot, ".fbx") == 0)
-        root.mTransformation = (struct aiMatrix4x4){.a1 = 1, .b2 = 1, .c3 = 1, .d4 = 1};
+    if (text_has_ending(file, ".fbx")) root.mTransformation = (struct aiMatrix4x4){.a1 = 1, .b2 = 1, .c3 = 1, .d4 = 1};
     return root;
 }
 

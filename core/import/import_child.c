@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The process that reads: limits first, then the work, then the scene into the file of the task.
+/* The process that reads sets its limits, does the work, and writes the scene into the file of the task.
  *
  * For all but IFC it is a fork without exec. The parent may have threads; only this one is left in the fork. glibc lets
  * such a process use malloc and stdio; libraries are loaded before the fork. It ends by _exit, which runs

@@ -137,7 +137,7 @@ static const char *without_folder(const char *path)
     return last != NULL ? last + 1 : path;
 }
 
-/* An image within the mesh's file: "*3", or by the name that it once had as a file. *number: -1, none. */
+/* Finds an image within the mesh's file, by "*3" or by the name that it once had as a file. *number is -1 for none. */
 static const struct aiTexture *find_within(const struct aiScene *in, const char *path, long *number)
 {
     *number = path[0] == '*' ? strtol(path + 1, NULL, 10) : -1;

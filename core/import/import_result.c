@@ -75,9 +75,8 @@ static int put_array(int fd, void **array, size_t size, struct sh_err *err)
     return rc;
 }
 
-int import_result_write(struct scene *scene, int fd, struct sh_err *err)
+int import_result_write(struct scene *s, int fd, struct sh_err *err)
 {
-    struct scene *s = scene;
     struct result_head head = {.n_vertices = s->n_vertices,
                                .n_triangles = s->n_triangles,
                                .n_surfaces = s->n_surfaces,

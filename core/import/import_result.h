@@ -8,7 +8,7 @@
 struct scene_build;
 
 /* Writes the scene to an empty file. Its arrays are released on the way. */
-int import_result_write(struct scene *scene, int fd, struct sh_err *err);
+int import_result_write(struct scene *s, int fd, struct sh_err *err);
 
 /* Adds the scene in the file to b, after b's other files. Nothing in it is trusted: SH_EINPUT says what is
  * wrong. The parts that have been read are cut out of the file, to free memory. */

@@ -3,7 +3,6 @@
 #include <errno.h>
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #include "core/import/readers.h"
@@ -37,10 +36,8 @@ static int check_spec(struct scene_build *b, struct sh_err *err)
 static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, struct sh_err *err)
 {
     build_begin_file(b, spec);
-    size_t len = strlen(spec->file);
     for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
-        size_t ending_len = strlen(readers[i].ending);
-        if (len <= ending_len || strcasecmp(spec->file + len - ending_len, readers[i].ending) != 0) continue;
+        if (!text_has_ending(spec->file, readers[i].ending)) continue;
         int rc = check_spec(b, err);
         if (rc == SH_OK) rc = readers[i].read(b, err);
         return rc == SH_OK ? build_end_file(b, err) : rc;

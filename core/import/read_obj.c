@@ -295,7 +295,7 @@ static int read_statements(struct obj *o, struct sh_err *err)
     return rc;
 }
 
-/* All vertices are there now. */
+/* Reads the faces that were kept for later. All vertices are known now. */
 static int read_later(struct obj *o, struct sh_err *err)
 {
     int rc = SH_OK;

@@ -87,7 +87,7 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
                          LATEST_S);
     if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                         "t_s %.9g comes after %.9g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
+                         "t_s %.15g comes after %.15g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
                          1e-6 * POSE_MIN_STEP_US);
     return SH_OK;
 }
@@ -199,8 +199,8 @@ static void heading_at(const struct trajectory *curve, double t_s, double d, con
     if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }
 
-/* The share of an interval that the platform has gone after the share f of its time. It is f, or smooth where it begins
- * or ends at rest. */
+/* The share of an interval's way that is done after the share f of its time: the cubic from 0 to 1 whose slope at
+ * either end is 1, or 0 where the platform is at rest there. */
 static double along(double f, int from_rest, int to_rest)
 {
     double g = 1.0 - f;

@@ -8,6 +8,7 @@
 
 #include "core/crs.h"
 #include "core/import/geotiff/tags.h"
+#include "core/text.h"
 
 /* Tags, and keys of the tag GEO_KEYS. */
 enum { WIDTH = 256, HEIGHT = 257, PIXEL_SCALE = 33550, TIE_POINTS = 33922, TRANSFORMATION = 34264, GEO_KEYS = 34735 };
@@ -39,8 +40,7 @@ struct reader {
 
 int geotiff_is_name(const char *file)
 {
-    const char *dot = strrchr(file, '.');
-    return dot != NULL && (strcasecmp(dot, ".tif") == 0 || strcasecmp(dot, ".tiff") == 0);
+    return text_has_ending(file, ".tif") || text_has_ending(file, ".tiff");
 }
 
 /* Returns a key that is a number in the directory itself; 0: it isn't there. */

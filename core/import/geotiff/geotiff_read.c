@@ -158,7 +158,7 @@ static int check_band(struct raster *r, struct sh_err *err)
         r->bits, r->format);
 }
 
-/* Checks the memory for vertices, triangles and labels, here and on their way back. */
+/* Refuses a raster whose vertices, triangles and labels may take too much memory, with the copy that goes back. */
 static int check_memory(struct raster *r, struct sh_err *err)
 {
     const struct scene *s = NULL;
@@ -339,7 +339,7 @@ static int count_alone(struct raster *r, struct sh_err *err)
 }
 
 /* Warns of heights that no place on the Earth has: such values usually mark cells without height. */
-static void doubt_heights(const struct raster *r)
+static void warn_of_odd_heights(const struct raster *r)
 {
     const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;
     const double odd = is_low ? r->lowest : r->highest;
@@ -369,7 +369,7 @@ static int geotiff_read_say(struct raster *r, struct sh_err *err)
                    "its ModelPixelScale or ModelTiepoint scales the heights; this is not used, since the file names no "
                    "system for heights");
     if (r->g.turns_heights) build_warn(r->b, "its ModelTransformation changes the heights; this is not used");
-    doubt_heights(r);
+    warn_of_odd_heights(r);
     return rc;
 }
 

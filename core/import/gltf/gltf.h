@@ -31,6 +31,7 @@ struct gltf {
     struct gltf_kept *buffer, *view, *accessor;
     uint32_t n_buffers, n_views, n_accessors, n_nodes, n_drawn;
     struct gltf_node *node;
+    uint32_t *stack;       /* [n_nodes + 1] nodes still to come, while the tree is walked */
     json_t *names;         /* of materials, by number; no two are the same */
     bool by_assimp;        /* glTF 1.0, or meshes by Draco: Assimp reads it */
     double largest;        /* largest |coordinate| of positions in single precision */

@@ -45,7 +45,7 @@ static const json_t *meshopt_of(const json_t *object)
     return more != NULL ? more : gltf_extension(object, "KHR_meshopt_compression");
 }
 
-/* The bytes that a buffer view names, or an extension of it. */
+/* Finds the bytes that a buffer view, or an extension of it, names. */
 static int open_part(struct gltf *g, const json_t *object, const char *at, struct gltf_bytes *out)
 {
     uint64_t offset = 0, length = 0;

@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #include "core/import/gltf/gltf.h"
@@ -16,8 +15,7 @@
 
 bool gltf_is_name(const char *file)
 {
-    const char *dot = strrchr(file, '.');
-    return dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
+    return text_has_ending(file, ".gltf") || text_has_ending(file, ".glb");
 }
 
 /* Warns of what was left out or changed, one line for each kind. */

@@ -9,6 +9,11 @@
 
 #include "core/text.h"
 
+/* The words of a product in messages: a format for printf, and its arguments. */
+#define IFC_PRODUCT_FORMAT "%.*s '%.40s' %.22s"
+#define IFC_PRODUCT_WORDS(product) \
+    (int)((product)->type.n < 48 ? (product)->type.n : 48), (product)->type.p, (product)->name, (product)->guid
+
 struct ifc_product {
     uint64_t id;
     struct text_span type; /* as the file has it, in capitals */

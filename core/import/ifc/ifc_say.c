@@ -28,8 +28,7 @@ static void end_line(struct lines *l)
 static void add_name(struct lines *l, const struct ifc_product *p)
 {
     char name[160];
-    const int len = snprintf(name, sizeof name, "%.*s '%.40s' %.22s", (int)(p->type.n < 48 ? p->type.n : 48), p->type.p,
-                             p->name, p->guid);
+    const int len = snprintf(name, sizeof name, IFC_PRODUCT_FORMAT, IFC_PRODUCT_WORDS(p));
     if (l->n_listed++ >= MAX_NAMED) return;
     if (l->len + (size_t)len + 4 > LINE_ROOM) end_line(l);
     if (l->len == 0 && l->n_lines == 0)
@@ -63,9 +62,8 @@ int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, c
         if (l.n == 0) continue;
         if (strict && ifc_is_doubtful((enum ifc_finding)f))
             return build_fail(b, SH_EINPUT, err,
-                              "%zu product%s: %s: %.*s '%.40s' %.22s%s; allowed none (scene.ifc_strict)", l.n,
-                              l.n > 1 ? "s" : "", l.text, (int)(first->type.n < 48 ? first->type.n : 48), first->type.p,
-                              first->name, first->guid, l.n > 1 ? " and others" : "");
+                              "%zu product%s: %s: " IFC_PRODUCT_FORMAT "%s; allowed none (scene.ifc_strict)", l.n,
+                              l.n > 1 ? "s" : "", l.text, IFC_PRODUCT_WORDS(first), l.n > 1 ? " and others" : "");
         for (size_t i = 0; i < records->n_products; i++)
             if ((int)finding[i] == f) add_name(&l, &records->product[i]);
         end_group(&l);

@@ -98,12 +98,10 @@ struct found {
 static int ifc_site_follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type,
                            size_t n, struct found *to)
 {
-    uint64_t id;
     char what[96];
     snprintf(what, sizeof what, "a reference to %s is missing", type);
-    if (!step_reference(ref, &id)) return ifc_site_fail(r, from, what);
-    const struct step_record *record = ifc_index_find(&r->index, id);
-    if (record == NULL || !text_is(record->type, type)) return ifc_site_fail(r, from, what);
+    const struct step_record *record = ifc_index_follow(&r->index, ref, type);
+    if (record == NULL) return ifc_site_fail(r, from, what);
     to->record = *record;
     if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n)
         return ifc_site_fail(r, &to->record, "attributes are missing");

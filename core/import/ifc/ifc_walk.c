@@ -20,7 +20,7 @@ enum kind {
     CURVED = 4,      /* it has circles or other curves, which readers cut up */
     ASSIMP_ERRS = 8, /* Assimp is known to get it wrong without a message */
     POINTS = 16,     /* points, which may be far */
-    TURNED = 64,     /* a profile turned about an axis: its radius is among the points */
+    TURNED = 64,     /* a profile turned about an axis: its points bound the radius */
     RADIUS = 32,     /* a circle or the like: keep_radius knows the attribute */
 };
 
