@@ -10,8 +10,8 @@
  *   planar      a turn, from step 0 on           a line                `steps` a turn, those of first..last cast
  *   beams       a turn, from azimuth 0 on        a line                a firing sequence of up to 128 beams, over
  *                                                                      and over, while the azimuth turns
- *   sphere      a ring: one elevation            all rings, -90 up     `steps` a ring; of rings at -90 and 90 deg,
- *                                                to 90 deg, or some    which are poles, only one is cast
+ *   sphere      a ring: one elevation            all rings, -90 up     `steps` a ring; at the poles, -90 and 90 deg,
+ *                                                to 90 deg, or some    only one is cast
  *   directions  the list once                    a line                one each
  *
  * Time is counted in ticks. A tick of a beams head is the largest time that all its firing times are multiples

@@ -3,7 +3,7 @@
  *
  * In: points of the scene, as differences from a centre in metres. Out: differences from the anchor in the
  * CRS. The anchor is the centre's position in the CRS, so anchor + difference is the point's position, and
- * nothing is lost to large numbers. The centre is the station, until georef_recentre moves it.
+ * large coordinates lose no digits. The centre is the station, until georef_recentre moves it.
  *
  * The scene's frame is one of these: the tangent frame of the station (x east, y north, z up along the
  * ellipsoid's normal); the tangent frame of another place, turned against it (rotation); a grid.
