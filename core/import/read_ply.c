@@ -29,15 +29,10 @@ static int check_mesh(const struct ply *y, struct sh_err *err)
 
 /* ---- vertices */
 
-static const struct ply_lost *find_lost(const struct ply *y, uint32_t number)
+static int compare_lost(const void *number, const void *lost)
 {
-    size_t from = 0, to = y->n_lost;
-    while (from < to) {
-        const size_t at = (from + to) / 2;
-        if (y->lost[at].number == number) return &y->lost[at];
-        *(y->lost[at].number < number ? &from : &to) = y->lost[at].number < number ? at + 1 : at;
-    }
-    return NULL;
+    const uint32_t a = *(const uint32_t *)number, b = ((const struct ply_lost *)lost)->number;
+    return (a > b) - (a < b);
 }
 
 /* A vertex that is not finite is an error only where a face uses it. It keeps its number, so that the others keep
@@ -88,7 +83,8 @@ static int set_corner(struct ply *y, size_t to, size_t from, struct sh_err *err)
         return ply_fail(&y->r, err, what);
     }
     const uint32_t at = (uint32_t)index;
-    const struct ply_lost *lost = y->n_lost > 0 ? find_lost(y, at) : NULL;
+    const struct ply_lost *lost =
+        y->n_lost > 0 ? bsearch(&at, y->lost, y->n_lost, sizeof *y->lost, compare_lost) : NULL;
     if (lost != NULL) {
         y->b->line = lost->line;
         return build_fail(y->b, SH_EINPUT, err, "vertex %u (%g %g %g) is not finite, and a face uses it", at + 1,

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "core/crs.h"
 #include "core/import/geotiff/tags.h"
@@ -189,27 +188,26 @@ static int read_place(struct reader *r)
 
 /* ---- heights */
 
-/* Finds the value of an item of GDAL's metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. NULL: it isn't
- * there. */
-static const char *item(const char *metadata, const char *role)
+/* Finds the value of an item of GDAL's metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. It is empty
+ * where there is none. */
+static struct text_span item(const char *metadata, const char *role)
 {
     char mark[40];
     snprintf(mark, sizeof mark, " role=\"%s\">", role);
-    const char *at = strstr(metadata, mark);
-    return at != NULL ? at + strlen(mark) : NULL;
+    const char *at = strstr(metadata, mark), *value = at != NULL ? at + strlen(mark) : "";
+    return (struct text_span){value, strcspn(value, "<")};
 }
 
 static int read_item(const struct reader *r, const char *metadata, const char *role, double *value)
 {
-    const char *at = item(metadata, role);
-    const int n = at != NULL ? (int)strcspn(at, "<") : 0;
+    const struct text_span text = item(metadata, role);
     char *end = NULL;
-    if (n == 0) return SH_OK;
-    *value = strtod(at, &end);
-    end += end > at ? strspn(end, " \t\r\n") : 0;
-    if (end == at + n && isfinite(*value) && (*value != 0.0 || strcmp(role, "scale") != 0)) return SH_OK;
+    if (text.n == 0) return SH_OK;
+    *value = strtod(text.p, &end);
+    end += end > text.p ? strspn(end, " \t\r\n") : 0;
+    if (end == text.p + text.n && isfinite(*value) && (*value != 0.0 || strcmp(role, "scale") != 0)) return SH_OK;
     return sh_fail(r->err, SH_EINPUT, "%s: the %s of its heights is '%.*s'; allowed are numbers, and no scale of 0",
-                   r->tags.path, role, n < 40 ? n : 40, at);
+                   r->tags.path, role, text.n < 40 ? (int)text.n : 40, text.p);
 }
 
 /* Returns 1 where the metadata name the unit. */
@@ -221,16 +219,15 @@ static int named_unit(const struct reader *r, const char *metadata, double *unit
     } known[] = {{"m", 1.0},           {"metre", 1.0},     {"meter", 1.0},
                  {"ft", FOOT_M},       {"foot", FOOT_M},   {"US survey foot", US_FOOT_M},
                  {"us-ft", US_FOOT_M}, {"ftUS", US_FOOT_M}};
-    const char *at = item(metadata, "unittype");
-    const int n = at != NULL ? (int)strcspn(at, "<") : 0;
-    if (n == 0) return 0;
+    const struct text_span text = item(metadata, "unittype");
+    if (text.n == 0) return 0;
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        if (strncasecmp(at, known[i].name, (size_t)n) != 0 || known[i].name[n] != '\0') continue;
+        if (!text_is_word(text, known[i].name)) continue;
         *unit_m = known[i].unit_m;
         return 1;
     }
     return sh_fail(r->err, SH_EINPUT, "%s: the unit of its heights is '%.*s'; allowed are m, ft, US survey foot",
-                   r->tags.path, n < 40 ? n : 40, at);
+                   r->tags.path, text.n < 40 ? (int)text.n : 40, text.p);
 }
 
 static int read_height_unit(const struct reader *r, const char *metadata, double *unit_m)

@@ -23,6 +23,7 @@ struct ifc_product {
     bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;
+    int finding;                   /* enum ifc_finding, once its body is chosen */
     bool is_coarse;                /* curved, and the body is ifc-lite's, which cuts circles up by levels of its own */
     bool is_turned;                /* it has a solid that is turned about an axis */
     double points_m;               /* largest coordinate of its points */
