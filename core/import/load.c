@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* scene_load finds the reader of each file by its ending, and makes the scene of all of them. */
-#include <errno.h>
 #include <math.h>
-#include <string.h>
-#include <sys/stat.h>
 
 #include "core/import/readers.h"
+#include "core/infile.h"
 #include "core/scene/build_load.h"
 #include "core/scene/copies.h"
 #include "core/scene/cutouts.h"
@@ -27,9 +25,10 @@ static int check_spec(struct scene_build *b, struct sh_err *err)
     for (int k = 0; k < 3; k++)
         if (!isfinite(spec->offset_m[k]))
             return build_fail(b, SH_EINPUT, err, "offset %g; allowed are finite numbers", spec->offset_m[k]);
-    struct stat st;
-    if (stat(spec->file, &st) != 0) return build_fail(b, SH_EINPUT, err, "%s", strerror(errno));
-    if (!S_ISREG(st.st_mode)) return build_fail(b, SH_EINPUT, err, "not a file");
+    const char *why;
+    FILE *file = infile_open(spec->file, &why);
+    if (file == NULL) return build_fail(b, SH_EINPUT, err, "%s", why);
+    fclose(file);
     return SH_OK;
 }
 
