@@ -123,11 +123,11 @@ static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
     return sh_fail(err, code, "%s: is being written by process %ld (%s); choose another file name", path, pid, name);
 }
 
-/* Locks the file as long as fd is open. Returns 0 where another process has the lock. On a file system without locks it
- * does nothing. */
-static int has_locked(int fd)
+/* Locks the file as long as fd is open, for writing (LOCK_EX) or against writers (LOCK_SH). Returns 0 where another
+ * process has the lock. On a file system without locks it does nothing. */
+static int has_locked(int fd, int kind)
 {
-    return flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    return flock(fd, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK;
 }
 
 /* Does the name still belong to what was opened? Another writer may have renamed it before we had the lock. */
@@ -141,7 +141,7 @@ static int is_named(const char *name, int fd)
 /* Locks a file that is written in place. It must still have its name, since bytes in a file without a name are lost. */
 static int lock_named(const char *path, int fd, int code, struct sh_err *err)
 {
-    if (!has_locked(fd)) return fail_locked(path, fd, code, err);
+    if (!has_locked(fd, LOCK_EX)) return fail_locked(path, fd, code, err);
     return is_named(path, fd) ? SH_OK : sh_fail(err, code, "%s: another process has just written it anew", path);
 }
 
@@ -151,8 +151,7 @@ static int check_unlocked(const char *path, struct sh_err *err)
 {
     const int fd = open(path, O_RDONLY | PLAIN);
     if (fd < 0) return SH_OK; /* there is no file, or it can't be opened to ask for its lock */
-    const int rc =
-        flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, SH_EINPUT, err) : SH_OK;
+    const int rc = has_locked(fd, LOCK_SH) ? SH_OK : fail_locked(path, fd, SH_EINPUT, err);
     close(fd);
     return rc;
 }
@@ -253,7 +252,7 @@ static int lock_part(const char *part, int *out, struct sh_err *err)
         const int opened = open_part(part, &fd, err);
         if (opened < 0) return opened;
         if (opened == 0) continue;
-        if (!has_locked(fd)) return hand_out(fail_locked(part, fd, SH_EINPUT, err), fd, out);
+        if (!has_locked(fd, LOCK_EX)) return hand_out(fail_locked(part, fd, SH_EINPUT, err), fd, out);
         if (is_named(part, fd))
             return hand_out(ftruncate(fd, 0) == 0 ? SH_OK : newfile_fail(part, "create", err), fd, out);
         close(fd);
@@ -275,7 +274,7 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
     const int fd = open(part, O_RDWR | PLAIN);
     if (fd < 0) return newfile_fail(part, "be opened for reading and writing", err);
     rc = check_left(part, fd, err);
-    if (rc == SH_OK && !has_locked(fd))
+    if (rc == SH_OK && !has_locked(fd, LOCK_EX))
         rc = sh_fail(err, SH_ESTATE, "%s: is still being written by another process", part);
     if (rc == SH_OK && !is_named(part, fd))
         rc = sh_fail(err, SH_ESTATE, "%s: another process has just completed or removed it", part);
@@ -287,7 +286,7 @@ int newfile_whole(const char *path, int *out, struct sh_err *err)
     int rc = check_target(path, err);
     if (rc != SH_OK) return rc;
     int fd = open(path, O_RDWR | PLAIN);
-    if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && has_locked(fd)) return hand_out(SH_OK, fd, out);
+    if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && has_locked(fd, LOCK_EX)) return hand_out(SH_OK, fd, out);
     if (fd >= 0) close(fd);
     *out = open(path, O_RDONLY | PLAIN);
     return *out >= 0 ? SH_OK : newfile_fail(path, "be opened", err);
@@ -299,8 +298,7 @@ long long newfile_left_len(const char *part)
     long long len = 0;
     const int fd = open(part, O_RDONLY | PLAIN);
     if (fd < 0) return 0;
-    if (fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && (flock(fd, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK))
-        len = st.st_size;
+    if (fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && has_locked(fd, LOCK_SH)) len = st.st_size;
     close(fd);
     return len;
 }
