@@ -107,8 +107,8 @@ static int fail_map(const struct georef_spec *spec, const char *why, struct sh_e
                        "georef: the grid of the scene or of the output does not reach latitude %g, longitude %g (%s)",
                        spec->lat_deg, spec->lon_deg, why);
     if (spec->crs == GEOREF_UTM)
-        return sh_fail(err, SH_EINPUT, "georef: %s does not reach latitude %g, longitude %g (%s); zone 0: by position",
-                       name, spec->lat_deg, spec->lon_deg, why);
+        return sh_fail(err, SH_EINPUT, "georef: %s does not reach latitude %g, longitude %g (%s)%s", name,
+                       spec->lat_deg, spec->lon_deg, why, spec->utm_zone > 0 ? "; zone 0: by position" : "");
     return sh_fail(err, SH_EINPUT, "georef: %s", why);
 }
 

@@ -45,7 +45,7 @@ static int check_sample(const struct pose_sample *s, const struct pose_sample *b
         norm2 += s->pose.quat[k] * s->pose.quat[k];
     if (!finite || !isfinite(norm2)) return sh_fail(err, SH_EINPUT, "sample %zu: not a finite number", i);
     if (!(norm2 > 1e-12)) return sh_fail(err, SH_EINPUT, "sample %zu: a quaternion of length 0", i);
-    if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
+    if (before != NULL && !trajectory_is_later(s, before))
         return sh_fail(err, SH_EINPUT, "sample %zu: %.9g s after the one before; allowed at least %g s", i,
                        s->t_s - before->t_s, 1e-6 * POSE_MIN_STEP_US);
     return SH_OK;

@@ -85,7 +85,7 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
     if (!(fabs(s->t_s) <= LATEST_S))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err, "t_s %.9g; allowed %g to %g", s->t_s, -LATEST_S,
                          LATEST_S);
-    if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
+    if (before != NULL && !trajectory_is_later(s, before))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
                          "t_s %.15g comes after %.15g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
                          1e-6 * POSE_MIN_STEP_US);

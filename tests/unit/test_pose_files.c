@@ -128,6 +128,10 @@ static void test_csv_errors(void **state)
     }
     struct trajectory *tr;
     struct sh_err err;
+    /* Steps of the least length: doubles near 1.7e9 are 0.24 us apart. */
+    write_file(NAMES "1700000000,1,2,3,4\n1700000000.0001,1,2,3,4\n1700000000.0002,1,2,3,4\n");
+    assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_OK);
+    trajectory_free(tr);
     assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", NULL, &tr, &err), SH_EINPUT);
     /* A number does not end at a byte 0. */
     static const char zero[] = NAMES "0,1\0002,2,3,4\n";
