@@ -80,7 +80,7 @@ struct beam {
     double resolution_m;
     /* tables over the distance -1 .. 1 of a line from the centre: the energy beyond the line, and its first moment */
     double half[BEAM_HALF_STEPS + 2], moment[BEAM_HALF_STEPS + 2];
-    /* second moments of that energy about the footprint's centre: across the line, and along it */
+    /* second moments of that energy about the footprint's centre: along the line's normal, and along the line */
     double along[BEAM_HALF_STEPS + 2], across[BEAM_HALF_STEPS + 2];
 };
 

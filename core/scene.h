@@ -11,9 +11,9 @@
  *   glTF     is metres and y up by definition; its tree is multiplied in double (core/import/gltf)
  *   STL      has neither
  * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles
- * five times. Polygons are cut into triangles. A pair of object and material that an earlier file has, too, is the
- * same surface, with the same label. Ownership: scene_load allocates everything, scene_free releases it. After the
- * load a scene is constant and may be read from any thread. */
+ * five times. Polygons are cut into triangles. A pair of object and material that is there already, in
+ * this file or an earlier one, is the same surface, with the same label. Ownership: scene_load allocates everything,
+ * scene_free releases it. After the load a scene is constant and may be read from any thread. */
 #ifndef CORE_SCENE_H
 #define CORE_SCENE_H
 

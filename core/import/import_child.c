@@ -53,15 +53,16 @@ static void send_progress(void *ctx, const char *what, double fraction)
     send_text(IMPORT_PROGRESS, 0, fraction, what);
 }
 
-/* Resets signals as in a new program, but ignores those that the parent handles, since Ctrl-C reaches both. */
+/* Resets signals as in a new program. Those in the list are ignored: Ctrl-C reaches both processes, and the parent
+ * decides what it means; a write that fails returns an error. */
 static void set_signals(void)
 {
-    static const int parents[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXFSZ};
+    static const int ignored[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXFSZ};
     sigset_t none;
     for (int s = 1; s < NSIG; s++)
         signal(s, SIG_DFL);
-    for (size_t i = 0; i < sizeof parents / sizeof parents[0]; i++)
-        signal(parents[i], SIG_IGN);
+    for (size_t i = 0; i < sizeof ignored / sizeof ignored[0]; i++)
+        signal(ignored[i], SIG_IGN);
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
 }
