@@ -38,11 +38,11 @@ enum {
 /* Bodies of IFC are read by two readers, by Assimp where they are not installed, or by one alone. */
 enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
 
-/* Limits for readers in processes of their own: Assimp, and each reader of IFC. */
+/* Limits for readers in processes of their own: Assimp, and the readers of glTF, GeoTIFF and IFC. */
 struct scene_import_limits {
     uint32_t memory_mib; /* on top of the program's own; the same for the scene that is handed back */
     double time_s;       /* the most seconds, both of time and of processor time */
-    uint32_t files;      /* open at a time by Assimp */
+    uint32_t files;      /* open at a time in such a process; the programs of IFC have a limit of their own */
     enum scene_ifc_reader ifc_reader;
     int ifc_strict;         /* 1: a difference between the readers of IFC is an error */
     const char *ifc_folder; /* where they are; NULL: installed, or built, beside the program */
@@ -147,7 +147,7 @@ struct scene {
     struct scene_copied *copied;   /* [n_copied] */
     uint32_t n_copied, n_copies;   /* meshes that have copies; copies of all of them */
     uint32_t n_all;                /* triangles, with those of the copies */
-    uint32_t n_meshes;             /* placements in node trees; one for each .obj or .ply */
+    uint32_t n_meshes;             /* placements in node trees, solids of .stl, bodies of IFC; other files: 1 */
     double (*vertex_m)[3];         /* [n_vertices] prcs */
     uint32_t (*triangle)[3];       /* [n_triangles] indices into vertex_m */
     uint16_t *label;               /* [n_triangles] index into surface */
@@ -180,9 +180,9 @@ struct scene {
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
  * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
  *   report asks to stop.
- * Assimp reads in a process of its own, forked here: it crashes, never ends or takes all memory on some broken
- *   files. Its crash, or a limit that it reaches, is SH_EINPUT, too. The child is reaped, and does not
- *   outlive the calling thread. */
+ * Assimp and the readers of glTF, GeoTIFF and IFC read in processes of their own, started here, since some broken files
+ *   make decoders crash, never end or take all memory. A crash, or a limit that is reached, is SH_EINPUT, too. The
+ *   children are reaped, and do not outlive the calling thread. */
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err);
 

@@ -10,7 +10,7 @@
  * products are formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
  *
  * Angles are in turns (1 turn = 2 pi rad) until a sine is needed, so that reduction is exact.
- * A frame is one sweep of the pan, in a whole number of lines; with pan speed 0, or no pan range, one line.
+ * A frame is one pan sweep, a whole number of lines. With pan speed 0, or no pan range, it is one line.
  * Pure; any thread. */
 #ifndef CORE_SCHEDULE_H
 #define CORE_SCHEDULE_H
