@@ -49,9 +49,9 @@ const struct scene *bvh_scene(const struct bvh *bvh);
 struct bvh_plane {
     double n[3], d;
 } __attribute__((aligned(32))); /* half a cache line */
-/* triangle: of the scene's own, as all hits are where it has no copies. A miss has none. */
+/* The triangle must be one of the scene's own, not of a copy, and not BVH_NO_TRIANGLE. */
 const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle);
-/* The same plane for any triangle. */
+/* Gives the plane of any triangle, also of a copy. */
 void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane);
 
 enum {
@@ -80,7 +80,7 @@ struct bvh_rays {
     struct bvh_origins from;
     struct vec3_in dir; /* unit vectors, prcs */
     double range_max_m; /* hits beyond it may or may not be reported */
-    int scattered;      /* 1: neighbours have nothing in common, and are cast one by one */
+    int scattered;      /* 1: neighbours go in different directions, and are cast one by one */
     /* out: */
     double *range_m;    /* along the ray; NaN: it meets nothing */
     uint32_t *triangle; /* of the scene; BVH_NO_TRIANGLE */
@@ -103,8 +103,8 @@ static inline struct bvh_rays bvh_rays_chunk(const struct bvh_rays *rays, uint32
 }
 
 struct bvh_counters {
-    uint64_t leaves;  /* that packets were tested against, each for all its rays */
-    uint64_t decided; /* pairs of ray and triangle so near an edge that they were examined singly */
+    uint64_t leaves;  /* tests of a packet's rays against a leaf's triangles */
+    uint64_t decided; /* pairs of ray and triangle so near an edge that each was examined by itself */
 };
 
 /* Cost by stage, for measuring: `now` counts in any unit and is read between the stages of each chunk. The
@@ -135,8 +135,8 @@ struct vec3_floats bvh_work_directions(const struct bvh_work *work);
 /* Sets them, for n <= BVH_CHUNK rays that are decided without bvh_hits. */
 void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, uint32_t n);
 
-/* Exact hits. A ray does not hit the surface that it begins on, within half a micrometre. Range error: see
- * tests/accuracy. Allocates nothing. */
+/* Exact hits. Hits within half a micrometre of a ray's origin don't count, so that it does not hit the surface that it
+ * begins on. tests/accuracy measures the error of ranges. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* The range of one ray's first hit; NaN: none. */
@@ -148,7 +148,8 @@ double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3
 /* Rays from .. to - 1 hit that triangle, or nothing (BVH_NO_TRIANGLE). Sets their ranges, labels and steepness,
  * bit by bit as bvh_hits does. It may overwrite up to seven rays after these, so set later ones afterwards. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
-/* The same where each has its own triangle[0 ..]; numbers beyond the scene's are passed over. */
+/* The same where ray `from` hits triangle[0], the next one triangle[1], and so on. A ray whose number is beyond the
+ * scene's triangles stays as it is. */
 void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,
                      uint32_t to);
 /* The range of one plane along a ray, by the same arithmetic. */

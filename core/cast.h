@@ -81,15 +81,15 @@ struct cast_beam {
     enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
                           * and beams begin at station_m (instrument_has_offset) */
     uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
-    struct beam_pattern pattern, fine; /* sub-rays; the finest */
+    struct beam_pattern pattern, fine; /* sub-rays; BEAM_FINE_RINGS, for beam_cut */
     const struct beam_outlines *outlines;
 };
 
-/* Colours of points. Range is the one that is sent; where encoders err, height is along the true beam. The frame
- * scalar is that at the pulse's firing time. */
+/* Colours of points. A colour by range shows the range that is sent. A colour by height is computed along the true
+ * beam, also where the encoders err. The frame scalar is that at the pulse's firing time. */
 struct cast_colour {
     struct colour_scale scale;
-    double frame;                           /* of a head that stands; a moving one has those of its knots */
+    double frame;                           /* frame scalar of a standing head; a moving one has those of its knots */
     const struct surface_colours *surfaces; /* texture; must outlive the scan */
 };
 
@@ -98,10 +98,10 @@ struct cast_colour {
 struct cast_disturbance {
     int dark;         /* the laser does not fire: shots are empty, except for echoes that noise makes in waveforms */
     double slip_turn; /* the beam's pan is this much more than the encoder reads */
-    /* The share of the optical power that a clean window lets through, both ways together. With a signal model each
-     * return is so much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by 1 /
-     * share. That is the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik). The
-     * voltage goes with the optical power, and a receiver's thermal noise is the same without light. */
+    /* The optical power that the window lets through, both ways together; 1: as a clean window. With a signal model
+     * each return is so much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by
+     * 1 / share. That is the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik).
+     * The voltage goes with the optical power, and a receiver's thermal noise is the same without light. */
     double share;
     uint32_t n_wobbles; /* each adds turn * sin(2 pi hz (t - begin)) to the axes, t since the scan's start */
     struct cast_wobble {
@@ -127,7 +127,7 @@ void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, doubl
 /* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
-    /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it, with the same
+    /* NULL: none. Else it belongs to bvh and station_m. Rays that begin there are looked up in it, with the same
      * hits. All other rays are cast into the BVH: beams that begin beside the station, sub-rays, rays beyond
      * glass and mirrors, and those to moving bodies. A head that moves has no sight. */
     const struct sight *sight;
@@ -145,10 +145,10 @@ struct cast_setup {
     double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
     /* NULL: pulses are single rays. Else blocks have room for beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
-    enum beam_select echoes; /* which of a pulse's */
+    enum beam_select echoes; /* the ones of a pulse that are reported */
     uint32_t max_echoes;     /* of a pulse, no more than detect or beam allow; 0: as many as they allow */
-    double
-        pulse_m; /* c tau / 2 of the pulse, a beam's resolution_m; for the widths of echoes, where a block has room */
+    /* c tau / 2 of the pulse, as a beam's resolution_m; for the widths of echoes, where a block has room for these */
+    double pulse_m;
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     const struct cast_tripod *tripod; /* NULL: none. For a head that stands still */
@@ -190,8 +190,8 @@ void caster_free(struct caster *caster);
 int caster_add_waves(struct caster *caster, struct sh_err *err);
 
 /* Fills block from the run, with attributes where it has room for them. The echo of a single ray has the
- * width of the pulse. That of a footprint, or of returns merged from glass and mirrors, has the width of
- * core/footprint.h. An amplitude needs a signal model. Range noise moves echoes, and doesn't widen them. The
+ * width of the pulse. An echo of a footprint, or of returns merged from glass and mirrors, has the width that
+ * core/footprint.h defines. An amplitude needs a signal model. Range noise moves echoes, and doesn't widen them. The
  * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes; where they are
  * found in waveforms, max_echoes also with single rays). Returns the number of echoes. Allocates nothing. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
@@ -214,7 +214,7 @@ struct cast_hit {
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 
-/* Exact hits, with the caster's working memory; bvh.h. */
+/* bvh_hits, with the caster's working memory. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Makes the outlines of a scene that are steps as seen from the station: beam_outlines_create, with rays into bvh.

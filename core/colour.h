@@ -41,7 +41,7 @@ void colour_between(double low, double high, double figure, uint8_t rgb[3]);
 void colour_ramp(double part, uint8_t rgb[3]);
 /* Grey: black at -30 dB and below, white at 0 dB and above, even steps of dB between. NaN: colour_unknown. */
 void colour_reflectance(double db, uint8_t rgb[3]);
-/* A hue for each number, a golden section of the circle apart: however many there are, neighbours differ. */
+/* A hue for each number. Successive numbers are a golden section of the colour circle apart, so that they differ. */
 void colour_number(uint32_t number, uint8_t rgb[3]);
 
 /* As 0xrrggbb. */
@@ -50,8 +50,7 @@ static inline uint32_t colour_packed(const uint8_t rgb[3])
     return (uint32_t)rgb[0] << 16 | (uint32_t)rgb[1] << 8 | rgb[2];
 }
 
-/* Linear light of 0 to 1 as sRGB has it, and back, IEC 61966-2-1. Values beyond that range stay beyond
- * it. */
+/* Convert linear light, 0 to 1, to sRGB and back (IEC 61966-2-1). Values beyond that range stay beyond it. */
 double colour_srgb_encode(double linear);
 double colour_srgb_decode(double srgb);
 

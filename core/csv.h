@@ -10,12 +10,12 @@ enum { CSV_MAX_COLUMNS = 16 };
 
 struct csv {
     struct text text;
-    const char *const *known;    /* names of columns, NULL at the end; their indices are those of `value` */
-    int column[CSV_MAX_COLUMNS]; /* of the file: which known one */
+    const char *const *known;    /* names of columns, NULL at the end; value[k] belongs to known[k] */
+    int column[CSV_MAX_COLUMNS]; /* for each column of the file its index in known */
     int n_columns;
-    uint32_t has;                  /* bit per known column */
-    double value[CSV_MAX_COLUMNS]; /* of the line read last, by known column; 0 where there is none */
-    uint64_t line;                 /* its number */
+    uint32_t has;                  /* bit k: the file has known[k] */
+    double value[CSV_MAX_COLUMNS]; /* of the line read last; 0 where the file has no such column */
+    uint64_t line;                 /* number of that line, from 1 */
     const struct sh_report *report;
 };
 

@@ -21,9 +21,8 @@
  * Detection. The signal carries Gaussian noise of sigma 1/k in units of the threshold, k the signal-to-noise
  * ratio at the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the
  * pulses see a target at the data sheet's range. Reflectance, relative to a white Lambertian target at that
- * range, hit head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the
- * threshold, as a head measures it, is
- * 10 log10 (A + n/k): 0 dB or more of what is detected.
+ * range, hit head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). The amplitude that a head reports, in
+ * dB above the threshold, is 10 log10 (A + n/k). It is 0 dB or more for every echo, since others are not detected.
  *
  * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik,
  * Introduction to radar systems, 1980), and a part that no signal makes smaller (clock, digits):
@@ -31,7 +30,8 @@
  *     sigma^2 = floor^2 + (X^2 - floor^2) (A_Y / A)^2,  and a part per distance added to sigma
  *
  * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on. With k below 8 noise
- * alone may be detected, where A is nearly 0: A counts as DETECT_LEAST_AMPLITUDE or more here, so that ranges stay finite.
+ * alone may be detected, where A is nearly 0: A counts as DETECT_LEAST_AMPLITUDE or more here, so that ranges stay
+ * finite.
  *
  * Random numbers are keyed by (seed, scan, pulse, echo, purpose): nothing depends on what else was detected.
  * Entries without echo stay so. Pure; any thread; allocates nothing. */
@@ -59,7 +59,7 @@ struct detect_signal_spec {
     int sharp;             /* no noise on the signal: detected where A >= 1 */
     double overlap_m;      /* R_o; 0: all light is caught at any range */
     double extinction_1_m; /* beyond that of the data sheet's day; may be below 0 */
-    /* X at Y m on a target of that reflectance; and what is left at any signal */
+    /* range noise: X, Y and the target's reflectance; the part that no signal makes smaller; the part per distance */
     double sigma_m, sigma_at_m, sigma_reflectance, sigma_floor_m, sigma_ppm;
     uint64_t seed;
 };
@@ -70,7 +70,7 @@ struct detect_signal {
         more_1_m[DETECT_MAX_REACHES]; /* g = g0 + sum of more (R - at): the first everywhere, others where R > at */
     double per_overlap2, extinction2_1_m;
     double per_snr;         /* 1/k; 0: sharp */
-    double floor2, jitter2; /* of sigma^2: constant, and at A = 1 */
+    double floor2, jitter2; /* parts of sigma^2: the constant one, and the other one at A = 1 */
     double per_distance;
     uint64_t signal_key, range_key;
 };
@@ -112,10 +112,10 @@ void detect_fixed_noise(double sigma0_m, double sigma1, uint64_t range_key, uint
                         double *range_m);
 
 /* Range ambiguity: an echo that comes back after the next pulse has left, beyond R_u = c T / 2 (T: time
- * between pulses). Folded: reported as of the last pulse that had left by then, R mod R_u. (It stays with its
- * own pulse here, so that its direction is that of the pulse it belongs to.) Resolved: reported where it is,
- * within so many zones; what lies beyond is lost. In both an echo is lost that comes back while the head is
- * blind, less than range_min_m after a pulse. */
+ * between pulses). Folded: reported as an echo of the last pulse that had left by then, at R mod R_u. (It stays with
+ * its own pulse here, so that its direction is that of the pulse it belongs to.) Resolved: reported where it is,
+ * within so many zones; what lies beyond is lost. In both an echo is lost that comes back while the head is blind,
+ * less than range_min_m after a pulse. */
 enum detect_ambiguity { DETECT_AMBIGUITY_NONE, DETECT_FOLDED, DETECT_RESOLVED };
 void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, double range_min_m, uint32_t n,
                   double *range_m);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Limits as a text names them: rounded to so many digits, towards the side that is allowed. A user who takes the figure
- * isn't refused again. A limit above 0 that is such a number but for 1e-9 of it stays that number. */
+/* Rounds limits above 0 for messages: to so many digits, towards the side that is allowed. So a user who takes the
+ * figure of the message isn't refused again. A limit within 1e-9 (relative) of a rounded figure becomes that figure. */
 #ifndef CORE_DIGITS_H
 #define CORE_DIGITS_H
 

@@ -23,8 +23,9 @@ static inline void direct_set(int fd, int *is_on, int on)
     *is_on = is_set ? on : -1;
 }
 
-/* pwrite(), again after a signal. Where the file system refuses a direct write after all, or wants larger blocks,
- * direct writing is over, and the bytes are written without it. Returns how many were written, or -1 with errno. */
+/* As pwrite(), but it tries again after a signal. Where the file system refuses a direct write after all, or wants
+ * larger blocks, this write and all later ones go through the cache. Returns how many bytes were written, or -1 with
+ * errno. */
 static inline ssize_t direct_pwrite(int fd, int *is_on, const void *data, size_t len, off_t at)
 {
     for (;;) {

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The exact distance of a point to the scene's own triangles; those of copies are left out (core/scene_copies.h writes
- * them out). In: a scene, and a point in prcs (metres). Out: the nearest point of the mesh. Embree's point query
- * proposes triangles, double precision decides.
+/* The exact distance of a point to the scene's own triangles. Triangles of copies don't count; core/scene_copies.h
+ * turns copies into own triangles. In: a scene, and a point in prcs (metres). Out: the nearest point of the mesh.
+ * Embree's point query proposes triangles, double precision decides.
  *
  * The query runs in a float frame about the scene's centre. Every radius is widened by that frame's rounding,
- * so no triangle that could be nearest is missed. The distance is point to triangle in double, edges and face
- * apart, since barycentric regions (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles.
+ * so no triangle that could be nearest is missed. The distance from point to triangle is computed in double, edges and
+ * face separately, since barycentric regions (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles.
  * Its error is at most 16 half-units in the last place of the distance to the triangle's farthest corner, at
  * any coordinates. */
 #ifndef CORE_DISTANCE_H

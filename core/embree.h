@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Embree 3 or 4: the only place that includes it, and the meaning of its errors. The Makefile chooses the
+/* Embree 3 or 4. No other file includes it. This header also turns its errors into ours. The Makefile chooses the
  * version (SH_EMBREE) with the library that it links. Point queries are the same in both. */
 #ifndef CORE_EMBREE_H
 #define CORE_EMBREE_H

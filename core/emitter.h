@@ -5,13 +5,13 @@
  * Angles are those of a line head: elevation (mirror) and azimuth (pan, clockwise from y seen from above);
  * direction = (sin pan cos mirror, cos pan cos mirror, sin mirror).
  *
- *   kind        a line is                        a frame is            pulses
+ *   kind        a line is                        a pan sweep is        pulses
  *   line        a sweep of the mirror            a sweep of the pan    at an even rate
  *   planar      a turn, from step 0 on           a line                `steps` a turn, those of first..last cast
  *   beams       a turn, from azimuth 0 on        a line                a firing sequence of up to 128 beams, over
  *                                                                      and over, while the azimuth turns
- *   sphere      a ring: one elevation            all rings, -90 up     `steps` a ring; of rings at -90 and 90 deg,
- *                                                to 90 deg, or some    which are poles, only one is cast
+ *   sphere      a ring: one elevation            all rings, -90 up     `steps` a ring; at the poles, -90 and 90 deg,
+ *                                                to 90 deg, or some    only one is cast
  *   directions  the list once                    a line                one each
  *
  * Time is counted in ticks. A tick of a beams head is the largest time that all its firing times are multiples
@@ -44,7 +44,7 @@ struct emitter_firing {
 struct emitter {
     enum emitter_kind kind;
     uint32_t steps;                             /* pulses of a line; line and beams: 0 */
-    uint32_t first_step, last_step, front_step; /* planar: cast, both included; looks along y */
+    uint32_t first_step, last_step, front_step; /* planar: the first and last step cast; the step that looks along y */
     int turn;                                   /* +1: clockwise seen from above; -1: the other way */
     /* sphere: `rings` of elevations -90 + 180 (first_ring + i) / gaps deg; gaps 0: one, at circle_udeg */
     uint32_t rings, first_ring, gaps;

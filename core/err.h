@@ -25,7 +25,7 @@ enum sh_code {
 
 struct sh_err {
     int code;
-    char text[1024]; /* has room for the list of all kinds of faults */
+    char text[1024]; /* long enough for a message that lists all kinds of injected faults */
 };
 
 /* Fills err (which may be NULL) and returns code, so that `return sh_fail(err, SH_EINPUT, ...)` reads well.

@@ -12,7 +12,7 @@
  * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit
  * plane, with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a
  * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc;
- * equal areas of energy in the disc are equal areas of energy in every footprint. Its range counts along
+ * parts of the disc with equal energy have equal energy in every footprint. The range of a sub-ray counts along
  * itself from the exit plane.
  * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same
  * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the
@@ -30,9 +30,9 @@
  *
  * Width. An echo's width adds two widths as squares: that of the pulse, resolution_m, and 2.355 sigma of its
  * ranges (full widths at half maximum of Gaussians). A return may stand for a part of the footprint, or for
- * the area around a sub-ray. The ranges within it count as well, to first order on its plane: the standard
- * deviation is short by half of (s tan i)^2 of it, s = theta / 2. Where lines cross in the footprint it is
- * short by a few percent more, as its parts are then known by sample places.
+ * the area around a sub-ray. The spread of ranges within it counts as well, to first order on its plane. That
+ * makes the standard deviation too small by a share of (s tan i)^2 / 2, s = theta / 2. Where lines cross in the
+ * footprint it is too small by a few percent more, since the parts are then known by sample places only.
  *
  * One ray for the whole footprint. Where the footprint lies on one plane at incidence i, its mean range is
  * not that of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho
@@ -78,9 +78,9 @@ struct beam {
     double exit_radius_m; /* D / 2 */
     double slope;         /* theta / 2 */
     double resolution_m;
-    /* beyond a line, by its distance from the centre, -1 .. 1: energy, and its first moment */
+    /* tables over the distance -1 .. 1 of a line from the centre: the energy beyond the line, and its first moment */
     double half[BEAM_HALF_STEPS + 2], moment[BEAM_HALF_STEPS + 2];
-    /* its second moments, about the footprint's centre: along the distance, and along the line */
+    /* second moments of that energy about the footprint's centre: along the line's normal, and along the line */
     double along[BEAM_HALF_STEPS + 2], across[BEAM_HALF_STEPS + 2];
 };
 
@@ -88,33 +88,33 @@ struct beam {
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
 /* Replaces the range at a footprint's centre by the mean of the footprint's ranges. It lies on one plane, with steep =
- * 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. Where the plane is within a
- * footprint's angle of the beam, beyond s / cos i = 1/2, x is that of 1/2. */
+ * 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. At grazing incidence, where
+ * s / cos i is more than 1/2, x is taken as if it were 1/2. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
-/* The width of its echo: for pulses of beam->resolution_m. */
+/* The widths of the echoes of such footprints, for pulses of beam->resolution_m. */
 void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
-/* Width of an echo whose ranges vary so: pulse_m is the pulse's own, c tau / 2. */
+/* The width of an echo whose ranges have that variance. pulse_m is the pulse's own width, c tau / 2. */
 double beam_echo_width(double pulse_m, double variance_m2);
 
 /* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
  * times the distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
-/* Its second moments, along n and along the line. */
+/* The second moments of that part, along n and along the line. */
 void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
-    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; from n on: nothing */
-    double rest; /* variance of x (and of y) around a place: that of the footprint minus that of the places */
+    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* 0 from n on, up to a multiple of 64 */
+    double rest; /* variance of x (and of y) within the area of a place: the footprint's minus that of the places */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
-/* At the end of a plane, the sub-rays that hit it stand for the part of the footprint on it. The error of their
- * centre is less than this times w, and that of the echo's range less than this times w(R) tan i: 0.12 with 4
+/* Where a plane ends within a footprint, the sub-rays that hit it stand for the part of the footprint on it. The error
+ * of their centre is less than this times w, and that of the echo's range less than this times w(R) tan i: 0.12 with 4
  * rings, 0.05 with 12. The RMS over all cuts is about a quarter of it. No fit through the same sub-rays does
- * better, since each has 1/n of the energy or nothing. Outlines cut exactly. */
+ * better, since each has 1/n of the energy or nothing. Outlines (below) cut exactly. */
 double beam_end_error(uint32_t rings);
 
 /* Two axes across a beam's direction. */
@@ -127,7 +127,7 @@ struct beam_sight {
 struct beam_return {
     double range_m;
     double energy; /* of the footprint's */
-    double back;   /* what comes back of that, where surfaces are modelled; else the energy again */
+    double back;   /* the part of it that comes back, where surfaces are modelled; else the energy again */
     float sigma_m; /* of the ranges within it */
     uint32_t label;
     uint32_t colour; /* goes along with the label */
@@ -165,7 +165,7 @@ struct beam_alike {
     double energy;         /* of a return */
     const double *range_m; /* NaN: the sub-ray hits nothing */
     const uint32_t *label;
-    const double *rho; /* what comes back of the energy; NULL: all */
+    const double *rho; /* the share of the energy that comes back; NULL: all of it */
 };
 enum { BEAM_ALIKE = 16 };
 /* Merges the pulses whose returns all lie on one surface without a gap, as most do, several at a time. The echoes are
@@ -173,7 +173,7 @@ enum { BEAM_ALIKE = 16 };
  * an element for each pulse. */
 uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alike *alike, struct beam_echo *echo);
 
-/* ---- what a footprint may reach besides the surface in its centre */
+/* ---- outlines: edges beyond which a footprint may reach another surface than the one in its centre */
 
 /* The outlines of a scene as seen from one place: edges with the surface on one side only. A footprint
  * without an outline lies on the surface that its centre hits: one ray is enough. An edge with a triangle on

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How the scene's frame (prcs) lies on the Earth. In: points of the scene, or places on the Earth (degrees,
- * metres). Out: the other, and rotations between the frames. It is set up once for a scene, so that all
+/* How the scene's frame (prcs) lies on the Earth. It turns points of the scene into places on the Earth (degrees,
+ * metres) and back, and gives rotations between the frames. It is set up once for a scene, so that all
  * stations agree.
  *   tangent  metric. One point of the scene, origin_m, is at a place on the Earth. z is the plumb line (the
  *            ellipsoid's normal) there, and true north there lies north_deg clockwise from the scene's y

@@ -3,7 +3,7 @@
  *
  * In: points of the scene, as differences from a centre in metres. Out: differences from the anchor in the
  * CRS. The anchor is the centre's position in the CRS, so anchor + difference is the point's position, and
- * nothing is lost to large numbers. The centre is the station, until georef_recentre moves it.
+ * large coordinates lose no digits. The centre is the station, until georef_recentre moves it.
  *
  * The scene's frame is one of these: the tangent frame of the station (x east, y north, z up along the
  * ellipsoid's normal); the tangent frame of another place, turned against it (rotation); a grid.
@@ -20,8 +20,8 @@
  * chart`). Order 1, 2, 3 evaluate its Taylor polynomial about the centre in a few ns, within georef_bound_m.
  * Order 5 exists where heights stay what they are (a grid to another one or to geodetic). In geodetic output
  * longitude has a closed form, which holds up to some radii of the scene from a pole (georef/polynomial.h).
- * Only a map that is not linear has polynomials. Exact with every method are local, ecef from a metric frame,
- * and the grid that the scene is in.
+ * Only a map that is not linear has polynomials. Local, ecef from a metric frame, and the scene's own grid are
+ * linear, and exact with every method.
  *
  * Heights are ellipsoidal, or above a geoid (interpolated for each point: method exact only). Thread: a
  * georef is constant after creation and georef_set_method. */
@@ -59,7 +59,7 @@ struct georef_spec {
 
 /* A place on WGS 84. */
 struct georef_place {
-    double lat_deg, lon_deg; /* -90..90, -180..180 */
+    double lat_deg, lon_deg; /* -90..90, -180..180; a longitude that comes in may be up to 360 */
     double height_m;         /* ellipsoidal */
 };
 
@@ -84,7 +84,7 @@ void georef_free(struct georef *georef);
 
 /* Makes a georef about another centre, for a head that moves or ranges that no longer fit. Scene frame,
  * CRS, zone and false origin are the same; polynomials and anchor are about centre_m (prcs). SH_EINPUT
- * where the zone does not reach. Method as before; its bound may be another. */
+ * where the zone does not reach. The method stays the same, but its bound may change. */
 int georef_recentre(const struct georef *georef, const double centre_m[3], struct georef **out, struct sh_err *err);
 
 /* The centre in the CRS, to which the differences are added. */
@@ -131,7 +131,7 @@ void georef_reverse(const struct georef *georef, const double d_crs[3], double p
 void georef_difference(const struct georef *georef, const double p_crs[3], double d_crs[3]);
 
 /* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just
- * scale_m, of the grid) for points within reach_m of the centre, and so that these fit into 31 bits and a
+ * scale_m, of the grid) for points within reach_m of the centre, and so that their counts fit into 31 bits and a
  * sign. Degrees of longitude have a scale of their own: near a pole, differences are large in degrees and
  * short on the ground. Where 360 degrees don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m
  * / 2^31 on the ground. SH_EINPUT, naming the smallest scale_m that would do, where the others don't fit. */

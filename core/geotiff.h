@@ -17,10 +17,10 @@ struct geotiff {
     char crs[16];           /* of easting and northing, "EPSG:25832"; empty: the file names none of the registry */
     int unit_given;         /* 0: neither system nor unit is named, so metres are assumed */
     int height_unit_given;  /* likewise of the heights */
-    int above_ellipsoid;    /* the heights count from an ellipsoid, by a code of GeoTIFF's own */
+    int above_ellipsoid;    /* GeoTIFF's own code (5001 to 5033) says that the heights count from an ellipsoid */
     double unit_m;          /* of easting and northing in the file */
-    int maps_heights;       /* its scale or tie point has a part for heights, not used since these have no system */
-    int turns_heights;      /* its ModelTransformation has one, not used */
+    int maps_heights;       /* its scale or tie point would change heights; not used without a vertical system */
+    int turns_heights;      /* its ModelTransformation would change heights; not used */
     /* [0]: at the middle of the first cell, where its height is. [1], [2]: added by each column and row. Metres, also
      * for systems in feet. */
     double easting_m[3], northing_m[3];

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Room for n elements of `size` bytes, one at least, in *array (a pointer to the array's pointer, from malloc or NULL).
- * false: no memory, and the array is as it was. */
+/* Makes room for n elements of `size` bytes, one at least. array points to the array's pointer, which is NULL or from
+ * malloc. false: there is no memory, and the array is as it was. */
 static inline bool resize(void *array, size_t n, size_t size)
 {
     void *old, *other;
@@ -19,7 +19,7 @@ static inline bool resize(void *array, size_t n, size_t size)
     return true;
 }
 
-/* Room for `need` elements, and some to spare. *room: how many there is room for, before and after. */
+/* Makes room for `need` elements, and some to spare. *room is the number of elements that there is room for. */
 static inline bool grow(void *array, size_t *room, size_t need, size_t size)
 {
     if (need <= *room) return true;

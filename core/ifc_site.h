@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Where an IFC building model stands: its IFCMAPCONVERSION and IFCSITE records, which mesh readers leave out.
  *
- * Reads the STEP file (ISO 10303-21) for IfcSite.RefLatitude, RefLongitude, RefElevation; the site's
- * ObjectPlacement, whose origin is the point that they locate; and TrueNorth of the model's
- * IfcGeometricRepresentationContext. And for IfcMapConversion, by which the model's origin has coordinates in an
- * IfcProjectedCRS. Strict: what is there but not as IFC2x3/IFC4 define it is an error, not a guess.
+ * It reads these from the STEP file (ISO 10303-21): IfcSite.RefLatitude, RefLongitude, RefElevation; the site's
+ * ObjectPlacement, whose origin is the point that they locate; TrueNorth of the model's
+ * IfcGeometricRepresentationContext; and IfcMapConversion, which gives the model's origin coordinates in an
+ * IfcProjectedCRS. A record that is there, but not as IFC2x3/IFC4 define it, is an error. Nothing is guessed.
  *
  * IfcMapConversion.Scale is map units per unit of the model. Where IfcProjectedCRS has no MapUnit, the map's unit is
  * the known one (metre, foot, US survey foot, or the model's own) that is nearest to unit of the model / Scale. */

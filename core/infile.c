@@ -7,7 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* NULL: a regular file. */
+/* Returns the reason to refuse a file of that mode; NULL: it is a regular file. */
 static const char *why_none(mode_t mode)
 {
     if (S_ISREG(mode)) return NULL;

@@ -5,18 +5,19 @@
  *
  * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner
  * system (2007), and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on
- * geometric error model (2015). Here they are geometry, not its first-order expansion. Beam of line angle m
- * (elevation) and pan p, both true angles of the axes, in the frame that turns with the pan (x right, along
- * the mirror's axis; y ahead; z up):
+ * geometric error model (2015). Here they are exact geometry, not its first-order expansion. For line angle m
+ * (elevation) and pan p, both true angles of the axes, the beam is, in the frame that turns with the pan (x right,
+ * along the mirror's axis; y ahead; z up):
  *
  *     direction = Ry(trunnion) (sin c, cos c cos m, cos c sin m)      c: collimation
  *     origin    = (mirror_offset, transit_offset, 0)
  *
- * collimation: the beam leaves the plane across the mirror's axis, to the right; in pan by c / cos m.
- * trunnion: the mirror's axis is not level, its right end sinks; in pan by trunnion tan m.
- * transit offset: the mirror's axis passes this far ahead of the pan's axis; seen in range by cos m, in line
- * angle by -sin m / R.
- * mirror offset: the beam leaves this far to the right of the pan's axis; seen in pan by 1 / (R cos m).
+ * collimation: the beam leaves the plane across the mirror's axis, to the right; pan changes by c / cos m.
+ * trunnion: the mirror's axis is not level, its right end sinks; pan changes by trunnion tan m.
+ * transit offset: the mirror's axis passes this far ahead of the pan's axis; for each metre of it, range changes by
+ * cos m, and line angle by -sin m / R.
+ * mirror offset: the beam leaves this far to the right of the pan's axis; for each metre of it, pan changes by
+ * 1 / (R cos m).
  *
  * Encoders, each: reading = a + index + scale a + eccentricity sin(a - phase); a: true angle, as scheduled.
  * Range: reading = (1 + range_scale) R + range_offset.

@@ -4,7 +4,7 @@
 #include <dlfcn.h>
 #include <string.h>
 
-/* The sonames that a linked program would record: the Makefile reads them from the libraries. */
+/* The Makefile reads these sonames from the installed libraries, as a linker would. */
 static const struct {
     const char *file, *needs;
 } libraries[] = {

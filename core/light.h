@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The speed of light in vacuum, in metres per second. A range is half the way of light in the time back
- * and forth. */
+/* The speed of light in vacuum, in metres per second. A range is half the distance that light goes
+ * between emission and echo. */
 #ifndef CORE_LIGHT_H
 #define CORE_LIGHT_H
 

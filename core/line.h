@@ -35,9 +35,9 @@ struct line_wave {
     uint32_t first; /* number of its first sample on the pulse's grid */
     uint32_t n;     /* samples */
     uint32_t at;    /* of its first sample in line_waves.sample */
-    uint32_t a, b,
-        c; /* the beam: polar: 0, mirror counts, pan counts; geo: the change of x, y, z along a metre of range,
-                       * as bit patterns of floats, in the CRS's units (not in scale_m) */
+    /* The beam. polar: 0, mirror counts, pan counts; geo: the change of x, y, z along a metre of range, as bit patterns
+     * of floats, in the CRS's units (not in scale_m). */
+    uint32_t a, b, c;
 };
 
 /* The waveforms of a block's pulses, in order of pulse, then of range. */
@@ -46,7 +46,7 @@ struct line_waves {
     struct line_wave *wave;
     uint16_t *sample;
     uint32_t n_left_out; /* samples that found no room */
-    /* The digitiser: set once by who makes the block, and the same for all blocks of a scan. */
+    /* The digitiser. It is set when the block is made, and is the same for all blocks of a scan. */
     uint32_t sample_ps;   /* time between samples */
     uint16_t baseline_16; /* the count without light, in 1/16 counts */
     uint8_t bits;         /* of a sample */
@@ -55,7 +55,7 @@ struct line_waves {
 
 struct line_block {
     /* place in the scan */
-    uint32_t frame;     /* frame (pan sweep) number, from 0 */
+    uint32_t frame;     /* number of the pan sweep, from 0 */
     uint32_t line;      /* line number in the scan, from 0 */
     uint64_t pulse0;    /* number of the block's first pulse in the scan */
     uint32_t n_pulses;  /* consecutive pulses covered, all of them cast */
@@ -84,7 +84,7 @@ struct line_end {
     uint32_t frame, line;
     uint64_t pulse0;                  /* the line's first pulse in the scan */
     uint32_t n_fired;                 /* pulses of the whole sweep, the blind part included */
-    uint32_t n_cast;                  /* of these, cast */
+    uint32_t n_cast;                  /* the ones of these that were cast */
     uint32_t n_echoes;                /* echoes sent; 0 also where blocks of the line were lost */
     int64_t t0_ns, t1_ns;             /* first pulse of this line, first pulse of the next, since the scan's start */
     uint32_t mirror_count, pan_count; /* encoder readings at the last pulse of this line */

@@ -13,7 +13,9 @@
 #include <sys/sysmacros.h>
 #include <unistd.h>
 
-enum { TRIES = 100 }; /* each lost to another writer that ended at that moment */
+enum { TRIES = 100 }; /* a try fails only where another writer ends at that moment */
+/* Opening neither follows a link nor waits, and takes no terminal. */
+enum { PLAIN = O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC };
 
 static int code_of(int error)
 {
@@ -39,7 +41,7 @@ static int newfile_fail(const char *path, const char *what, struct sh_err *err)
     return sh_fail(err, code_of(error), "%s: cannot %s: %s", path, what, strerror(error));
 }
 
-/* ---- what may not be written to */
+/* ---- files that must not be written to */
 
 static int fail_link(const char *path, struct sh_err *err)
 {
@@ -121,11 +123,11 @@ static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
     return sh_fail(err, code, "%s: is being written by process %ld (%s); choose another file name", path, pid, name);
 }
 
-/* Locks the file as long as fd is open. Returns 0 where another process has the lock. On a file system without locks it
- * does nothing. */
-static int has_locked(int fd)
+/* Locks the file as long as fd is open, for writing (LOCK_EX) or against writers (LOCK_SH). Returns 0 where another
+ * process has the lock. On a file system without locks it does nothing. */
+static int has_locked(int fd, int kind)
 {
-    return flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK;
+    return flock(fd, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK;
 }
 
 /* Does the name still belong to what was opened? Another writer may have renamed it before we had the lock. */
@@ -136,10 +138,10 @@ static int is_named(const char *name, int fd)
            open_st.st_ino == named.st_ino;
 }
 
-/* Locks a file that is written in place. What is written to a file without a name is lost. */
+/* Locks a file that is written in place. It must still have its name, since bytes in a file without a name are lost. */
 static int lock_named(const char *path, int fd, int code, struct sh_err *err)
 {
-    if (!has_locked(fd)) return fail_locked(path, fd, code, err);
+    if (!has_locked(fd, LOCK_EX)) return fail_locked(path, fd, code, err);
     return is_named(path, fd) ? SH_OK : sh_fail(err, code, "%s: another process has just written it anew", path);
 }
 
@@ -147,10 +149,9 @@ static int lock_named(const char *path, int fd, int code, struct sh_err *err)
  * name. */
 static int check_unlocked(const char *path, struct sh_err *err)
 {
-    const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
-    if (fd < 0) return SH_OK; /* none is there, or it can't be asked */
-    const int rc =
-        flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK ? fail_locked(path, fd, SH_EINPUT, err) : SH_OK;
+    const int fd = open(path, O_RDONLY | PLAIN);
+    if (fd < 0) return SH_OK; /* there is no file, or it can't be opened to ask for its lock */
+    const int rc = has_locked(fd, LOCK_SH) ? SH_OK : fail_locked(path, fd, SH_EINPUT, err);
     close(fd);
     return rc;
 }
@@ -180,13 +181,13 @@ static int empty_it(const char *path, int fd, struct sh_err *err)
 
 int newfile_open(const char *path, int *out, struct sh_err *err)
 {
-    const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* a FIFO can't hold us in open */
+    const int flags = O_WRONLY | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC; /* opening a FIFO must not wait */
     int fd = open(path, flags | O_NOFOLLOW, 0666), is_shared = 0;
     if (fd < 0 && errno == ELOOP) {
         struct stat st;
         const int n = number_of(path);
         if (n < 0) return fail_link(path, err);
-        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode); /* a shell goes on where we end */
+        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode); /* a shell writes on at the same offset */
         fd = is_shared ? fcntl(n, F_DUPFD_CLOEXEC, 0) : open(path, flags, 0666);
     }
     if (fd < 0 && errno == ENXIO)
@@ -205,7 +206,7 @@ int newfile_append(const char *path, int *out, struct sh_err *err)
     struct stat st;
     int rc = check_target(path, err), fd;
     if (rc != SH_OK) return rc;
-    fd = open(path, O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
+    fd = open(path, O_RDWR | O_CREAT | O_APPEND | PLAIN, 0666);
     if (fd < 0) return newfile_fail(path, "be opened for writing", err);
     if (fstat(fd, &st) != 0) rc = newfile_fail(path, "be opened for writing", err);
     if (rc == SH_OK && st.st_nlink > 1) rc = fail_hard_link(path, &st, err);
@@ -229,14 +230,13 @@ static int check_left(const char *part, int fd, struct sh_err *err)
     return st.st_nlink > 1 ? fail_hard_link(part, &st, err) : SH_OK;
 }
 
-/* 1: part is open. 0: it came or went in between, try again. Negative: it can't be. */
+/* 1: part is open. 0: it appeared or vanished between two calls, try again. Negative: it can't be opened. */
 static int open_part(const char *part, int *fd, struct sh_err *err)
 {
-    const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
-    *fd = open(part, flags | O_CREAT | O_EXCL, 0666);
+    *fd = open(part, O_RDWR | PLAIN | O_CREAT | O_EXCL, 0666);
     if (*fd >= 0) return 1;
     if (errno != EEXIST) return newfile_fail(part, "create", err);
-    *fd = open(part, flags);
+    *fd = open(part, O_RDWR | PLAIN);
     if (*fd < 0 && errno == ENOENT) return 0;
     if (*fd < 0 && errno == ELOOP) return fail_link(part, err);
     if (*fd < 0) return newfile_fail(part, "create", err);
@@ -245,14 +245,14 @@ static int open_part(const char *part, int *fd, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
-/* newfile_part, for a path that may be replaced. */
+/* Does the work of newfile_part once path is known to be replaceable. */
 static int lock_part(const char *part, int *out, struct sh_err *err)
 {
     for (int fd, i = 0; i < TRIES; i++) {
         const int opened = open_part(part, &fd, err);
         if (opened < 0) return opened;
         if (opened == 0) continue;
-        if (!has_locked(fd)) return hand_out(fail_locked(part, fd, SH_EINPUT, err), fd, out);
+        if (!has_locked(fd, LOCK_EX)) return hand_out(fail_locked(part, fd, SH_EINPUT, err), fd, out);
         if (is_named(part, fd))
             return hand_out(ftruncate(fd, 0) == 0 ? SH_OK : newfile_fail(part, "create", err), fd, out);
         close(fd);
@@ -271,10 +271,10 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
 {
     int rc = check_target(part, err);
     if (rc != SH_OK) return rc;
-    const int fd = open(part, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    const int fd = open(part, O_RDWR | PLAIN);
     if (fd < 0) return newfile_fail(part, "be opened for reading and writing", err);
     rc = check_left(part, fd, err);
-    if (rc == SH_OK && !has_locked(fd))
+    if (rc == SH_OK && !has_locked(fd, LOCK_EX))
         rc = sh_fail(err, SH_ESTATE, "%s: is still being written by another process", part);
     if (rc == SH_OK && !is_named(part, fd))
         rc = sh_fail(err, SH_ESTATE, "%s: another process has just completed or removed it", part);
@@ -283,13 +283,12 @@ int newfile_left(const char *part, int *out, struct sh_err *err)
 
 int newfile_whole(const char *path, int *out, struct sh_err *err)
 {
-    const int flags = O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC;
     int rc = check_target(path, err);
     if (rc != SH_OK) return rc;
-    int fd = open(path, O_RDWR | flags);
-    if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && has_locked(fd)) return hand_out(SH_OK, fd, out);
+    int fd = open(path, O_RDWR | PLAIN);
+    if (fd >= 0 && check_left(path, fd, NULL) == SH_OK && has_locked(fd, LOCK_EX)) return hand_out(SH_OK, fd, out);
     if (fd >= 0) close(fd);
-    *out = open(path, O_RDONLY | flags);
+    *out = open(path, O_RDONLY | PLAIN);
     return *out >= 0 ? SH_OK : newfile_fail(path, "be opened", err);
 }
 
@@ -297,10 +296,9 @@ long long newfile_left_len(const char *part)
 {
     struct stat st;
     long long len = 0;
-    const int fd = open(part, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    const int fd = open(part, O_RDONLY | PLAIN);
     if (fd < 0) return 0;
-    if (fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && (flock(fd, LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK))
-        len = st.st_size;
+    if (fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && has_locked(fd, LOCK_SH)) len = st.st_size;
     close(fd);
     return len;
 }
@@ -357,7 +355,7 @@ int newfile_settle(const char *path, const char *part, int fd, struct sh_err *er
     return rc == SH_OK ? close_renamed(path, fd) : rc;
 }
 
-/* Some file systems can't rename without replacing; a link is never in the place of another name. */
+/* Some file systems can't rename without replacing. There link() gives the new name, since it never replaces a file. */
 static int rename_free(const char *path, const char *part)
 {
     if (renameat2(AT_FDCWD, part, AT_FDCWD, path, RENAME_NOREPLACE) == 0) return 0;

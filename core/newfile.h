@@ -18,7 +18,7 @@
 
 /* Opens a file that is written in place: it is made, or emptied. It is locked as long as *fd is open: a second
  * writer is refused before it empties the file. Devices are taken as they are, and pipes that have a reader. A file
- * behind /dev/stdout or /dev/fd/N is not emptied: *fd then is that descriptor once more, since others write there, too.
+ * behind /dev/stdout or /dev/fd/N is not emptied: *fd is then a duplicate of that descriptor, since others write there.
  * *fd is for writing, and blocks. */
 int newfile_open(const char *path, int *fd, struct sh_err *err);
 
@@ -31,12 +31,12 @@ int newfile_append(const char *path, int *fd, struct sh_err *err);
  * has its name, so that a second writer of the same file is refused. A writer of a file that is being written in
  * place is refused, too. A `part` that a killed writer has left is taken over. *fd is for reading and writing. */
 int newfile_part(const char *path, const char *part, int *fd, struct sh_err *err);
-/* Such a file, written by put in one go, as PATH.part. Its errors follow "PATH: cannot be written: ". put need not check
- * its writes to the file: one that fails is an error here. */
+/* Writes such a file by one call of put, as PATH.part. Errors of put are reported as "PATH: cannot be written: ...".
+ * put need not check its writes to the file: a failed one is found here. */
 typedef int newfile_put(const void *source, FILE *file, struct sh_err *why);
 int newfile_write(const char *path, newfile_put *put, const void *source, struct sh_err *err);
-/* The same for a file that newfile_append has opened: it stays locked, and *fd becomes that of the new file.
- * SH_ESTATE: path is that file no more, but another process's, or nobody's. */
+/* The same for a file that newfile_append has opened as *fd. The new file is locked, too, and *fd becomes its
+ * descriptor. SH_ESTATE: path no longer names the file of *fd. */
 int newfile_replace(const char *path, int *fd, newfile_put *put, const void *source, struct sh_err *err);
 /* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. It leaves no
  * file behind. */

@@ -4,7 +4,7 @@
  * reasons.
  *
  * Each stage takes the cheapest option whose bounds hold the tolerance. Where none does, it takes the one
- * with the least error, and the row says so. Bounds are proven (order, georeferencing) or found by sampling:
+ * with the least error, and the row says so. Bounds are proven (georeferencing) or found by sampling:
  * some thousands of the head's own pulses, drawn with a fixed key, are cast with the option and with the
  * reference. Costs are rounded figures (core/plan/cost.h). They are not measured while planning, so that the
  * same scene, head and tolerance always have the same plan. No clock, no files. */
@@ -39,7 +39,7 @@ struct plan_row {
     char why[192];
     int forced; /* the configuration says so, not the plan */
     uint32_t n_left;
-    struct plan_option left[PLAN_MAX_OPTIONS]; /* what was left out; why_not says why */
+    struct plan_option left[PLAN_MAX_OPTIONS]; /* the options left out; why_not says why */
 };
 
 /* A choice to be made. */
@@ -48,7 +48,7 @@ struct plan_choice {
     const struct plan_option *option; /* [n], from rough to exact */
     uint32_t n;
     int forced;      /* number of the option that the configuration names; -1: none */
-    const char *key; /* that names it */
+    const char *key; /* the configuration's key that names it */
     struct plan_tolerance tolerance;
 };
 
@@ -66,7 +66,7 @@ struct plan_georef_need {
     enum georef_method forced; /* GEOREF_AUTO: the cheapest one whose bound meets the tolerance, else exact */
 };
 
-/* Chooses the method and fills row. SH_EINPUT: what is forced has no bound here. The georef is not
+/* Chooses the method and fills row. SH_EINPUT: the forced method has no bound here. The georef is not
  * changed. */
 int plan_georef(const struct georef *georef, const struct plan_georef_need *need, enum georef_method *method,
                 struct plan_row *row, struct sh_err *err);
@@ -93,8 +93,8 @@ struct plan_places {
 
 struct plan_sample;
 
-/* Draws equally many pulses of all places. 61 sub-rays show which pulses meet one smooth surface. These are
- * many and alike: only some of them are cast with the reference. The places must outlive the sample.
+/* Draws equally many pulses of all places. 61 sub-rays of each show which pulses hit one smooth surface. Such pulses
+ * are many and alike, so only some of them are cast with the reference. The places must outlive the sample.
  * Where report asks to stop, sampling ends at once, and its figures mean nothing. */
 int plan_sample_create(const struct plan_places *places, const struct sh_report *report, struct plan_sample **out,
                        struct sh_err *err);
@@ -107,8 +107,8 @@ void plan_sample_free(struct plan_sample *sample);
  * first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
-/* The error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
- * pulse whose way is longer than that counts as wrong, too: the rest of its way is not known. */
+/* The error of following pulses through only `depth` surfaces of glass or mirrors; the reference is CAST_MAX_DEPTH. A
+ * pulse whose way is longer than the reference counts as wrong, too: the rest of its way is not known. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
 /* ---- sight */
@@ -120,23 +120,24 @@ struct plan_sight_need {
     double n_triangles;    /* of the scene */
     uint32_t packet;       /* rays per Embree call */
     uint64_t memory_bytes; /* that a map may take */
-    int forced;            /* by cast.sight, 1: a map; 0: none; -1: not */
+    int forced;            /* by cast.sight, 1: a map; 0: none; -1: not forced */
     const char *why_not;   /* no map is possible; NULL: it is */
 };
 
 /* Shares of the pulses, by the cell of the map that they lie in. The cell shows one triangle, nothing, a few triangles,
- * or many (ask). small: its triangles are met by so few rays that the map leaves them to the BVH. */
+ * or many (ask). small: so few rays hit its triangles that the map leaves them to the BVH. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */
     double examined;  /* triangles of the scene that making the map examines one by one (sight_examined) */
 };
 
-/* Chooses (*map: 1: one is made) and fills row. Casts some pulses of the places, unless a map can't pay anyway. */
+/* Sets *map to 1 where a map is worth its cost, and fills row. It casts some pulses of the places to find out, unless
+ * there are too few pulses for any map. */
 int plan_sight(const struct plan_sight_need *need, const struct plan_places *places, const struct sh_report *report,
                int *map, struct plan_row *row, struct sh_err *err);
 
-/* The steps of plan_sight. 0: so few pulses don't pay for a map, whatever they hit. */
+/* The steps of plan_sight. The first one returns 0 where a map costs more than it saves, whatever the pulses hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
 /* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as of struct sight_spec. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
@@ -153,7 +154,7 @@ struct plan_methods {
     int sight;           /* first hits are looked up in the station's map */
 };
 
-/* A beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
+/* Sets a beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* The row of the mesh: the error of its vertices, see struct scene. */
@@ -180,7 +181,7 @@ size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_RO
 /* Processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and the rest of
  * the work for each pulse. Rows have the cost of methods beyond that. */
 double plan_pulse_ns(double n_triangles, uint32_t packet);
-/* A row about which there is nothing to choose. */
+/* Fills the row of a stage that has no choice of methods. */
 void plan_say(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
               const char *why);
 

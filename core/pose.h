@@ -44,9 +44,9 @@ struct pose_knot {
 };
 
 enum pose_flags {
-    POSE_EXTRAPOLATED = 1u << 0, /* beyond the last pose that had come */
-    POSE_LATE = 1u << 1,         /* too far beyond it: the platform is taken to stand there */
-    POSE_NONE = 1u << 2,         /* none had come yet: the station's */
+    POSE_EXTRAPOLATED = 1u << 0, /* after the last live pose that had arrived */
+    POSE_LATE = 1u << 1,         /* too long after it: the platform is taken to stand */
+    POSE_NONE = 1u << 2,         /* no live pose had arrived yet: this is the station's */
 };
 
 void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, double quat[4]);
@@ -59,13 +59,13 @@ void pose_from_matrix(const double rotation[9], double quat[4]);
  *     -sh cr + ch sp sr    ch cp   -sh sr - ch sp cr
  *     -cp sr               sp       cp cr              */
 void pose_attitude(double heading_rad, double pitch_rad, double roll_rad, double rotation[9]);
-/* The same of a levelled head. */
+/* The same for a levelled head. */
 void pose_heading(double heading_rad, double rotation[9]);
 void pose_rotate(const double quat[4], const double v[3], double out[3]);
 /* Angle between two attitudes, in [0, pi]. */
 double pose_angle_between(const double a[4], const double b[4]);
 void pose_between(const struct pose *a, const struct pose *b, double fraction, struct pose *out);
-/* The pose of what is mounted on a body: mount is its pose in the body's frame. */
+/* The pose of a head that is mounted on a body: mount is the head's pose in the body's frame. */
 void pose_mount(const struct pose *body, const struct pose *mount, struct pose *out);
 
 /* The last of n >= 1 knots, in order of time, at or before t_ns; before the first one 0. */
@@ -113,21 +113,23 @@ void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose 
 struct pose_knot_rules {
     double start_s, end_s; /* on the trajectory */
     double tolerance_m;    /* between two knots pose_between may differ from the trajectory by this */
-    int64_t longest_ns;    /* two knots are at most so far apart ... */
-    double longest_m;      /* ... where the head moves further than this between them, or turns by over 0.01 rad */
+    /* Where the head moves further than longest_m between two knots, or turns by over 0.01 rad, they are at most
+     * longest_ns apart. */
+    int64_t longest_ns;
+    double longest_m;
 };
 
 struct pose_path {
     struct pose_knot *knot; /* the first one at time 0 */
     size_t n;
-    double
-        error_m; /* largest distance from the trajectory: closed bound, acceleration and lever arm times step^2 / 8 */
+    /* Bound of the largest distance from the trajectory: (acceleration + turning rate^2 * lever arm) * step^2 / 8. */
+    double error_m;
 };
 
 /* The path of a head that is mounted on the platform, from start_s (time 0 of the knots) to end_s or the
  * trajectory's end, whichever comes first. There is a knot at each sample, and between two samples as many as
  * the rules ask for; error_m is more than tolerance_m only where POSE_MIN_STEP_US is the limit. The caller
- * frees out->knot. SH_EINPUT for more than POSE_MAX_KNOTS. */
+ * frees out->knot, after an error as well. SH_EINPUT for more than POSE_MAX_KNOTS. */
 int trajectory_knots(const struct trajectory *trajectory, const struct pose *mount, const struct pose_knot_rules *rules,
                      const struct sh_report *report, struct pose_path *out, struct sh_err *err);
 

@@ -11,9 +11,9 @@
  *   glTF     is metres and y up by definition; its tree is multiplied in double (core/import/gltf)
  *   STL      has neither
  * Every placement of a mesh in a node tree counts: an object that is there five times gives its triangles
- * five times. Polygons are cut into triangles. A pair of object and material that is there already keeps its
- * label. Ownership: scene_load allocates everything, scene_free releases it. After the load a scene is
- * constant and may be read from any thread. */
+ * five times. Polygons are cut into triangles. A pair of object and material that is there already, in
+ * this file or an earlier one, is the same surface, with the same label. Ownership: scene_load allocates everything,
+ * scene_free releases it. After the load a scene is constant and may be read from any thread. */
 #ifndef CORE_SCENE_H
 #define CORE_SCENE_H
 
@@ -38,11 +38,11 @@ enum {
 /* Bodies of IFC are read by two readers, by Assimp where they are not installed, or by one alone. */
 enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
 
-/* Limits for readers in processes of their own: Assimp, and each reader of IFC. */
+/* Limits for readers in processes of their own: Assimp, and the readers of glTF, GeoTIFF and IFC. */
 struct scene_import_limits {
     uint32_t memory_mib; /* on top of the program's own; the same for the scene that is handed back */
     double time_s;       /* the most seconds, both of time and of processor time */
-    uint32_t files;      /* open at a time by Assimp */
+    uint32_t files;      /* open at a time in such a process; the programs of IFC have a limit of their own */
     enum scene_ifc_reader ifc_reader;
     int ifc_strict;         /* 1: a difference between the readers of IFC is an error */
     const char *ifc_folder; /* where they are; NULL: installed, or built, beside the program */
@@ -59,14 +59,13 @@ struct scene_places {
     struct scene_place *place; /* NULL: the mesh stands where its file says */
     size_t n;
     int own_surfaces; /* each copy has surfaces of its own: "OBJECT 1", "OBJECT 2" ... */
-    int written_out;  /* as triangles of the scene */
-    const char *says; /* the name of the list in errors */
+    const char *says; /* the name of this list, for errors */
 };
 
 struct scene_mesh_spec {
-    const char *
-        file; /* ending chooses the reader: .obj .ply .stl .tif in double; .ifc by two readers; .gltf .glb by their own;
-                       * others by Assimp */
+    /* The ending chooses the reader: .obj .ply .stl .tif in double; .ifc by two readers; .gltf .glb by their own; the
+     * others by Assimp. */
+    const char *file;
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */
@@ -95,8 +94,8 @@ struct scene_surface {
     uint16_t vertex_colours; /* enum scene_vertex_colours, once the load is over; they count before `colour` */
     uint16_t texture;        /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
     uint16_t opacity;        /* of the opacity map that cuts holes, likewise; 0: the alpha of `texture` cuts them */
-    float clear; /* share of the light that goes through it, as the file says, 0..1. Nothing here follows from it */
-    float solid; /* a texel that is less opaque is a hole: 0.5, or the format's figure; 0: there are no holes */
+    float clear;             /* share of the light that goes through it, as the file says, 0..1. core doesn't use it */
+    float solid;             /* a texel of less opacity is a hole: 0.5, or the format's figure; 0: there are no holes */
     /* Type and GlobalId of a product of IFC; else empty. */
     char type[SCENE_TYPE_LEN], guid[SCENE_GUID_LEN];
 };
@@ -104,11 +103,11 @@ struct scene_surface {
 /* An image that lies on surfaces. */
 struct scene_texture {
     char *file;     /* as found beside the mesh's file */
-    uint8_t *bytes; /* of one that lies within it; else NULL */
+    uint8_t *bytes; /* of an image that lies within the mesh's file; else NULL */
     size_t n_bytes;
     uint32_t raw_width, raw_height; /* struct texture_source */
     enum texture_wrap wrap[2];
-    int unreadable; /* known, and warned of */
+    int unreadable; /* 1: it can't be read, and a warning was given */
 };
 
 /* Counts of what the import left out or changed; each kind that is not 0 is also reported as one warning
@@ -148,7 +147,7 @@ struct scene {
     struct scene_copied *copied;   /* [n_copied] */
     uint32_t n_copied, n_copies;   /* meshes that have copies; copies of all of them */
     uint32_t n_all;                /* triangles, with those of the copies */
-    uint32_t n_meshes;             /* placements in node trees; one for each .obj or .ply */
+    uint32_t n_meshes;             /* placements in node trees, solids of .stl, bodies of IFC; other files: 1 */
     double (*vertex_m)[3];         /* [n_vertices] prcs */
     uint32_t (*triangle)[3];       /* [n_triangles] indices into vertex_m */
     uint16_t *label;               /* [n_triangles] index into surface */
@@ -174,16 +173,16 @@ struct scene {
 
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
- *   but .obj, .ply, .stl and .tif) is refused, with the figure, where 6e-8 of its coordinates, and of the numbers
- *   that place them, come to more.
+ *   but .obj, .ply, .stl and .tif) is refused where 6e-8 of its coordinates, and of the numbers that place them, is
+ *   more. The error names the figure.
  *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates, and of a binary .stl.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
  * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
  *   report asks to stop.
- * Assimp reads in a process of its own, forked here: it crashes, hangs or takes all memory on some broken
- *   files. Its crash, or a limit that it reaches, is SH_EINPUT, too. The child is reaped, and does not
- *   outlive the calling thread. */
+ * Assimp and the readers of glTF, GeoTIFF and IFC read in processes of their own, started here, since some broken files
+ *   make decoders crash, never end or take all memory. A crash, or a limit that is reached, is SH_EINPUT, too. The
+ *   children are reaped, and do not outlive the calling thread. */
 int scene_load(const struct scene_mesh_spec *specs, size_t n_specs, double tolerance_m, const struct sh_report *report,
                struct scene **out, struct sh_err *err);
 
@@ -244,7 +243,7 @@ void scene_corners(const struct scene *scene, uint32_t triangle, double corner[3
 /* Triangles that are kept in memory: its own, and those of each mesh that has copies. */
 uint64_t scene_n_kept(const struct scene *scene);
 
-/* A direction into the frame of the scene, and back into that of the mesh. */
+/* Turns a direction from the mesh's frame into the scene's. out may be v. */
 static inline void scene_copy_turn(const struct scene_copy *c, const double v[3], double out[3])
 {
     const double x = v[0], y = v[1];
@@ -253,7 +252,7 @@ static inline void scene_copy_turn(const struct scene_copy *c, const double v[3]
     out[2] = v[2];
 }
 
-/* Likewise for a point. */
+/* A point from the mesh's frame into the scene's, and back. out may be the point. */
 static inline void scene_copy_put(const struct scene_copy *c, const double v[3], double out[3])
 {
     scene_copy_turn(c, v, out);
@@ -274,7 +273,8 @@ static inline void scene_copy_put_back(const struct scene_copy *c, const double 
 void scene_uv_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
                  double uv[2]);
 
-/* Likewise the colour there, between those of the corners, sRGB; scene->rgb is there. 0: some corner has none. */
+/* Interpolates the colour there between those of the corners, sRGB; scene->rgb must be there. Returns 0 where a corner
+ * has none. */
 int scene_rgb_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
                  uint8_t rgb[3]);
 

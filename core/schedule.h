@@ -10,7 +10,7 @@
  * products are formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
  *
  * Angles are in turns (1 turn = 2 pi rad) until a sine is needed, so that reduction is exact.
- * A frame is one sweep of the pan, in a whole number of lines; with pan speed 0, or no pan range, one line.
+ * A frame is one pan sweep, a whole number of lines. With pan speed 0, or no pan range, it is one line.
  * Pure; any thread. */
 #ifndef CORE_SCHEDULE_H
 #define CORE_SCHEDULE_H
@@ -28,7 +28,7 @@ struct schedule_spec {
     int64_t pan_start_udeg, pan_stop_udeg;
     uint32_t frames; /* 0: without end */
     /* NULL: a line head. Else the pan keeps still; prr_uhz is steps * lines_uhz where the emitter has steps, and
-     * only for show where it has a table; line angles count from azimuth 0 on (planar: emitter_step_udeg) */
+     * only for display where it has a table; line angles count from azimuth 0 on (planar: emitter_step_udeg) */
     const struct emitter *emitter;
 };
 
@@ -68,8 +68,9 @@ struct schedule_run {
     int64_t ns_quot;
     /* Where angles or times come from a table, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings.
      * It fires d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick
-     * ticks after the first one: put d for j in dt above. (Directions: one pulse a tick, sequence_ticks is 0, and
-     * dt as it stands.) mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r + firing[i].pan_turn */
+     * ticks after the first one; in the formula of dt above, d(j) stands for j. (Directions: one pulse a tick,
+     * sequence_ticks is 0, and dt as it stands.) mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r +
+     * firing[i].pan_turn */
     const struct emitter_firing *firing;
     uint32_t n_firings, firing_at;
     uint64_t sequence_ticks;

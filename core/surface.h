@@ -47,7 +47,7 @@ struct surface_texture;
 struct surface_table {
     uint32_t n;
     int has_lobes;  /* some surface is specular or retro-reflecting */
-    int has_optics; /* some surface is of glass or a mirror */
+    int has_optics; /* some surface is glass or a mirror */
     int has_mirror;
     struct surface *surface;          /* [n + 1] */
     struct surface_texture **texture; /* [n + 1], NULL where there is none; NULL: none has */
@@ -78,7 +78,7 @@ int surface_table_by_vertex(struct surface_table *table, uint32_t label, struct 
 /* Labels of hits hold the surface in their low 16 bits. Where a texture holds the reflectance, the
  * high ones are 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
-/* Likewise of a hit with that colour, sRGB. */
+/* The same for a hit on colours of vertices; rgb is the colour there, sRGB. */
 uint32_t surface_texel_of(uint32_t label, const uint8_t rgb[3]);
 static inline uint32_t surface_of_label(uint32_t label)
 {
@@ -96,7 +96,7 @@ struct surface_colours {
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
 void surface_colours_free(struct surface_colours *colours);
-/* Each entry is set first. */
+/* Sets an entry from the mesh's own colours. It is called once for each entry, before surface_colours_texture. */
 void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named);
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,

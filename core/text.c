@@ -12,7 +12,7 @@
 #include "core/huge_pages.h"
 #include "core/infile.h"
 
-/* Read, not mapped: a file that shrinks while it is mapped would end the process. */
+/* The file is read, not mapped: one that shrinks while it is mapped would end the process. */
 static int read_whole(struct text *t, FILE *f, text_progress *progress, void *ctx, struct sh_err *err)
 {
     struct stat st;
@@ -59,7 +59,7 @@ int text_open(struct text *t, const char *path, text_progress *progress, void *c
     if (rc != SH_OK) return rc;
     t->p = t->data;
     t->end = t->data + t->size;
-    if (t->size >= 3 && memcmp(t->p, "\xef\xbb\xbf", 3) == 0) t->p += 3; /* UTF-8's mark says nothing */
+    if (t->size >= 3 && memcmp(t->p, "\xef\xbb\xbf", 3) == 0) t->p += 3; /* the byte order mark of UTF-8 */
     t->c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     if (t->c_locale == (locale_t)0) return text_fail(t, 0, SH_ENOMEM, err, "no memory for a locale");
     return SH_OK;
@@ -67,7 +67,7 @@ int text_open(struct text *t, const char *path, text_progress *progress, void *c
 
 void text_drop_read(struct text *t)
 {
-    const size_t block = (size_t)2 << 20; /* of huge pages: a part of one can't be given back */
+    const size_t block = (size_t)2 << 20; /* a huge page, which can only be given back whole */
     const size_t first = (block - (uintptr_t)t->data % block) % block, read = (size_t)(t->p - t->data);
     const size_t from = t->n_dropped > first ? t->n_dropped : first;
     if (read < from + block) return;
@@ -124,7 +124,7 @@ void text_next_line(struct text *t)
     t->line++;
 }
 
-/* Where a word ends: at a blank, a line's end, or a backslash that hides one. */
+/* A word ends at a blank, a line's end, or a backslash that hides a line's end. */
 static bool at_word_end(const struct text *t, const char *p)
 {
     if (p >= t->end || is_blank(*p) || *p == '\n' || *p == '\r') return true;
@@ -218,7 +218,7 @@ static const char *scan_decimal(const char *p, struct decimal *d)
         if (fraction && d->exponent > -1000) d->exponent--;
     }
     if (n_digits == 0) return NULL;
-    d->simple &= d->exponent > -1000; /* there may be more decimals than were counted */
+    d->simple &= d->exponent > -1000; /* at this limit decimals are no longer counted */
     if (*p != 'e' && *p != 'E') return p;
     p++;
     bool down = *p == '-';

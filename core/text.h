@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#include <strings.h>
 
 #include "core/err.h"
 
@@ -28,6 +29,13 @@ bool text_is(struct text_span span, const char *text);
 /* The same word, whatever its case? */
 bool text_is_word(struct text_span span, const char *word);
 
+/* Whether a file's name ends so, whatever its case; the ending alone is not such a name. */
+static inline bool text_has_ending(const char *file, const char *ending)
+{
+    const size_t len = strlen(file), n = strlen(ending);
+    return len > n && strcasecmp(file + len - n, ending) == 0;
+}
+
 /* Whether the list has the text. NULL ends the list. */
 bool text_is_one_of(struct text_span span, const char *const *list);
 
@@ -39,11 +47,11 @@ struct text {
     uint64_t line;  /* of p, from 1 */
     bool continued; /* a backslash before the line's end joins the next one (OBJ) */
     locale_t c_locale;
-    size_t n_dropped; /* bytes from data on: text_drop_read */
+    size_t n_dropped; /* bytes from data on that text_drop_read has given back */
 };
 
-/* Called every 16 MiB that are read, fraction -1: unknown. A result other than 0 ends the reading, with err
- * filled. */
+/* Called after every 16 MiB that are read, with fraction -1 (unknown). Where it returns other than 0, with err filled,
+ * reading ends. */
 typedef int text_progress(void *ctx, double fraction, struct sh_err *err);
 
 /* Reads the whole file; p is at its first byte, or after UTF-8's byte order mark. progress may be NULL. text_close is
@@ -71,7 +79,7 @@ static inline int text_hex_digit(char c)
  * read after the first one that is not part of it, so n may be 4 where a NUL ends the text. */
 int text_utf8_len(const char *p, size_t n);
 
-/* Blanks, and line ends that a backslash hides. */
+/* Skips blanks, and line ends that a backslash hides. */
 void text_skip_blanks(struct text *t);
 
 /* Does a word end at p? */

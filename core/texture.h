@@ -22,7 +22,8 @@ enum {
     TEXTURE_MAX_MEMORY = 1 << 30,
 };
 
-/* The image beyond 0..1, in each direction. Decal: no image there, and the surface is as without one. */
+/* How an image goes on beyond coordinates of 0..1, in each direction. Decal: there is no image there, and the surface
+ * is as without one. */
 enum texture_wrap { TEXTURE_REPEAT, TEXTURE_CLAMP, TEXTURE_MIRROR, TEXTURE_DECAL };
 
 struct texture_source {
@@ -44,18 +45,19 @@ struct texture_image {
 int texture_read(const struct texture_source *source, struct texture_image *image, struct sh_err *err);
 void texture_image_free(struct texture_image *image);
 
-/* A texel's number, row by row, at finite coordinates; -1: decal, and beyond the image. */
+/* The size of an image, and how it goes on beyond its sides. */
 struct texture_frame {
     uint32_t width, height;
     enum texture_wrap wrap[2];
 };
+/* Returns the number of the texel, row by row, at finite coordinates; -1: they are beyond a decal. */
 int64_t texture_at(const struct texture_frame *frame, const double uv[2]);
 
 /* Where an image has holes: one bit a texel. */
 struct texture_mask;
 
-/* Texels whose value is below `solid` (0..1) are holes. Value: alpha; by_light: of an image without alpha its
- * luma instead (an opacity map). *out is NULL where there is no hole; else it is released with free(). */
+/* Texels whose value is below `solid` (0..1) are holes. The value is alpha. With by_light, an image without alpha is an
+ * opacity map, and the value is its luma. *out is NULL where there is no hole; else it is released with free(). */
 int texture_mask_create(const struct texture_image *image, const enum texture_wrap wrap[2], double solid, int by_light,
                         struct texture_mask **out, struct sh_err *err);
 /* There is no hole where uv is not finite, or beyond a decal. */

@@ -100,19 +100,11 @@ static int64_t floor_div(int64_t a, int64_t b)
     return a / b - (a % b < 0);
 }
 
-/* The entry in force at a TAI second. */
-static uint32_t entry_at_tai(const struct utc_table *table, int64_t tai_s)
+/* The entry in force at a second of POSIX time, or of TAI. */
+static uint32_t entry_at(const struct utc_table *table, int64_t s, int is_tai)
 {
     uint32_t i = table->n - 1;
-    while (i > 0 && tai_s < table->leap[i].posix_s + table->leap[i].tai_minus_utc)
-        i--;
-    return i;
-}
-
-static uint32_t entry_at_posix(const struct utc_table *table, int64_t posix_s)
-{
-    uint32_t i = table->n - 1;
-    while (i > 0 && posix_s < table->leap[i].posix_s)
+    while (i > 0 && s < table->leap[i].posix_s + (is_tai ? table->leap[i].tai_minus_utc : 0))
         i--;
     return i;
 }
@@ -120,7 +112,7 @@ static uint32_t entry_at_posix(const struct utc_table *table, int64_t posix_s)
 void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time *out)
 {
     int64_t tai_s = floor_div(tai_ns, UTC_SECOND_NS);
-    uint32_t i = entry_at_tai(table, tai_s);
+    uint32_t i = entry_at(table, tai_s, 1);
     int64_t posix_s = tai_s - table->leap[i].tai_minus_utc;
     /* The inserted second: the next entry's midnight by the old offset. */
     int leap = i + 1 < table->n && posix_s >= table->leap[i + 1].posix_s;
@@ -145,8 +137,8 @@ int utc_to_tai(const struct utc_table *table, const struct utc_time *utc, int64_
         return sh_fail(err, SH_EINPUT, "there is no %02d:%02d:%02d", utc->hour, utc->minute, utc->second);
     int64_t midnight_s = date_days(utc->year, utc->month, utc->day) * DAY_S;
     int64_t posix_s = midnight_s + utc->hour * 3600 + utc->minute * 60 + utc->second;
-    int32_t offset = table->leap[entry_at_posix(table, midnight_s)].tai_minus_utc;
-    int32_t tomorrow = table->leap[entry_at_posix(table, midnight_s + DAY_S)].tai_minus_utc;
+    int32_t offset = table->leap[entry_at(table, midnight_s, 0)].tai_minus_utc;
+    int32_t tomorrow = table->leap[entry_at(table, midnight_s + DAY_S, 0)].tai_minus_utc;
     int64_t day_s = DAY_S + tomorrow - offset;
     if (posix_s - midnight_s >= day_s || (utc->second == 60 && posix_s - midnight_s != DAY_S))
         return sh_fail(err, SH_EINPUT, "%04d-%02d-%02d has no %02d:%02d:%02d", utc->year, utc->month, utc->day,
@@ -157,13 +149,13 @@ int utc_to_tai(const struct utc_table *table, const struct utc_time *utc, int64_
 
 int64_t utc_posix_from_tai(const struct utc_table *table, int64_t tai_ns)
 {
-    uint32_t i = entry_at_tai(table, floor_div(tai_ns, UTC_SECOND_NS));
+    uint32_t i = entry_at(table, floor_div(tai_ns, UTC_SECOND_NS), 1);
     return tai_ns - table->leap[i].tai_minus_utc * UTC_SECOND_NS;
 }
 
 int64_t utc_tai_from_posix(const struct utc_table *table, int64_t posix_ns)
 {
-    uint32_t i = entry_at_posix(table, floor_div(posix_ns, UTC_SECOND_NS));
+    uint32_t i = entry_at(table, floor_div(posix_ns, UTC_SECOND_NS), 0);
     return posix_ns + table->leap[i].tai_minus_utc * UTC_SECOND_NS;
 }
 
@@ -180,7 +172,7 @@ struct utc_gps utc_gps_week(int64_t tai_ns)
 
 /* ---- text */
 
-/* Does the text begin like the form? 0 in it stands for any digit. */
+/* Whether the text begins as the form does. A 0 of the form stands for any digit. */
 static int begins_like(const char *text, const char *form)
 {
     for (; *form != '\0'; form++, text++)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* UTC, TAI and GPS time.
  *
- * One continuous scale inside: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, which is what CLOCK_TAI
- * counts; dates are taken from 1972 to 2199, well within int64. UTC is TAI less a whole number of seconds
+ * Inside the program there is one continuous scale: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, as CLOCK_TAI
+ * counts. Dates from 1972 to 2199 are allowed, well within int64. UTC is TAI less a whole number of seconds
  * that a table gives; during a leap second the time of day reads 23:59:60. GPS time is TAI less 19 s, counted
  * from 1980-01-06T00:00:00Z in weeks of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); a table is not needed for
  * it. POSIX time has no leap seconds: 23:59:60 has the number of the second after it (POSIX.1, 4.16).
@@ -21,8 +21,8 @@ enum { UTC_MAX_LEAPS = 64, UTC_TEXT_LEN = 32 };
 #define UTC_SECOND_NS ((int64_t)1000000000)
 
 struct utc_leap {
-    int64_t posix_s;       /* from this second on, the one after the leap second, */
-    int32_t tai_minus_utc; /* TAI is ahead by so many seconds */
+    int64_t posix_s;       /* the second after the leap second */
+    int32_t tai_minus_utc; /* TAI is ahead of UTC by so many seconds, from posix_s on */
 };
 
 struct utc_table {

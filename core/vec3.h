@@ -51,7 +51,7 @@ static inline double vec3_distance(const double a[3], const double b[3])
     return vec3_length(d);
 }
 
-/* Bounds: of nothing yet, and of one point more; NaN widens nothing. */
+/* Bounds of points: vec3_bound_nothing begins with empty ones, vec3_bound widens them by a point. NaN widens none. */
 static inline void vec3_bound_nothing(double min[3], double max[3])
 {
     for (int i = 0; i < 3; i++) {
@@ -68,8 +68,8 @@ static inline void vec3_bound(double min[3], double max[3], const double a[3])
     }
 }
 
-/* Whether one of a triangle's corners is the origin. A ray from a corner begins on the surface, and hits it nowhere
- * else. Whatever its direction, the sides of two edges are 0, and the range of the plane is rounding. */
+/* Whether one of a triangle's corners is the origin. A ray that begins at a corner hits the triangle nowhere else. For
+ * any direction it lies on the lines of two edges: their side tests give 0, and the plane's range is only rounding. */
 static inline int vec3_is_any_zero(double corner[3][3])
 {
     for (int i = 0; i < 3; i++)

@@ -7,9 +7,9 @@
 #include <stdint.h>
 #include <string.h>
 
-/* The best version of a loop for the CPU at hand, chosen once at start. VEC_ONE, for measuring: the one version is
- * that of the compiler's options. Sanitizers can't follow the resolver; before version 18 clang gives it a name that
- * other files don't find (llvm-project pull request 71706). */
+/* Builds a function in several versions; the best one for the CPU at hand is chosen once at start. With VEC_ONE, for
+ * measuring, there is only the version of the compiler's options. Sanitizers can't follow the resolver. Clang before
+ * version 18 gives it a name that other files don't find (llvm-project pull request 71706). */
 #if defined(VEC_ONE) || (defined(__clang__) && __clang_major__ < 18)
 #define VEC_CLONES
 #elif defined(__x86_64__) && !defined(SH_SANITIZE) && defined(__clang__)
@@ -20,7 +20,7 @@
 #define VEC_CLONES
 #endif
 #define VEC_INLINE static inline __attribute__((always_inline))
-/* Before a loop whose arrays don't overlap, where that can't be said by restrict: they came in a struct. */
+/* Stands before a loop whose arrays don't overlap, where they came in a struct, so that restrict can't say it. */
 #ifdef __clang__
 #define VEC_LOOP _Pragma("clang loop vectorize(assume_safety)")
 #else
@@ -38,7 +38,7 @@ VEC_INLINE double vec_round(double x, uint64_t *bits)
     return shifted - magic;
 }
 
-/* A whole number below 2^52 as a double. Below AVX-512 vectors know no conversion from 64 bits. */
+/* A whole number below 2^52 as a double. Vector instructions before AVX-512 can't convert 64-bit numbers. */
 VEC_INLINE double vec_from_u64(uint64_t whole)
 {
     const uint64_t bits = whole | 0x4330000000000000ULL; /* 2^52 + whole */
@@ -159,7 +159,7 @@ VEC_INLINE double vec_log(double x)
     return k * 0.693147180559945309 + 2.0 * (t + t * (z * p));
 }
 
-/* e^x; below -700 and above 700 that of the limit. x = k log 2 + r, |r| <= log(2)/2, and the Taylor series to
+/* e^x; x below -700 or above 700 counts as that limit. x = k log 2 + r, |r| <= log(2)/2, and the Taylor series to
  * r^13, whose remainder is below 1e-17; relative error below 1e-15 (tests/unit/test_vecmath.c). */
 VEC_INLINE double vec_exp(double x)
 {
@@ -181,7 +181,7 @@ VEC_INLINE double vec_exp(double x)
     p = p * r + 0.5;
     p = p * r + 1.0;
     p = p * r + 1.0;
-    uint64_t power = (bits + 1023) << 52; /* the low bits of k's are k itself, in two's complement */
+    uint64_t power = (bits + 1023) << 52; /* the low bits are k in two's complement; the shift drops the others */
     double scale;
     memcpy(&scale, &power, sizeof scale);
     return p * scale;

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* The rotation in the map at its centre. */
+/* georef_axes: the rotation that the map makes at its centre. */
 #include <string.h>
 
 #include "core/georef/state.h"
 #include "core/mat3.h"
 
-/* Far enough that nanometres of rounding are 1e-10 rad. Differences to both sides are exact for a
- * quadratic map. */
+/* Over this distance, nanometres of rounding are 1e-10 rad. Differences to both sides are exact for a quadratic
+ * map. */
 static const double STEP_M = 100.0;
 
-/* Column k is the image of a metre along axis k. */
+/* Column k of the Jacobian is the image of a metre along axis k. */
 static void jacobian(const struct georef *georef, double j[9])
 {
     double lat_m, lon_m, axis_m, out[2][3];
@@ -32,7 +32,7 @@ static void jacobian(const struct georef *georef, double j[9])
     }
 }
 
-/* Inverse transposed: the matrix of cofactors over the determinant. */
+/* Makes the transposed inverse, which is the matrix of cofactors over the determinant. */
 static int invert(const double m[9], double out[9])
 {
     for (int i = 0; i < 3; i++)
@@ -46,8 +46,8 @@ static int invert(const double m[9], double out[9])
     return det > 0.1; /* false for NaN */
 }
 
-/* The map is a rotation, and stretching along its own axes before or after: the rotation is the polar factor,
- * by Newton's iteration (Higham 1986), which converges quadratically from near. */
+/* The map is a rotation with some stretching before or after it. The rotation alone is the Jacobian's polar factor.
+ * Newton's iteration (Higham 1986) finds it, and converges quadratically, since the Jacobian is near a rotation. */
 void georef_axes(const struct georef *georef, double rotation[9])
 {
     double m[9], other[9];

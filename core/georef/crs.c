@@ -7,13 +7,13 @@
 #include "core/angle.h"
 #include "core/georef/proj_lib.h"
 
-/* The data of a system of the registry that are used here. */
+/* A system of the registry, as far as it is used here. */
 struct grid {
     const char *name;
     struct proj_lib lib;
     PJ_CONTEXT *context;
-    PJ *to; /* to longitude and latitude in degrees, in this order, whatever the order of the systems' own axes */
-    double unit_m;                                   /* of its axes */
+    PJ *to;        /* transforms to longitude and latitude in degrees, in this order */
+    double unit_m; /* of its axes */
     double west_deg, south_deg, east_deg, north_deg; /* where it is used; west NaN: not known */
 };
 
@@ -89,7 +89,8 @@ static PJ_COORD transformed(const struct grid *grid, double easting_m, double no
     return grid->lib.proj_trans(grid->to, PJ_FWD, in);
 }
 
-/* Measures by differences over 100 m each way: their error is of the third order, below 1e-9 in any survey grid. */
+/* Measures convergence and scale by differences over 100 m each way. Their error is of the third order, below 1e-9 in
+ * any survey grid. */
 static void measure_grid(const struct grid *grid, double easting_m, double northing_m, const PJ_COORD *at,
                          struct crs_place *place)
 {
@@ -103,7 +104,7 @@ static void measure_grid(const struct grid *grid, double easting_m, double north
     place->scale = 2.0 * step_m / hypot(east_m, north_m);
 }
 
-/* Areas of use are rough, and end at borders. A missing digit or a wrong unit leads further off than this. */
+/* Areas of use are rough, and end at borders. A missing digit or a wrong unit gives a place farther away than this. */
 #define AREA_MARGIN_DEG 2.0
 
 static int is_within(const struct grid *grid, const PJ_COORD *at)

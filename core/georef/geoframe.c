@@ -19,7 +19,7 @@ int geoframe_set_tangent(struct geoframe *frame, const double origin_m[3], const
                                .height_m = at->height_m,
                                .north_deg = north_deg};
     double enu[9], s = sin(angle_rad(north_deg)), c = cos(angle_rad(north_deg));
-    /* north is (s, c) in the scene, east a right angle clockwise from it */
+    /* North is (s, c) in the scene; east is a right angle clockwise from it. */
     const double turn[9] = {c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0};
     for (int i = 0; i < 3; i++)
         if (!isfinite(origin_m[i]) || !isfinite(north_deg))
@@ -109,7 +109,7 @@ static int grid_to_enu(const struct geoframe *frame, const struct georef_place *
     struct locate_grid utm;
     int rc = locate_in_grid(at, frame->zone == 0 ? GEOREF_UPS : frame->zone, &utm, err);
     if (rc != SH_OK) return rc;
-    /* grid north bears convergence: it is (s, c) in east and north */
+    /* The bearing of grid north is the convergence, so grid north is (s, c) in east and north. */
     double s = sin(angle_rad(utm.convergence_deg)), c = cos(angle_rad(utm.convergence_deg));
     const double turn[9] = {c, s, 0.0, -s, c, 0.0, 0.0, 0.0, 1.0};
     memcpy(rotation, turn, sizeof turn);

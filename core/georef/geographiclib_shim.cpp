@@ -55,7 +55,7 @@ struct shim_grid {
     }
 };
 
-/* The zone for UTMUPS, of a zone as core/georef.h counts them. */
+/* Turns a zone of core/georef.h (0: by position, GEOREF_UPS) into one of UTMUPS. */
 static int utmups_zone(int zone)
 {
     return zone == 0 ? int(UTMUPS::STANDARD) : zone < 0 ? int(UTMUPS::UPS) : zone;
@@ -68,8 +68,8 @@ struct shim_map {
     /* in: the scene frame */
     bool from_grid;
     LocalCartesian local; /* tangent */
-    double turn[9];       /* prcs -> its axes */
-    double centre_m[3];   /* from its origin, in its axes */
+    double turn[9];       /* prcs -> axes of `local` */
+    double centre_m[3];   /* from the origin of `local`, in its axes */
     shim_grid in;         /* grid */
     double in_x0, in_y0;  /* of the centre */
     /* out */
@@ -78,7 +78,7 @@ struct shim_map {
     shim_grid grid;
     double place[3];  /* of the centre */
     double anchor[3]; /* of the centre, with false origin */
-    double x0, y0;    /* of the centre, without */
+    double x0, y0;    /* of the centre, without false origin */
 
     double undulation(double lat, double lon) const
     {
@@ -98,7 +98,7 @@ struct shim_map {
         in.project(place[0], place[1], in_x0, in_y0);
     }
 
-    /* Another hemisphere's false northing; UPS has a projection for each. */
+    /* Sets the false northing of that hemisphere. UPS can't do it, as it has a projection for each hemisphere. */
     void force_side(int side)
     {
         if (crs != GEOREF_UTM || side == 0 || grid.north == (side > 0)) return;
@@ -136,7 +136,7 @@ struct shim_map {
                       centre_m[2] + (turn[6] * dx + turn[7] * dy + turn[8] * dz), lat, lon, height);
     }
 
-    /* By d from the centre as it is, in prcs. */
+    /* Moves the centre by d, in prcs. */
     void move_centre(const double d[3])
     {
         const bool was_north = grid.north;
@@ -199,7 +199,7 @@ struct shim_map {
 
 static const double nan_m = std::numeric_limits<double>::quiet_NaN();
 
-/* Runs what may throw; the reason becomes a text. */
+/* Calls f. An exception becomes a text, and -1. */
 template <typename F> static int attempt(char *why, size_t len, F f)
 {
     try {
@@ -215,7 +215,7 @@ template <typename F> static int attempt(char *why, size_t len, F f)
     return -1;
 }
 
-/* Runs what may throw; n values become NaN then. */
+/* Calls f. After an exception the n values are NaN. */
 template <typename F> static void attempt(double *value, size_t n, F f)
 {
     try {
@@ -318,7 +318,7 @@ void shim_map_place(const struct shim_map *map, double place[3])
     std::copy_n(map->place, 3, place);
 }
 
-/* prcs to the tangent frame's origin, to ECEF, to the centre's axes. */
+/* The rotation goes from prcs to the axes of the tangent frame, then to ECEF, then to the centre's axes. */
 static void meridian_of_metric(const struct shim_map *map, struct shim_meridian *out)
 {
     double p[3], from[9], to[9];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The parts of GeographicLib that are used, for C; georef_geodetic and georef_geoid_free are there as
- * well. Only the files of core/georef include this. Angles are in degrees, lengths in metres. No exception
- * leaves it: each becomes a text, or NaN. */
+/* The parts of GeographicLib that are used, for C. The shim also defines georef_geodetic and georef_geoid_free. Only
+ * the files of core/georef include this. Angles are in degrees, lengths in metres. No exception leaves it: each
+ * becomes a text, or NaN. */
 #ifndef CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 #define CORE_GEOREF_GEOGRAPHICLIB_SHIM_H
 
@@ -43,11 +43,11 @@ void shim_map_free(struct shim_map *map);
 void shim_map_anchor(const struct shim_map *map, double anchor[3]);
 /* The place of the centre: degrees, degrees, ellipsoidal height. */
 void shim_map_place(const struct shim_map *map, double place[3]);
-/* The figures that longitude depends on: how differences in prcs lie to the centre's meridian. */
+/* The figures that longitude depends on: how differences in prcs lie relative to the centre's meridian. */
 struct shim_meridian {
     double turn[9];          /* differences in prcs -> east, north, up at the centre, row by row */
     double axis_m;           /* from the Earth's axis, or from the pole in a UPS grid */
-    double sin_lat, cos_lat; /* how up and north point along the axis; in a UPS grid as at the pole */
+    double sin_lat, cos_lat; /* components of up and of north along the Earth's axis; in a UPS grid those at the pole */
 };
 /* 0 where there is none: from a UTM grid. */
 int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out);

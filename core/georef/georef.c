@@ -2,6 +2,7 @@
 #include "core/georef.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,12 +13,13 @@
 #include "core/mat3.h"
 #include "core/vec3.h"
 
-/* Polynomials are fitted within this. Where longitude is one of their outputs it is 1/64 of the distance
- * from the axis: the series of longitude converges within that distance. */
+/* Polynomials are fitted within FIT_MAX_M. Where longitude is one of their outputs, the limit is FIT_OF_AXIS of the
+ * distance from the Earth's axis, since the series of longitude converges only within that distance. Below FIT_LEAST_M
+ * there are no polynomials. */
 #define FIT_MAX_M   20000.0
 #define FIT_OF_AXIS (1.0 / 64.0)
 #define FIT_LEAST_M 1.0
-/* Nearer to a pole there is no longitude to begin with. */
+/* A centre nearer to the axis than this is at the pole, and has no longitude. */
 #define AXIS_LEAST_M 1.0
 
 static int check_spec(const struct georef_spec *spec, struct sh_err *err)
@@ -35,7 +37,7 @@ static int check_spec(const struct georef_spec *spec, struct sh_err *err)
     return rc;
 }
 
-/* Refuses a matrix that is no rotation by more than rounding. */
+/* Refuses a matrix that differs from a rotation by more than rounding. */
 static int check_rotation(const double r[9], struct sh_err *err)
 {
     for (int i = 0; i < 9; i++) {
@@ -47,7 +49,7 @@ static int check_rotation(const double r[9], struct sh_err *err)
     return SH_OK;
 }
 
-/* How the scene frame lies: a grid, or turned; a rotation of zeros stands for the unit matrix. */
+/* Checks how the scene frame lies, and puts the unit matrix in the place of a rotation of zeros. */
 static int set_up_frame(struct georef_spec *spec, struct sh_err *err)
 {
     static const double none[9];
@@ -98,14 +100,15 @@ static void set_up_centre(struct georef *georef)
 
 static int fail_map(const struct georef_spec *spec, const char *why, struct sh_err *err)
 {
+    char name[32] = "UPS";
+    if (spec->utm_zone != GEOREF_UPS) snprintf(name, sizeof name, "UTM zone %d", spec->utm_zone);
     if (spec->prcs_is_grid)
         return sh_fail(err, SH_EINPUT,
                        "georef: the grid of the scene or of the output does not reach latitude %g, longitude %g (%s)",
                        spec->lat_deg, spec->lon_deg, why);
     if (spec->crs == GEOREF_UTM)
-        return sh_fail(err, SH_EINPUT,
-                       "georef: UTM zone %d does not reach latitude %g, longitude %g (%s); 0: by position",
-                       spec->utm_zone, spec->lat_deg, spec->lon_deg, why);
+        return sh_fail(err, SH_EINPUT, "georef: %s does not reach latitude %g, longitude %g (%s)%s", name,
+                       spec->lat_deg, spec->lon_deg, why, spec->utm_zone > 0 ? "; zone 0: by position" : "");
     return sh_fail(err, SH_EINPUT, "georef: %s", why);
 }
 

@@ -49,9 +49,12 @@ int georef_locate_utm(int zone, int north, const double grid_m[3], struct georef
     if (zone < 0 || zone > 60) return sh_fail(err, SH_EINPUT, "UTM zone %d; allowed 1 to 60, or 0: UPS", zone);
     if (!isfinite(grid_m[0]) || !isfinite(grid_m[1]) || !isfinite(grid_m[2]))
         return sh_fail(err, SH_EINPUT, "%s coordinates are not finite numbers of metres", zone == 0 ? "UPS" : "UTM");
-    if (shim_locate_utm(zone, north, grid_m, out, why, sizeof why) != 0)
-        return sh_fail(err, SH_EINPUT, "%.3f E %.3f N is not in %s %d%c (%s)", grid_m[0], grid_m[1],
-                       zone == 0 ? "UPS" : "UTM zone", zone, north ? 'N' : 'S', why);
+    if (shim_locate_utm(zone, north, grid_m, out, why, sizeof why) != 0) {
+        char name[32];
+        snprintf(name, sizeof name, zone == 0 ? "UPS " : "UTM zone %d", zone);
+        return sh_fail(err, SH_EINPUT, "%.3f E %.3f N is not in %s%c (%s)", grid_m[0], grid_m[1], name,
+                       north ? 'N' : 'S', why);
+    }
     out->height_m = grid_m[2];
     return SH_OK;
 }

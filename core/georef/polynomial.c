@@ -5,8 +5,8 @@
  * interpolated by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are
  * kilometres apart. So the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in a
  * coefficient of degree k, and return multiplied by (scene / 20 km)^k only. Derivatives by small differences
- * would amplify the rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. In the meridian the nodes
- * lie in its plane.
+ * would amplify the rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. For the form `meridian` all
+ * nodes lie in the meridian's plane.
  *
  * Bound. The error of an order, at every point of the cylinder, is at most the sum of four parts: the
  * absolute values of the terms left out up to degree 6, each at its own worst place; the rest of the series,
@@ -77,8 +77,8 @@ static void next_power(int power[3])
     }
 }
 
-/* Nodes in the meridian's plane, given as 0, n, u, and the map there. Beyond the pole latitude goes on beyond
- * 90 degrees. */
+/* Replaces the nodes in the meridian's plane, whose n and u are in value[1] and value[2], by the map there. Beyond the
+ * pole, latitude counts on beyond 90 degrees, so that it stays smooth. */
 static void sample_meridian(const struct shim_map *map, const struct polynomial *p, double value[3][CUBE])
 {
     double place[3], pole;
@@ -94,7 +94,8 @@ static void sample_meridian(const struct shim_map *map, const struct polynomial 
     }
 }
 
-/* Among the terms of degree d, x^a y^b has the place (d-a)(d-a+1)/2, and y^b z^c the place d(d+1)/2 + c. */
+/* Copies the terms of two variables. Among the terms of degree d, x^a y^b has the place (d-a)(d-a+1)/2, and y^b z^c the
+ * place d(d+1)/2 + c. */
 static void set_up_plane(struct polynomial *p)
 {
     int first = 0, at = 0, meridian = p->form == POLYNOMIAL_MERIDIAN;
@@ -183,8 +184,8 @@ static double series_bound_m(const struct polynomial *p, int order, double radiu
     return bound_m + 10.0 * whole_m[POLYNOMIAL_DEGREE] * ratio * reach_m / p->half_m;
 }
 
-/* Points of a frame that is turned may be as far up as they are away. Turning into the meridian moves a point
- * by s - a, at most radius^2 / 2a. */
+/* Where prcs z is not up at the centre, a point may be as far up as it is away. Turning a point into the meridian moves
+ * it by s - a, which is at most radius^2 / 2a. */
 static double meridian_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                                const double weight[3])
 {

@@ -18,13 +18,13 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
         unit[i] = 1.0;
     }
     if (!georef_has_map(georef)) return;
-    if (georef->crs == GEOREF_ECEF) { /* from a grid, whose lengths differ by less than this */
+    if (georef->crs == GEOREF_ECEF) { /* prcs is a grid, whose lengths differ from true ones by less than 10 % */
         for (int i = 0; i < 3; i++)
             span[i] *= 1.1;
         return;
     }
-    /* Heights differ from those of the tangent plane by reach^2 / 2R. Those of a geoid change by less than 1 % of the
-     * way. */
+    /* Heights differ from those of the tangent plane by reach^2 / 2R. A geoid's height changes by less than 1 % of the
+     * distance. */
     span[2] = reach_m * 1.01 + reach_m * reach_m / (2 * 6.3e6);
     if (georef->crs == GEOREF_UTM) {
         double convergence_rad, scale;

@@ -23,7 +23,7 @@
 
 enum { LOOK_MS = 20, MAX_WARNINGS = 1000 };
 
-#define LEAST_MORE_NS ((int64_t)10000000000) /* for a second reader, once the first has ended */
+#define LEAST_MORE_NS ((int64_t)10000000000) /* what a second reader gets at least, once the first has ended */
 
 uint64_t import_memory_of(pid_t pid, enum import_memory which)
 {
@@ -60,7 +60,7 @@ void import_close(struct import_apart *a)
     }
 }
 
-/* Signals are blocked until the child has handlers of its own: this process's must not run there. */
+/* Forks with all signals blocked, so that this process's handlers don't run in the child. The child unblocks them. */
 static int start_child(struct import_apart *a, struct sh_err *err)
 {
     sigset_t all, before;
@@ -106,7 +106,7 @@ static void take_note(struct import_apart *a, struct import_note *note)
         sh_fail(&a->said, note->code >= SH_ELOST && note->code < 0 ? note->code : SH_EINPUT, "%s", note->text);
 }
 
-/* Takes all notes that have come, each of them whole. 0: the pipe is closed. */
+/* Takes all notes that have arrived. A note is written in one piece, so it is read whole. 0: the pipe is closed. */
 static int take_notes(struct import_apart *a)
 {
     struct import_note note;

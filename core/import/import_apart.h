@@ -27,13 +27,13 @@ struct import_apart {
     struct import_task task; /* name, argv, b and limits by the caller */
     int result_fd, note[2], pid_fd;
     pid_t pid;
-    int64_t start_ns, end_ns; /* begin, and the latest end */
-    uint64_t most_bytes;      /* its resident memory */
-    int is_over, status;      /* as of waitpid */
+    int64_t start_ns, end_ns; /* when it began, and when it must have ended */
+    uint64_t most_bytes;      /* limit of its resident memory */
+    int is_over, status;      /* whether the process has ended; its status as waitpid gives it */
     enum import_end end;
     bool is_shortened; /* end_ns comes from the other reader */
     int n_warnings;
-    struct sh_err said; /* its error */
+    struct sh_err said; /* the error that it reported; code 0: none */
 };
 /* Fails where no process can be made; nothing is open then. */
 int import_start(struct import_apart *a, struct sh_err *err);

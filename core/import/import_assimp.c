@@ -8,7 +8,6 @@
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #include <assimp/config.h>
@@ -32,7 +31,7 @@ struct import {
     struct scene_build *b;
     struct assimp_lib lib;
     const struct aiScene *in;
-    const struct aiMatrix4x4 *level[MAX_DEPTH]; /* of the node and above it, root first; identities left out */
+    const struct aiMatrix4x4 *level[MAX_DEPTH]; /* matrices from the root to the node; identities left out */
     int n_levels;
     struct import_uv uv;      /* of the mesh at hand */
     unsigned n_turned;        /* meshes whose texture is turned */
@@ -75,8 +74,9 @@ static double largest_of(const double v[3], double largest)
     return largest;
 }
 
-/* Takes vertices that are up to `most` in each direction, with an error up to `error`, through one row of a matrix. The
- * row's numbers were rounded to single precision, too; only 0 and 1 are exact. */
+/* Finds the largest coordinate, and its error, that one row of a matrix makes of vertices up to `most` in each
+ * direction with errors up to `error`. The row's numbers were rounded to single precision, too; only 0 and 1 are
+ * exact. */
 static void add_rounding(const ai_real row[4], const double most[3], const double error[3], double *out_most,
                          double *out_error)
 {
@@ -90,7 +90,7 @@ static void add_rounding(const ai_real row[4], const double most[3], const doubl
     }
 }
 
-/* Keeps the error of a mesh's vertices, up to `most` in each direction, through all levels. */
+/* Finds the error of a mesh's vertices, up to `most_in` in each direction, once all levels have placed them. */
 static void keep_error(struct import *im, const double most_in[3])
 {
     double most[3], error[3], next_most[3], next_error[3];
@@ -210,7 +210,7 @@ static int add_node(struct import *im, const struct aiNode *node, int depth, str
     return rc;
 }
 
-/* Every instance counts, as it does in the loop that reports. */
+/* Counts every instance, as add_mesh does where it reports progress. */
 static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
 {
     uint64_t n = 0;
@@ -255,9 +255,7 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
 static struct aiNode root_of(const struct aiScene *in, const char *file)
 {
     struct aiNode root = *in->mRootNode;
-    const char *dot = strrchr(file, '.');
-    if (dot != NULL && strcasecmp(dot, ".fbx") == 0)
-        root.mTransformation = (struct aiMatrix4x4){.a1 = 1, .b2 = 1, .c3 = 1, .d4 = 1};
+    if (text_has_ending(file, ".fbx")) root.mTransformation = (struct aiMatrix4x4){.a1 = 1, .b2 = 1, .c3 = 1, .d4 = 1};
     return root;
 }
 
@@ -266,7 +264,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct import im = {.b = b};
     struct import_log log = {0};
     struct stat st;
-    /* Assimp's C interface has no progress: say once that a large file will take a while. */
+    /* Assimp's C interface reports no progress, so a message at the start says that a large file takes a while. */
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
     int rc = assimp_lib_load(&im.lib, err);
     if (rc != SH_OK) return rc;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The process that reads: limits first, then the work, then the scene into the file of the task.
+/* The process that reads sets its limits, does the work, and writes the scene into the file of the task.
  *
  * For all but IFC it is a fork without exec. The parent may have threads; only this one is left in the fork. glibc lets
  * such a process use malloc and stdio; libraries are loaded before the fork. It ends by _exit, which runs
@@ -27,8 +27,7 @@ _Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written i
 
 static int note_fd; /* the pipe, before and after it is moved to its place */
 
-/* Errors are reported by the pipe alone. Where that fails, the exit status still shows that something
- * did. */
+/* Only the pipe reports errors. Where a write to it fails, the exit status still shows that reading failed. */
 static void send_note(const struct import_note *note)
 {
     while (write(note_fd, note, sizeof *note) < 0 && errno == EINTR)
@@ -54,16 +53,16 @@ static void send_progress(void *ctx, const char *what, double fraction)
     send_text(IMPORT_PROGRESS, 0, fraction, what);
 }
 
-/* Sets signals as they are in a new program. Ctrl-C reaches both processes: the parent decides what it
- * means. */
+/* Resets signals as in a new program. Those in the list are ignored: Ctrl-C reaches both processes, and the parent
+ * decides what it means; a write that fails returns an error. */
 static void set_signals(void)
 {
-    static const int parents[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXFSZ};
+    static const int ignored[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXFSZ};
     sigset_t none;
     for (int s = 1; s < NSIG; s++)
         signal(s, SIG_DFL);
-    for (size_t i = 0; i < sizeof parents / sizeof parents[0]; i++)
-        signal(parents[i], SIG_IGN);
+    for (size_t i = 0; i < sizeof ignored / sizeof ignored[0]; i++)
+        signal(ignored[i], SIG_IGN);
     sigemptyset(&none);
     sigprocmask(SIG_SETMASK, &none, NULL);
 }
@@ -102,8 +101,8 @@ static void offer_to_the_oom_killer(void)
     close(fd);
 }
 
-/* The parent watches the memory in use, and the clock. The kernel's limits are the second line: processor time, for
- * a parent that is stopped, and in a fork the address space. That limit is twice the one of memory, since a process has
+/* The parent watches the memory in use, and the clock. The kernel's limits also work while the parent is stopped:
+ * processor time, and in a fork the address space. That limit is twice the one of memory, since a process has
  * more address space than memory. The address sanitizer takes terabytes of it. */
 static int set_limits(const struct import_task *task)
 {
@@ -118,7 +117,7 @@ static int set_limits(const struct import_task *task)
         done = done && set_limit(RLIMIT_AS, import_memory_of(getpid(), IMPORT_ADDRESSES) + 2 * bytes);
 #endif
     offer_to_the_oom_killer();
-    return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* no core dump by a pipe either, which ignores the limit */
+    return done && prctl(PR_SET_DUMPABLE, 0) == 0; /* a core dump into a pipe ignores RLIMIT_CORE */
 }
 
 static int prepare(const struct import_task *task, struct sh_err *err)

@@ -13,8 +13,8 @@ struct scene_build;
 enum import_note_kind { IMPORT_WARNING = 1, IMPORT_PROGRESS, IMPORT_ERROR };
 
 struct import_note {
-    int32_t kind, code; /* code: of an error */
-    double fraction;    /* of a progress */
+    int32_t kind, code; /* code: of IMPORT_ERROR */
+    double fraction;    /* of IMPORT_PROGRESS */
     char text[512];
 };
 
@@ -29,7 +29,7 @@ struct import_task {
     int result_fd, note_fd; /* the scene, the messages; a program finds them as 3 and 4 */
 };
 
-/* Reads the file that b is at, in a process that was just forked with all signals blocked. Exit status 0: the
+/* Reads the file of task->b, in a process that was just forked with all signals blocked. Exit status 0: the
  * scene is written. */
 _Noreturn void import_child(const struct import_task *task);
 

@@ -32,7 +32,7 @@ static bool is_colour(const struct aiColor4D *c)
     return is_share(c->r) && is_share(c->g) && is_share(c->b);
 }
 
-/* The first colour that comes with a material's name stays. glTF has linear colours. */
+/* Keeps a surface's first colour. glTF has linear colours. */
 static void keep_colour(const struct assimp_lib *lib, const struct scene_build *b, const struct aiMaterial *material,
                         struct scene_surface *surface)
 {
@@ -137,7 +137,7 @@ static const char *without_folder(const char *path)
     return last != NULL ? last + 1 : path;
 }
 
-/* An image within the mesh's file: "*3", or by the name that it once had as a file. *number: -1, none. */
+/* Finds an image within the mesh's file, by "*3" or by the name that it once had as a file. *number is -1 for none. */
 static const struct aiTexture *find_within(const struct aiScene *in, const char *path, long *number)
 {
     *number = path[0] == '*' ? strtol(path + 1, NULL, 10) : -1;
@@ -148,8 +148,8 @@ static const struct aiTexture *find_within(const struct aiScene *in, const char 
     return *number >= 0 && *number < (long)in->mNumTextures ? in->mTextures[*number] : NULL;
 }
 
-/* An image within the mesh's file gets that file's name and its own number. Height 0 means that it is packed: then its
- * width counts bytes. */
+/* An image within the mesh's file gets that file's name and its own number. In Assimp, height 0 means that the image is
+ * packed (PNG, JPEG), and its width counts bytes. */
 static int add_image(struct scene_build *b, const struct aiScene *in, const struct slot *slot, uint16_t *number,
                      struct sh_err *err)
 {
@@ -170,7 +170,8 @@ static int add_image(struct scene_build *b, const struct aiScene *in, const stru
     return build_texture(b, &image, number, err);
 }
 
-/* glTF says whether alpha counts; other formats may say that it doesn't. */
+/* Returns the opacity below which a texel is a hole. glTF says whether alpha counts; other formats may say that it
+ * doesn't. */
 static float solid_from(const struct assimp_lib *lib, const struct scene_build *b, const struct aiMaterial *material,
                         unsigned flags)
 {

@@ -27,7 +27,7 @@ void import_rgb(struct scene_build *b, const struct aiColor4D *colour, uint8_t r
 struct import_uv {
     unsigned set;
     double scale[2], shift[2];
-    bool is_turned; /* and turned, which is not read: Assimp says it in ways that differ by format */
+    bool is_turned; /* the texture is rotated, too; not read, since its meaning in Assimp differs by format */
 };
 /* material: NULL for none. */
 void import_uv(const struct assimp_lib *lib, const struct aiMaterial *material, struct import_uv *uv);

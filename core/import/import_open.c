@@ -53,7 +53,7 @@ struct aiFile import_open_stream(FILE *stream)
     return (struct aiFile){on_read, on_write, on_tell, on_size, on_seek, on_flush, (char *)(void *)stream};
 }
 
-/* Assimp asks for many names that need not exist. */
+/* Opens a file to read. Assimp also asks for names that need not exist, so a missing file is not noted as refused. */
 static struct aiFile *on_open(struct aiFileIO *io, const char *path, const char *mode)
 {
     struct import_open *open = (struct import_open *)(void *)io->UserData;

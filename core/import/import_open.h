@@ -13,7 +13,7 @@ struct import_open {
 };
 
 void import_open_set_up(struct import_open *open);
-/* A file as Assimp calls it, to read or to write (core/studio/mesh). The stream stays the caller's. */
+/* Wraps a stream as a file of Assimp, to read or to write (core/studio/mesh). The stream stays the caller's. */
 struct aiFile import_open_stream(FILE *stream);
 
 #endif

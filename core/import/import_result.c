@@ -15,7 +15,7 @@
 #include "core/scene/build_surfaces.h"
 
 enum {
-    AT_ONCE = 1 << 13,       /* elements between two looks at `stop` */
+    AT_ONCE = 1 << 13,       /* elements between two checks of `stop` */
     MAX_TEXTURE_NAME = 8192, /* bytes */
 };
 
@@ -29,7 +29,7 @@ struct result_head {
     struct scene_says says;
 };
 
-/* Before its name and its bytes. */
+/* Stands before a texture's name and bytes. */
 struct result_texture {
     uint64_t name_len, n_bytes;
     uint32_t raw_width, raw_height, wrap[2];
@@ -75,9 +75,8 @@ static int put_array(int fd, void **array, size_t size, struct sh_err *err)
     return rc;
 }
 
-int import_result_write(struct scene *scene, int fd, struct sh_err *err)
+int import_result_write(struct scene *s, int fd, struct sh_err *err)
 {
-    struct scene *s = scene;
     struct result_head head = {.n_vertices = s->n_vertices,
                                .n_triangles = s->n_triangles,
                                .n_surfaces = s->n_surfaces,
@@ -140,7 +139,8 @@ static int import_result_take(struct result *r, void *data, size_t size)
     return rc;
 }
 
-/* A name in the mesh's folder is handed back with that folder. */
+/* The other process found the texture in the mesh's folder, so its path begins with that folder. build_texture adds the
+ * folder again, so it is cut off here. */
 static int add_texture(struct result *r, const char *file, const void *bytes, const struct result_texture *size,
                        uint32_t i)
 {
@@ -247,7 +247,7 @@ static int take_vertices(struct result *r)
     return rc;
 }
 
-/* Some triangles, as the file's arrays have them. */
+/* As many triangles as are read at a time, in arrays as the file has them. */
 struct triangles {
     uint32_t corner[AT_ONCE][3];
     uint16_t label[AT_ONCE];

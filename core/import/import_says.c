@@ -5,9 +5,10 @@
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
 #include <assimp/scene.h>
+
+#include "core/text.h"
 
 /* Returns a number of the file's metadata, or `other` where it isn't there or is not a number. */
 static double number_of(const struct aiScene *in, const char *key, double other)
@@ -46,7 +47,7 @@ static int axis_of(const struct aiScene *in, const char *key, const char *sign_k
 static int is_left_handed(int right, int up, int front)
 {
     const int a = right < 0 ? -right : right, b = up < 0 ? -up : up, c = front < 0 ? -front : front;
-    if (a * b * c != 6 || a + b + c != 6) return 0; /* they are not three axes: nothing follows */
+    if (a * b * c != 6 || a + b + c != 6) return 0; /* they are not three different axes */
     return (b == a % 3 + 1) == ((right < 0) + (up < 0) + (front < 0)) % 2;
 }
 
@@ -66,8 +67,7 @@ static struct scene_says fbx_says(const struct aiScene *in)
 struct scene_says import_says(const struct aiScene *in, const char *file)
 {
     static const char *const metres_y_up[] = {".gltf", ".glb", ".dae", ".ifc"};
-    const char *dot = strrchr(file, '.');
-    for (size_t i = 0; dot != NULL && i < sizeof metres_y_up / sizeof metres_y_up[0]; i++)
-        if (strcasecmp(dot, metres_y_up[i]) == 0) return (struct scene_says){.unit_m = 1.0, .up = 2};
-    return dot != NULL && strcasecmp(dot, ".fbx") == 0 ? fbx_says(in) : (struct scene_says){0};
+    for (size_t i = 0; i < sizeof metres_y_up / sizeof metres_y_up[0]; i++)
+        if (text_has_ending(file, metres_y_up[i])) return (struct scene_says){.unit_m = 1.0, .up = 2};
+    return text_has_ending(file, ".fbx") ? fbx_says(in) : (struct scene_says){0};
 }

@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* scene_load finds the reader of each file by its ending, and makes the scene of all of them. */
-#include <errno.h>
 #include <math.h>
-#include <string.h>
-#include <strings.h>
-#include <sys/stat.h>
 
 #include "core/import/readers.h"
+#include "core/infile.h"
 #include "core/scene/build_load.h"
 #include "core/scene/copies.h"
 #include "core/scene/cutouts.h"
@@ -28,19 +25,18 @@ static int check_spec(struct scene_build *b, struct sh_err *err)
     for (int k = 0; k < 3; k++)
         if (!isfinite(spec->offset_m[k]))
             return build_fail(b, SH_EINPUT, err, "offset %g; allowed are finite numbers", spec->offset_m[k]);
-    struct stat st;
-    if (stat(spec->file, &st) != 0) return build_fail(b, SH_EINPUT, err, "%s", strerror(errno));
-    if (!S_ISREG(st.st_mode)) return build_fail(b, SH_EINPUT, err, "not a file");
+    const char *why;
+    FILE *file = infile_open(spec->file, &why);
+    if (file == NULL) return build_fail(b, SH_EINPUT, err, "%s", why);
+    fclose(file);
     return SH_OK;
 }
 
 static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, struct sh_err *err)
 {
     build_begin_file(b, spec);
-    size_t len = strlen(spec->file);
     for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
-        size_t ending_len = strlen(readers[i].ending);
-        if (len <= ending_len || strcasecmp(spec->file + len - ending_len, readers[i].ending) != 0) continue;
+        if (!text_has_ending(spec->file, readers[i].ending)) continue;
         int rc = check_spec(b, err);
         if (rc == SH_OK) rc = readers[i].read(b, err);
         return rc == SH_OK ? build_end_file(b, err) : rc;

@@ -12,16 +12,16 @@
 #include "core/scene/find_file.h"
 #include "core/text.h"
 
-/* Missing things of a kind: one warning counts them, and names the first. */
+/* Values or files of one kind that are left out or missing. One warning counts them, and names the first. */
 struct missing {
     uint64_t n, line;
     char first[96];
 };
 
-/* The libraries say this of a surface's material. */
+/* Notes about a surface's material, from all libraries read so far. */
 struct known {
-    bool is_there;
-    uint32_t opacity_by; /* definition that has its opacity; 0: none so far */
+    bool is_there;       /* a library defines it */
+    uint32_t opacity_by; /* number of the definition that gave its opacity; 0: none so far */
 };
 
 struct mtl {
@@ -31,9 +31,9 @@ struct mtl {
     uint32_t first;            /* surface of the OBJ */
     struct known *known;       /* [surfaces from first on] */
     uint32_t definition;       /* number of the newmtl at hand, from 1 */
-    char name[SCENE_NAME_LEN]; /* newmtl, cut as the names of surfaces are */
-    struct text_span material; /* of name */
-    bool has_opacity;          /* d of the material at hand, which counts before Tr */
+    char name[SCENE_NAME_LEN]; /* of newmtl, cut as the names of surfaces are */
+    struct text_span material; /* all of name */
+    bool has_opacity;          /* the material at hand has had d, which counts before Tr */
     struct missing colour, opacity, texture;
 };
 
@@ -201,7 +201,7 @@ static void read_map(const struct text *t, struct text_span text, struct map *ma
     map->image.name = without_quotes((struct text_span){p, (size_t)(end - p)});
 }
 
-/* How an image lies on the triangles of a surface: their coordinates on it, from those of the file. */
+/* Applies a map's scale and shift to the texture coordinates of a surface's triangles. */
 static void move_uv(struct scene_build *b, uint32_t label, const struct map *map)
 {
     struct scene *s = b->scene;
@@ -319,8 +319,8 @@ static struct text_span next_name(const char **p, const char *end)
     return name;
 }
 
-/* A line holds several names, or one with blanks, perhaps with a comment after it. The reading for which a file exists
- * is taken. */
+/* A line holds several names, or one name with blanks, perhaps with a comment after it. The interpretation for which a
+ * file exists is taken. */
 static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, struct sh_err *err)
 {
     const struct text_span whole = without_quotes(line->names), bare = without_comment(line->names);
@@ -335,7 +335,7 @@ static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, stru
         rc = read_if_there(m, next_name(&p, end), line->line, &found, err);
         any |= found;
     }
-    for (const char *p = bare.p; p < end && any;) { /* some exist: the others are reported singly */
+    for (const char *p = bare.p; p < end && any;) { /* some exist: each of the others gets a warning */
         const struct text_span folder = build_folder_of(m->b->spec->file), name = next_name(&p, end);
         char *path = build_find_file(&folder, 1, name);
         if (path == NULL) warn_of_library(m, name, line->line);

@@ -30,7 +30,7 @@ struct obj {
     double rgb_scale; /* 0: not known yet */
     struct later *later;
     size_t n_later, cap_later;
-    const struct later *again; /* the one that is read now, after all statements; NULL before */
+    const struct later *again; /* the face that is read again now, after all statements; NULL before */
     struct text_span object, material;
     struct mtl_line *library; /* lines that name libraries */
     size_t n_libraries, cap_libraries;
@@ -122,7 +122,7 @@ static int read_uv(struct obj *o, struct sh_err *err)
 /* A vertex may come later in the file than the face that names it. */
 enum { LATER = 1 };
 
-/* Index 0: the corner has none. */
+/* Sets the corner's texture coordinates. Index 0: it has none. */
 static int set_corner_uv(struct obj *o, int64_t index, float uv[2], struct sh_err *err)
 {
     const size_t seen = o->again != NULL ? o->again->n_uv : o->n_uv;
@@ -295,7 +295,7 @@ static int read_statements(struct obj *o, struct sh_err *err)
     return rc;
 }
 
-/* All vertices are there now. */
+/* Reads the faces that were kept for later. All vertices are known now. */
 static int read_later(struct obj *o, struct sh_err *err)
 {
     int rc = SH_OK;

@@ -29,18 +29,14 @@ static int check_mesh(const struct ply *y, struct sh_err *err)
 
 /* ---- vertices */
 
-static const struct ply_lost *find_lost(const struct ply *y, uint32_t number)
+static int compare_lost(const void *number, const void *lost)
 {
-    size_t from = 0, to = y->n_lost;
-    while (from < to) {
-        const size_t at = (from + to) / 2;
-        if (y->lost[at].number == number) return &y->lost[at];
-        *(y->lost[at].number < number ? &from : &to) = y->lost[at].number < number ? at + 1 : at;
-    }
-    return NULL;
+    const uint32_t a = *(const uint32_t *)number, b = ((const struct ply_lost *)lost)->number;
+    return (a > b) - (a < b);
 }
 
-/* A vertex that is not finite is an error only where a face uses it. Its number stays taken. */
+/* A vertex that is not finite is an error only where a face uses it. It keeps its number, so that the others keep
+ * theirs. */
 static int lose_vertex(struct ply *y, const double v[3], struct sh_err *err)
 {
     static const double nowhere[3] = {0.0, 0.0, 0.0};
@@ -76,7 +72,7 @@ static int take_vertex(struct ply *y, struct sh_err *err)
 
 /* ---- faces */
 
-/* Corner `to` of the next polygon is the one at `from` of the row. */
+/* Sets corner `to` of the next polygon to corner `from` of the row. */
 static int set_corner(struct ply *y, size_t to, size_t from, struct sh_err *err)
 {
     const uint32_t *number = y->weld.number, n = y->b->scene->n_vertices - y->b->vertex0 + y->b->n_welded;
@@ -87,7 +83,8 @@ static int set_corner(struct ply *y, size_t to, size_t from, struct sh_err *err)
         return ply_fail(&y->r, err, what);
     }
     const uint32_t at = (uint32_t)index;
-    const struct ply_lost *lost = y->n_lost > 0 ? find_lost(y, at) : NULL;
+    const struct ply_lost *lost =
+        y->n_lost > 0 ? bsearch(&at, y->lost, y->n_lost, sizeof *y->lost, compare_lost) : NULL;
     if (lost != NULL) {
         y->b->line = lost->line;
         return build_fail(y->b, SH_EINPUT, err, "vertex %u (%g %g %g) is not finite, and a face uses it", at + 1,
@@ -163,8 +160,8 @@ static int note_rounding(const struct ply *y, struct sh_err *err)
     return build_single(y->b, largest, largest * BUILD_SINGLE_ROUNDING, false, err);
 }
 
-/* With more vertices than faces, faces hardly share vertices. Where they share them, there are half as
- * many vertices as faces. */
+/* Whether faces hardly share vertices: there are more vertices than faces. A closed mesh of triangles that shares them
+ * has half as many vertices as faces. */
 static bool is_torn(const struct ply *y, uint64_t vertices)
 {
     for (int i = 0; i < y->r.h.n_elements; i++)

@@ -18,7 +18,7 @@ struct ply {
     struct scene_build *b;
     struct ply_rows r;
     uint16_t label;         /* of the next face */
-    struct build_weld weld; /* number NULL: vertices are taken as they come */
+    struct build_weld weld; /* number NULL: vertices are not merged */
     struct ply_lost *lost;  /* in the order of the file */
     size_t n_lost, cap_lost;
     uint64_t n_empty; /* faces without corners */
@@ -29,11 +29,11 @@ struct ply {
     size_t n_colours, cap_colours;
     double rgb_scale;  /* of colours of vertices; 0: not known yet */
     double face_scale; /* of those of faces */
-    /* These are there, and wanted: */
+    /* The file has these, and they are wanted: */
     bool has_vertex_rgb;               /* colours of vertices */
     bool has_face_rgb;                 /* colours of faces, in the element at hand */
     bool has_uv;                       /* texture coordinates, by vertex, face or both */
-    bool has_vertex_uv, has_texcoords; /* those of vertices; those of the row at hand, a pair for each corner */
+    bool has_vertex_uv, has_texcoords; /* by vertex; by face, in the row at hand, a pair for each corner */
     bool has_texnumbers;
     bool has_label[PLY_MAX_TEXTURES + 1];
     uint16_t labels[PLY_MAX_TEXTURES + 1]; /* by texture; the last is that of faces without */

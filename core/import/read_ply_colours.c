@@ -24,7 +24,7 @@ static bool has_rgb(const struct ply *y, enum ply_kind kind)
            read_ply_colours_find(y, kind, PLY_BLUE) != NULL;
 }
 
-/* The factor to 0..255; 0: a floating type, whose numbers decide. */
+/* The factor that brings colours to 0..255; 0: the type is floating, and the numbers themselves decide. */
 static double scale_of(const struct ply_property *p)
 {
     return p->type == PLY_FLOAT || p->type == PLY_DOUBLE ? 0.0 : p->type == PLY_UINT16 ? 255.0 / 65535.0 : 1.0;
@@ -79,7 +79,8 @@ int ply_begin_textures(struct ply *y, struct sh_err *err)
     return SH_OK;
 }
 
-/* The label of faces with texture i; the last one is that of faces without. A file with one texture has one label. */
+/* Sets the label of faces with texture i. PLY_MAX_TEXTURES stands for faces without one. A file with one texture has
+ * one label. */
 static int use_label(struct ply *y, int i, struct sh_err *err)
 {
     const bool is_named = y->has_texnumbers && i < PLY_MAX_TEXTURES;

@@ -59,7 +59,7 @@ static int read_facet(struct stl *s, const char *p, struct sh_err *err)
     return rc == SH_OK ? build_polygon(s->b, 3, s->label, err) : rc;
 }
 
-/* Corners are floats: rounded when the file was written, and taken as they are. */
+/* Corners are floats, which were rounded when the file was written. They are taken as they are. */
 static int read_binary(struct stl *s, struct sh_err *err)
 {
     const uint32_t n = le_get32(s->t.data + COUNT_AT);
@@ -124,7 +124,7 @@ static int read_text_facet(struct stl *s, struct sh_err *err)
 {
     size_t n = 0;
     struct text_span word = text_word(&s->t);
-    while (word.n > 0 && !text_is_word(word, "outer")) /* the rest of the line is the normal, or also what follows it */
+    while (word.n > 0 && !text_is_word(word, "outer")) /* the normal; "outer loop" may stand on the same line */
         word = text_word(&s->t);
     int rc = word.n > 0 ? SH_OK : expect(s, "outer", err);
     if (rc == SH_OK) rc = expect(s, "loop", err);
@@ -162,7 +162,7 @@ static int read_text(struct stl *s, struct sh_err *err)
     return rc;
 }
 
-/* Its first word is solid, and no byte near it is 0. */
+/* Whether the first word is "solid", and no byte near the beginning is 0. */
 static bool is_text(const struct stl *s)
 {
     struct text t = s->t;

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/import. scene_load chooses from these readers. In: a builder that is at a file. Out: its vertices and
- * faces in the builder's scene. */
+/* Private to core/import. scene_load chooses from these readers. In: a builder whose spec names the file. Out: the
+ * file's vertices and faces in the builder's scene. */
 #ifndef CORE_IMPORT_READERS_H
 #define CORE_IMPORT_READERS_H
 
 #include "core/scene/build.h"
 
-/* The readers. Each has the spec, and the file's name, from the builder. */
 int read_obj(struct scene_build *b, struct sh_err *err);
-/* Takes what follows mtllib in a line of an OBJ. */
+/* A line `mtllib NAMES` of an OBJ. */
 struct mtl_line {
     struct text_span names;
     uint64_t line;

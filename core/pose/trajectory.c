@@ -20,7 +20,7 @@ static int stands(const struct trajectory *tr, size_t i)
                   sizeof tr->sample[i].pose.position_m) == 0;
 }
 
-/* Derivative at sample i of the parabola through it and its neighbours (at an end: its two nearest). */
+/* Derivative at sample i of the parabola through it and its neighbours (at an end: through the nearest three). */
 static double velocity(const struct trajectory *tr, size_t i, int axis)
 {
     size_t last = tr->n - 1;
@@ -45,7 +45,7 @@ static int check_sample(const struct pose_sample *s, const struct pose_sample *b
         norm2 += s->pose.quat[k] * s->pose.quat[k];
     if (!finite || !isfinite(norm2)) return sh_fail(err, SH_EINPUT, "sample %zu: not a finite number", i);
     if (!(norm2 > 1e-12)) return sh_fail(err, SH_EINPUT, "sample %zu: a quaternion of length 0", i);
-    if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
+    if (before != NULL && !trajectory_is_later(s, before))
         return sh_fail(err, SH_EINPUT, "sample %zu: %.9g s after the one before; allowed at least %g s", i,
                        s->t_s - before->t_s, 1e-6 * POSE_MIN_STEP_US);
     return SH_OK;
@@ -121,6 +121,7 @@ void trajectory_at(const struct trajectory *tr, double t_s, struct pose *pose, d
     double h = b->t_s - a->t_s, f = (t_s - a->t_s) / h, g = 1.0 - f;
     pose_between(&a->pose, &b->pose, f, pose);
     *frame = a->frame + f * (b->frame - a->frame);
+    /* The Hermite curve is the straight line plus a cubic that is 0 at both ends and corrects the velocities there. */
     for (int k = 0; k < 3; k++) {
         double d = b->pose.position_m[k] - a->pose.position_m[k];
         double va = h * tr->velocity_m_s[i][k] - d, vb = h * tr->velocity_m_s[i + 1][k] - d;
@@ -154,6 +155,7 @@ static double parts_of(const struct trajectory *tr, size_t i, const struct pose_
                         turn / LONGEST_RAD);
     double sag = (acceleration(tr, i) + turn / h * turn / h * arm_m) * h * h / 8.0; /* in one part */
     double longest_s = 1e-9 * (double)rules->longest_ns;
+    /* Without the factor, rounding would make a part too many where h is a multiple of longest_s. */
     double parts = fmax(ceil(sqrt(sag / rules->tolerance_m)), fmin(ceil(h / longest_s * (1.0 - 1e-9)), ceil(moves)));
     double most = floor(h / (1e-6 * POSE_MIN_STEP_US));
     parts = fmax(1.0, fmin(parts, most));

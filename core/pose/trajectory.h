@@ -13,6 +13,13 @@ struct trajectory {
     double (*velocity_m_s)[3];  /* at the samples */
 };
 
+/* Whether a sample is at least POSE_MIN_STEP_US after the one before. Times of a UNIX clock are rounded to parts of a
+ * microsecond, so that the step between two of them may come out shorter by one such part. */
+static inline int trajectory_is_later(const struct pose_sample *s, const struct pose_sample *before)
+{
+    return s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US - 0x1p-51 * fabs(s->t_s);
+}
+
 /* The straight way between two samples. */
 static inline double trajectory_chord_m(const struct pose_sample *a, const struct pose_sample *b)
 {

@@ -12,7 +12,7 @@
 
 static const double STEP_S = 0.02;  /* of the samples that way-points are turned into */
 static const double STEP_M = 0.01;  /* likewise, where that is longer */
-static const double LEG_PARTS = 64; /* of a leg, however short: the curve between two points is a cubic */
+static const double LEG_PARTS = 64; /* a leg may have this many, however short: a cubic curve needs them */
 static const double SLOWEST_M_S = 1e-3;
 static const double LATEST_S = 4e9; /* differences fit into 63 bits of nanoseconds, and the year 2096 since 1970 */
 
@@ -85,9 +85,9 @@ static int take_sample(const struct csv *csv, const struct pose_sample *before, 
     if (!(fabs(s->t_s) <= LATEST_S))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err, "t_s %.9g; allowed %g to %g", s->t_s, -LATEST_S,
                          LATEST_S);
-    if (before != NULL && !(s->t_s - before->t_s > 0.999e-6 * POSE_MIN_STEP_US))
+    if (before != NULL && !trajectory_is_later(s, before))
         return text_fail(&csv->text, csv->line, SH_EINPUT, err,
-                         "t_s %.9g comes after %.9g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
+                         "t_s %.15g comes after %.15g; allowed rising times, at least %g s apart", s->t_s, before->t_s,
                          1e-6 * POSE_MIN_STEP_US);
     return SH_OK;
 }
@@ -125,10 +125,10 @@ int trajectory_read_csv(const char *path, const struct sh_report *report, struct
 enum { WX, WY, WZ, SPEED, PAUSE };
 static const char *const waypoint_columns[] = {"x_m", "y_m", "z_m", "speed_m_s", "pause_s", NULL};
 
-/* The points as samples, whose times are without the pauses; and the pauses. */
+/* Way-points of a file. */
 struct way {
-    struct samples points;
-    double *pause_s, pauses_s; /* of each; their sum */
+    struct samples points;     /* their times don't count pauses */
+    double *pause_s, pauses_s; /* the pause of each point; the sum of all */
     size_t pauses_room;
 };
 
@@ -144,7 +144,7 @@ static int check_waypoint(const struct csv *csv, struct sh_err *err)
     return check_position(csv, WX, err);
 }
 
-/* speed_m_s: of the way to it. */
+/* speed_m_s is the speed on the way to this point. */
 static int add_waypoint(const struct csv *csv, double speed_m_s, struct way *way, struct sh_err *err)
 {
     const double *v = csv->value;
@@ -185,8 +185,8 @@ static int read_waypoints(struct csv *csv, struct way *way, struct sh_err *err)
     }
 }
 
-/* Heading of the way from d before t_s to d after it, in the axes of level. Where the way goes straight up
- * the heading stays. */
+/* Sets the heading of the way from d before t_s to d after it, in the axes of level. Where the way goes straight up,
+ * *heading_rad stays as it is. */
 static void heading_at(const struct trajectory *curve, double t_s, double d, const double level[9], double *heading_rad)
 {
     struct pose a, b;
@@ -199,8 +199,8 @@ static void heading_at(const struct trajectory *curve, double t_s, double d, con
     if (hypot(on_m[0], on_m[1]) > d * SLOWEST_M_S) *heading_rad = atan2(on_m[0], on_m[1]);
 }
 
-/* The share of an interval that the platform has gone after the share f of its time. It is f, or smooth where it begins
- * or ends at rest. */
+/* The share of an interval's way that is done after the share f of its time: the cubic from 0 to 1 whose slope at
+ * either end is 1, or 0 where the platform is at rest there. */
 static double along(double f, int from_rest, int to_rest)
 {
     double g = 1.0 - f;
@@ -219,7 +219,7 @@ static size_t leg_parts(const struct trajectory *curve, size_t i)
 /* Going along a curve. */
 struct walk {
     const struct trajectory *curve;
-    const struct geoframe *frame; /* NULL: level is the scene's own */
+    const struct geoframe *frame; /* NULL: up is the scene's z everywhere */
     const struct sh_report *report;
     struct samples out;
     double heading_rad; /* of the last sample */

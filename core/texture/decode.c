@@ -12,7 +12,7 @@
 
 #include "core/text.h"
 
-/* A block's size stands before it. */
+/* Each block has its size in front of it, in this many bytes. */
 enum { HEAD = 16 };
 static _Thread_local size_t memory_left;
 static _Thread_local int ran_out; /* memory was refused */
@@ -59,8 +59,8 @@ static void counted_free(void *p)
 #define STBI_MALLOC(size)     counted_alloc(size)
 #define STBI_REALLOC(p, size) counted_realloc(p, size)
 #define STBI_FREE(p)          counted_free(p)
-#define STBI_ASSERT(x)        ((void)0) /* a table of 256 short codes would end the program; the index is in range */
-#ifdef __clang__ /* stb_image adds 0 to NULL, and copies 0 bytes from there; bounds are looked at all the same */
+#define STBI_ASSERT(x)        ((void)0) /* one fails for a table of 256 short codes, though the index is in range */
+#ifdef __clang__ /* stb_image adds 0 to NULL, and copies 0 bytes from there; the address sanitizer stays on */
 #pragma clang attribute push(__attribute__((no_sanitize("undefined"))), apply_to = function)
 #endif
 #include <stb/stb_image.h>
@@ -102,7 +102,7 @@ static int unpack(const struct texture_source *s, struct texture_image *image, s
     return SH_OK;
 }
 
-/* Many writers of TGA and BMP leave a fourth channel of zeros: that is no alpha. (A PNG's is meant.) */
+/* Many writers of TGA and BMP leave a fourth channel of zeros, which is no alpha. In a PNG it is one. */
 static void drop_unused_alpha(const uint8_t *bytes, struct texture_image *image)
 {
     size_t n = (size_t)image->width * image->height, i = 0;
@@ -207,8 +207,8 @@ static const uint8_t *find_frame(const uint8_t *bytes, size_t n)
     return NULL;
 }
 
-/* stb_image itself refuses PNG and JPEG that are too large. But it then tries the other formats, so that its reason is
- * a wrong one. */
+/* stb_image itself refuses PNG and JPEG that are too large. But it then tries the other formats, and gives the reason
+ * of the last one. */
 static int check_header(const char *file, const uint8_t *bytes, size_t n, struct sh_err *err)
 {
     const uint8_t *frame = is_jpeg(bytes, n) ? find_frame(bytes, n) : NULL;
@@ -220,8 +220,8 @@ static int check_header(const char *file, const uint8_t *bytes, size_t n, struct
     return check_size(file, side[0], side[1], err);
 }
 
-/* As stbi_info_from_memory, with the reason of the file's own format. A BMP's height is negative where its rows begin
- * at the top. */
+/* As stbi_info_from_memory, but a failure has the reason of the file's own format. A BMP's height is negative where
+ * its rows begin at the top. */
 static int get_info(const uint8_t *bytes, size_t n, int *width, int *height, int *channels)
 {
     stbi__context s;
@@ -247,7 +247,7 @@ static int is_webp(const uint8_t *bytes, size_t n)
     return n >= 12 && memcmp(bytes, "RIFF", 4) == 0 && memcmp(bytes + 8, "WEBP", 4) == 0;
 }
 
-/* libwebp's other memory depends on the image's size, which is checked before. */
+/* The memory that libwebp itself takes depends on the image's size, which is checked before. */
 static int decode_webp(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                        struct texture_image *image, struct sh_err *err)
 {

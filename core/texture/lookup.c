@@ -32,7 +32,7 @@ static int64_t along(double x, uint32_t n, enum texture_wrap wrap)
     return at < (int64_t)n ? at : (int64_t)n - 1; /* at the end, or rounded to it */
 }
 
-/* Counted from the top, so that a point on the border of two rows belongs to the upper one. */
+/* The row of a coordinate, counted from the top. A point on the border of two rows belongs to the upper one. */
 static int64_t down(double y, uint32_t n, enum texture_wrap wrap)
 {
     double turn = floor(y), part = y - turn;

@@ -243,6 +243,7 @@ static void test_refusals(void **state)
         {{.crs = GEOREF_UTM, .utm_zone = -2}, "zone -2"},
         {{.crs = GEOREF_UTM, .lat_deg = 48, .lon_deg = 16, .utm_zone = 10}, "zone 10 does not reach"},
         {{.crs = GEOREF_UTM, .lat_deg = 89, .lon_deg = 16, .utm_zone = 33}, "zone 33 does not reach"},
+        {{.crs = GEOREF_UTM, .lat_deg = 50, .lon_deg = 16, .utm_zone = GEOREF_UPS}, "georef: UPS does not reach"},
         {{.crs = GEOREF_LOCAL, .station_m = {0, NAN, 0}}, "station position y"},
         {{.crs = (enum georef_crs)7}, "allowed local, ecef, utm, geodetic"},
     };
@@ -254,6 +255,12 @@ static void test_refusals(void **state)
         if (strstr(err.text, bad[i].part) == NULL) fail_msg("'%s' without '%s'", err.text, bad[i].part);
         assert_null(strchr(err.text, '\n'));
     }
+    struct georef_place at;
+    struct sh_err err = {0, ""};
+    assert_int_equal(georef_locate_utm(0, 1, (const double[3]){9e6, 2e6, 0}, &at, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "9000000.000 E 2000000.000 N is not in UPS N"));
+    assert_int_equal(georef_locate_utm(33, 0, (const double[3]){9e6, 2e6, 0}, &at, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "is not in UTM zone 33S"));
 }
 
 int main(void)

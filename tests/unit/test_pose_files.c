@@ -108,6 +108,8 @@ static void test_csv_errors(void **state)
         {NAMES "0,1 m,2,3,4\n", "line 2", "x_m"},
         {NAMES "0,1,2,3,4\n# c\n0,1,2,3,4\n", "line 4", "rising times"},
         {NAMES "0,1,2,3,4\n0.00005,1,2,3,4\n", "line 3", "at least 0.0001 s"},
+        {NAMES "1700000000.25,1,2,3,4\n1700000000.125,1,2,3,4\n", "line 3",
+         "t_s 1700000000.125 comes after 1700000000.25;"},
         {NAMES "0,1,2,3,4\n1e300,1,2,3,4\n", "line 3", "t_s 1e+300; allowed -4e+09 to 4e+09"},
         {NAMES "-1e18,1,2,3,4\n0,1,2,3,4\n", "line 2", "t_s -1e+18; allowed"},
         {"\xef\xbb" NAMES, "line 1", "is unknown"}, /* no whole byte order mark */
@@ -126,6 +128,10 @@ static void test_csv_errors(void **state)
     }
     struct trajectory *tr;
     struct sh_err err;
+    /* Steps of the least length: doubles near 1.7e9 are 0.24 us apart. */
+    write_file(NAMES "1700000000,1,2,3,4\n1700000000.0001,1,2,3,4\n1700000000.0002,1,2,3,4\n");
+    assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_OK);
+    trajectory_free(tr);
     assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", NULL, &tr, &err), SH_EINPUT);
     /* A number does not end at a byte 0. */
     static const char zero[] = NAMES "0,1\0002,2,3,4\n";

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The scene: axes, files together, checks, names, limits and refusals. */
 #include <math.h>
+#include <sys/stat.h>
 
 #include "tests/unit/scene_files.h"
 
@@ -55,6 +56,10 @@ static void files_add_up(void **state)
     unlink(a);
     assert_int_equal(scene_load(specs, 2, 1, NULL, &s, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "a.obj: No such file"));
+    assert_int_equal(mkdir(a, 0700), 0);
+    assert_int_equal(scene_load(specs, 2, 1, NULL, &s, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "a.obj: a directory, not a file"));
+    rmdir(a);
     unlink(b);
 }
 

@@ -4,23 +4,16 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 #include "core/crs.h"
 #include "core/import/geotiff/tags.h"
+#include "core/text.h"
 
 /* Tags, and keys of the tag GEO_KEYS. */
 enum { WIDTH = 256, HEIGHT = 257, PIXEL_SCALE = 33550, TIE_POINTS = 33922, TRANSFORMATION = 34264, GEO_KEYS = 34735 };
 enum { GDAL_METADATA = 42112, GDAL_NO_DATA = 42113 };
-enum {
-    MODEL = 1024,
-    RASTER = 1025,
-    GEOGRAPHIC = 2048,
-    PROJECTED = 3072,
-    UNIT = 3076,
-    VERTICAL = 4096,
-    VERTICAL_UNIT = 4099
-};
+enum { MODEL = 1024, RASTER = 1025, GEOGRAPHIC = 2048, PROJECTED = 3072, UNIT = 3076 };
+enum { VERTICAL = 4096, VERTICAL_UNIT = 4099 };
 enum { MODEL_PROJECTED = 1, MODEL_GEOGRAPHIC, MODEL_GEOCENTRIC, RASTER_IS_POINT = 2, USER_DEFINED = 32767 };
 enum { MOST_KEYS = 512, FIRST_ELLIPSOID = 5001, LAST_ELLIPSOID = 5033, FIRST_VERTICAL_EPSG = 5100 };
 
@@ -32,15 +25,14 @@ struct reader {
     struct geotiff *g;
     double key[4 * MOST_KEYS];
     size_t n_key;
-    double map[16];           /* rows: easting, northing and height, in the file's units, of column, row, value, 1 */
+    double map[16];           /* rows: easting, northing, height in the file's units; columns: column, row, value, 1 */
     double z_scale, z_offset; /* of heights, by scale and tie point */
     struct sh_err *err;
 };
 
 int geotiff_is_name(const char *file)
 {
-    const char *dot = strrchr(file, '.');
-    return dot != NULL && (strcasecmp(dot, ".tif") == 0 || strcasecmp(dot, ".tiff") == 0);
+    return text_has_ending(file, ".tif") || text_has_ending(file, ".tiff");
 }
 
 /* Returns a key that is a number in the directory itself; 0: it isn't there. */
@@ -189,26 +181,26 @@ static int read_place(struct reader *r)
 
 /* ---- heights */
 
-/* GDAL writes this into its metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. NULL: it isn't there. */
-static const char *item(const char *metadata, const char *role)
+/* Finds the value of an item of GDAL's metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. It is empty
+ * where there is none. */
+static struct text_span item(const char *metadata, const char *role)
 {
     char mark[40];
     snprintf(mark, sizeof mark, " role=\"%s\">", role);
-    const char *at = strstr(metadata, mark);
-    return at != NULL ? at + strlen(mark) : NULL;
+    const char *at = strstr(metadata, mark), *value = at != NULL ? at + strlen(mark) : "";
+    return (struct text_span){value, strcspn(value, "<")};
 }
 
 static int read_item(const struct reader *r, const char *metadata, const char *role, double *value)
 {
-    const char *at = item(metadata, role);
-    const int n = at != NULL ? (int)strcspn(at, "<") : 0;
+    const struct text_span text = item(metadata, role);
     char *end = NULL;
-    if (n == 0) return SH_OK;
-    *value = strtod(at, &end);
-    end += end > at ? strspn(end, " \t\r\n") : 0;
-    if (end == at + n && isfinite(*value) && (*value != 0.0 || strcmp(role, "scale") != 0)) return SH_OK;
+    if (text.n == 0) return SH_OK;
+    *value = strtod(text.p, &end);
+    end += end > text.p ? strspn(end, " \t\r\n") : 0;
+    if (end == text.p + text.n && isfinite(*value) && (*value != 0.0 || strcmp(role, "scale") != 0)) return SH_OK;
     return sh_fail(r->err, SH_EINPUT, "%s: the %s of its heights is '%.*s'; allowed are numbers, and no scale of 0",
-                   r->tags.path, role, n < 40 ? n : 40, at);
+                   r->tags.path, role, text.n < 40 ? (int)text.n : 40, text.p);
 }
 
 /* Returns 1 where the metadata name the unit. */
@@ -220,16 +212,15 @@ static int named_unit(const struct reader *r, const char *metadata, double *unit
     } known[] = {{"m", 1.0},           {"metre", 1.0},     {"meter", 1.0},
                  {"ft", FOOT_M},       {"foot", FOOT_M},   {"US survey foot", US_FOOT_M},
                  {"us-ft", US_FOOT_M}, {"ftUS", US_FOOT_M}};
-    const char *at = item(metadata, "unittype");
-    const int n = at != NULL ? (int)strcspn(at, "<") : 0;
-    if (n == 0) return 0;
+    const struct text_span text = item(metadata, "unittype");
+    if (text.n == 0) return 0;
     for (size_t i = 0; i < sizeof known / sizeof known[0]; i++) {
-        if (strncasecmp(at, known[i].name, (size_t)n) != 0 || known[i].name[n] != '\0') continue;
+        if (!text_is_word(text, known[i].name)) continue;
         *unit_m = known[i].unit_m;
         return 1;
     }
     return sh_fail(r->err, SH_EINPUT, "%s: the unit of its heights is '%.*s'; allowed are m, ft, US survey foot",
-                   r->tags.path, n < 40 ? n : 40, at);
+                   r->tags.path, text.n < 40 ? (int)text.n : 40, text.p);
 }
 
 static int read_height_unit(const struct reader *r, const char *metadata, double *unit_m)
@@ -265,7 +256,7 @@ static int read_heights(struct reader *r)
     if (rc == SH_OK) {
         r->g->no_data = strtod(text, &end);
         if (end == text) r->g->no_data = NAN;
-        /* As GDAL has it: scale and tie point count where the heights have a system. */
+        /* As in GDAL, scale and tie point change heights only where these have a system or a unit. */
         const int is_vertical = key(r, VERTICAL) != 0 || key(r, VERTICAL_UNIT) != 0;
         double offset = is_vertical ? r->z_offset : 0.0, scale = is_vertical ? r->z_scale : 1.0;
         rc = read_item(r, metadata, "offset", &offset);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads cells by libtiff, row by row: packed, predicted, striped and tiled ones alike become plain numbers. */
+/* Reads cells by libtiff, block by block. Packed, predicted, striped and tiled cells all become plain numbers. */
 #include "core/import/geotiff/geotiff_read.h"
 
 #include <math.h>
@@ -43,7 +43,7 @@ struct raster {
     TIFF *tif;
     char said[160]; /* libtiff's error */
     uint16_t bits, format;
-    double no_data;                     /* as the cells' type holds it */
+    double no_data;                     /* rounded as a cell's type rounds it */
     uint32_t block_width, block_height; /* of a tile, or of a strip, which is as wide as the raster */
     size_t block_bytes;
     uint8_t *block;
@@ -131,7 +131,7 @@ static int look_at_others(struct raster *r, struct sh_err *err)
     return r->lib.TIFFSetDirectory(r->tif, 0) ? SH_OK : fail_reading(r, "its directory", err);
 }
 
-/* Heights: one band of numbers that is no picture. */
+/* Heights must be one band of numbers, and no picture. */
 static int check_band(struct raster *r, struct sh_err *err)
 {
     uint16_t bands = 1, photometric = PHOTOMETRIC_MINISBLACK;
@@ -158,7 +158,7 @@ static int check_band(struct raster *r, struct sh_err *err)
         r->bits, r->format);
 }
 
-/* Checks the memory for vertices, triangles and labels, here and on their way back. */
+/* Refuses a raster whose vertices, triangles and labels may take too much memory, with the copy that goes back. */
 static int check_memory(struct raster *r, struct sh_err *err)
 {
     const struct scene *s = NULL;
@@ -338,8 +338,8 @@ static int count_alone(struct raster *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* Warns of values that usually mean no height, where the file doesn't say so. No place on the Earth has them. */
-static void doubt_heights(const struct raster *r)
+/* Warns of heights that no place on the Earth has: such values usually mark cells without height. */
+static void warn_of_odd_heights(const struct raster *r)
 {
     const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;
     const double odd = is_low ? r->lowest : r->highest;
@@ -369,7 +369,7 @@ static int geotiff_read_say(struct raster *r, struct sh_err *err)
                    "its ModelPixelScale or ModelTiepoint scales the heights; this is not used, since the file names no "
                    "system for heights");
     if (r->g.turns_heights) build_warn(r->b, "its ModelTransformation changes the heights; this is not used");
-    doubt_heights(r);
+    warn_of_odd_heights(r);
     return rc;
 }
 

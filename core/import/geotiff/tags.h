@@ -22,7 +22,7 @@ void tags_close(struct tags *tags);
 
 /* Reads up to `most` numbers of a tag, of any type. *n: how many; 0: there is no such tag. */
 int tags_numbers(const struct tags *tags, unsigned tag, double *out, size_t most, size_t *n, struct sh_err *err);
-/* Reads its text; empty: there is none. SH_EINPUT: the text and a NUL have no room. */
+/* Reads the text of a tag; empty: there is none. SH_EINPUT: there is no room for the text and a NUL. */
 int tags_text(const struct tags *tags, unsigned tag, char *out, size_t room, struct sh_err *err);
 
 #endif

@@ -13,7 +13,7 @@
 #include "core/import/gltf/gltf_bytes.h"
 #include "core/scene/build.h"
 
-/* Bytes that are kept once, however often they are asked for. */
+/* Bytes of a buffer, view or accessor. They are made at the first use, and kept for later ones. */
 struct gltf_kept {
     struct gltf_bytes bytes;
     void *own; /* to be freed; NULL: they are part of something else */
@@ -31,11 +31,12 @@ struct gltf {
     struct gltf_kept *buffer, *view, *accessor;
     uint32_t n_buffers, n_views, n_accessors, n_nodes, n_drawn;
     struct gltf_node *node;
-    json_t *names;         /* of materials: by number, no two the same */
+    uint32_t *stack;       /* [n_nodes + 1] nodes still to come, while the tree is walked */
+    json_t *names;         /* of materials, by number; no two are the same */
     bool by_assimp;        /* glTF 1.0, or meshes by Draco: Assimp reads it */
-    double largest;        /* |coordinate|, of positions in single precision */
-    double error;          /* of these, once they are placed */
-    double step_error;     /* of positions that are whole numbers, once they are placed */
+    double largest;        /* largest |coordinate| of positions in single precision */
+    double error;          /* largest error of these, once they are placed */
+    double step_error;     /* largest error of positions that are whole numbers, once they are placed */
     uint64_t n_done;       /* triangles, for the progress */
     uint32_t n_hidden;     /* nodes with meshes that KHR_node_visibility hides */
     uint32_t n_shapeless;  /* primitives without POSITION */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Accessors and buffer views. Numbers of the file are up to 2^53, counts below 2^32 and strides up to 2^16, so that
- * sums and products of them stay within 64 bits. */
+/* Accessors and buffer views. Offsets in the file are up to 2^53, counts below 2^32 and strides up to 2^16. So sums and
+ * products of them stay within 64 bits. */
 #include "core/import/gltf/gltf_accessor.h"
 
 #include <math.h>
@@ -45,7 +45,7 @@ static const json_t *meshopt_of(const json_t *object)
     return more != NULL ? more : gltf_extension(object, "KHR_meshopt_compression");
 }
 
-/* The bytes that a buffer view names, or an extension of it. */
+/* Finds the bytes that a buffer view, or an extension of it, names. */
 static int open_part(struct gltf *g, const json_t *object, const char *at, struct gltf_bytes *out)
 {
     uint64_t offset = 0, length = 0;

@@ -20,7 +20,7 @@ enum gltf_component {
 
 /* An accessor that is checked: elements 0 to count - 1 may be asked for. */
 struct gltf_view {
-    const uint8_t *data; /* NULL: all are zero */
+    const uint8_t *data; /* NULL: all elements are zero */
     uint64_t stride;
     uint32_t count, n_components;
     enum gltf_component component;
@@ -28,9 +28,9 @@ struct gltf_view {
 };
 /* The bytes of a buffer view; stride 0: elements without gaps. */
 int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint64_t *stride);
-/* type: "VEC3". accessor GLTF_NONE is an error. */
+/* Checks an accessor of that type, for example "VEC3". accessor GLTF_NONE is an error. */
 int gltf_view_open(struct gltf *g, uint32_t accessor, const char *type, struct gltf_view *out);
-/* Component k of element i; normalized ones are -1 to 1. */
+/* Component k of element i. Normalised numbers come out as -1 to 1, or 0 to 1 where they are unsigned. */
 double gltf_value(const struct gltf_view *v, uint32_t i, uint32_t k);
 /* Whole numbers have an error of up to half of this. 0: they are floats. */
 double gltf_step(const struct gltf_view *v);

@@ -13,8 +13,8 @@ static const char *const known[] = {
     /* read */
     "KHR_mesh_quantization", "KHR_texture_transform", "KHR_node_visibility", "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression", "KHR_meshopt_compression", "EXT_texture_webp", "KHR_draco_mesh_compression",
-    /* other image formats than those that are read, or colours by shaders: a warning comes where one is
-     * missed */
+    /* image formats that are not read, and colours by shaders: where such an image or colour is missing, a warning
+     * says so */
     "KHR_techniques_webgl", "KHR_technique_webgl", "KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds",
     /* These make no difference to a laser: lights, gloss, movement, levels of detail, metadata of objects. */
     "KHR_materials_*", "ADOBE_materials_*", "NV_materials_mdl", "KHR_lights_*", "EXT_lights_*", "KHR_animation_pointer",
@@ -78,7 +78,7 @@ bool gltf_is_by_shaders(const json_t *material)
            gltf_extension(material, "KHR_technique_webgl") != NULL;
 }
 
-/* Assimp unpacks Draco, and leaves out or misreads these. */
+/* Assimp, which unpacks Draco, leaves out or misreads these. */
 static int check_for_assimp(struct scene_build *b, const json_t *root, struct sh_err *err)
 {
     static const char *const other[] = {"EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "EXT_meshopt_compression",
@@ -102,7 +102,8 @@ static bool is_packed(const json_t *root, const json_t *primitive)
            json_object_get(position, "bufferView") == NULL && json_object_get(position, "sparse") == NULL;
 }
 
-/* A file need not require Draco where it has plain accessors, too. Some writers leave out both. */
+/* Whether some primitive is packed, also in a file that doesn't require Draco. Such a file should have plain accessors,
+ * too, but some writers leave them out. */
 static bool has_packed(const json_t *root)
 {
     const json_t *meshes = json_object_get(root, "meshes");

@@ -53,7 +53,7 @@ static int find_json(struct gltf *g, struct gltf_bytes *json)
     return gltf_fail(g, "it is a .glb of version %u; allowed are 1 and 2", version);
 }
 
-/* 1.0 has objects by name in place of lists, and need not say its version. */
+/* glTF 1.0 has objects by name in place of lists, and need not state its version. */
 static int check_version(struct gltf *g)
 {
     const json_t *asset = json_object_get(g->root, "asset");
@@ -101,7 +101,9 @@ static int gltf_file_make_room(struct gltf *g)
     g->view = calloc(g->n_views + 1u, sizeof *g->view);
     g->accessor = calloc(g->n_accessors + 1u, sizeof *g->accessor);
     g->node = calloc(g->n_nodes + 1u, sizeof *g->node);
-    if (g->buffer != NULL && g->view != NULL && g->accessor != NULL && g->node != NULL) return SH_OK;
+    g->stack = calloc(g->n_nodes + 1u, sizeof *g->stack);
+    if (g->buffer != NULL && g->view != NULL && g->accessor != NULL && g->node != NULL && g->stack != NULL)
+        return SH_OK;
     return build_fail(g->b, SH_ENOMEM, g->err, "no memory for its lists");
 }
 
@@ -127,6 +129,7 @@ void gltf_close(struct gltf *g)
     free_all(g->view, g->n_views);
     free_all(g->accessor, g->n_accessors);
     free(g->node);
+    free(g->stack);
     json_decref(g->names);
     json_decref(g->root);
     text_close(&g->file);
@@ -134,7 +137,8 @@ void gltf_close(struct gltf *g)
 
 /* ---- buffers */
 
-static char *beside(const struct gltf *g, const char *name)
+/* The path of a file in the mesh's folder; to be freed. NULL: no memory. */
+static char *sibling_of(const struct gltf *g, const char *name)
 {
     const char *mesh = g->b->spec->file;
     char *path = NULL;
@@ -142,12 +146,12 @@ static char *beside(const struct gltf *g, const char *name)
     return asprintf(&path, "%.*s%s", folder, mesh, name) >= 0 ? path : NULL;
 }
 
-/* Tries the unescaped name, too, for writers that escape nothing. */
+/* Tries the URI as it is written, too, for writers that escape nothing. */
 static int read_file(struct gltf *g, const char *uri, struct gltf_kept *out)
 {
     struct text t = {0};
     struct sh_err why = {0};
-    char *name = gltf_uri_name(uri), *path = name != NULL ? beside(g, name) : NULL, *plain = beside(g, uri);
+    char *name = gltf_uri_name(uri), *path = name != NULL ? sibling_of(g, name) : NULL, *plain = sibling_of(g, uri);
     int rc = SH_OK;
     if (path == NULL || plain == NULL) rc = build_fail(g->b, SH_ENOMEM, g->err, "no memory for a name");
     const char *file = rc == SH_OK && access(path, F_OK) != 0 && access(plain, F_OK) == 0 ? plain : path;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks indices of the whole file, also where no scene draws them: those that name nothing are counted, and the first
- * one is named. In drawn parts such an index is an error when it is read; this warns of the rest. */
+/* Checks indices of the whole file, also in parts that no scene draws. Indices of elements that don't exist are
+ * counted, and the first one is named. In drawn parts such an index is an error when it is read, so this warns of the
+ * other parts. */
 #include "core/import/gltf/gltf_indices.h"
 
 #include <math.h>
@@ -12,8 +13,8 @@
 
 enum { MAX_DEPTH = 12 };
 
-/* Keys that hold an index, or a list of them. Where a key has another meaning elsewhere, the object's own key is
- * given, too. */
+/* Keys that hold an index, or a list of them. Where a key has another meaning elsewhere, `within` limits it to objects
+ * under that key. */
 static const struct {
     const char *key, *within, *list;
 } indices[] = {{"mesh", NULL, "meshes"},
@@ -47,7 +48,7 @@ static const char *const entered[] = {"EXT_mesh_gpu_instancing",
 struct search {
     const json_t *root;
     uint64_t n;
-    struct gltf_at first; /* of them */
+    struct gltf_at first; /* place of the first one; number and list are its, too */
     double number;
     const char *list;
 };
@@ -70,7 +71,7 @@ static void look_at_all(struct search *s, const json_t *value, const char *list,
         look_at(s, json_array_get(value, i), list, gltf_at("%.80s[%zu]", at, i).text);
 }
 
-/* Attributes and targets: any key is an accessor. Those of Draco are numbers of its own. */
+/* In attributes and targets every key holds an accessor. Attributes of Draco hold its own numbers, and are left out. */
 static void look_at_attributes(struct search *s, const json_t *object, const char *at)
 {
     const char *key;
@@ -114,7 +115,7 @@ static void walk_object(struct search *s, const json_t *object, const char *with
     }
 }
 
-/* key: of the list's or the object's own. */
+/* key is the key under which the list or the object itself stands. */
 static void walk(struct search *s, const json_t *value, const char *key, const char *at, int depth)
 {
     if (depth > MAX_DEPTH) return;

@@ -5,7 +5,7 @@
 
 #include "core/import/gltf/gltf.h"
 
-#define MOST_WHOLE 0x1p53 /* numbers of JSON are read as doubles: whole ones up to here are exact */
+#define MOST_WHOLE 0x1p53 /* JSON numbers are read as doubles, which hold whole numbers up to here exactly */
 
 int gltf_list(struct gltf *g, const json_t *of, const char *key, const char *at, json_t **out)
 {

@@ -111,7 +111,7 @@ static int read_wrap(struct gltf *g, const json_t *texture, const char *at, stru
     return rc;
 }
 
-/* Decodes escaped characters in a file's name, unless a file has the name as it is written. */
+/* Adds an image that is a file of its own. Escaped characters of its name are decoded. */
 static int add_file(struct gltf *g, const char *uri, struct build_image *image, uint16_t *number)
 {
     char *name = gltf_uri_name(uri);
@@ -153,8 +153,8 @@ static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint
 
 /* ---- textures */
 
-/* The texture's only image has a format that isn't read: an error where its colours are wanted and the file requires
- * them. */
+/* Reports a texture whose only image has a format that isn't read. This is an error where colours are wanted and the
+ * file requires that format's extension. */
 static int miss_image(struct gltf *g, const json_t *texture, const char *at)
 {
     const char *name = json_object_iter_key(json_object_iter(json_object_get(texture, "extensions")));
@@ -184,8 +184,8 @@ static int add_texture(struct gltf *g, uint32_t i, uint16_t *number)
     return rc == SH_OK ? add_image(g, source, &image, number) : rc;
 }
 
-/* u' = offset + turn * scale * u, from the upper left corner, with v down; a turn is counter-clockwise as one looks at
- * the mesh. (The matrix is that of Khronos' viewer: their text's example, the lower left quarter, needs it so.) */
+/* u' = offset + turn * scale * u, from the upper left corner, with v down. A turn is counter-clockwise as one looks at
+ * the mesh. The matrix is that of Khronos' viewer. It fits the example of their text, the lower left quarter. */
 static int read_lay(struct gltf *g, const json_t *info, const char *at, struct gltf_look *look)
 {
     const json_t *lay = gltf_extension(info, "KHR_texture_transform");
@@ -217,7 +217,7 @@ static float solid_of(const json_t *material)
     return (float)fmin(json_number_value(cutoff), 1.0);
 }
 
-/* Where the base colour stands: KHR_materials_pbrSpecularGlossiness has names of its own. */
+/* The keys of the base colour. KHR_materials_pbrSpecularGlossiness has names of its own for them. */
 struct base {
     json_t *of;
     const char *factor, *texture;
@@ -252,7 +252,7 @@ static int keep_colour(struct gltf *g, const struct base *base, const char *at, 
     if (surface->has_colour) return SH_OK;
     int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba);
     for (int k = 0; k < 3 && rc == SH_OK; k++) {
-        if (!(rgba[k] >= 0.0 && rgba[k] <= 1.0)) return SH_OK; /* no colour of a surface */
+        if (!(rgba[k] >= 0.0 && rgba[k] <= 1.0)) return SH_OK; /* note_odd has counted it */
         surface->colour[k] = (float)colour_srgb_encode(rgba[k]);
     }
     surface->has_colour = rc == SH_OK;

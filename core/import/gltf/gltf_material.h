@@ -18,7 +18,7 @@ struct gltf_look {
 };
 /* Names all materials. Due once, before the first gltf_look_open. */
 int gltf_name_materials(struct gltf *g);
-/* object: its name. */
+/* Gives the label and the texture of a primitive. object: the name of its object. */
 int gltf_look_open(struct gltf *g, const char *object, const json_t *primitive, const char *at, struct gltf_look *look);
 
 #endif

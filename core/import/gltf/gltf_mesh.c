@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The primitives of a mesh into the builder, of any mode. A vertex is added when a triangle first uses it: primitives
- * may share accessors that are much larger than themselves. */
+/* Adds the primitives of a mesh to the builder, of any mode. A vertex is added when a triangle first uses it, since
+ * primitives may share accessors that are much larger than themselves. */
 #include "core/import/gltf/gltf_mesh.h"
 
 #include <stdlib.h>
@@ -53,7 +53,7 @@ static void add_rgb(const struct part *p, uint32_t i, uint8_t out[4])
     build_rgb(p->g->b, rgb, 255.0, out);
 }
 
-/* corner: places in the list of indices, or of vertices where there is none. */
+/* corner has places in the list of indices; without that list, places in the list of vertices. */
 static int add_triangle(struct part *p, const uint32_t corner[3])
 {
     struct scene_build *b = p->g->b;

@@ -9,7 +9,7 @@
 
 struct gltf;
 
-/* Adds the node's mesh, at `world`. object: its name. */
+/* Adds the node's mesh, placed by the matrix `world`. object: the node's name. */
 int gltf_add_mesh(struct gltf *g, uint32_t node, const char *object, const gltf_matrix world);
 
 #endif

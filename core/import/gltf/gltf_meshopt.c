@@ -37,10 +37,8 @@ static int decode(const struct gltf_packed *p, void *out)
 
 static int check(struct scene_build *b, const struct gltf_packed *p, const char *at, struct sh_err *err)
 {
-    static const char *const modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES", NULL}, *const filters[] = {
-                                                                                         "NONE", "OCTAHEDRAL",
-                                                                                         "QUATERNION", "EXPONENTIAL",
-                                                                                         NULL};
+    static const char *const modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES", NULL};
+    static const char *const filters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", NULL};
     if (!text_is_one_of(text_span_of(p->mode), modes))
         return build_fail(b, SH_EINPUT, err,
                           "%s: meshopt's mode %.40s is not known; known are ATTRIBUTES, TRIANGLES, INDICES", at,

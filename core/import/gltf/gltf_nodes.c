@@ -4,7 +4,6 @@
 #include "core/import/gltf/gltf_nodes.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 #include "core/import/gltf/gltf.h"
 #include "core/import/gltf/gltf_accessor.h"
@@ -71,22 +70,22 @@ static uint32_t child_of(const json_t *children, size_t k)
     return (uint32_t)json_number_value(json_array_get(children, k));
 }
 
-/* Places all nodes below a node without a parent. stack: [n_nodes] */
-static void place_tree(struct gltf *g, const json_t *nodes, uint32_t root, uint32_t *stack)
+/* Places all nodes below a node without a parent. */
+static void place_tree(struct gltf *g, const json_t *nodes, uint32_t root)
 {
     size_t n = 0;
-    stack[n++] = root;
+    g->stack[n++] = root;
     while (n > 0) {
-        struct gltf_node *node = &g->node[stack[--n]];
+        struct gltf_node *node = &g->node[g->stack[--n]];
         const json_t *children = json_object_get(json_array_get(nodes, (size_t)(node - g->node)), "children");
         if (node->parent != GLTF_NONE) gltf_multiply(g->node[node->parent].world, node->world, node->world);
         node->has_world = true;
         for (size_t k = json_array_size(children); k > 0; k--)
-            stack[n++] = child_of(children, k - 1);
+            g->stack[n++] = child_of(children, k - 1);
     }
 }
 
-static int place_all(struct gltf *g, uint32_t *stack)
+int gltf_place_nodes(struct gltf *g)
 {
     const json_t *nodes = json_object_get(g->root, "nodes");
     json_t *node;
@@ -99,17 +98,9 @@ static int place_all(struct gltf *g, uint32_t *stack)
         if (rc == SH_OK) rc = take_children(g, i, node);
     }
     for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
-        if (g->node[i].parent == GLTF_NONE) place_tree(g, nodes, i, stack);
+        if (g->node[i].parent == GLTF_NONE) place_tree(g, nodes, i);
     for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
         if (!g->node[i].has_world) rc = gltf_fail(g, "nodes[%u] is a child of itself", i);
-    return rc;
-}
-
-int gltf_place_nodes(struct gltf *g)
-{
-    uint32_t *stack = malloc((g->n_nodes + (size_t)1) * sizeof *stack);
-    int rc = stack != NULL ? place_all(g, stack) : build_fail(g->b, SH_ENOMEM, g->err, "no memory for nodes");
-    free(stack);
     return rc;
 }
 
@@ -174,15 +165,14 @@ static bool is_hidden(const json_t *node)
     return json_is_false(json_object_get(gltf_extension(node, "KHR_node_visibility"), "visible"));
 }
 
-/* Draws a node's own mesh first, then its children in their order. stack[n_nodes] holds the nodes still to come. Nodes
- * below a hidden one are hidden. */
-static int draw_tree(struct gltf *g, const json_t *nodes, uint32_t root, uint32_t *stack)
+/* Draws a node's own mesh first, then its children in their order. Nodes below a hidden one are hidden. */
+static int draw_tree(struct gltf *g, const json_t *nodes, uint32_t root)
 {
     size_t n = 0;
     int rc = SH_OK;
-    stack[n++] = root;
+    g->stack[n++] = root;
     while (n > 0 && rc == SH_OK) {
-        const uint32_t i = stack[--n];
+        const uint32_t i = g->stack[--n];
         const json_t *node = json_array_get(nodes, i), *children = json_object_get(node, "children");
         g->node[i].is_drawn = true;
         g->n_drawn++;
@@ -192,12 +182,12 @@ static int draw_tree(struct gltf *g, const json_t *nodes, uint32_t root, uint32_
         }
         if (json_object_get(node, "mesh") != NULL) rc = draw_node(g, i, node);
         for (size_t k = json_array_size(children); k > 0; k--)
-            stack[n++] = child_of(children, k - 1);
+            g->stack[n++] = child_of(children, k - 1);
     }
     return rc;
 }
 
-static int draw_roots(struct gltf *g, const json_t *roots, const char *at, uint32_t *stack)
+static int draw_roots(struct gltf *g, const json_t *roots, const char *at)
 {
     const json_t *nodes = json_object_get(g->root, "nodes");
     int rc = SH_OK;
@@ -210,13 +200,13 @@ static int draw_roots(struct gltf *g, const json_t *roots, const char *at, uint3
             return gltf_fail(g, "%s.nodes has nodes[%u], which is a child of nodes[%u]: allowed are roots", at, i,
                              node->parent);
         if (node->is_drawn) return gltf_fail(g, "%s.nodes has nodes[%u] twice", at, i);
-        rc = draw_tree(g, nodes, i, stack);
+        rc = draw_tree(g, nodes, i);
     }
     return rc;
 }
 
-/* Without scenes all nodes count; of several without a default the first. */
-static int draw_default(struct gltf *g, uint32_t *stack)
+/* Without scenes all nodes are drawn. Where there are several scenes and no default, the first one is drawn. */
+int gltf_draw_scene(struct gltf *g)
 {
     const json_t *nodes = json_object_get(g->root, "nodes");
     json_t *scenes, *scene = NULL, *roots = NULL;
@@ -225,7 +215,7 @@ static int draw_default(struct gltf *g, uint32_t *stack)
     if (rc == SH_OK) rc = gltf_index(g, g->root, "scene", "", &number);
     if (rc == SH_OK && number == GLTF_NONE && json_array_size(scenes) == 0) {
         for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
-            if (g->node[i].parent == GLTF_NONE) rc = draw_tree(g, nodes, i, stack);
+            if (g->node[i].parent == GLTF_NONE) rc = draw_tree(g, nodes, i);
         return rc;
     }
     if (rc == SH_OK && number == GLTF_NONE && json_array_size(scenes) > 1)
@@ -234,13 +224,5 @@ static int draw_default(struct gltf *g, uint32_t *stack)
     const struct gltf_at at = gltf_at("scenes[%u]", number);
     if (rc == SH_OK) rc = gltf_object(g, "scenes", number, &scene);
     if (rc == SH_OK) rc = gltf_list(g, scene, "nodes", at.text, &roots);
-    return rc == SH_OK ? draw_roots(g, roots, at.text, stack) : rc;
-}
-
-int gltf_draw_scene(struct gltf *g)
-{
-    uint32_t *stack = malloc((g->n_nodes + (size_t)1) * sizeof *stack);
-    int rc = stack != NULL ? draw_default(g, stack) : build_fail(g->b, SH_ENOMEM, g->err, "no memory for nodes");
-    free(stack);
-    return rc;
+    return rc == SH_OK ? draw_roots(g, roots, at.text) : rc;
 }

@@ -18,7 +18,7 @@ struct gltf_node {
     bool is_drawn, has_world;
 };
 
-/* Number i of an object's list of nodes. at: the object, for messages. */
+/* Gives entry i of an object's list of nodes. at: the object, for messages. */
 int gltf_node_number(struct gltf *g, const json_t *list, size_t i, const char *key, const char *at, uint32_t *out);
 /* Finds where each node is. */
 int gltf_place_nodes(struct gltf *g);

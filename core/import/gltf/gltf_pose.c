@@ -226,7 +226,7 @@ static double place_error(const gltf_matrix m, const double error[3])
     return most;
 }
 
-/* Half a step of a position that is whole numbers, and of its targets. */
+/* The error of positions and targets that are whole numbers: half a step each. */
 static double half_step(const struct gltf_pose *pose)
 {
     double half = 0.5 * gltf_step(&pose->position);

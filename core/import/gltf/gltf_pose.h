@@ -19,12 +19,12 @@ struct gltf_pose {
     struct gltf_view position;
     struct gltf_target *target; /* those with an effect */
     size_t n_targets;
-    gltf_matrix *joint, *reach; /* [n_joints] NULL: no skin. reach: joint's sums, of absolute values */
+    gltf_matrix *joint, *reach; /* [n_joints] NULL: no skin. reach: as joint, but made of absolute values */
     uint32_t n_joints;
     struct gltf_view joints[GLTF_MAX_SETS], weights[GLTF_MAX_SETS];
     uint32_t n_sets;
-    double most[3];   /* |coordinate| of the terms of a position before joints move it */
-    double most_bent; /* |coordinate| of the terms where joints move it */
+    double most[3];   /* largest sum of |terms| of a position before joints move it, per axis */
+    double most_bent; /* the same after joints have moved it */
 };
 int gltf_pose_open(struct gltf *g, const json_t *node, const json_t *mesh, const json_t *primitive, const char *at,
                    struct gltf_pose *pose);

@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #include "core/import/gltf/gltf.h"
@@ -16,8 +15,7 @@
 
 bool gltf_is_name(const char *file)
 {
-    const char *dot = strrchr(file, '.');
-    return dot != NULL && (strcasecmp(dot, ".gltf") == 0 || strcasecmp(dot, ".glb") == 0);
+    return text_has_ending(file, ".gltf") || text_has_ending(file, ".glb");
 }
 
 /* Warns of what was left out or changed, one line for each kind. */
@@ -43,7 +41,7 @@ static void say_counts(const struct gltf *g)
                    g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
 }
 
-/* The error of whole numbers is the writer's choice: it is never refused. */
+/* Warns of the error of whole numbers. The file is not refused for it, since its writer chose these steps. */
 static int say_errors(struct gltf *g)
 {
     struct scene_build *b = g->b;

@@ -15,10 +15,10 @@ bool gltf_uri_is_data(const char *uri)
 }
 
 /* %XX is one byte; any other % stays as it is. %00 stays, too, since a NUL would end the name. */
-static size_t unescape(const char *in, char *out)
+char *gltf_uri_name(const char *uri)
 {
-    char *to = out;
-    for (; *in != '\0'; in++) {
+    char *name = malloc(strlen(uri) + 1), *to = name;
+    for (const char *in = uri; name != NULL && *in != '\0'; in++) {
         const int high = *in == '%' ? text_hex_digit(in[1]) : -1, low = high >= 0 ? text_hex_digit(in[2]) : -1;
         if (low >= 0 && high + low > 0) {
             *to++ = (char)(16 * high + low);
@@ -27,18 +27,11 @@ static size_t unescape(const char *in, char *out)
             *to++ = *in;
         }
     }
-    *to = '\0';
-    return (size_t)(to - out);
-}
-
-char *gltf_uri_name(const char *uri)
-{
-    char *name = malloc(strlen(uri) + 1);
-    if (name != NULL) unescape(uri, name);
+    if (name != NULL) *to = '\0';
     return name;
 }
 
-/* Both alphabets of RFC 4648. */
+/* The value of a base64 character, in either alphabet of RFC 4648; -1: it is none. */
 static int sextet_of(char c)
 {
     return c >= 'A' && c <= 'Z'   ? c - 'A'

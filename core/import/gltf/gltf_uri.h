@@ -12,7 +12,8 @@ struct scene_build;
 
 /* Whether the URI contains its data. */
 bool gltf_uri_is_data(const char *uri);
-/* Decodes a URI that contains its data; at: what has it, for messages. *own is to be freed, even after an error. */
+/* Decodes a URI that contains its data. at: the object with the URI, for messages. *own is to be freed, even after an
+ * error. */
 int gltf_uri_data(struct scene_build *b, const char *uri, const char *at, void **own, struct gltf_bytes *out,
                   struct sh_err *err);
 /* The file name that a URI stands for, with %20 and the like decoded; to be freed. NULL: no memory. */

@@ -65,7 +65,7 @@ bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, 
     return false;
 }
 
-/* The words of one reader's command. */
+/* One reader's command line, and its process. */
 struct command {
     char script[PATH_LEN + 32], memory[48], fineness[16];
     const char *argv[6];

@@ -14,7 +14,7 @@
 struct ifc_part {
     uint32_t n_vertices, n_triangles;
     float colour[4];  /* red, green, blue, opacity, 0..1 */
-    double largest_m; /* of the coordinates that were rounded to single precision */
+    double largest_m; /* largest coordinate that was rounded to single precision */
     const double (*vertex_m)[3];
     const uint32_t (*triangle)[3];
 };

@@ -5,8 +5,8 @@
 
 #include "core/import/ifc/ifc_product.h"
 
-/* Facets of curves explain this much of an area or a volume: a polygon of 24 sides has 1.1 % less area
- * than its circle. A sphere with half as many sides in each direction lacks twice as much. Without curves, only
+/* Facets of curves explain a difference of CURVED_SHARE in area or volume. A polygon of 24 sides has 1.1 % less area
+ * than its circle. A sphere of 24 facets around and 12 from pole to pole has 2.8 % less volume. Without curves, only
  * rounding is allowed. */
 #define CURVED_SHARE     0.03
 #define PLAIN_SHARE      1e-4
@@ -40,8 +40,8 @@ static bool areas_differ(const struct ifc_figures *a, const struct ifc_figures *
 
 /* Chooses between two closed bodies that differ, or two open ones. A failure that a reader reports counts against it.
  * ifc-lite rounds points beyond 1 km, web-ifc more often gets a profile or a cut wrong. */
-static enum ifc_source doubtful(const struct ifc_product *product, const struct ifc_body *web,
-                                const struct ifc_body *lite)
+static enum ifc_source preferred(const struct ifc_product *product, const struct ifc_body *web,
+                                 const struct ifc_body *lite)
 {
     if ((web->n_failures > 0) != (lite->n_failures > 0)) return web->n_failures > 0 ? IFC_LITE : IFC_WEB;
     return product->is_far ? IFC_WEB : IFC_LITE;
@@ -66,8 +66,8 @@ struct ifc_choice ifc_choose(const struct ifc_product *product, const struct ifc
     if (web_closed != lite_closed)
         return web_closed ? (struct ifc_choice){IFC_WEB, IFC_CLOSED_WEB}
                           : (struct ifc_choice){IFC_LITE, IFC_CLOSED_LITE};
-    if (boxes_differ(w, l, product->is_curved)) return (struct ifc_choice){doubtful(product, web, lite), IFC_BOX};
-    if (areas_differ(w, l, product->is_curved)) return (struct ifc_choice){doubtful(product, web, lite), IFC_AREA};
+    if (boxes_differ(w, l, product->is_curved)) return (struct ifc_choice){preferred(product, web, lite), IFC_BOX};
+    if (areas_differ(w, l, product->is_curved)) return (struct ifc_choice){preferred(product, web, lite), IFC_AREA};
     if (!web_closed) return (struct ifc_choice){IFC_WEB, IFC_OPEN};
     if (web->n_failures > 0 && lite->n_failures > 0) return (struct ifc_choice){IFC_WEB, IFC_FAILED};
     /* web-ifc keeps places far away to the micrometre, and its circles have as many sides as the tolerance asks for. */

@@ -9,7 +9,7 @@ struct ifc_product;
 
 enum ifc_source { IFC_NONE, IFC_WEB, IFC_LITE };
 
-/* Why a product is named. */
+/* The reason why a product is named in a warning. */
 enum ifc_finding {
     IFC_AGREED,
     IFC_LOST,        /* its records have a body, and no reader makes one */
@@ -20,7 +20,7 @@ enum ifc_finding {
     IFC_CLOSED_WEB,  /* only that one's is closed */
     IFC_CLOSED_LITE, /* likewise */
     IFC_OPEN,        /* both make the same, or one was run; the body is open */
-    IFC_FAILED,      /* the one that is taken admits a failure */
+    IFC_FAILED,      /* the reader whose body is taken reports a failure */
     IFC_UNCUT,       /* the records have an opening that cuts nothing */
     IFC_FINDINGS,
 };
@@ -34,7 +34,7 @@ struct ifc_choice {
 struct ifc_choice ifc_choose(const struct ifc_product *product, const struct ifc_body *web, const struct ifc_body *lite,
                              bool is_checked);
 
-/* Words for a finding, after "N products: "; NULL: there is nothing to say. */
+/* The words for a finding, after "N products: "; NULL for IFC_AGREED. */
 const char *ifc_finding_text(enum ifc_finding finding);
 /* A finding that means the scene may be wrong. */
 bool ifc_is_doubtful(enum ifc_finding finding);

@@ -6,7 +6,7 @@
 #include "core/import/ifc/ifc_bodies.h"
 #include "core/vec3.h"
 
-#define CLOSED_SHARE 1e-5 /* of the area: rounding leaves 1e-7, and a face that lacks more than this shows */
+#define CLOSED_SHARE 1e-5 /* of the area; rounding leaves 1e-7, and a missing face larger than this share is found */
 
 static void box_of(const struct ifc_part *part, size_t n_parts, struct ifc_figures *f)
 {

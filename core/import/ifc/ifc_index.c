@@ -17,6 +17,13 @@ const struct step_record *ifc_index_find(const struct ifc_index *x, uint64_t id)
     return x->n > 0 ? bsearch(&id, x->record, x->n, sizeof *x->record, ifc_compare) : NULL;
 }
 
+const struct step_record *ifc_index_follow(const struct ifc_index *x, struct text_span ref, const char *type)
+{
+    uint64_t id;
+    const struct step_record *to = step_reference(ref, &id) ? ifc_index_find(x, id) : NULL;
+    return to != NULL && text_is(to->type, type) ? to : NULL;
+}
+
 int ifc_index_fail(const struct ifc_index *x, const struct step_record *at, struct sh_err *err, const char *what)
 {
     return text_fail(&x->text, at->line, SH_EINPUT, err, "%.*s #%llu: %s", (int)at->type.n, at->type.p,

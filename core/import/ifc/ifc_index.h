@@ -23,6 +23,10 @@ void ifc_index_close(struct ifc_index *x);
 /* NULL: there is none of that number. */
 const struct step_record *ifc_index_find(const struct ifc_index *x, uint64_t id);
 
+/* Finds the record that an attribute refers to. NULL: the attribute is no reference, or the record is of another type.
+ */
+const struct step_record *ifc_index_follow(const struct ifc_index *x, struct text_span ref, const char *type);
+
 /* "FILE, line N: TYPE #n: what": SH_EINPUT. */
 int ifc_index_fail(const struct ifc_index *x, const struct step_record *at, struct sh_err *err, const char *what);
 

@@ -23,13 +23,13 @@ function part_of(mesh) {
     ...placed(mesh.positions, 3, [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, x, y, z, 1]) }
 }
 
-// It takes one product at a time, so that a failure has its product.
+// The reader gets one product at a time, so that a failure belongs to a product.
 function run_job(api, pre, job) {
   const rtc = pre.needsShift ? pre.rtcOffset : [0, 0, 0]
   const made = api.processGeometryBatchFromSource(pre.jobs.subarray(3 * job, 3 * job + 3), pre.unitScale, ...rtc,
     pre.needsShift, pre.voidKeys, pre.voidCounts, pre.voidValues, pre.styleIds, pre.styleColors,
     pre.planeAngleToRadians, pre.materialElementIds, pre.materialColorCounts, pre.materialColors)
-  // This was taken off before rounding, in y up.
+  // ifc-lite subtracted this from coordinates before rounding them; it is turned to y up here.
   const back = [rtc[0], rtc[2], -rtc[1]]
   const parts = []
   let type = ''

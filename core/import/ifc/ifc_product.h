@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The records of an IFC file say this of a product, and marks say what its geometry consists of. */
+/* A product of an IFC file, as its records describe it. Marks say what its geometry consists of. */
 #ifndef CORE_IMPORT_IFC_IFC_PRODUCT_H
 #define CORE_IMPORT_IFC_IFC_PRODUCT_H
 
@@ -8,6 +8,11 @@
 #include <stdint.h>
 
 #include "core/text.h"
+
+/* The words of a product in messages: a format for printf, and its arguments. */
+#define IFC_PRODUCT_FORMAT "%.*s '%.40s' %.22s"
+#define IFC_PRODUCT_WORDS(product) \
+    (int)((product)->type.n < 48 ? (product)->type.n : 48), (product)->type.p, (product)->name, (product)->guid
 
 struct ifc_product {
     uint64_t id;
@@ -18,12 +23,13 @@ struct ifc_product {
     bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;
+    int finding;                   /* enum ifc_finding, once its body is chosen */
     bool is_coarse;                /* curved, and the body is ifc-lite's, which cuts circles up by levels of its own */
     bool is_turned;                /* it has a solid that is turned about an axis */
     double points_m;               /* largest coordinate of its points */
     bool is_far;                   /* it has points beyond 1 km of their own origin */
     struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
-    uint32_t *style;               /* [n_styles] of its items, places in the records' style */
+    uint32_t *style;               /* [n_styles] styles of its items, as indices into ifc_records.style */
     size_t n_styles, room_styles;
 };
 

@@ -12,15 +12,14 @@
 #include "core/scene/build_surfaces.h"
 
 enum { LEAST_SEGMENTS = 24, MOST_SEGMENTS = 360 };
-#define FAR_LEVEL_SEGMENTS 48 /* from here on ifc-lite, too, is asked for finer facets */
+#define FINE_LEVEL_SEGMENTS 48 /* from this number on, ifc-lite is asked for its level "high" */
 
 struct reading {
     struct scene_build *b;
     struct scene_import_limits limits;
     struct ifc_records records;
     struct ifc_readings readings;
-    enum ifc_finding *finding; /* [n_products] */
-    double largest_m;          /* of what was rounded to single precision */
+    double largest_m; /* of what was rounded to single precision */
     struct sh_err *err;
 };
 
@@ -31,7 +30,7 @@ static struct ifc_fineness fineness_for(const struct ifc_records *records, doubl
     double segments = radius_m > 0.0 && share < 1.0 ? ceil(M_PI / acos(1.0 - share)) + 1.0 : LEAST_SEGMENTS;
     segments = fmin(fmax(segments, LEAST_SEGMENTS), MOST_SEGMENTS);
     return (struct ifc_fineness){.segments = (int)segments,
-                                 .level = segments >= FAR_LEVEL_SEGMENTS ? "high" : "medium",
+                                 .level = segments >= FINE_LEVEL_SEGMENTS ? "high" : "medium",
                                  .deviation_m = radius_m * (1.0 - cos(M_PI / (segments - 1.0)))};
 }
 
@@ -119,12 +118,12 @@ static int add_products(struct reading *r)
     int rc = SH_OK;
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
         struct ifc_product *p = &r->records.product[i];
-        if (p->opens_nothing) r->finding[i] = IFC_UNCUT;
+        if (p->opens_nothing) p->finding = IFC_UNCUT;
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);
         const struct ifc_choice choice = ifc_choose(p, web, lite, in->has_web && in->has_lite);
-        r->finding[i] = choice.finding;
+        p->finding = (int)choice.finding;
         p->is_coarse = p->is_curved && choice.source == IFC_LITE;
         if (choice.source == IFC_WEB) rc = add_body(r, p, &in->web, web);
         if (choice.source == IFC_LITE) rc = add_body(r, p, &in->lite, lite);
@@ -181,8 +180,6 @@ static int check_number(struct reading *r)
 static int read_by_two(struct reading *r)
 {
     const struct ifc_fineness fineness = fineness_for(&r->records, r->b->tolerance_m);
-    r->finding = calloc(r->records.n_products + 1, sizeof *r->finding);
-    if (r->finding == NULL) return build_fail(r->b, SH_ENOMEM, r->err, "no memory for its products");
     int rc = check_number(r);
     if (rc != SH_OK) return rc;
     build_announce(r->b);
@@ -192,7 +189,7 @@ static int read_by_two(struct reading *r)
     if (rc == SH_OK) rc = add_products(r);
     if (rc == SH_OK) rc = say_facets(r, &fineness);
     if (rc == SH_OK) ifc_say_coarse(r->b, &r->records);
-    if (rc == SH_OK) rc = ifc_say_findings(r->b, &r->records, r->finding, r->limits.ifc_strict, r->err);
+    if (rc == SH_OK) rc = ifc_say_findings(r->b, &r->records, r->limits.ifc_strict, r->err);
     if (rc == SH_OK) rc = build_single(r->b, r->largest_m, BUILD_SINGLE_ROUNDING * r->largest_m, true, r->err);
     return rc;
 }
@@ -248,6 +245,5 @@ int read_ifc(struct scene_build *b, struct sh_err *err)
     const int rc = read_records(&r);
     ifc_readings_free(&r.readings);
     ifc_records_close(&r.records);
-    free(r.finding);
     return rc;
 }

@@ -15,7 +15,7 @@ struct ifc_records;
 struct ifc_fineness {
     int segments;
     const char *level;
-    double deviation_m; /* of the largest circle's facets; 0: there is none */
+    double deviation_m; /* of the largest circle from its facets; 0: there is no circle */
 };
 
 /* The bodies that each reader has made. */
@@ -38,10 +38,9 @@ void ifc_readings_free(struct ifc_readings *r);
 
 /* ---- ifc_say.c */
 
-/* Warns of findings, and names up to 100 products for each, several in a line. With strict, the first line of the first
- * doubtful finding is an error instead. finding[records->n_products]. */
-int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
-                     bool strict, struct sh_err *err);
+/* Warns of the products' findings, and names up to 100 products for each, several in a line. With strict, the first
+ * line of the first doubtful finding is an error instead. */
+int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, bool strict, struct sh_err *err);
 /* Names the curved products whose facets follow no tolerance. */
 void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records);
 /* Names the products that Assimp may read wrongly, in a warning or, with refuse, in an error. why: the reason that no

@@ -43,9 +43,8 @@ static int check_placement(struct ifc_records *r, const struct ifc_product *p, s
         uint32_t *mark = &r->mark[at - r->index.record];
         if (*mark == own)
             return text_fail(&r->index.text, at->line, SH_EINPUT, err,
-                             "IFCLOCALPLACEMENT #%llu is relative to itself, so %.*s '%.40s' %.22s has no place",
-                             (unsigned long long)at->id, (int)(p->type.n < 48 ? p->type.n : 48), p->type.p, p->name,
-                             p->guid);
+                             "IFCLOCALPLACEMENT #%llu is relative to itself, so " IFC_PRODUCT_FORMAT " has no place",
+                             (unsigned long long)at->id, IFC_PRODUCT_WORDS(p));
         if (*mark != 0) return SH_OK;
         *mark = own;
     }

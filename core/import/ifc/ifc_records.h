@@ -17,7 +17,7 @@ struct ifc_records {
     struct ifc_product *product; /* [n_products] in the order of ids */
     size_t n_products, room_products;
     double unit_m;
-    struct sh_err no_unit;   /* why the file's unit of length is not known, so that unit_m is 1; code 0: it is */
+    struct sh_err no_unit;   /* why the file's unit of length is not known, so that unit_m is 1; code 0: it is known */
     double radius_m;         /* of the largest circle that is cut into edges; 0: there is none */
     uint32_t *mark, stamp;   /* [index.n] of the last walk */
     struct ifc_style *style; /* [n_styles] by item */

@@ -7,9 +7,14 @@
 
 enum { MAX_NAMED = 100, LINE_ROOM = 420 /* the rest of a line has room for ", and N more" */ };
 
-/* Names, line by line. */
+/* Groups of products that are no findings. */
+enum { COARSE = IFC_FINDINGS, MISREAD };
+
+/* The products of a group are named line by line. */
 struct lines {
     struct scene_build *b;
+    const struct ifc_records *records;
+    int group; /* a finding, COARSE or MISREAD */
     const char *text;
     size_t n;        /* products of the group */
     size_t n_listed; /* on this line and before */
@@ -28,8 +33,7 @@ static void end_line(struct lines *l)
 static void add_name(struct lines *l, const struct ifc_product *p)
 {
     char name[160];
-    const int len = snprintf(name, sizeof name, "%.*s '%.40s' %.22s", (int)(p->type.n < 48 ? p->type.n : 48), p->type.p,
-                             p->name, p->guid);
+    const int len = snprintf(name, sizeof name, IFC_PRODUCT_FORMAT, IFC_PRODUCT_WORDS(p));
     if (l->n_listed++ >= MAX_NAMED) return;
     if (l->len + (size_t)len + 4 > LINE_ROOM) end_line(l);
     if (l->len == 0 && l->n_lines == 0)
@@ -41,59 +45,62 @@ static void add_name(struct lines *l, const struct ifc_product *p)
         l->len += (size_t)snprintf(l->line + l->len, sizeof l->line - l->len, ", %s", name);
 }
 
-static void end_group(struct lines *l)
+static bool is_in_group(const struct lines *l, const struct ifc_product *p)
 {
+    if (l->group == MISREAD) return !p->is_air && p->assimp_wrong.n > 0;
+    return l->group == COARSE ? p->is_coarse : p->finding == l->group;
+}
+
+/* Counts the products of the group. Returns the first one; NULL: there is none. */
+static const struct ifc_product *count_group(struct lines *l)
+{
+    const struct ifc_product *first = NULL;
+    for (size_t i = l->records->n_products; i-- > 0;)
+        if (is_in_group(l, &l->records->product[i])) {
+            first = &l->records->product[i];
+            l->n++;
+        }
+    return first;
+}
+
+static void say_group(struct lines *l)
+{
+    for (size_t i = 0; i < l->records->n_products; i++)
+        if (is_in_group(l, &l->records->product[i])) add_name(l, &l->records->product[i]);
     if (l->n_listed > MAX_NAMED)
         l->len +=
             (size_t)snprintf(l->line + l->len, sizeof l->line - l->len, ", and %zu more", l->n_listed - MAX_NAMED);
     end_line(l);
 }
 
-int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, const enum ifc_finding *finding,
-                     bool strict, struct sh_err *err)
+int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, bool strict, struct sh_err *err)
 {
     for (int f = IFC_AGREED + 1; f < IFC_FINDINGS; f++) {
-        struct lines l = {.b = b, .text = ifc_finding_text((enum ifc_finding)f)};
-        const struct ifc_product *first = NULL;
-        for (size_t i = records->n_products; i-- > 0;) {
-            if ((int)finding[i] != f) continue;
-            first = &records->product[i];
-            l.n++;
-        }
-        if (l.n == 0) continue;
+        struct lines l = {b, records, f, .text = ifc_finding_text((enum ifc_finding)f)};
+        const struct ifc_product *first = count_group(&l);
+        if (first == NULL) continue;
         if (strict && ifc_is_doubtful((enum ifc_finding)f))
             return build_fail(b, SH_EINPUT, err,
-                              "%zu product%s: %s: %.*s '%.40s' %.22s%s; allowed none (scene.ifc_strict)", l.n,
-                              l.n > 1 ? "s" : "", l.text, (int)(first->type.n < 48 ? first->type.n : 48), first->type.p,
-                              first->name, first->guid, l.n > 1 ? " and others" : "");
-        for (size_t i = 0; i < records->n_products; i++)
-            if ((int)finding[i] == f) add_name(&l, &records->product[i]);
-        end_group(&l);
+                              "%zu product%s: %s: " IFC_PRODUCT_FORMAT "%s; allowed none (scene.ifc_strict)", l.n,
+                              l.n > 1 ? "s" : "", l.text, IFC_PRODUCT_WORDS(first), l.n > 1 ? " and others" : "");
+        say_group(&l);
     }
     return SH_OK;
 }
 
 void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records)
 {
-    struct lines l = {.b = b, .text = "curved, with the body of ifc-lite, whose facets don't keep scene.tolerance_m"};
-    for (size_t i = 0; i < records->n_products; i++)
-        l.n += records->product[i].is_coarse;
-    for (size_t i = 0; i < records->n_products; i++)
-        if (records->product[i].is_coarse) add_name(&l, &records->product[i]);
-    end_group(&l);
+    struct lines l = {b, records, COARSE,
+                      .text = "curved, with the body of ifc-lite, whose facets don't keep scene.tolerance_m"};
+    count_group(&l);
+    say_group(&l);
 }
 
 int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
                    struct sh_err *err)
 {
-    struct lines l = {.b = b, .text = "Assimp is known to read their shapes wrong, without a message"};
-    const struct ifc_product *first = NULL;
-    for (size_t i = records->n_products; i-- > 0;) {
-        const struct ifc_product *p = &records->product[i];
-        if (p->is_air || p->assimp_wrong.n == 0) continue;
-        first = p;
-        l.n++;
-    }
+    struct lines l = {b, records, MISREAD, .text = "Assimp is known to read their shapes wrong, without a message"};
+    const struct ifc_product *first = count_group(&l);
     if (first != NULL && refuse)
         return build_fail(
             b, SH_EINPUT, err,
@@ -101,8 +108,6 @@ int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, boo
             "scene.ifc_reader: assimp reads them in spite of that",
             why, (int)(first->assimp_wrong.n < 48 ? first->assimp_wrong.n : 48), first->assimp_wrong.p, l.n,
             first->name, first->guid);
-    for (size_t i = 0; i < records->n_products; i++)
-        if (!records->product[i].is_air && records->product[i].assimp_wrong.n > 0) add_name(&l, &records->product[i]);
-    end_group(&l);
+    say_group(&l);
     return SH_OK;
 }

@@ -41,7 +41,7 @@ static int advise(struct reader *r, int rc)
     return rc == SH_EINPUT ? sh_fail(r->err, rc, "%.440s; %s", said.text, ADVICE) : rc;
 }
 
-/* Sites without angles (of other parts of a complex) don't count. */
+/* A site without angles does not count; it is another part of a complex. */
 static int is_located(const struct step_record *site)
 {
     struct text_span arg[SITE_ARGS];
@@ -93,17 +93,15 @@ struct found {
     struct text_span arg[STEP_MAX_ARGS];
 };
 
-/* The record that an attribute refers to, of this type and with n attributes at least (n <=
+/* Gives the record that an attribute refers to. It must have this type and at least n attributes (n <=
  * STEP_MAX_ARGS). */
 static int ifc_site_follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type,
                            size_t n, struct found *to)
 {
-    uint64_t id;
     char what[96];
     snprintf(what, sizeof what, "a reference to %s is missing", type);
-    if (!step_reference(ref, &id)) return ifc_site_fail(r, from, what);
-    const struct step_record *record = ifc_index_find(&r->index, id);
-    if (record == NULL || !text_is(record->type, type)) return ifc_site_fail(r, from, what);
+    const struct step_record *record = ifc_index_follow(&r->index, ref, type);
+    if (record == NULL) return ifc_site_fail(r, from, what);
     to->record = *record;
     if (step_split(to->record.args, to->arg, STEP_MAX_ARGS) < n)
         return ifc_site_fail(r, &to->record, "attributes are missing");
@@ -211,7 +209,8 @@ static int read_north(struct reader *r, struct ifc_site *site)
 
 /* ---- the map */
 
-/* Returns the usual unit of maps that is within 1 % of m, or NaN. A map's own scale differs from 1 by less. */
+/* Returns the usual unit of maps that is within 1 % of m metres, or NaN. The 1 % leaves room for the map's own scale,
+ * which differs from 1 by less. */
 static double known_unit_m(double m, double model_m)
 {
     const double known[] = {1.0, model_m, 0.3048, 1200.0 / 3937.0};

@@ -24,11 +24,10 @@ static bool read_colour(const struct ifc_records *r, const struct step_record *s
                         bool *is_limited)
 {
     struct text_span arg[4];
-    uint64_t id;
     double part;
-    if (step_split(shading->args, arg, 1) < 1 || !step_reference(arg[0], &id)) return false;
-    const struct step_record *rgb = ifc_index_find(&r->index, id);
-    if (rgb == NULL || !text_is(rgb->type, "IFCCOLOURRGB") || step_split(rgb->args, arg, 4) != 4) return false;
+    if (step_split(shading->args, arg, 1) < 1) return false;
+    const struct step_record *rgb = ifc_index_follow(&r->index, arg[0], "IFCCOLOURRGB");
+    if (rgb == NULL || step_split(rgb->args, arg, 4) != 4) return false;
     for (int k = 0; k < 3; k++) {
         if (!step_real(&r->index.text, arg[1 + k], &part)) return false;
         colour[k] = limit(part, is_limited);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Styles of surfaces say which items of an IFC file have which name and colour. */
+/* Styles of surfaces give names and colours to items of an IFC file. */
 #ifndef CORE_IMPORT_IFC_IFC_STYLES_H
 #define CORE_IMPORT_IFC_IFC_STYLES_H
 
@@ -10,7 +10,7 @@
 
 /* A style of surfaces, and an item that has it. */
 struct ifc_style {
-    uint64_t item;   /* the first member, as ifc_first asks; 0: the style is a material's */
+    uint64_t item;   /* stands first, as ifc_first demands; 0: the style is a material's */
     char *name;      /* may be empty */
     float colour[3]; /* 0..1 */
     float clear;     /* its transparency, 0..1 */

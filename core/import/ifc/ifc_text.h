@@ -5,8 +5,8 @@
 
 #include "core/text.h"
 
-/* Returns a quoted text of a STEP file as UTF-8, from malloc, with \X2\, \X4\, \X\, \S\, '' and raw bytes decoded.
- * Returns "" for what is no text ($, *), and NULL without memory. */
+/* Returns a quoted text of a STEP file as UTF-8, to be freed, with \X2\, \X4\, \X\, \S\, '' and raw bytes decoded.
+ * Returns "" where the attribute is no text ($, *), and NULL without memory. */
 char *ifc_text(struct text_span quoted);
 
 #endif

@@ -8,14 +8,6 @@
 
 enum { PROJECT_UNITS = 8, PROJECT_ARGS = 9, SI_ARGS = 4 };
 
-/* The record that an attribute refers to, if it is of this type. */
-static const struct step_record *ifc_unit_follow(const struct ifc_index *x, struct text_span ref, const char *type)
-{
-    uint64_t id;
-    const struct step_record *to = step_reference(ref, &id) ? ifc_index_find(x, id) : NULL;
-    return to != NULL && text_is(to->type, type) ? to : NULL;
-}
-
 static int read_si(const struct ifc_index *x, const struct step_record *unit, double *m, struct sh_err *err)
 {
     static const struct {
@@ -38,12 +30,12 @@ static int read_si(const struct ifc_index *x, const struct step_record *unit, do
 static int read_converted(const struct ifc_index *x, const struct step_record *unit, struct text_span ref, double *m,
                           struct sh_err *err)
 {
-    const struct step_record *measure = ifc_unit_follow(x, ref, "IFCMEASUREWITHUNIT");
+    const struct step_record *measure = ifc_index_follow(x, ref, "IFCMEASUREWITHUNIT");
     struct text_span arg[2], list;
     double factor;
     if (measure == NULL) return ifc_index_fail(x, unit, err, "a reference to IFCMEASUREWITHUNIT is missing");
     if (step_split(measure->args, arg, 2) != 2) return ifc_index_fail(x, measure, err, "attributes are missing");
-    const struct step_record *si = ifc_unit_follow(x, arg[1], "IFCSIUNIT");
+    const struct step_record *si = ifc_index_follow(x, arg[1], "IFCSIUNIT");
     if (si == NULL) return ifc_index_fail(x, measure, err, "a reference to IFCSIUNIT is missing");
     const char *open = memchr(arg[0].p, '(', arg[0].n);
     const size_t skip = open != NULL ? (size_t)(open - arg[0].p) : 0;
@@ -87,7 +79,7 @@ int ifc_unit_find(const struct ifc_index *x, double *m, struct sh_err *err)
     if (rc != SH_OK) return rc;
     if (step_split(project->args, arg, PROJECT_ARGS) != PROJECT_ARGS)
         return ifc_index_fail(x, project, err, "not the 9 attributes that IFC defines");
-    const struct step_record *units = ifc_unit_follow(x, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT");
+    const struct step_record *units = ifc_index_follow(x, arg[PROJECT_UNITS], "IFCUNITASSIGNMENT");
     if (units == NULL) return ifc_index_fail(x, project, err, "no unit of length: it names no IFCUNITASSIGNMENT");
     const char *p = units->args.p, *end = p + units->args.n;
     for (uint64_t id; ifc_next_reference(&p, end, &id);) {

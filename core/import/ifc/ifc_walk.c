@@ -15,12 +15,12 @@
 
 enum kind {
     PLAIN = 0,
-    STOP = 1,        /* nothing of the geometry follows */
+    STOP = 1,        /* no geometry follows from here */
     BODY = 2,        /* a solid or a surface */
     CURVED = 4,      /* it has circles or other curves, which readers cut up */
-    ASSIMP_ERRS = 8, /* Assimp is known to get it wrong, silently */
+    ASSIMP_ERRS = 8, /* Assimp is known to get it wrong without a message */
     POINTS = 16,     /* points, which may be far */
-    TURNED = 64,     /* a profile turned about an axis: its radius is among the points */
+    TURNED = 64,     /* a profile turned about an axis: its points bound the radius */
     RADIUS = 32,     /* a circle or the like: keep_radius knows the attribute */
 };
 
@@ -92,7 +92,7 @@ static const struct type_kind kinds[] = {
 struct walk {
     struct ifc_records *r;
     struct ifc_product *product;
-    uint32_t *stack; /* places in record */
+    uint32_t *stack; /* indices into ifc_index.record */
     size_t n, room;
     uint64_t *voids; /* pairs: product, opening; by product */
     size_t n_voids, room_voids;

@@ -3,7 +3,7 @@
 // the machine's byte order. Coordinates are metres, y up.
 //
 //   head     "shifc01\0"
-//   product  u32 express id; u32 parts; u32 failures that the reader admitted; u32 length of text
+//   product  u32 express id; u32 parts; u32 failures that the reader reported; u32 length of text
 //            text: type of the product, '\n', the first failure, perhaps empty; UTF-8; zeros up to a multiple of 8
 //            parts
 //   part     u32 vertices; u32 triangles; f32[4] colour: red, green, blue, opacity, 0..1
@@ -19,7 +19,7 @@ function write(bytes) {
   for (let done = 0; done < bytes.length;) done += fs.writeSync(RESULT, bytes, done)
 }
 
-// The file, read whole. Of a small one the bodies are made sooner than the optimised code for them would be compiled.
+// For a file below this size, reading takes less time than compiling the optimised code would.
 const SMALL = 6e6
 
 export function load(file) {
@@ -56,7 +56,7 @@ export function end() {
   write(bytes_of(new Uint32Array([0, 0, 0, 0])))
 }
 
-// One line as a struct import_note of core/import/import_child.h: kind 3 is an error, code -1 that of a wrong file.
+// Sends one line as a struct import_note of core/import/import_child.h: kind 3 is an error, code -1 means a wrong file.
 export function fail(error) {
   const note = Buffer.alloc(528), put = new DataView(note.buffer, note.byteOffset)
   const little = new Uint8Array(new Uint16Array([1]).buffer)[0] === 1
@@ -67,7 +67,7 @@ export function fail(error) {
   process.exit(1)
 }
 
-// Points as `local` has them, stride numbers each, through a 4 x 4 matrix in columns; in double.
+// Multiplies the points of `local`, stride numbers each, by a 4 x 4 matrix in columns, in double.
 export function placed(local, stride, m) {
   const n = local.length / stride, vertex = new Float64Array(3 * n)
   let largest = 0

@@ -13,7 +13,8 @@ static uint64_t step_count(const char *p, const char *end, char what)
     return n;
 }
 
-/* In strings a quote is written twice, which reads as the end of one and the start of the next. */
+/* Overwrites comments with blanks. A quote within a text is written twice, which counts as the end of one text and the
+ * start of the next. */
 static int blank_comments(struct text *t, struct sh_err *err)
 {
     uint64_t line = 1, opened = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Records of a STEP file (ISO 10303-21): #id= TYPE(arguments); in memory, found by type or number. */
+/* Reads the records of a STEP file (ISO 10303-21), #id= TYPE(arguments);, one after the other from memory. */
 #ifndef CORE_IMPORT_IFC_STEP_H
 #define CORE_IMPORT_IFC_STEP_H
 
@@ -18,8 +18,8 @@ int step_open(struct text *t, const char *path, struct sh_err *err);
 /* The next record from t->p on: 1, 0 at the end, or a negative SH_E code. */
 int step_next(struct text *t, struct step_record *record, struct sh_err *err);
 
-/* Splits at commas outside of brackets and quotes, blanks cut off. Returns how many there are; the first max
- * are stored. */
+/* Splits a list at commas outside of brackets and quotes, and cuts blanks off. Returns the number of parts; the first
+ * max are stored. */
 size_t step_split(struct text_span list, struct text_span *part, size_t max);
 
 /* "(a, b)" -> "a, b"; 0 when it is no list. */

@@ -4,7 +4,7 @@
 import { createRequire } from 'node:module'
 import { begin, end, fail, load, placed, product } from './result.mjs'
 
-// Its log goes to the console: a line for each failure, before the product that has it.
+// web-ifc logs to the console: a line for each failure, before the product that has it.
 const failures = []
 for (const name of ['log', 'warn', 'error', 'info', 'debug'])
   console[name] = (...text) => failures.push(text.join(' ').replace(/^\[WEB-IFC\]\[\w+\]/, ''))
