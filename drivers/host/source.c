@@ -76,7 +76,7 @@ static int split_address(const char *address, char host[256], char port[8], stru
     return 0;
 }
 
-/* Best effort: a small buffer costs speed, not correctness. */
+/* Errors are ignored: a small buffer costs speed, not correctness. */
 static void tune_socket(int fd)
 {
     int size = RECEIVE_BUFFER, on = 1;
@@ -105,6 +105,16 @@ static int wait_connected(int fd, int64_t deadline_ns)
     }
 }
 
+/* Whether the socket is connected to itself. TCP does that where nobody listens, and the system gives the socket the same
+ * port that it connects to. */
+static int is_own_end(int fd, const struct addrinfo *ai)
+{
+    struct sockaddr_storage own = {0};
+    socklen_t len = sizeof own;
+    return getsockname(fd, (struct sockaddr *)&own, &len) == 0 && len == ai->ai_addrlen &&
+           memcmp(&own, ai->ai_addr, len) == 0;
+}
+
 /* Returns a connected socket, or -1 with errno. */
 static int connect_one(const struct addrinfo *ai, int64_t deadline_ns)
 {
@@ -114,6 +124,7 @@ static int connect_one(const struct addrinfo *ai, int64_t deadline_ns)
     int error = 0;
     if (connect(fd, ai->ai_addr, ai->ai_addrlen) != 0)
         error = errno == EINPROGRESS ? wait_connected(fd, deadline_ns) : errno;
+    if (error == 0 && is_own_end(fd, ai)) error = ECONNREFUSED;
     if (error == 0) return fd;
     close(fd);
     errno = error;
@@ -134,7 +145,7 @@ static int open_tcp(const char *address, struct host_source *out, struct sh_err 
         n++;
     for (const struct addrinfo *ai = list; ai != NULL && out->fd < 0; ai = ai->ai_next, n--) {
         const int64_t now_ns = host_deadline_ns(0);
-        out->fd = connect_one(ai, now_ns + (deadline_ns - now_ns) / n); /* the others need some of the time */
+        out->fd = connect_one(ai, now_ns + (deadline_ns - now_ns) / n); /* the other addresses share what is left */
     }
     int error = errno;
     freeaddrinfo(list);

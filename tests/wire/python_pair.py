@@ -48,6 +48,7 @@ def misuse(path):
     head, theirs = pair()
     threading.Timer(0.05, theirs.close).start()
     refused(head.next_frame, 1e300)  # longer than poll() can wait
+    connected_to_itself()
     for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
         late_replies(lines)
     late_answer()
@@ -55,6 +56,20 @@ def misuse(path):
     dropped_frames()
     whole_frame()
     print("refused")
+
+
+def connected_to_itself():
+    """Where nobody listens, the system may give a socket the same port that it connects to. TCP then connects it to
+    itself. Here the socket asks for that port."""
+    connect = socket.create_connection
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    socket.create_connection = lambda at, timeout_s: connect(at, timeout_s, source_address=at)
+    try:
+        refused(scanhead.open, f"tcp:127.0.0.1:{port}")
+    finally:
+        socket.create_connection = connect
 
 
 def late_replies(lines):
