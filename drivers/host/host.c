@@ -32,7 +32,7 @@ static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, 
                         struct sh_err *err)
 {
     struct host_usb_watch *watch = deadline_ns > host_deadline_ns(0) ? host_usb_watch_open(source) : NULL;
-    wrong_too |= strncmp(source, "tty:", 4) == 0; /* the node of one that is not plugged in isn't there */
+    wrong_too |= strncmp(source, "tty:", 4) == 0; /* until it is plugged in, its node may be missing, or not be a terminal */
     for (;;) {
         int rc = host_source_open(source, out, err);
         if (rc == SH_OK || rc == SH_ENOMEM || (rc == SH_EINPUT && !wrong_too) || host_deadline_ns(0) >= deadline_ns ||

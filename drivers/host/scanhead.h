@@ -76,10 +76,10 @@ void scanhead_close(struct scanhead *sh);
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
- * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters and the hash are kept, and
- * what the stream has reported, too, until its sequence begins anew after a restart. A jump in the sequence shows what
- * was lost meanwhile. On USB the same head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file
- * or "fd:N". Any other error: the head did not come back in time, or a signal came; call again, or close. */
+ * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters and the hash are kept.
+ * Descriptor, anchor and names are kept, too, unless the head has started again. A jump in the sequence shows how many
+ * frames were lost meanwhile. On USB the same head is the one with the same ids and serial number. SCANHEAD_ESTATE for
+ * a file or "fd:N". Any other error: the head did not come back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* Heads on USB now. */
@@ -129,6 +129,7 @@ enum scanhead_event_code {
     SCANHEAD_EV_ERROR = 7,
     SCANHEAD_EV_SETTINGS = 8,
     SCANHEAD_EV_POSE_LATE = 9,
+    /* after the colon: the event's values */
     SCANHEAD_EV_PPS = 10,  /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
     SCANHEAD_EV_TIME = 11, /* before each repeated descriptor: 0, device time (ns), its GPS time (ns) */
     SCANHEAD_EV_SITE = 12, /* a station was moved (SITE:POSE): its number, warnings of the head about its place */
@@ -182,8 +183,9 @@ enum scanhead_notice_kind {
     /* A frame with a correct header and a wrong payload: seq is its number, t_ns its time. n: its bytes up to the next
      * correct frame. Where bytes were lost, n is less than the frame's length field says. */
     SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
-    /* n bytes that belong to nothing: garbage, a frame with a broken header, a broken reply, replies after these up to
-     * the next frame. A whole run of them is one notice, before the next frame or reply. */
+    /* n bytes that belong to no frame or reply: garbage, a frame with a broken header, a broken reply. After these
+     * replies count as garbage, too, up to the next frame. A whole run of them is one notice, before the next frame or
+     * reply. */
     SCANHEAD_NOTICE_BAD_BYTES = 6,
     /* The connection or the recording ended within a frame or a reply, of which n bytes had come. seq: the frame's
      * number, if its header had come. */
@@ -293,9 +295,9 @@ struct scanhead_wave {
     uint32_t first, n;      /* samples, by their number on the grid */
     const uint8_t *sample;  /* n counts of two bytes, little-endian; valid as the frame's payload is */
     double range_m, step_m; /* of the first sample; from one to the next */
-    /* In the polar layout this is the beam in the head's frame SOCS, of length one. In the geo layout it is the
-     * change of x, y and z in the CRS along a metre of range. So range times direction goes from the head (geo: the
-     * anchor, where the head stands) to the sample. */
+    /* In the polar layout this is the beam's direction in the head's frame SOCS, of length one. In the geo layout it is
+     * the change of x, y and z in the CRS along a metre of range. So range times direction leads to the sample from the
+     * head; in the geo layout, from the anchor. */
     double direction[3];
     uint32_t sample_ps, bits; /* time between samples; bits of a count */
     double baseline;          /* the count without light */
@@ -320,11 +322,11 @@ struct scanhead_line_end {
     int64_t t0_ns, t1_ns;     /* since the scan's start: this line's first pulse, the next one's */
     uint32_t n_fired, n_cast; /* pulses of the whole sweep; those outside its blind part */
     uint32_t n_echoes;        /* echoes sent; this, n_crowded, n_faint and n_unfit are 0 where parts were lost */
-    uint32_t mirror_count, pan_count,
-        status;         /* encoders at its last pulse; bit 0: last of the frame, bit 1: stopped within */
-    uint32_t n_crowded; /* echoes left out, the weakest: a pulse had more than the head sends */
-    uint32_t n_faint;   /* hits that the head did not detect */
-    uint32_t n_unfit;   /* echoes too far for the stream's integers: sent as empty shots */
+    uint32_t mirror_count, pan_count; /* encoders at the line's last pulse */
+    uint32_t status;                  /* bit 0: last line of a pan sweep; bit 1: the scan was stopped in this line */
+    uint32_t n_crowded;               /* echoes left out, the weakest: a pulse had more than the head sends */
+    uint32_t n_faint;                 /* hits that the head did not detect */
+    uint32_t n_unfit;                 /* echoes too far for the stream's integers: sent as empty shots */
 };
 /* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
@@ -336,8 +338,8 @@ struct scanhead_info {
     int crs;           /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS, 3 geodetic */
     int epsg;          /* 0 for local */
     int geoid_heights; /* 1: heights of UTM and geodetic points are above the geoid; 0: ellipsoidal */
-    double anchor[3];  /* metres; geodetic: degrees, degrees, metres. Moves along with a head on a trajectory */
-    double scale_m;    /* a count on the wire is at most this on the ground */
+    double anchor[3];  /* metres; geodetic: degrees, degrees, metres. It moves along with a head on a trajectory */
+    double scale_m;    /* the step of coordinates on the wire is at most this long on the ground */
     double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m; /* the station on WGS 84, ellipsoidal height; 0 where no place is configured */
     double station_m[3];               /* the station in the scene frame */
@@ -358,7 +360,7 @@ enum scanhead_emitter_kind {
     SCANHEAD_EMIT_PLANAR = 1,     /* one plane, in steps; a line is a turn, from step 0 on */
     SCANHEAD_EMIT_BEAMS = 2,      /* a firing sequence of beams turns about the vertical; a line is a turn */
     SCANHEAD_EMIT_SPHERE = 3,     /* rings of one elevation each; a line is a ring, a frame all of them */
-    SCANHEAD_EMIT_DIRECTIONS = 4, /* a list; a line is the list once */
+    SCANHEAD_EMIT_DIRECTIONS = 4, /* a list of directions; a line is the whole list once */
 };
 struct scanhead_beam {
     double elevation_deg, azimuth_deg; /* azimuth: clockwise from where the head looks when it fires */
@@ -368,13 +370,13 @@ enum { SCANHEAD_MAX_BEAMS = 128 };
 struct scanhead_emitter {
     int kind;       /* enum scanhead_emitter_kind */
     uint32_t steps; /* pulses of a line; beams: 0 */
-    /* planar: the steps that are cast, both included. front_step, of a sphere, too: the step that looks along y */
+    /* planar: the first and the last step that are cast. planar and sphere: the step that looks along y */
     int first_step, last_step, front_step;
     int turn;       /* +1: clockwise seen from above, -1: the other way */
     uint32_t rings; /* sphere: how many rings a frame has */
     /* ring i has the elevation first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
     double first_ring_deg, ring_step_deg;
-    int echoes;                                /* the head sends of each pulse: 0 all, 1 first, 2 last, 3 strongest */
+    int echoes;                                /* which ones of a pulse are sent: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
     struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
@@ -383,9 +385,9 @@ struct scanhead_emitter {
  * within a scan, the head sends it again. */
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
-/* Where a moving head was. Between two poses of one frame of SCANHEAD_POSES the position goes along the
- * straight line, and the attitude turns the shorter way about one fixed axis at constant rate (slerp). The
- * head itself moves so. */
+/* The place and attitude of a moving head at a time. Between two poses of one frame of SCANHEAD_POSES it moves along
+ * the straight line, and turns the shorter way about one fixed axis at constant rate (slerp). This is no approximation:
+ * the head casts its pulses from these poses. */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */
@@ -416,8 +418,8 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
  * of week. It is valid for frames up to the one that scanhead_next returned last. It counts from the last time that the
  * head reported, at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the nanosecond
  * where the head's clock has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head
- * doesn't know the time, or before the time and the scan's start have come. Where the head knows the time, it comes
- * before the first points that can be placed. */
+ * doesn't know the time, or before the time and the scan's start have come. A head that knows the time sends it before
+ * the first points that can be decoded. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 /* The same for n times, bit for bit. It is faster where all times lie within one second. */
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
@@ -433,8 +435,8 @@ struct scanhead_stats { /* over all connections of the handle */
     uint64_t pulses_lost; /* pulses the head says it could not compute */
     /* How often each notice came. seq_gaps above counts restarts, too. frames counts neither repeated nor late ones. */
     uint64_t repeated, late, restarts, cuts, echoes, late_replies, unasked, closed, reattached;
-    /* Frames of bad_payload that no gap shows: before the first frame, before a restart, and after the last frame. So
-     * seq_lost + bad_unseen frames are known to be lost on the way. */
+    /* Frames of bad_payload that no gap shows: before the first whole frame, before a restart, and after the last whole
+     * frame. So seq_lost + bad_unseen frames are known to be lost on the way. */
     uint64_t bad_unseen;
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);

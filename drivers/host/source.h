@@ -11,8 +11,8 @@
 
 #include "core/err.h"
 
-/* How bytes come and go, without blocking. Descriptors, USB, captured files and a head in this process have a table
- * each. */
+/* A kind of source: functions that move bytes without blocking. Descriptors, USB, captured files and a head in this
+ * process have such a table each. */
 struct host_source;
 struct scanhead;
 struct host_source_ops {

@@ -14,7 +14,7 @@ enum {
     USB_CLASS = 0xff,
     USB_SUBCLASS = 0x53,
     USB_PROTOCOL = 0x48,
-    USB_REQUEST_SESSION = 0x22, /* bmRequestType 0x41, wValue 1 opens, 0 closes, wIndex: the interface; 0xc1 asks */
+    USB_REQUEST_SESSION = 0x22, /* bmRequestType 0x41: wValue 1 opens, 0 closes; 0xc1 asks; wIndex: the interface */
     USB_CONTROL_MS = 5000,      /* USB 2.0, 9.2.6.1: no request takes longer */
 };
 

@@ -15,9 +15,9 @@
  *   - No session: we wait for inotify only. An open event starts a session, even if the hang-up says that the
  *     client has left already: its bytes are still to be read (echo '*RST' > /dev/pts/3).
  *   - Session: we wait for the master as well. The session ends when the master hangs up and all that was
- *     written is read. A close event is queued before the close takes effect, and an open event after the
- *     open did. An open that comes after our hang-up is therefore still unread when the watch is set up
- *     again, or seen as "no hang-up".
+ *     written is read. A client that opens the slave just then is not missed: the kernel queues an open event
+ *     after the open took effect. So when the watch is set up again, either the master no longer hangs up, or
+ *     the event is still unread.
  *   - Session, and inotify reports that the last client went and another came before we looked: the hang-up
  *     never showed. Clients that come one after the other give open, close, open, ... without equal
  *     neighbours: nothing is merged, the count is exact, and we report LINK_CLOSED and LINK_OPENED. Only
@@ -47,7 +47,7 @@ struct pty_link {
     int is_deaf;                /* no new client can be seen: the next poll fails */
     int open;                   /* a session is on, as the caller knows or is about to learn */
     unsigned count;             /* clients of the session; 0 with open set: the last seems to be gone */
-    int open_event_due;         /* that client is counted, but its open event may be still to come */
+    int open_event_due;         /* its client is counted, but that client's open event may be still to come */
     int due_closed, due_opened; /* events that the caller still has to get, in this order */
 };
 

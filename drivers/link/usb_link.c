@@ -148,7 +148,7 @@ static void usb_link_report(struct usb_link *self, int i, uint32_t want_write, s
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
-/* The back end's news come first; of an unplug they say more than scanhead_usb_cut, which is then left out. */
+/* The back end's message comes first. About an unplug it says more than that of scanhead_usb_cut, which is left out. */
 static void report_news(struct usb_link *self, struct link_events *events)
 {
     if (self->news[0] != '\0' && self->head.cut == USB_END_UNPLUGGED) self->head.cut_due = 0;

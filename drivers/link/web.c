@@ -203,7 +203,7 @@ static int send_message(struct web_session *s, struct lws *wsi)
     return n < 0 ? -1 : 0;
 }
 
-/* HTTP and WebSocket. The request is that of the connection's web_request. */
+/* Handles libwebsockets' calls for HTTP and WebSocket. The request has been read before: conn->request. */
 static int serve_client(struct web_conn *conn, enum lws_callback_reasons reason, void *in, size_t len)
 {
     struct lws *wsi = conn->wsi;

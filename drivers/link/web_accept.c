@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Connections until their first request is whole. The request is judged here as it comes, without taking it out of the
+/* Serves connections until their request is whole. The request is judged here as it comes, without taking it out of the
  * socket. A wrong one is answered at its first wrong byte, and libwebsockets never sees it. For a correct one
- * libwebsockets gets a new request with only the fields that it needs, and nothing of what follows the request. With
- * more fields or arguments than it has room for it would close without a word, and it would act on fields that we don't
- * support (h2c). */
+ * libwebsockets gets a new request with only the fields that it needs, and no byte from after the request. Given the
+ * client's own request, libwebsockets would act on fields that we don't support (h2c). It would also close the
+ * connection without an answer if the request had more fields or arguments than it has room for. */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
@@ -26,7 +26,7 @@ struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn)
     return wsi;
 }
 
-/* The bytes that the socket must have before it is looked at again: one more than it has. */
+/* The socket is not reported as readable again before it has more than `have` bytes. */
 static int wait_for_more(int fd, int have)
 {
     const int low = have + 1;
@@ -188,7 +188,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
     char request[WEB_MAX_REQUEST];
     const int fd = web_lws.lws_get_socket_fd(conn->wsi);
     struct pollfd peer = {.fd = fd, .events = POLLRDHUP};
-    const int ended = poll(&peer, 1, 0) > 0; /* before looking: then nothing comes after what is seen */
+    const int ended = poll(&peer, 1, 0) > 0; /* asked first: if it has ended, recv below sees all that will ever come */
     const ssize_t n = recv(fd, request, sizeof request, MSG_PEEK);
     if (n < 0 && (errno == EAGAIN || errno == EINTR)) return 0;
     if (n <= 0) return -1;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Answers by HTTP, and their way out in pieces. One request, one connection: it ends with its first answer. */
+/* Answers requests by HTTP, in pieces. A connection ends after its first answer. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +28,8 @@ static const char *reason_of(int status)
     return "Error";
 }
 
-/* As snprintf. Its fields bind a browser: nothing is loaded from elsewhere, no frame around the page, no type
- * guessed. */
+/* Writes and returns as snprintf. The fields forbid a browser to load anything from elsewhere, to show the page within
+ * another site's page, and to guess a type. */
 static int write_head(char *to, size_t room, int status, const char *type, size_t len)
 {
     const char *more = status == 405   ? "allow: GET, HEAD\r\n"
@@ -51,7 +51,7 @@ int web_http_words(char *to, size_t room, int status, const char *words, int hea
     return head_only ? n : n + snprintf(to + n, room - (size_t)n, "%s\n", words);
 }
 
-/* The content is what conn has. */
+/* Answers with the content that conn has. */
 static int answer(struct web_conn *conn, int status, const char *type)
 {
     unsigned char text[LWS_PRE + WEB_TEXT_ROOM], *head = text + LWS_PRE;

@@ -72,8 +72,8 @@ static int is_own_origin(const struct fields *f)
            strncasecmp(f->origin.s + n, f->host.s, f->host.len) == 0;
 }
 
-/* An image or a script of another site's page sends no Origin, but browsers then say where it is from. Links to the
- * page itself are followed. */
+/* An image or a script of another site's page is asked for without an Origin, but browsers then say in Sec-Fetch-Site
+ * where it is from. Links from other sites to the page's own files work. */
 static int is_foreign_part(const struct fields *f, const char *path)
 {
     struct web_page page;

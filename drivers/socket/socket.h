@@ -33,8 +33,8 @@ int socket_is_group(const struct sockaddr *address);
 int socket_open(const struct socket_place *place, int *fd, char *name, size_t len, struct sh_err *err);
 /* The same at a known address of any family: a descriptor, or -1 with errno. */
 int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting);
-/* Listens again where a listener has listened, whose socket is closed by now. So no name is looked up, which may lead
- * to several addresses. A descriptor, or -1 with errno. */
+/* Listens again at the address of a listener whose socket is closed by now. It does not look up the name again, which
+ * may lead to another address. Returns a descriptor, or -1 with errno. */
 struct socket_address {
     struct sockaddr_storage at;
     socklen_t len;
@@ -45,10 +45,10 @@ void socket_note_address(int listener, struct socket_address *at);
 /* Whether a socket is connected to itself. TCP does that where nobody listens on a port of this machine, and the system
  * gives that same port to the socket that connects to it. */
 int socket_is_own_end(int fd);
-/* SH_E for an errno of either. */
+/* Returns the SH_E for an errno of opening, binding or connecting a socket. */
 int socket_error_code(int error);
 
-/* A descriptor to be given up for a moment when there are no more; -1: none is left. */
+/* Returns a descriptor in reserve, which socket_accept closes for a moment when no other is left; -1: none is left. */
 int socket_reserve(void);
 /* The next client of a listener. 0: there is none. 1: *fd is its descriptor, which does not block, or -1 where the
  * process or the system had no descriptor left. Such a client is turned away, since it would wake the listener's thread
@@ -71,8 +71,8 @@ void socket_tune_impatient(int fd);
  * stream, reset or any other failure. */
 ssize_t socket_read(int fd, void *buf, size_t len);
 ssize_t socket_write(int fd, const void *buf, size_t len);
-/* As socket_write, but 0 as long as a peer that has gone has bytes here that are not read: the last request of a client
- * that left is not lost. Only for callers that read whenever poll says so. */
+/* As socket_write, but when the peer has gone it returns 0 until all that the peer sent is read. So the last request of
+ * a client that left is not lost. Only for callers that read whenever poll says so. */
 ssize_t socket_write_heard(int fd, const void *buf, size_t len);
 /* Breaks a connected TCP socket: its peer sees a reset, and loses what it has not taken. The descriptor stays. */
 void socket_break(int fd);

@@ -61,7 +61,7 @@ static int is_broadcast(struct sockaddr_storage *at)
     return at->ss_family == AF_INET && v4(at)->sin_addr.s_addr == htonl(INADDR_BROADCAST);
 }
 
-/* interface 0: where the route leads. */
+/* Joins the group at `at`, on an interface by its number; 0: on the one that the route leads to. */
 static int join(int fd, struct sockaddr_storage *at, unsigned interface)
 {
     const int no = 0;
@@ -93,7 +93,7 @@ static int start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned in
     return is_group ? join(fd, at, interface) : 0;
 }
 
-/* "GROUP%INTERFACE" of IPv4, which getaddrinfo does not know. */
+/* Takes "GROUP%INTERFACE" of IPv4 apart, which getaddrinfo does not know. */
 static int split_interface(const char *host, char address[MAX_HOST], unsigned *interface, struct sh_err *err)
 {
     const char *percent = strchr(host, '%');

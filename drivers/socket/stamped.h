@@ -40,9 +40,9 @@ int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, st
 uint64_t stamped_dropped(const struct stamped_socket *socket);
 void stamped_close(struct stamped_socket *socket);
 
-/* Waits until the kernel stamps what comes, about a second at most: it begins some time after a socket first asked it
- * to. Earlier bytes have the time of reading. While `keeper` is open the kernel goes on stamping. Without a loopback it
- * does not wait. */
+/* Waits until the kernel stamps what comes, for about a second at most. The kernel begins to do so some time after a
+ * first socket asked for it; until then bytes get the time at which they are read. While `keeper` is open the kernel
+ * goes on stamping. Without a loopback interface this does not wait. */
 void stamped_begin(struct stamped_socket *keeper);
 
 /* ---- streams */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The functionfs back end: the device on a real device controller of this machine (a board with a UDC), as a
- * gadget of the Linux kernel. The kernel answers the standard requests from the descriptors it was given;
- * what concerns our own interfaces comes as events on ep0. The core hears of a configuration as if it had
+ * gadget of the Linux kernel. The kernel answers the standard requests from the descriptors it was given.
+ * Requests to our own interfaces come as events on ep0. The core hears of a configuration as if it had
  * answered the requests itself.
  *
  * A device that is only a port has no ep0 of ours: the kernel's f_acm is all of it. Then the state of the controller,
@@ -124,7 +124,7 @@ static void enable(struct functionfs *self)
 {
     struct usb_ctrlrequest setup = {.bRequest = USB_REQ_SET_CONFIGURATION};
     le_put16(&setup.wValue, USB_CONFIGURATION);
-    disable(self, 0); /* the kernel leaves out the event before when it was not read in time */
+    disable(self, 0); /* the kernel drops a DISABLE that was not read before ENABLE came */
     usb_device_attach(self->device, gadget_rate(&self->gadget), on_complete, self);
     usb_device_assume_address(self->device);
     usb_device_control(self->device, &setup, NULL, 0);
@@ -171,7 +171,8 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
     if (n == USB_STALL) stall(self, in);
 }
 
-/* Without ep0: follows the controller's state. If the port was hung up, the device was not configured in between. */
+/* Follows the controller's state, for a gadget without ep0. A port that was hung up shows that the device was not
+ * configured for a while, even if the state is "configured" again. */
 static void take_state(struct functionfs *self, int hung_up)
 {
     char text[32];
@@ -183,7 +184,7 @@ static void take_state(struct functionfs *self, int hung_up)
     if (is && (hung_up || !was)) enable(self);
 }
 
-/* One event of ep0; 0: there is none. */
+/* Takes one event of ep0; 0: there is none. */
 static int functionfs_take_event(struct functionfs *self)
 {
     struct usb_functionfs_event event;

@@ -39,7 +39,8 @@ static inline int gadget_has_functionfs(const struct gadget *gadget)
 int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err);
 /* Plugs in: udc, or the first free controller where that is empty. */
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
-/* Without FunctionFS, after binding: state_fd, which poll(2) reports with POLLPRI when the state has changed. */
+/* Opens state_fd, on which poll(2) reports POLLPRI when the controller's state has changed. For gadgets without
+ * FunctionFS, once they are bound. */
 int gadget_watch_state(struct gadget *gadget, struct sh_err *err);
 /* Whether the host has configured it. before: the last answer, which still holds while the bus is suspended. */
 int gadget_is_configured(const struct gadget *gadget, int before);

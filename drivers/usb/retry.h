@@ -17,8 +17,8 @@ struct usb_retry {
 /* pace_ms 0: USB_RETRY_MS. what: "usbip", for errors. */
 int usb_retry_open(struct usb_retry *retry, const char *what, int pace_ms, struct sh_err *err);
 void usb_retry_close(struct usb_retry *retry);
-/* The host is gone: an attempt is due every pace_ms from now. SH_EIO: the timer can't be set. Here and below the owner
- * hears of it. */
+/* The host is gone: an attempt is due every pace_ms from now. SH_EIO: the timer can't be set. This function and the
+ * last two also send the owner a message. */
 int usb_retry_start(struct usb_retry *retry, const struct usb_owner *owner);
 /* After poll(2) on the timer: 1 when an attempt is due. */
 int usb_retry_is_due(struct usb_retry *retry, short revents);

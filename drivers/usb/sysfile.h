@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Files of sysfs and configfs: a value each. All return 0, or -1 with errno. */
+/* Reads and writes files of sysfs and configfs, which hold one value each. All return 0, or -1 with errno. */
 #ifndef DRIVERS_USB_SYSFILE_H
 #define DRIVERS_USB_SYSFILE_H
 

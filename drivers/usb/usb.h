@@ -124,11 +124,12 @@ void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int du
 /* Halts the endpoint, until the host clears it. 0: there is none now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
- * into the one after it. Until the interface ends. */
+ * into the one after it. This holds until the interface ends. */
 void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
 /* Sets how long each control request takes. 0: it is answered at once. */
 void usb_device_set_slow(struct usb_device *device, double ms);
-/* For back ends, which make requests wait. Whether a request has to; held: those that wait already. */
+/* This and the next four functions are for back ends, which keep the list `held` of requests that wait. Returns whether
+ * another request has to wait. */
 int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held);
 /* Appends a request, with its id set. They are answered one after the other; each takes the time asked for. */
 void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request);
@@ -144,7 +145,7 @@ void usb_device_lengthen(struct usb_device *device, uint32_t n);
 /* ---- for functions. An endpoint that is not there, or is halted, has no room and nothing to read. A suspended device
  * has no room. */
 
-/* Bytes taken by waiting IN transfers, maybe 0. */
+/* Writes to the waiting IN transfers. Returns how many bytes they took, maybe 0. */
 size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);
 int usb_device_can_write(const struct usb_device *device, uint8_t endpoint);
 /* Reads bytes of one epoch at a time. */

@@ -112,8 +112,8 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
-/* A free place, or that of the connection that has been here longest without importing. There always is one, since
- * at most one host has imported. */
+/* Returns a free place, or ends the connection that has been here longest without importing, and returns its place.
+ * There always is one, since at most one host has imported. */
 static struct usbip_conn *usbip_make_room(struct usbip *self)
 {
     struct usbip_conn *oldest = NULL;
@@ -200,7 +200,7 @@ static int unplug(struct usbip *self)
 {
     if (self->unplugged) return SH_ESTATE;
     self->unplugged = 1;
-    if (self->listener >= 0) close(self->listener); /* first: who is cut off finds nobody there */
+    if (self->listener >= 0) close(self->listener); /* first, so that a host that is cut off can't come back at once */
     self->listener = -1;
     for (int i = 0; i < MAX_CONNS; i++)
         usbip_conn_end(&self->conn[i]);
