@@ -11,7 +11,7 @@
 
 /* Room for some seconds, and for the longest frame. */
 enum { KEEP = 8192 };
-_Static_assert(KEEP > 2 * NATIVE_MAX_POSES, "a frame has room beside the one before");
+_Static_assert(KEEP > 2 * NATIVE_MAX_POSES, "two frames have room");
 
 struct host_poses {
     uint64_t n; /* how many came; the last KEEP are kept, number i at at[i % KEEP] */

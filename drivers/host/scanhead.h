@@ -38,7 +38,7 @@ extern "C" {
 #define SCANHEAD_VERSION     "1.0.0"
 #define SCANHEAD_API_VERSION 1
 
-/* SCANHEAD_VERSION of the library that the program runs with. */
+/* Returns SCANHEAD_VERSION of the library that the program runs with. */
 const char *scanhead_version(void);
 
 enum scanhead_error {
@@ -72,7 +72,7 @@ int scanhead_open(const char *source, struct scanhead **out, char *err, size_t e
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
 /* sh may be NULL. */
 void scanhead_close(struct scanhead *sh);
-/* The text of the last error; the handle's, until its next call. */
+/* Returns the text of the last error. It is the handle's, until its next call. */
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
@@ -82,7 +82,7 @@ const char *scanhead_error(const struct scanhead *sh);
  * a file or "fd:N". Any other error: the head did not come back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
-/* Heads on USB now. */
+/* A head that is on USB now. */
 struct scanhead_usb_head {
     char source[192]; /* for scanhead_open: usb:vid:pid:serial */
     uint16_t vid, pid;
@@ -156,8 +156,8 @@ struct scanhead_frame {
     char event_text[96];
 };
 
-/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC, repeated frames, and frames that
- * come after newer ones are left out and counted, see scanhead_on_notice. */
+/* Gets the next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC, repeated frames, and frames
+ * that come after newer ones are left out and counted, see scanhead_on_notice. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
 /* Notices about a stream, one for each event. Losses are counted in two independent ways:
@@ -183,9 +183,8 @@ enum scanhead_notice_kind {
     /* A frame with a correct header and a wrong payload: seq is its number, t_ns its time. n: its bytes up to the next
      * correct frame. Where bytes were lost, n is less than the frame's length field says. */
     SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
-    /* n bytes that belong to no frame or reply: garbage, a frame with a broken header, a broken reply. After these
-     * replies count as garbage, too, up to the next frame. A whole run of them is one notice, before the next frame or
-     * reply. */
+    /* n bytes that belong to no frame or reply: garbage, a frame with a broken header, a broken reply, or replies
+     * between these and the next frame. A whole run of them is one notice, before the next frame or reply. */
     SCANHEAD_NOTICE_BAD_BYTES = 6,
     /* The connection or the recording ended within a frame or a reply, of which n bytes had come. seq: the frame's
      * number, if its header had come. */
@@ -219,7 +218,7 @@ struct scanhead_notice {
  * its reply, frames that came earlier may still be kept for scanhead_next. On this handle fn may only call
  * scanhead_get_stats, which already counts the notice. NULL, as at first: no function. Counters go on either way. */
 void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx);
-/* The kind in lower case, such as "bad payload"; "?" for another number. */
+/* Returns the kind in lower case, such as "bad payload"; "?" for another number. */
 const char *scanhead_notice_name(int kind);
 
 enum { SCANHEAD_NO_LABEL = 0xffff };
@@ -250,8 +249,8 @@ struct scanhead_columns {
     uint16_t *label;
     uint8_t *echo, *echo_count;
 };
-/* scanhead_points() into columns: the same figures, bit for bit, in less time. Columns need room for max figures each,
- * and must not overlap. Returns the number of points written, or a negative error. */
+/* Writes what scanhead_points() gives into columns: the same figures, bit for bit, in less time. Columns need room for
+ * max figures each, and must not overlap. Returns the number of points written, or a negative error. */
 int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      const struct scanhead_columns *to, uint32_t max);
 
@@ -265,7 +264,7 @@ struct scanhead_attribute {
  * many, or SCANHEAD_ESTATE where they are not those of the last points, because frames were lost. */
 int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                         struct scanhead_attribute *attributes, uint32_t max);
-/* 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the
+/* Returns 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
@@ -277,7 +276,7 @@ struct scanhead_colour {
  * points, and after their attributes where the head sends both. */
 int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      struct scanhead_colour *colours, uint32_t max);
-/* 1: a frame of colours follows each frame of points; else as scanhead_has_attributes. */
+/* Returns 1 if a frame of colours follows each frame of points; else as scanhead_has_attributes. */
 int scanhead_has_colours(const struct scanhead *sh);
 
 /* A head that finds echoes in waveforms reports how far the shape of each echo is from the pulse's, RMS over its
@@ -295,9 +294,8 @@ struct scanhead_wave {
     uint32_t first, n;      /* samples, by their number on the grid */
     const uint8_t *sample;  /* n counts of two bytes, little-endian; valid as the frame's payload is */
     double range_m, step_m; /* of the first sample; from one to the next */
-    /* In the polar layout this is the beam's direction in the head's frame SOCS, of length one. In the geo layout it is
-     * the change of x, y and z in the CRS along a metre of range. So range times direction leads to the sample from the
-     * head; in the geo layout, from the anchor. */
+    /* Polar layout: the beam's direction in the head's frame SOCS, of length one. Geo layout: the change of x, y and z
+     * in the CRS along a metre of range. So range times direction leads to the sample from the head or the anchor. */
     double direction[3];
     uint32_t sample_ps, bits; /* time between samples; bits of a count */
     double baseline;          /* the count without light */
@@ -351,7 +349,7 @@ struct scanhead_info {
     int stop;     /* 1: the station is a stop on a trajectory */
     double frame; /* of a stop: frame scalar of the trajectory; else 0 */
 };
-/* SCANHEAD_ESTATE before descriptor and anchor have come. */
+/* Fills in *info. SCANHEAD_ESTATE before descriptor and anchor have come. */
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
 
 /* How the pulses of a head are arranged. */
@@ -381,8 +379,8 @@ struct scanhead_emitter {
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
     struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
 };
-/* SCANHEAD_ESTATE before the descriptor has come. The emitter holds for the points that follow. When settings change
- * within a scan, the head sends it again. */
+/* Fills in *emitter, which holds for the points that follow. SCANHEAD_ESTATE before the descriptor has come. When
+ * settings change within a scan, the head sends another emitter. */
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
 /* The place and attitude of a moving head at a time. Between two poses of one frame of SCANHEAD_POSES it moves along
@@ -400,8 +398,8 @@ enum scanhead_pose_flags {
     SCANHEAD_POSE_LATE = 2,         /* too long after the last pose: the head assumed that the platform stands */
     SCANHEAD_POSE_NONE = 4,         /* the head had not been given any yet */
 };
-/* The pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
- * SCANHEAD_ESTATE where the stream has not said it, or the head stands still. */
+/* Gets the pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
+ * SCANHEAD_ESTATE where the stream has not reported it, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
 /* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`.
  * Returns how many. */
@@ -413,19 +411,19 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
  * frames were lost; their coordinates and frame scalars are NaN. SCANHEAD_ESTATE for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
-/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
- * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
- * of week. It is valid for frames up to the one that scanhead_next returned last. It counts from the last time that the
- * head reported, at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the nanosecond
+/* Gets the GPS time of t_ns since the scan's start (scanhead_point.t_ns), in the adjusted standard form of LAS: seconds
+ * since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second of week.
+ * It is valid for frames up to the one that scanhead_next returned last. It counts from the last time of the head's
+ * clock, which comes at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the nanosecond
  * where the head's clock has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head
  * doesn't know the time, or before the time and the scan's start have come. A head that knows the time sends it before
  * the first points that can be decoded. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
-/* The same for n times, bit for bit. It is faster where all times lie within one second. */
+/* Does the same for n times, bit for bit. It is faster where all times lie within one second. */
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
                        double *adjusted_standard_gps_time_s);
 
-/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet. */
+/* Returns 1 and the two names of a label (the handle's, until its next call), or 0 when they have not come yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);
 
 struct scanhead_stats { /* over all connections of the handle */
@@ -441,8 +439,8 @@ struct scanhead_stats { /* over all connections of the handle */
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 
-/* Hash of the stream so far, as COUNTS.md defines stream_sha256: 64 hex digits and a NUL. Counting starts
- * with scanhead_hash_start() and costs about a nanosecond per byte. */
+/* scanhead_hash_hex() gives the hash of the stream so far, as COUNTS.md defines stream_sha256: 64 hex digits and a NUL.
+ * It begins with the frames after scanhead_hash_start(), and costs about a nanosecond per byte. */
 void scanhead_hash_start(struct scanhead *sh);
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65]);
 

@@ -105,8 +105,8 @@ static int wait_connected(int fd, int64_t deadline_ns)
     }
 }
 
-/* Whether the socket is connected to itself. TCP does that where nobody listens, and the system gives the socket the same
- * port that it connects to. */
+/* Whether the socket is connected to itself. TCP does that where nobody listens, and the system gives the socket the
+ * same port that it connects to. */
 static int is_own_end(int fd, const struct addrinfo *ai)
 {
     struct sockaddr_storage own = {0};

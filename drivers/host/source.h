@@ -61,10 +61,11 @@ int host_capture_open(struct host_source *source, struct sh_err *err);
  * not missed. */
 struct host_usb_watch *host_usb_watch_open(const char *source);
 void host_usb_watch_close(struct host_usb_watch *watch);
-/* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */
+/* Waits before the next try. rc: why the last one failed. Returns 0: try again, or the deadline is over; -1: a signal
+ * came. */
 int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_ns);
 
-/* Nanoseconds of the monotonic clock at which timeout_ms from now is over; INT64_MAX for a negative one. */
+/* Returns when timeout_ms are over, in ns of the monotonic clock; INT64_MAX for a negative timeout. */
 int64_t host_deadline_ns(int timeout_ms);
 
 #endif

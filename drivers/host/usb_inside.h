@@ -38,7 +38,7 @@ struct usb_found {
     char name[160]; /* usb:vid:pid:serial */
 };
 
-/* The vendor interface of a device's active configuration: 1, or 0 where there is none. */
+/* Finds the vendor interface of a device's active configuration. Returns 1, or 0 where there is none. */
 int host_usb_interface(libusb_device *device, struct usb_interface *interface);
 
 /* Opens the one head that is wanted; asked: the source as the caller wrote it, for errors. SH_ELOST: there is

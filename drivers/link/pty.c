@@ -157,15 +157,22 @@ static int pty_open(const struct link_spec *spec, void **link, struct sh_err *er
     return SH_OK;
 }
 
+/* Ends the session and stops watching the terminal. */
+static void pty_let_go(struct pty_link *pty)
+{
+    pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
+    pty->open = pty->due_opened = 0;
+    pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
+    pty->count = 0;
+    pty->line.n_out = 0;
+    inotify_rm_watch(pty->inotify, pty->watch);
+    pty_read_inotify(pty, 0);
+}
+
 /* All clients are gone and what they wrote is read. Clients that come meanwhile are found at the end. */
 static int pty_end(struct pty_link *pty)
 {
-    pty->open = pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
-    pty->count = 0;
-    pty->line.n_out = 0;
-    pty->due_closed = 1;
-    inotify_rm_watch(pty->inotify, pty->watch);
-    pty_read_inotify(pty, 0);
+    pty_let_go(pty);
     struct pty_device device = pty->device;
     int rc = pty_device_rest(&device);
     pty_set_device(pty, &device);
@@ -256,17 +263,6 @@ static int pty_unread(void *link, int session)
 }
 
 /* ---- injected faults */
-
-/* Ends the session and stops watching the terminal. */
-static void pty_let_go(struct pty_link *pty)
-{
-    pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
-    pty->open = pty->due_opened = pty->open_event_due = 0;
-    pty->count = 0;
-    pty->line.n_out = 0;
-    inotify_rm_watch(pty->inotify, pty->watch);
-    pty_read_inotify(pty, 0);
-}
 
 static int pty_cut(struct pty_link *pty)
 {

@@ -77,7 +77,7 @@ static int is_left_over(const char *text, const struct stat *link, const struct 
     return made.tv_sec < born.tv_sec || (made.tv_sec == born.tv_sec && made.tv_nsec < born.tv_nsec);
 }
 
-/* 1: there is nothing at path, 0: a symlink that may be replaced, or an error. */
+/* Returns 1: there is nothing at path; 0: a symlink that may be replaced; or an error. */
 static int symlink_look(const char *path, const char *slave, struct sh_err *err)
 {
     struct stat self, target;

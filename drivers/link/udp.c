@@ -285,7 +285,7 @@ static int connect_to(int fd, const struct link_spec *spec, const struct receive
     return connect(fd, (const struct sockaddr *)&to->at, to->len);
 }
 
-/* ", from 127.0.0.2:2368" or ", from port 2368" for errors. */
+/* Writes ", from 127.0.0.2:2368" or ", from port 2368", for errors. */
 static void source_text(const struct link_spec *spec, char *text, size_t size)
 {
     text[0] = '\0';

@@ -156,7 +156,7 @@ void web_linger(struct web_link *web, struct web_conn *conn);
 int web_request_read(const struct web_link *web, const char *head, size_t len, struct web_request *out,
                      const char **words);
 
-/* web_http.c. As libwebsockets' callbacks: 0, or -1 to close the connection. */
+/* web_http.c. These two return as libwebsockets' callbacks do: 0, or -1 to close the connection. */
 int web_http_begin(struct web_link *web, struct web_conn *conn);
 int web_http_go_on(struct web_link *web, struct web_conn *conn);
 /* A whole answer in words, as snprintf. */

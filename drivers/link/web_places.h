@@ -33,7 +33,7 @@ struct web_place {
 /* Fills in what counts as one address: the 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */
 void web_address(const struct sockaddr_storage *from, unsigned char address[8]);
 
-/* WEB_PLACES of them, each `stride` bytes after the one before. */
+/* WEB_PLACES places, each `stride` bytes after the one before. */
 struct web_places {
     struct web_place *first;
     size_t stride;
@@ -41,8 +41,8 @@ struct web_places {
 
 /* Returns the index of a place for a new client from this address. If its phase isn't NOBODY, its present client has to
  * go. It is one of this address if the address holds as many as it may, else one of the address that holds the most.
- * Clients go in this order, the oldest first: those that are PARTING or LINGERING, those that are ASKING, and those that
- * took nothing of their answer for WEB_GOODBYE_MS. -1: no client may go. */
+ * Clients go in this order, the oldest first: those that are PARTING or LINGERING, those that are ASKING, and those
+ * that took nothing of their answer for WEB_GOODBYE_MS. -1: no client may go. */
 int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_us);
 
 #endif

@@ -80,7 +80,7 @@ static int is_foreign_part(const struct fields *f, const char *path)
     return (http_text_is(f->site, "cross-site") || http_text_is(f->site, "same-site")) && !web_page_at(path, &page);
 }
 
-/* Decodes %41 and the like. 0; 1: the text is cut; 400. */
+/* Decodes %41 and the like. Returns 0; 1 if the text is cut; or the status 400. */
 static int decode(struct http_text in, char *out, size_t room)
 {
     size_t n = 0;
@@ -99,7 +99,7 @@ static int decode(struct http_text in, char *out, size_t room)
     return n >= room;
 }
 
-/* 16 bytes as base64. */
+/* Whether a key is 16 bytes as base64. */
 static int is_key(struct http_text key)
 {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -108,7 +108,7 @@ static int is_key(struct http_text key)
     return key.len == 24;
 }
 
-/* RFC 6455 4.2.1. */
+/* Checks the fields that ask for a WebSocket (RFC 6455 4.2.1). */
 static int read_upgrade(const struct fields *f, struct web_request *out, const char **words)
 {
     *words = "/ws takes only a WebSocket of version 13, subprotocol scanhead-native-1";

@@ -77,24 +77,24 @@ struct usb_backend_ops {
 /* NULL for an unknown type. */
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
 
-/* A listening or (attach) connected socket, not blocking. The path of a Unix socket whose process is gone is
- * taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
+/* backend_socket.c: opens a listening or (attach) connected socket, which does not block. The path of a Unix socket
+ * whose process is gone is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
-/* The next client's descriptor, not blocking; -1: none. reserve: socket_reserve()'s. The owner hears of clients for
- * whom there is no descriptor. backend_socket.c */
+/* Returns the next client's descriptor, which does not block; -1: none. reserve: socket_reserve()'s. The owner hears of
+ * clients for whom there is no descriptor. */
 int usb_backend_accept(int listener, int *reserve, const struct usb_owner *owner);
 
-/* The address that a socket of usb_backend_socket is connected to. usb_backend_connect connects to it again,
- * without waiting or looking up names. 0: *fd is connected. EINPROGRESS: once poll(2) finds *fd writable,
- * usb_backend_connect_error says how it went. Any other errno: *fd is -1. backend_socket.c */
+/* usb_backend_peer notes the address that a socket of usb_backend_socket is connected to. usb_backend_connect connects
+ * to it again, without waiting or looking up names. It returns 0: *fd is connected. EINPROGRESS: once poll(2) finds *fd
+ * writable, usb_backend_connect_error says how it went. Any other errno: *fd is -1. */
 struct socket_address; /* drivers/socket/socket.h */
 void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket_address *out);
 int usb_backend_connect(const struct socket_address *to, int *fd);
 int usb_backend_connect_error(int fd);
 /* To be called before closing. Sends nothing more, and waits until the peer has read everything and hung up,
  * or until timeout_ms pass without a byte; eight times that at most. Closing with unread requests of the peer
- * would throw away replies on their way. backend_socket.c */
+ * would throw away replies on their way. */
 void usb_backend_hang_up(int fd, int timeout_ms);
 
 #endif

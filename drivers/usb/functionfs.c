@@ -98,7 +98,7 @@ static void disable(struct functionfs *self, int unplugged)
     if (unplugged)
         usb_device_detach(self->device);
     else
-        usb_device_reset(self->device, usb_device_rate(self->device));
+        usb_device_reset(self->device);
     ffs_console_stop(&self->console);
 }
 

@@ -63,7 +63,7 @@ void ffs_pipes_close(struct ffs_pipes *pipes);
 /* Returns the model's address of the first endpoint to which the controller has given another, and that in *given; 0:
  * there is none, or the controller does not say. To be called while a configuration is up. */
 uint8_t ffs_pipes_moved(const struct ffs_pipes *pipes, uint8_t *given);
-/* The model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
+/* Returns the model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,

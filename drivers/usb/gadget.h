@@ -44,16 +44,16 @@ int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
 int gadget_watch_state(struct gadget *gadget, struct sh_err *err);
 /* Whether the host has configured it. before: the last answer, which still holds while the bus is suspended. */
 int gadget_is_configured(const struct gadget *gadget, int before);
-/* "full", "high", "super". */
+/* Returns "full", "high" or "super". */
 const char *gadget_rate_name(enum usb_rate rate);
-/* 0: its controller sees no host. */
+/* Whether its controller sees a host. */
 int gadget_is_on_bus(const struct gadget *gadget);
-/* The rate of the bus it is on. */
+/* Returns the rate of the bus it is on. */
 enum usb_rate gadget_rate(const struct gadget *gadget);
-/* SH_EINPUT: the controller it is bound to is not as fast. */
+/* Checks whether the controller it is bound to is as fast as that. SH_EINPUT: it is not. */
 int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err);
 void gadget_unbind(struct gadget *gadget);
-/* After ep0 and the endpoints are closed. */
+/* Removes the gadget. To be called after ep0 and the endpoints are closed. */
 void gadget_remove(struct gadget *gadget);
 
 #endif

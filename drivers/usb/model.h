@@ -94,7 +94,7 @@ size_t usb_describe_string(const struct usb_model *model, const struct usb_ident
                            size_t room);
 /* The Microsoft OS 2.0 descriptor set; 0 without compatible ids. */
 size_t usb_describe_ms_os(const struct usb_model *model, uint8_t *out, size_t room);
-/* Index of an endpoint in tables: 0 to 15 OUT, 16 to 31 IN. */
+/* Returns the index of an endpoint in tables: 0 to 15 OUT, 16 to 31 IN. */
 static inline unsigned usb_endpoint_index(unsigned address)
 {
     return (address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16u : 0u);

@@ -22,7 +22,7 @@ void usb_retry_close(struct usb_retry *retry);
 int usb_retry_start(struct usb_retry *retry, const struct usb_owner *owner);
 /* After poll(2) on the timer: 1 when an attempt is due. */
 int usb_retry_is_due(struct usb_retry *retry, short revents);
-/* How an attempt went. Only the first failure is news. */
+/* These two report how an attempt went. After a first failure, more of them are not reported. */
 void usb_retry_failed(struct usb_retry *retry, const char *why, const struct usb_owner *owner);
 int usb_retry_done(struct usb_retry *retry, const struct usb_owner *owner);
 

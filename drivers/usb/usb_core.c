@@ -116,11 +116,10 @@ void usb_device_detach(struct usb_device *device)
     if (device->state != USB_DETACHED) usb_enter(device, USB_DETACHED, USB_END_UNPLUGGED);
 }
 
-void usb_device_reset(struct usb_device *device, enum usb_rate rate)
+void usb_device_reset(struct usb_device *device)
 {
     if (device->state == USB_DETACHED) return;
     usb_enter(device, USB_DEFAULT, USB_END_RESET);
-    device->rate = rate;
     device->suspended = 0;
 }
 

@@ -129,7 +129,7 @@ static void welcome(struct usbredir *self)
 {
     int fd = usb_backend_accept(self->listener, &self->reserve, self->owner);
     if (fd < 0) return;
-    stop(self); /* one that has not said hello */
+    stop(self); /* a guest that has not sent its hello */
     if (start(self, fd) != SH_OK) close(fd);
 }
 

@@ -87,7 +87,7 @@ static void on_reset(void *priv)
 {
     struct usbredir *self = priv;
     if (usbredir_is_early(self)) return;
-    usb_device_reset(self->device, usb_device_rate(self->device));
+    usb_device_reset(self->device);
     usb_device_assume_address(self->device);
 }
 

@@ -1661,7 +1661,7 @@ class Head:
         return tuple(_column(c, len(rows)) for c in columns)
 
     def pose(self, t_ns: int) -> Optional[Pose]:
-        """Where a moving head was t_ns after the scan's start; None: the stream has not said it."""
+        """Where a moving head was t_ns after the scan's start; None: the stream has not reported it."""
         leg = self._poses.leg(t_ns)
         if leg is None:
             return None
@@ -1673,7 +1673,7 @@ class Head:
 
     def gps_time_ns(self, t_ns: int) -> Optional[int]:
         """GPS time of t_ns after the scan's start: ns since 1980-01-06T00:00:00Z without leap seconds. None:
-        the head does not know the time, or has not said it yet."""
+        the head does not know the time, or has not reported it yet."""
         if self._gps is None or self._scan_t0_ns is None:
             return None
         return self._gps[1] + self._scan_t0_ns + t_ns - self._gps[0]
