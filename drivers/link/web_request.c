@@ -68,7 +68,7 @@ static int is_own_origin(const struct fields *f)
 {
     static const char scheme[] = "http://";
     const size_t n = sizeof scheme - 1;
-    return f->origin.len == n + f->host.len && strncasecmp(f->origin.s, scheme, n) == 0 &&
+    return f->host.len != 0 && f->origin.len == n + f->host.len && strncasecmp(f->origin.s, scheme, n) == 0 &&
            strncasecmp(f->origin.s + n, f->host.s, f->host.len) == 0;
 }
 
