@@ -60,12 +60,24 @@ int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *rev
     }
 }
 
-/* A pty whose master is closed says EIO; a reset connection is as gone as a closed one. */
 int host_is_hang_up(const struct scanhead *sh, int error)
 {
     if (sh->source.usb != NULL) return error == ENODEV || error == ECONNRESET;
-    return !sh->source.is_file && (error == EIO || error == ECONNRESET || error == EPIPE || error == ENODEV ||
-                                   error == ENXIO || error == ETIMEDOUT);
+    if (sh->source.is_file) return 0;
+    switch (error) {
+    case EIO: /* a pty whose master is closed */
+    case ENODEV:
+    case ENXIO:
+    case EPIPE:
+    case ECONNRESET:
+    case ETIMEDOUT: /* this and the next: TCP has given up, and reports the last reason that it met */
+    case EHOSTUNREACH:
+    case ENETUNREACH:
+    case ENETDOWN:
+        return 1;
+    default:
+        return 0;
+    }
 }
 
 void host_note_loss(struct scanhead *sh, int error)
