@@ -67,6 +67,7 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
         take_apart(self);
         return rc;
     }
+    snprintf(self->udc, sizeof self->udc, "%s", self->gadget.udc);
     *backend = self;
     return SH_OK;
 }
@@ -74,7 +75,7 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
 static void functionfs_endpoint(const void *backend, char *buf, size_t len)
 {
     const struct functionfs *self = backend;
-    snprintf(buf, len, "functionfs:%s", self->gadget.udc);
+    snprintf(buf, len, "functionfs:%s", self->udc);
 }
 
 enum { AT_EP0, AT_AIO, AT_TTY, AT_TIMER, N_FDS };
@@ -253,8 +254,8 @@ static int functionfs_more(const void *backend)
 
 static int unplug(struct functionfs *self)
 {
-    if (self->unplugged[0] != '\0') return SH_ESTATE;
-    snprintf(self->unplugged, sizeof self->unplugged, "%s", self->gadget.udc);
+    if (self->unplugged) return SH_ESTATE;
+    self->unplugged = 1;
     gadget_unbind(&self->gadget);
     disable(self, 1);
     return SH_OK;
@@ -263,9 +264,9 @@ static int unplug(struct functionfs *self)
 static int plug(struct functionfs *self)
 {
     struct sh_err err;
-    if (self->unplugged[0] == '\0') return SH_OK;
-    if (gadget_bind(&self->gadget, self->unplugged, &err) != SH_OK) return SH_ESTATE;
-    self->unplugged[0] = '\0';
+    if (!self->unplugged) return SH_OK;
+    if (gadget_bind(&self->gadget, self->udc, &err) != SH_OK) return SH_ESTATE;
+    self->unplugged = 0;
     return SH_OK;
 }
 

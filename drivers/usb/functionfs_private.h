@@ -104,7 +104,8 @@ struct functionfs {
     int ep0;                       /* -1: nothing of the device is FunctionFS's */
     int has_said_moved;            /* some endpoint has another address than the device's */
     const struct usb_owner *owner; /* within handle() */
-    char unplugged[256];           /* unplugged from this controller by an injected fault; empty: it is not */
+    char udc[256];                 /* the controller; stays the same, so that other threads may read it */
+    int unplugged;                 /* by an injected fault */
     int backlog;                   /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;

@@ -32,7 +32,8 @@ struct usbip {
     int taken;
     uint64_t n_welcomed;
     struct usbip_conn conn[MAX_CONNS];
-    char name[USB_BACKEND_NAME_MAX];
+    char at[USB_BACKEND_NAME_MAX]; /* of the listener, as text */
+    _Atomic unsigned port;         /* of vhci_hcd, as long as it is attached here; other threads ask for the endpoint */
 };
 
 static int attach_here(struct usbip *self, struct sh_err *err)
@@ -54,16 +55,14 @@ static int attach_here(struct usbip *self, struct sh_err *err)
     }
     usbip_conn_start(&self->conn[0], pair[0], self->device, &self->taken);
     usbip_conn_import(&self->conn[0]);
-    snprintf(self->name, sizeof self->name, "usbip:vhci_hcd.0:%u", port);
+    self->port = port;
     return SH_OK;
 }
 
 static int listen_here(struct usbip *self, const struct usb_backend_spec *spec, struct sh_err *err)
 {
-    char at[USB_BACKEND_NAME_MAX - 8] = "";
-    int rc = usb_backend_socket(spec, "usbip", &self->listener, at, sizeof at, err);
+    int rc = usb_backend_socket(spec, "usbip", &self->listener, self->at, sizeof self->at, err);
     if (rc != SH_OK) return rc;
-    snprintf(self->name, sizeof self->name, "usbip:%s", at);
     socket_note_address(self->listener, &self->address);
     self->reserve = socket_reserve();
     return SH_OK;
@@ -93,7 +92,10 @@ static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *de
 static void usbip_endpoint(const void *backend, char *buf, size_t len)
 {
     const struct usbip *self = backend;
-    snprintf(buf, len, "%s", self->name);
+    if (self->here)
+        snprintf(buf, len, "usbip:vhci_hcd.0:%u", self->port);
+    else
+        snprintf(buf, len, "usbip:%s", self->at);
 }
 
 enum { AT_LISTENER = MAX_CONNS, AT_RETRY, N_FDS };
