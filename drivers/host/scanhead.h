@@ -98,9 +98,9 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
  * are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops the oldest and counts
  * them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
- * the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the answer to *IDN?.
- * Before it was in raw mode, the terminal may have echoed the head's own bytes to the head. It does the same after a
- * command that ended without its reply, since that may still come. */
+ * the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the answer to *IDN?,
+ * because the terminal may have echoed the head's own bytes to the head. It does the same after a command that ended
+ * without its reply, since that may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -357,7 +357,7 @@ enum scanhead_emitter_kind {
     SCANHEAD_EMIT_LINE = 0,       /* a mirror sweeps lines, the pan turns; nothing else is set */
     SCANHEAD_EMIT_PLANAR = 1,     /* one plane, in steps; a line is a turn, from step 0 on */
     SCANHEAD_EMIT_BEAMS = 2,      /* a firing sequence of beams turns about the vertical; a line is a turn */
-    SCANHEAD_EMIT_SPHERE = 3,     /* rings of one elevation each; a line is a ring, a frame all of them */
+    SCANHEAD_EMIT_SPHERE = 3,     /* rings of one elevation each; a line is a ring, a scan frame has all of them */
     SCANHEAD_EMIT_DIRECTIONS = 4, /* a list of directions; a line is the whole list once */
 };
 struct scanhead_beam {
@@ -371,7 +371,7 @@ struct scanhead_emitter {
     /* planar: the first and the last step that are cast. planar and sphere: the step that looks along y */
     int first_step, last_step, front_step;
     int turn;       /* +1: clockwise seen from above, -1: the other way */
-    uint32_t rings; /* sphere: how many rings a frame has */
+    uint32_t rings; /* sphere: how many rings a scan frame has */
     /* ring i has the elevation first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
     double first_ring_deg, ring_step_deg;
     int echoes;                                /* which ones of a pulse are sent: 0 all, 1 first, 2 last, 3 strongest */
