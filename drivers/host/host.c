@@ -293,6 +293,7 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 {
     memset(frame, 0, sizeof *frame);
     sh->payload = NULL;
+    sh->has_no_limit = timeout_ms < 0;
     free(sh->kept.current);
     sh->kept.current = NULL;
     if (sh->kept.first != NULL) {

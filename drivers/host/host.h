@@ -51,10 +51,11 @@ struct host_notices {
 
 struct scanhead {
     struct host_source source;
-    int ended; /* no more bytes will come */
-    int lost;  /* because the device was unplugged */
-    int reset; /* because the bus was reset, with the device still on it */
-    int stuck; /* half a command went out: nothing sensible can follow */
+    int ended;        /* no more bytes will come */
+    int lost;         /* because the device was unplugged */
+    int reset;        /* because the bus was reset, with the device still on it */
+    int stuck;        /* half a command went out: nothing sensible can follow */
+    int has_no_limit; /* the present call waits without a time limit, so a signal ends it */
     struct native_parser parser;
     struct host_notices notices;
     struct host_kept kept;

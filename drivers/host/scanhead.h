@@ -16,7 +16,8 @@
  *     scanhead_close(sh);
  *
  * Results: functions return 0, or a count, or a negative SCANHEAD_E. After an error scanhead_error() has a line of
- * text. Functions that take a const handle leave that text as it was.
+ * text. Functions that take a const handle leave that text as it was. A timeout_ms below 0 is no time limit; a signal
+ * then ends the wait of scanhead_next and scanhead_command with SCANHEAD_ETIMEOUT.
  *
  * Ownership: a value that a function returns, or writes into the caller's memory, is the caller's. Strings and
  * payloads are the handle's; the comment of each says how long they live.
@@ -91,8 +92,7 @@ struct scanhead_usb_head {
     double speed_bit_s; /* 0: unknown */
     char problem[320];  /* why it can't be opened, for instance no permission; empty: it can */
 };
-/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be
- * NULL). */
+/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
@@ -156,8 +156,8 @@ struct scanhead_frame {
     char event_text[96];
 };
 
-/* Gets the next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC, repeated frames, and frames
- * that come after newer ones are left out and counted, see scanhead_on_notice. */
+/* Gets the next frame, in order. Frames with a wrong CRC, repeated frames, and frames that come after newer ones are
+ * left out and counted, see scanhead_on_notice. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
 /* Notices about a stream, one for each event. Losses are counted in two independent ways:
