@@ -98,9 +98,9 @@ int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
  * are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops the oldest and counts
  * them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
- * the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the answer to *IDN?,
- * because the terminal may have echoed the head's own bytes to the head. It does the same after a command that ended
- * without its reply, since that may still come. */
+ * the first command on a "tty:" it sends an empty line and *IDN?. It skips all reply lines up to the answer, because
+ * the terminal may have echoed the head's own bytes to the head. It does the same after a command that ended without
+ * its reply, since that may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -407,8 +407,8 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
                    uint32_t max);
 /* Takes points of the polar layout from the head's frame to the scene frame: x, y and z in place. Where the
  * head moves, each point goes with the pose of its own time. frame (may be NULL) gets the frame scalar of
- * each; where the head stands at a stop, that of the stop. Returns how many points had no pose, because
- * frames were lost; their coordinates and frame scalars are NaN. SCANHEAD_ESTATE for another layout. */
+ * each point; at a stop of the head, the stop's. Returns how many points had no pose, because frames were
+ * lost; their coordinates and frame scalars are NaN. SCANHEAD_ESTATE for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
 /* Gets the GPS time of t_ns since the scan's start (scanhead_point.t_ns), in the adjusted standard form of LAS: seconds

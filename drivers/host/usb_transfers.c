@@ -144,7 +144,7 @@ static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoi
     return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
 }
 
-/* The same for the reads: all are taken back first. Those that failed along with this one count as cancelled, so that
+/* The same for the reads: all are taken back first. Reads that failed along with this one count as cancelled, so that
  * they don't start the endpoint again. */
 static int recover_reads(struct host_usb *usb)
 {

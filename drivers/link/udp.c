@@ -50,7 +50,7 @@ static const char *host_of(const struct link_spec *spec)
     return spec->address[0] != '\0' ? spec->address : "127.0.0.1";
 }
 
-/* A name with addresses of both kinds, such as localhost, leads to the IPv4 one: the receivers of these protocols often
+/* A name with addresses of both kinds, such as localhost, leads to the IPv4 one. The receivers of these protocols often
  * have no other, and no answer of theirs would show which one they listen on. */
 static int find_receiver(const struct link_spec *spec, struct sockaddr_storage *to, socklen_t *len, struct sh_err *err)
 {

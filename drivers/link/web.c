@@ -5,13 +5,13 @@
  * byte is ASCII (replies), else binary (frames). Messages of clients are text, whose lines are commands; the last line
  * of a message need not have an end. So frames, replies and commands are those of the protocol, and none is cut.
  *
- * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections, for the listening socket and for
- * the owner's wake-up, which are given to it as plain descriptors. All is done in the owner's thread.
+ * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections. It also waits for the listening
+ * socket and for the owner's wake-up, which it gets as plain descriptors. All is done in the owner's thread.
  *
  * Another site's page must not read or command a head on somebody's machine. A browser sends Host, the name in its
- * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is refused
- * (DNS rebinding: a name of the other site that leads here), and an Origin that is not this link gets no byte. Programs
- * that aren't browsers have no Origin. */
+ * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is
+ * refused: it may be a name of the other site that leads here (DNS rebinding). An Origin that is not this link gets no
+ * byte. Programs that aren't browsers have no Origin. */
 #include <libwebsockets.h>
 #include <stdlib.h>
 #include <string.h>

@@ -614,8 +614,8 @@ if np is not None:
 
 
 def _sincos(turns):
-    """sin and cos of turns >= 0, a float or an array: whole 1/256 turns by table, the rest by its series,
-    whose next terms are below 2^-56. libscanhead computes the same, in the same order."""
+    """sin and cos of turns >= 0, a float or an array. A table has whole 1/256 turns, and a series the rest; its next
+    terms are below 2^-56. libscanhead computes the same, in the same order."""
     part = turns * _PARTS
     if np is not None and isinstance(turns, np.ndarray):
         k = (part + 0.5).astype(np.int64)
@@ -986,8 +986,8 @@ def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
 
 
 class _Earth:
-    """From the scene to the CRS and back, as the anchor says: exact but for rounding, the series' 0.1 um, and
-    a geoid that is taken to be as high everywhere as at the station."""
+    """Takes places from the scene to the CRS and back, as the anchor says. Errors are those of rounding, 0.1 um of
+    the series, and the geoid, which is taken to be as high everywhere as at the station."""
 
     def __init__(self, anchor: Dict, layout: int) -> None:
         self.crs, self.station_m = anchor["crs"], anchor["station_m"]
