@@ -87,7 +87,7 @@ void host_note_loss(struct scanhead *sh, int error)
 }
 
 /* Takes bytes from the source into the parser. Returns as read() does. */
-static ssize_t take(struct scanhead *sh)
+static ssize_t io_take(struct scanhead *sh)
 {
     struct host_source *source = &sh->source;
     const uint8_t *items;
@@ -106,7 +106,7 @@ static ssize_t take(struct scanhead *sh)
 int host_fill(struct scanhead *sh, int64_t deadline_ns)
 {
     for (;;) {
-        const ssize_t n = take(sh);
+        const ssize_t n = io_take(sh);
         if (n > 0) return 0;
         if (n == 0 || host_is_hang_up(sh, errno)) {
             native_parser_finish(&sh->parser);

@@ -28,7 +28,7 @@ static unsigned level_at(const uint8_t *sent, size_t n, uint64_t bit)
 }
 
 /* Returns whether the driver passes the byte on. */
-static int take(const struct uart *uart, unsigned stop, uint8_t *byte)
+static int uart_take(const struct uart *uart, unsigned stop, uint8_t *byte)
 {
     if (stop != 0) return 1;
     if (*byte == 0) return !uart->drops_breaks;
@@ -58,7 +58,7 @@ size_t uart_read(const struct uart *uart, const uint8_t *sent, size_t n, uint8_t
         }
         bit += bit_at(uart, last);
         before = level_at(sent, n, bit++);
-        if (last == STOP && take(uart, before, &byte)) out[n_out++] = byte;
+        if (last == STOP && uart_take(uart, before, &byte)) out[n_out++] = byte;
     }
     return n_out;
 }

@@ -168,7 +168,7 @@ static int is_closing(struct lws *wsi)
     return web_lws.lws_get_close_length(wsi) > 0;
 }
 
-static int take_text(struct web_conn *conn, struct lws *wsi, const void *in, size_t len)
+static int web_take_text(struct web_conn *conn, struct lws *wsi, const void *in, size_t len)
 {
     struct web_session *s = conn->session;
     if (web_lws.lws_frame_is_binary(wsi))
@@ -204,7 +204,7 @@ static int send_message(struct web_session *s, struct lws *wsi)
 }
 
 /* Handles libwebsockets' calls for HTTP and WebSocket. The request has been read before: conn->request. */
-static int serve_client(struct web_conn *conn, enum lws_callback_reasons reason, void *in, size_t len)
+static int web_serve_client(struct web_conn *conn, enum lws_callback_reasons reason, void *in, size_t len)
 {
     struct lws *wsi = conn->wsi;
     struct web_link *web = web_link_of(wsi);
@@ -217,7 +217,7 @@ static int serve_client(struct web_conn *conn, enum lws_callback_reasons reason,
         session_open(web, conn);
         return 0;
     case LWS_CALLBACK_RECEIVE:
-        return conn->session != NULL ? take_text(conn, wsi, in, len) : 0;
+        return conn->session != NULL ? web_take_text(conn, wsi, in, len) : 0;
     case LWS_CALLBACK_SERVER_WRITEABLE:
         if (is_closing(wsi)) return 0; /* a close frame is the last one */
         return conn->session != NULL ? send_message(conn->session, wsi) : turn_away(web, wsi);
@@ -241,7 +241,7 @@ static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void 
         entering->wsi = wsi;
     }
     struct web_conn *conn = web_lws.lws_get_opaque_user_data(wsi);
-    return conn != NULL && conn->wsi == wsi ? serve_client(conn, reason, in, len) : 0;
+    return conn != NULL && conn->wsi == wsi ? web_serve_client(conn, reason, in, len) : 0;
 }
 
 /* ---- the owner's side */
@@ -283,7 +283,7 @@ static void time_is_over(lws_sorted_usec_list_t *timer)
 }
 
 /* Has libwebsockets work, and wait for most_us at most (below 0: for ever; 0: not at all). Returns 0 or SH_EIO. */
-static int serve(struct web_link *web, lws_usec_t most_us)
+static int web_serve(struct web_link *web, lws_usec_t most_us)
 {
     if (most_us > 0) web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, most_us);
     const int rc = web_lws.lws_service(web->context, most_us == 0 ? -1 : 0);
@@ -298,7 +298,7 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (web->is_silent) return link_poll_sink(wake_fd, 0, timeout_ms, &events);
     if (take_wake_fd(web, wake_fd) != SH_OK) return SH_EIO;
     web_report(web, want_write, &events);
-    if (serve(web, events.n > 0 ? 0 : (lws_usec_t)timeout_ms * 1000) != SH_OK) return SH_EIO;
+    if (web_serve(web, events.n > 0 ? 0 : (lws_usec_t)timeout_ms * 1000) != SH_OK) return SH_EIO;
     if (events.n == 0) web_report(web, want_write, &events);
     return events.n;
 }
@@ -357,7 +357,7 @@ static void say_goodbye(struct web_link *web)
     }
     lws_usec_t end = web_lws.lws_now_usecs() + (lws_usec_t)WEB_GOODBYE_MS * 1000;
     for (lws_usec_t now; any_session(web) && (now = web_lws.lws_now_usecs()) < end;)
-        if (serve(web, end - now) != SH_OK) return;
+        if (web_serve(web, end - now) != SH_OK) return;
 }
 
 static void web_close(void *link)

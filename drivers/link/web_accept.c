@@ -88,7 +88,7 @@ static void web_accept_make_room(struct web_link *web, struct web_conn *conn)
     web_conn_end(conn);
 }
 
-static void welcome(struct web_link *web, int fd, const struct sockaddr_storage *from, const char *peer)
+static void web_accept_welcome(struct web_link *web, int fd, const struct sockaddr_storage *from, const char *peer)
 {
     const int size = WEB_SEND_BUFFER;
     unsigned char address[sizeof web->conn->place.address];
@@ -127,7 +127,7 @@ static void accept_some(struct web_link *web)
         if (!socket_accept(web->listener.fd, &web->listener.reserve_fd, &fd, &from, &len)) return;
         socket_address_text((const struct sockaddr *)&from, len, peer, sizeof peer);
         if (fd >= 0)
-            welcome(web, fd, &from, peer);
+            web_accept_welcome(web, fd, &from, peer);
         else /* no descriptor is left */
             web_refused(web, peer);
     }
@@ -209,7 +209,7 @@ static int give_up(struct web_conn *conn)
     return linger(conn);
 }
 
-static int serve_client(struct web_link *web, struct web_conn *conn, enum lws_callback_reasons reason)
+static int web_accept_serve(struct web_link *web, struct web_conn *conn, enum lws_callback_reasons reason)
 {
     switch (reason) {
     case LWS_CALLBACK_TIMER:
@@ -228,7 +228,7 @@ int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
     struct web_conn *conn = web_lws.lws_get_opaque_user_data(wsi);
     uint64_t count;
     (void)user, (void)in, (void)len;
-    if (conn != NULL && conn->wsi == wsi) return serve_client(web, conn, reason);
+    if (conn != NULL && conn->wsi == wsi) return web_accept_serve(web, conn, reason);
     if (reason != LWS_CALLBACK_RAW_RX_FILE) return 0;
     if (wsi == web->listening)
         accept_some(web);

@@ -81,7 +81,7 @@ static int is_foreign_part(const struct fields *f, const char *path)
 }
 
 /* Decodes %41 and the like. Returns 0; 1 if the text is cut; or the status 400. */
-static int decode(struct http_text in, char *out, size_t room)
+static int web_request_decode(struct http_text in, char *out, size_t room)
 {
     size_t n = 0;
     for (size_t i = 0; i < in.len; i++) {
@@ -166,9 +166,9 @@ int web_request_read(const struct web_link *web, const char *head, size_t len, s
     if (f.has_coding || f.length > 0) return f.has_coding && f.n_length > 0 ? 400 : 413;
     *words = "a path must begin with /, and %XX in it must be a byte in hexadecimal, but not 0";
     if (target.path.len == 0 || target.path.s[0] != '/') return 400;
-    if (decode(target.path, out->path, sizeof out->path) == 400) return 400;
+    if (web_request_decode(target.path, out->path, sizeof out->path) == 400) return 400;
     if (is_foreign_part(&f, out->path)) return WEB_FOREIGN;
-    const int query = decode(target.query, out->query, sizeof out->query);
+    const int query = web_request_decode(target.query, out->query, sizeof out->query);
     if (query == 400) return 400;
     out->query_long = query == 1;
     f.is_upgrade &= !out->head_only && line.minor > 0; /* RFC 6455 4.1: only a GET of HTTP/1.1 is one */

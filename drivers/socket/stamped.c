@@ -75,7 +75,7 @@ static int join(int fd, struct sockaddr_storage *at, unsigned interface)
     return setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group);
 }
 
-static int start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned interface)
+static int stamped_start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned interface)
 {
     const int one = 1, size = RECEIVE_BUFFER_BYTES, is_group = socket_is_group((const struct sockaddr *)at);
     if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size) != 0) /* needs CAP_NET_ADMIN */
@@ -116,7 +116,7 @@ int stamped_open(const char *host, int port, struct stamped_socket *out, struct 
     if (rc != SH_OK) return rc;
     memcpy(&out->own, list->ai_addr, list->ai_addrlen);
     out->fd = socket(list->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (out->fd < 0 || start(out->fd, &out->own, list->ai_addrlen, interface) != 0 ||
+    if (out->fd < 0 || stamped_start(out->fd, &out->own, list->ai_addrlen, interface) != 0 ||
         getsockname(out->fd, (struct sockaddr *)&out->own, &out->own_len) != 0) {
         const int error = errno;
         rc = sh_fail(err, error == ENODEV ? SH_EINPUT : socket_error_code(error), "udp:%s:%d: %s%s", host, port,

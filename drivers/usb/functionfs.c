@@ -93,7 +93,7 @@ static int functionfs_prepare(void *backend, struct pollfd *fds)
 }
 
 /* The kernel reports a reset, a configuration that was taken away and an unplugging alike. */
-static void disable(struct functionfs *self, int unplugged)
+static void functionfs_disable(struct functionfs *self, int unplugged)
 {
     ffs_pipes_stop(&self->pipes);
     if (unplugged)
@@ -121,11 +121,11 @@ static void look_at_addresses(struct functionfs *self)
 }
 
 /* The host has configured the device. */
-static void enable(struct functionfs *self)
+static void functionfs_enable(struct functionfs *self)
 {
     struct usb_ctrlrequest setup = {.bRequest = USB_REQ_SET_CONFIGURATION};
     le_put16(&setup.wValue, USB_CONFIGURATION);
-    disable(self, 0); /* the kernel drops a DISABLE that was not read before ENABLE came */
+    functionfs_disable(self, 0); /* the kernel drops a DISABLE that was not read before ENABLE came */
     usb_device_attach(self->device, gadget_rate(&self->gadget), on_complete, self);
     usb_device_assume_address(self->device);
     usb_device_control(self->device, &setup, NULL, 0);
@@ -135,7 +135,7 @@ static void enable(struct functionfs *self)
 }
 
 /* A transfer in the wrong direction is FunctionFS's way to stall. */
-static void stall(struct functionfs *self, int in)
+static void functionfs_stall(struct functionfs *self, int in)
 {
     ssize_t n = in ? read(self->ep0, self->data, 0) : write(self->ep0, self->data, 0);
     (void)n; /* it fails, which is what stalls */
@@ -152,7 +152,7 @@ static void translate_index(const struct functionfs *self, struct usb_ctrlreques
     if (recipient == USB_RECIP_ENDPOINT) le_put16(&setup->wIndex, ffs_pipes_address(&self->pipes, index));
 }
 
-static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
+static void functionfs_answer(struct functionfs *self, struct usb_ctrlrequest setup)
 {
     const int in = (setup.bRequestType & USB_DIR_IN) != 0;
     const unsigned length = le_get16(&setup.wLength);
@@ -169,7 +169,7 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
         usb_device_control(self->device, &setup, self->data, length); /* the data are taken: too late to stall */
         return;
     }
-    if (n == USB_STALL) stall(self, in);
+    if (n == USB_STALL) functionfs_stall(self, in);
 }
 
 /* Follows the controller's state, for a gadget without ep0. A port that was hung up shows that the device was not
@@ -181,8 +181,8 @@ static void take_state(struct functionfs *self, int hung_up)
     if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return;
     const int was = usb_device_configuration(self->device) != 0;
     const int is = gadget_is_configured(&self->gadget, was);
-    if (was && (hung_up || !is)) disable(self, !gadget_is_on_bus(&self->gadget));
-    if (is && (hung_up || !was)) enable(self);
+    if (was && (hung_up || !is)) functionfs_disable(self, !gadget_is_on_bus(&self->gadget));
+    if (is && (hung_up || !was)) functionfs_enable(self);
 }
 
 /* Takes one event of ep0; 0: there is none. */
@@ -193,16 +193,16 @@ static int functionfs_take_event(struct functionfs *self)
     if (read(self->ep0, &event, sizeof event) != sizeof event) return 0;
     switch (event.type) {
     case FUNCTIONFS_ENABLE:
-        enable(self);
+        functionfs_enable(self);
         break;
     case FUNCTIONFS_DISABLE:
-        disable(self, !gadget_is_on_bus(&self->gadget));
+        functionfs_disable(self, !gadget_is_on_bus(&self->gadget));
         break;
     case FUNCTIONFS_UNBIND:
-        disable(self, 1);
+        functionfs_disable(self, 1);
         break;
     case FUNCTIONFS_SETUP:
-        answer(self, event.u.setup);
+        functionfs_answer(self, event.u.setup);
         break;
     case FUNCTIONFS_SUSPEND:
     case FUNCTIONFS_RESUME:
@@ -252,16 +252,16 @@ static int functionfs_more(const void *backend)
 
 /* ---- injected faults */
 
-static int unplug(struct functionfs *self)
+static int functionfs_unplug(struct functionfs *self)
 {
     if (self->unplugged) return SH_ESTATE;
     self->unplugged = 1;
     gadget_unbind(&self->gadget);
-    disable(self, 1);
+    functionfs_disable(self, 1);
     return SH_OK;
 }
 
-static int plug(struct functionfs *self)
+static int functionfs_plug(struct functionfs *self)
 {
     struct sh_err err;
     if (!self->unplugged) return SH_OK;
@@ -274,9 +274,9 @@ static int plug(struct functionfs *self)
 static int functionfs_fault(void *backend, enum usb_fault what)
 {
     struct functionfs *self = backend;
-    if (what == USB_FAULT_PLUG) return plug(self);
-    const int rc = unplug(self);
-    return what == USB_FAULT_UNPLUG || rc != SH_OK ? rc : plug(self);
+    if (what == USB_FAULT_PLUG) return functionfs_plug(self);
+    const int rc = functionfs_unplug(self);
+    return what == USB_FAULT_UNPLUG || rc != SH_OK ? rc : functionfs_plug(self);
 }
 
 static void functionfs_close(void *backend)

@@ -128,7 +128,7 @@ static struct usbip_conn *usbip_make_room(struct usbip *self)
     return oldest;
 }
 
-static void welcome(struct usbip *self, const struct usb_owner *owner)
+static void usbip_welcome(struct usbip *self, const struct usb_owner *owner)
 {
     const int size = SEND_BUFFER_BYTES;
     for (int i = 0; i < MAX_CONNS; i++) {
@@ -179,7 +179,7 @@ static int usbip_handle(void *backend, const struct pollfd *fds, int n, const st
         if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], owner);
     for (int i = 0; i < MAX_CONNS; i++)
         if (self->conn[i].fd >= 0) usbip_conn_answer_slow(&self->conn[i], owner);
-    if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self, owner);
+    if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) usbip_welcome(self, owner);
     int rc = SH_OK;
     if (fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents) && !self->unplugged)
         rc = attach_again(self, owner);
@@ -198,7 +198,7 @@ static int64_t usbip_due_ns(const void *backend)
 
 /* ---- injected faults */
 
-static int unplug(struct usbip *self)
+static int usbip_unplug(struct usbip *self)
 {
     if (self->unplugged) return SH_ESTATE;
     self->unplugged = 1;
@@ -209,7 +209,7 @@ static int unplug(struct usbip *self)
     return SH_OK;
 }
 
-static int plug(struct usbip *self)
+static int usbip_plug(struct usbip *self)
 {
     struct sh_err err;
     if (!self->unplugged) return SH_OK;
@@ -223,8 +223,8 @@ static int plug(struct usbip *self)
 static int usbip_fault(void *backend, enum usb_fault what)
 {
     struct usbip *self = backend;
-    if (what == USB_FAULT_UNPLUG) return unplug(self);
-    if (what == USB_FAULT_PLUG) return plug(self);
+    if (what == USB_FAULT_UNPLUG) return usbip_unplug(self);
+    if (what == USB_FAULT_PLUG) return usbip_plug(self);
     if (!self->taken) return SH_ESTATE;
     usb_device_restart(self->device);
     usbip_flush(self);
