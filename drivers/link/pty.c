@@ -81,7 +81,7 @@ static void pty_note(struct pty_link *pty, uint32_t mask)
     const int counted = pty->open_event_due;
     pty->open_event_due = 0;
     if ((mask & IN_CLOSE) != 0 && pty->count > 0) pty->count--;
-    if ((mask & (IN_OPEN | IN_Q_OVERFLOW)) == 0 || counted) return;
+    if ((mask & (IN_OPEN | IN_Q_OVERFLOW)) == 0 || counted) return; /* an overflow may have hidden an open event */
     if (!pty->open) {
         pty_begin(pty, 1);
     } else if (pty->count > 0) {

@@ -56,7 +56,7 @@ size_t uart_read(const struct uart *uart, const uint8_t *sent, size_t n, uint8_t
                 byte |= (uint8_t)(level_at(sent, n, bit + bit_at(uart, k)) << (k - 1));
             last = STOP;
         }
-        bit += bit_at(uart, last);
+        bit += bit_at(uart, last); /* the receiver waits for the next edge from its last sample on */
         before = level_at(sent, n, bit++);
         if (last == STOP && uart_take(uart, before, &byte)) out[n_out++] = byte;
     }

@@ -249,7 +249,7 @@ static int bind_source(int fd, const struct link_spec *spec, const struct sockad
 {
     const int one = 1;
     const int own = spec->source_port != 0 && is_same_place(from, to);
-    errno = EADDRINUSE;
+    errno = EADDRINUSE; /* for a receiver with this very address, where bind() is not tried */
     if (spec->source_port != 0) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (!own && bind(fd, (struct sockaddr *)from, len) == 0) return 0;
     if (spec->source_port == 0 || !spec->usual_port || errno != EADDRINUSE) return -1;

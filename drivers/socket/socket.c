@@ -214,6 +214,7 @@ enum socket_state socket_state(int fd, short revents)
     if ((revents & (POLLIN | POLLHUP | POLLERR | POLLNVAL)) == 0) return SOCKET_OPEN;
     char byte;
     ssize_t n = recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK);
-    if (n == 0) return (revents & (POLLHUP | POLLERR)) != 0 ? SOCKET_ENDED : SOCKET_SHUT;
+    if (n == 0)
+        return (revents & (POLLHUP | POLLERR)) != 0 ? SOCKET_ENDED : SOCKET_SHUT; /* POLLHUP: both sides are shut */
     return n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR ? SOCKET_ENDED : SOCKET_OPEN;
 }

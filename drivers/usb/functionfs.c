@@ -165,8 +165,8 @@ static void functionfs_answer(struct functionfs *self, struct usb_ctrlrequest se
         n = usb_device_control(self->device, &setup, self->data, 0);
         if (n >= 0 && read(self->ep0, self->data, 0) == 0) return;
     } else if (length <= sizeof self->data && usb_device_control(self->device, &setup, NULL, length) == 0 &&
-               read(self->ep0, self->data, length) == (ssize_t)length) {
-        usb_device_control(self->device, &setup, self->data, length); /* the data are taken: too late to stall */
+               read(self->ep0, self->data, length) == (ssize_t)length) { /* reading accepts the request */
+        usb_device_control(self->device, &setup, self->data, length);    /* the data are taken: too late to stall */
         return;
     }
     if (n == USB_STALL) functionfs_stall(self, in);
