@@ -295,7 +295,7 @@ struct scanhead_wave {
     const uint8_t *sample;  /* n counts of two bytes, little-endian; valid as the frame's payload is */
     double range_m, step_m; /* of the first sample; from one to the next */
     /* Polar layout: the beam's direction in the head's frame SOCS, of length one. Geo layout: the change of x, y and z
-     * in the CRS along a metre of range. So range times direction leads to the sample from the head or the anchor. */
+     * in the CRS along a metre of range. So range times direction leads to the sample, from the head (geo: anchor). */
     double direction[3];
     uint32_t sample_ps, bits; /* time between samples; bits of a count */
     double baseline;          /* the count without light */
