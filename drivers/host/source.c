@@ -18,6 +18,7 @@
 #include "drivers/host/source.h"
 
 enum { CONNECT_TIMEOUT_MS = 10000, RECEIVE_BUFFER = 4 << 20 };
+enum { IDLE_S = 10, INTERVAL_S = 5, PROBES = 3 }; /* of keep-alive: about 25 s, as the head has for its clients */
 
 static int fail_open(struct sh_err *err, int code, const char *name)
 {
@@ -76,11 +77,16 @@ static int split_address(const char *address, char host[256], char port[8], stru
     return 0;
 }
 
-/* Errors are ignored: a small buffer costs speed, not correctness. */
+/* A head that vanishes without a word, as by a loss of power, ends the connection (ETIMEDOUT). Errors are ignored: a
+ * small buffer costs speed, not correctness. */
 static void tune_socket(int fd)
 {
-    int size = RECEIVE_BUFFER, on = 1;
+    const int size = RECEIVE_BUFFER, on = 1, idle_s = IDLE_S, interval_s = INTERVAL_S, probes = PROBES;
     setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle_s, sizeof idle_s);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval_s, sizeof interval_s);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
     setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);
 #ifdef SO_BUF_LOCK
     /* The system may have allowed far less than asked; then let it still grow the buffer by itself. */

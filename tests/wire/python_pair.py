@@ -49,6 +49,7 @@ def misuse(path):
     threading.Timer(0.05, theirs.close).start()
     refused(head.next_frame, 1e300)  # longer than poll() can wait
     connected_to_itself()
+    keeps_alive()
     for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
         late_replies(lines)
     late_answer()
@@ -70,6 +71,17 @@ def connected_to_itself():
         refused(scanhead.open, f"tcp:127.0.0.1:{port}")
     finally:
         socket.create_connection = connect
+
+
+def keeps_alive():
+    """A head that loses power says nothing. After 10 s of silence its client asks three times, 5 s apart."""
+    with socket.create_server(("127.0.0.1", 0)) as door:
+        with scanhead.open(f"tcp:127.0.0.1:{door.getsockname()[1]}") as head:
+            ours = head._source.owner
+            assert ours.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+            idle_s, interval_s, probes = (ours.getsockopt(socket.IPPROTO_TCP, option) for option in (
+                socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT))
+            assert idle_s + interval_s * probes == 25
 
 
 def late_replies(lines):

@@ -1094,6 +1094,10 @@ def _open_source(name: str, timeout_s: float) -> _Source:
             raise ConnectionRefusedError(errno.ECONNREFUSED, os.strerror(errno.ECONNREFUSED))
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)  # a head that vanishes ends the connection
+        for option, value in (("TCP_KEEPIDLE", 10), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
+            if hasattr(socket, option):  # else after the system's own time
+                connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
         return _Source(name, connection.fileno(), connection)
     if kind == "tty":
         return _Source(name, _open_tty(rest))
