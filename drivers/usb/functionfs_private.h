@@ -50,6 +50,7 @@ struct ffs_pipes {
 int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const struct gadget *gadget, struct sh_err *err);
 /* The configuration has come up: puts all slots to use. */
 void ffs_pipes_start(struct ffs_pipes *pipes);
+/* The configuration is over: slots that the kernel gives back rest. */
 void ffs_pipes_stop(struct ffs_pipes *pipes);
 /* Takes one completion; 0: there is none. */
 int ffs_pipes_take(struct ffs_pipes *pipes);
@@ -87,10 +88,15 @@ struct ffs_console {
 
 /* number: of the tty, -1 for none. Fails where the tty can't be used. */
 int ffs_console_open(struct ffs_console *console, struct usb_device *device, int number, struct sh_err *err);
+/* The configuration has come up: opens the tty. */
 void ffs_console_start(struct ffs_console *console);
+/* Closes the tty, and ends the session. */
 void ffs_console_stop(struct ffs_console *console);
+/* Returns the events of poll(2) to wait for on fd. */
 short ffs_console_events(const struct ffs_console *console);
+/* Moves bytes between the tty and the core. timed_out: the timer has expired. */
 void ffs_console_handle(struct ffs_console *console, short revents, int timed_out);
+/* The core gives a transfer back. Returns 0: it is not one of the console. */
 int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer);
 void ffs_console_close(struct ffs_console *console);
 
