@@ -50,6 +50,7 @@ def misuse(path):
     refused(head.next_frame, 1e300)  # longer than poll() can wait
     connected_to_itself()
     keeps_alive()
+    oldest_gap()
     for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
         late_replies(lines)
     late_answer()
@@ -82,6 +83,17 @@ def keeps_alive():
             idle_s, interval_s, probes = (ours.getsockopt(socket.IPPROTO_TCP, option) for option in (
                 socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT))
             assert idle_s + interval_s * probes == 25
+
+
+def oldest_gap():
+    """A late frame cuts the oldest of 64 gaps in two: the next oldest makes room, and frames of both parts are late."""
+    sequence = scanhead._Sequence()
+    assert sequence.take((0, 0, 0)) == ("", 0, 1)
+    for i in range(1, 65):
+        assert sequence.take((4 * i, 0, i)) == ("gap", 4 * i - 3, 3)
+    for seq in (2, 1, 3):
+        assert sequence.take((seq, 0, -seq)) == ("late", seq, 1)
+    assert sequence.take((6, 0, -6)) == ("restarted", 6, 1)
 
 
 def late_replies(lines):

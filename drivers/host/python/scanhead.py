@@ -339,6 +339,8 @@ class _Sequence:
             before = (seq - gap[0]) % 2**32
             if before < gap[1]:
                 rest, gap[1] = gap[1] - before - 1, before
+                if gap is self._gaps[0] and len(self._gaps) == _GAPS:
+                    self._gaps.rotate(-1)  # it stays, and the next oldest makes room for its second part
                 self._add_gap((seq + 1) % 2**32, rest)
                 return True
         return False
