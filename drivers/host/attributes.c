@@ -29,7 +29,7 @@ int scanhead_has_deviations(const struct scanhead *sh)
     return host_has_content(sh, NATIVE_HAS_DEVIATIONS);
 }
 
-/* Returns whether the frame comes `after` numbers after the last points frame, and belongs to the same points. */
+/* Returns whether the frame's number is that of the last points frame plus `after`, and it belongs to these points. */
 static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t after)
 {
     return sh->have_points && frame->seq == sh->points_seq + after && frame->pulse0 == sh->of_points.pulse0 &&
@@ -37,8 +37,8 @@ static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *
 }
 
 /* Returns how many attributes, or colours, there are from `first` on, at most max; or an error. */
-static int beside_from(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type,
-                       uint32_t first, uint32_t max)
+static int attributes_from(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type,
+                           uint32_t first, uint32_t max)
 {
     const int is_colours = type == SCANHEAD_COLOURS, rc = host_check_last(sh, frame, type);
     if (rc != 0) return rc;
@@ -74,7 +74,7 @@ int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame,
 {
     if (scanhead_has_deviations(sh) != 1)
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: the head's attributes have no deviations", sh->source.name);
-    const int n = beside_from(sh, frame, SCANHEAD_ATTRIBUTES, first, max);
+    const int n = attributes_from(sh, frame, SCANHEAD_ATTRIBUTES, first, max);
     if (n > 0)
         set_deviations(frame->payload + (size_t)first * NATIVE_DEVIATION_LEN, frame->n_points, (uint32_t)n, deviation);
     return n;
@@ -83,7 +83,7 @@ int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame,
 int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                         struct scanhead_attribute *attributes, uint32_t max)
 {
-    const int n = beside_from(sh, frame, SCANHEAD_ATTRIBUTES, first, max);
+    const int n = attributes_from(sh, frame, SCANHEAD_ATTRIBUTES, first, max);
     if (n > 0) set_attributes(frame->payload + (size_t)first * NATIVE_ATTRIBUTE_LEN, (uint32_t)n, attributes);
     return n;
 }
@@ -91,7 +91,7 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
 int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      struct scanhead_colour *colours, uint32_t max)
 {
-    const int n = beside_from(sh, frame, SCANHEAD_COLOURS, first, max);
+    const int n = attributes_from(sh, frame, SCANHEAD_COLOURS, first, max);
     _Static_assert(sizeof *colours == NATIVE_COLOUR_LEN, "a colour is as on the wire");
     if (n > 0)
         memcpy(colours, frame->payload + NATIVE_COLOURS_HEAD_LEN + (size_t)first * NATIVE_COLOUR_LEN,

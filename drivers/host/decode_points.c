@@ -57,7 +57,7 @@ VEC_INLINE struct native_point point_of_tail(uint32_t tail)
 
 VEC_CLONES static void set_times(const uint32_t *restrict tail, int n, int64_t t0_ns, int64_t *restrict t_ns)
 {
-    for (int i = 0; i < n; i++) /* wraps where a broken stream's t0_ns is the largest */
+    for (int i = 0; i < n; i++) /* unsigned: with a broken stream's t0_ns the sum may be beyond 2^63 */
         t_ns[i] = (int64_t)((uint64_t)t0_ns + point_of_tail(tail[i]).dt_ns);
 }
 

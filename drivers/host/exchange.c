@@ -197,7 +197,9 @@ static int exchange_settle(struct scanhead *sh, int64_t deadline_ns)
         sh->source.asked++;
         int64_t until_ns = host_deadline_ns(ASK_AGAIN_MS);
         rc = pass_over(sh, until_ns < deadline_ns ? until_ns : deadline_ns);
-        if (rc != SH_ETIMEOUT || host_deadline_ns(0) >= deadline_ns) return rc;
+        const int64_t now_ns = host_deadline_ns(0);
+        const int was_signal = sh->has_no_limit && now_ns < until_ns;
+        if (rc != SH_ETIMEOUT || now_ns >= deadline_ns || was_signal) return rc;
     }
 }
 
@@ -216,6 +218,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     char line[COMMAND_MAX + 1];
     size_t len = strlen(command);
     sh->payload = NULL;
+    sh->has_no_limit = timeout_ms < 0;
     int rc = check_command(sh, command, len);
     if (rc != 0) return rc;
     memcpy(line, command, len);
@@ -236,8 +239,8 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
         if (sh->ended) return host_over(sh);
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
-    if (is_sent) give_up(sh, command); /* also where a frame that came meanwhile was wrong */
-    if (rc != SH_ETIMEOUT) return rc;
+    if (is_sent) give_up(sh, command);                  /* also where a frame that came meanwhile was wrong */
+    if (rc != SH_ETIMEOUT || timeout_ms < 0) return rc; /* without a time limit it was a signal */
     return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
                    timeout_ms);
 }

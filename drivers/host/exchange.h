@@ -20,7 +20,7 @@ void host_stray_line(struct scanhead *sh);
 /* Nothing more will come: keeps the frames that are in the parser. The rest of it is garbage. */
 int host_keep_rest(struct scanhead *sh);
 
-/* io.c: waits for `events` on the source: 0, SH_ETIMEOUT (also for a signal when there is no deadline), SH_EIO. */
+/* io.c: waits for `events` on the source: 0, SH_ETIMEOUT (also for a signal, if the call has no time limit), SH_EIO. */
 int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *revents);
 /* Reads what is there into the parser, waiting for it until the deadline. 0 also at the end: then sh->ended
  * is set. */

@@ -32,7 +32,7 @@ static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, 
                         struct sh_err *err)
 {
     struct host_usb_watch *watch = deadline_ns > host_deadline_ns(0) ? host_usb_watch_open(source) : NULL;
-    wrong_too |= strncmp(source, "tty:", 4) == 0; /* the node of one that is not plugged in isn't there */
+    wrong_too |= strncmp(source, "tty:", 4) == 0; /* until it is plugged in, its node may be missing, or no terminal */
     for (;;) {
         int rc = host_source_open(source, out, err);
         if (rc == SH_OK || rc == SH_ENOMEM || (rc == SH_EINPUT && !wrong_too) || host_deadline_ns(0) >= deadline_ns ||
@@ -195,7 +195,7 @@ static void fill_points(struct scanhead *sh, struct scanhead_frame *frame)
 }
 
 /* Fills a frame of attributes or colours. */
-static void fill_beside(struct scanhead_frame *frame)
+static void fill_attributes(struct scanhead_frame *frame)
 {
     struct native_attributes head;
     const int rc = frame->type == SCANHEAD_COLOURS
@@ -244,7 +244,7 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
         .raw_len = native_frame_len(raw),
     };
     if (header.type == NATIVE_POINTS) fill_points(sh, frame);
-    if (header.type == NATIVE_ATTRIBUTES || header.type == NATIVE_COLOURS) fill_beside(frame);
+    if (header.type == NATIVE_ATTRIBUTES || header.type == NATIVE_COLOURS) fill_attributes(frame);
     if (header.type == NATIVE_WAVES) fill_waves(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
@@ -293,6 +293,7 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 {
     memset(frame, 0, sizeof *frame);
     sh->payload = NULL;
+    sh->has_no_limit = timeout_ms < 0;
     free(sh->kept.current);
     sh->kept.current = NULL;
     if (sh->kept.first != NULL) {

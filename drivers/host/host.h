@@ -39,7 +39,7 @@ struct host_times {
     int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time that the head's clock had then */
 };
 
-/* Notices of what is not in the bytes themselves: lines that came unasked, connections. */
+/* Notices that the parser does not give: about lines that nobody waits for, and about connections. */
 struct host_notices {
     void (*fn)(void *ctx, const struct scanhead_notice *notice); /* NULL: nobody listens */
     void *ctx;
@@ -51,10 +51,11 @@ struct host_notices {
 
 struct scanhead {
     struct host_source source;
-    int ended; /* no more bytes will come */
-    int lost;  /* because the device was unplugged */
-    int reset; /* because the bus was reset, with the device still on it */
-    int stuck; /* half a command went out: nothing sensible can follow */
+    int ended;        /* no more bytes will come */
+    int lost;         /* because the device was unplugged */
+    int reset;        /* because the bus was reset, with the device still on it */
+    int stuck;        /* half a command went out: nothing sensible can follow */
+    int has_no_limit; /* the present call waits without a time limit, so a signal ends it */
     struct native_parser parser;
     struct host_notices notices;
     struct host_kept kept;
@@ -68,7 +69,7 @@ struct scanhead {
     int have_seq, have_descriptor, have_anchor, have_pulse;
     uint32_t last_seq;      /* of a frame that is not LOCAL */
     uint64_t last_repeated; /* how many frames were repeated up to it */
-    int told_alone;         /* since then a descriptor came for this reader alone */
+    int told_alone;         /* a descriptor for this reader alone came after last_seq */
     struct native_descriptor descriptor;
     struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
     struct native_beam beam[NATIVE_MAX_BEAMS];

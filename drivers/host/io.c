@@ -54,18 +54,30 @@ int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *rev
         if (n > 0) return 0;
         if (n == 0) return sh_fail(&sh->err, SH_ETIMEOUT, "%s: no data came within the time limit", sh->source.name);
         if (errno != EINTR) return sh_fail(&sh->err, SH_EIO, "%s: %s", sh->source.name, strerror(errno));
-        /* Without a deadline, only a signal gives the program its turn. */
-        if (deadline_ns == INT64_MAX)
+        /* Without a time limit, only a signal gives the program its turn. */
+        if (sh->has_no_limit)
             return sh_fail(&sh->err, SH_ETIMEOUT, "%s: a signal interrupted the wait", sh->source.name);
     }
 }
 
-/* A pty whose master is closed says EIO; a reset connection is as gone as a closed one. */
 int host_is_hang_up(const struct scanhead *sh, int error)
 {
     if (sh->source.usb != NULL) return error == ENODEV || error == ECONNRESET;
-    return !sh->source.is_file && (error == EIO || error == ECONNRESET || error == EPIPE || error == ENODEV ||
-                                   error == ENXIO || error == ETIMEDOUT);
+    if (sh->source.is_file) return 0;
+    switch (error) {
+    case EIO: /* a pty whose master is closed */
+    case ENODEV:
+    case ENXIO:
+    case EPIPE:
+    case ECONNRESET:
+    case ETIMEDOUT: /* this and the next: TCP has given up, and reports the last reason that it met */
+    case EHOSTUNREACH:
+    case ENETUNREACH:
+    case ENETDOWN:
+        return 1;
+    default:
+        return 0;
+    }
 }
 
 void host_note_loss(struct scanhead *sh, int error)
@@ -75,7 +87,7 @@ void host_note_loss(struct scanhead *sh, int error)
 }
 
 /* Takes bytes from the source into the parser. Returns as read() does. */
-static ssize_t take(struct scanhead *sh)
+static ssize_t io_take(struct scanhead *sh)
 {
     struct host_source *source = &sh->source;
     const uint8_t *items;
@@ -94,7 +106,7 @@ static ssize_t take(struct scanhead *sh)
 int host_fill(struct scanhead *sh, int64_t deadline_ns)
 {
     for (;;) {
-        const ssize_t n = take(sh);
+        const ssize_t n = io_take(sh);
         if (n > 0) return 0;
         if (n == 0 || host_is_hang_up(sh, errno)) {
             native_parser_finish(&sh->parser);

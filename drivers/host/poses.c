@@ -11,13 +11,13 @@
 
 /* Room for some seconds, and for the longest frame. */
 enum { KEEP = 8192 };
-_Static_assert(KEEP > 2 * NATIVE_MAX_POSES, "a frame has room beside the one before");
+_Static_assert(KEEP > 2 * NATIVE_MAX_POSES, "two frames have room");
 
 struct host_poses {
-    uint64_t n; /* that came; the last KEEP are there, number i at i % KEEP */
+    uint64_t n; /* how many came; the last KEEP are kept, number i at at[i % KEEP] */
     struct {
         struct native_pose pose;
-        int begins; /* 1: first of its stream frame. The way from the pose before is not known */
+        int begins; /* 1: first of its stream frame; between it and the pose before, the head's motion is not known */
     } at[KEEP];
 };
 
@@ -53,7 +53,8 @@ static int poses_find(const struct host_poses *poses, int64_t t_ns, const struct
     return 0;
 }
 
-/* From pose a to pose b: the rotation at a, and the axis (head's frame) and angle of the turn from there. */
+/* The motion from pose a to pose b: the rotation at a, and the axis (in SOCS, the head's frame) and angle of the turn
+ * from there. */
 struct leg {
     const struct native_pose *a, *b;
     double rotation[9], axis[3], angle_rad;
@@ -111,7 +112,7 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
     return (int)i;
 }
 
-/* Puts the point to the place of v, which is in the head's frame. */
+/* Sets the point's coordinates in the scene from v, its coordinates in the head's frame SOCS. */
 static void place(const double rotation[9], const double at[3], const double v[3], struct scanhead_point *p)
 {
     double turned[3];
@@ -121,7 +122,7 @@ static void place(const double rotation[9], const double at[3], const double v[3
     p->z = at[2] + turned[2];
 }
 
-/* The point turns by Rodrigues' formula in the head's frame, then by the rotation at the leg's begin. */
+/* Turns the point by Rodrigues' formula in the head's frame SOCS, then by the rotation at the leg's begin. */
 static void place_moving(const struct leg *leg, double f, struct scanhead_point *p)
 {
     const double angle = f * leg->angle_rad, s = sin(angle), versine = 1 - cos(angle);

@@ -16,7 +16,8 @@
  *     scanhead_close(sh);
  *
  * Results: functions return 0, or a count, or a negative SCANHEAD_E. After an error scanhead_error() has a line of
- * text. Functions that take a const handle leave that text as it was.
+ * text. Functions that take a const handle leave that text as it was. A timeout_ms below 0 is no time limit; a signal
+ * then ends the wait of scanhead_next and scanhead_command with SCANHEAD_ETIMEOUT.
  *
  * Ownership: a value that a function returns, or writes into the caller's memory, is the caller's. Strings and
  * payloads are the handle's; the comment of each says how long they live.
@@ -38,7 +39,7 @@ extern "C" {
 #define SCANHEAD_VERSION     "1.0.0"
 #define SCANHEAD_API_VERSION 1
 
-/* SCANHEAD_VERSION of the library that the program runs with. */
+/* Returns SCANHEAD_VERSION of the library that the program runs with. */
 const char *scanhead_version(void);
 
 enum scanhead_error {
@@ -72,17 +73,17 @@ int scanhead_open(const char *source, struct scanhead **out, char *err, size_t e
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
 /* sh may be NULL. */
 void scanhead_close(struct scanhead *sh);
-/* The text of the last error; the handle's, until its next call. */
+/* Returns the text of the last error. It is the handle's, until its next call. */
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
- * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters and the hash are kept, and
- * what the stream has reported, too, until its sequence begins anew after a restart. A jump in the sequence shows what
- * was lost meanwhile. On USB the same head is the one with the same ids and serial number. SCANHEAD_ESTATE for a file
- * or "fd:N". Any other error: the head did not come back in time, or a signal came; call again, or close. */
+ * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters and the hash are kept.
+ * Descriptor, anchor and names are kept, too, unless the head has started again. A jump in the sequence shows how many
+ * frames were lost meanwhile. On USB the same head is the one with the same ids and serial number. SCANHEAD_ESTATE for
+ * a file or "fd:N". Any other error: the head did not come back in time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
-/* Heads on USB now. */
+/* A head that is on USB now. */
 struct scanhead_usb_head {
     char source[192]; /* for scanhead_open: usb:vid:pid:serial */
     uint16_t vid, pid;
@@ -91,16 +92,15 @@ struct scanhead_usb_head {
     double speed_bit_s; /* 0: unknown */
     char problem[320];  /* why it can't be opened, for instance no permission; empty: it can */
 };
-/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be
- * NULL). */
+/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
  * are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops the oldest and counts
  * them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
- * the first command on a "tty:" it sends an empty line and *IDN?, and skips all reply lines up to the answer to *IDN?.
- * Before it was in raw mode, the terminal may have echoed the head's own bytes to the head. It does the same after a
- * command that ended without its reply, since that may still come. */
+ * the first command on a "tty:" it sends an empty line and *IDN?. It skips all reply lines up to the answer, because
+ * the terminal may have echoed the head's own bytes to the head. It does the same after a command that ended without
+ * its reply, since that may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */
@@ -129,6 +129,7 @@ enum scanhead_event_code {
     SCANHEAD_EV_ERROR = 7,
     SCANHEAD_EV_SETTINGS = 8,
     SCANHEAD_EV_POSE_LATE = 9,
+    /* after the colon: the event's values */
     SCANHEAD_EV_PPS = 10,  /* a full second: UTC (s since 1970), device time of the edge (ns), GPS time (s) */
     SCANHEAD_EV_TIME = 11, /* before each repeated descriptor: 0, device time (ns), its GPS time (ns) */
     SCANHEAD_EV_SITE = 12, /* a station was moved (SITE:POSE): its number, warnings of the head about its place */
@@ -155,8 +156,8 @@ struct scanhead_frame {
     char event_text[96];
 };
 
-/* The next frame, in order. timeout_ms < 0 waits for ever. Frames with a wrong CRC, repeated frames, and frames that
- * come after newer ones are left out and counted, see scanhead_on_notice. */
+/* Gets the next frame, in order. Frames with a wrong CRC, repeated frames, and frames that come after newer ones are
+ * left out and counted, see scanhead_on_notice. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
 /* Notices about a stream, one for each event. Losses are counted in two independent ways:
@@ -182,8 +183,8 @@ enum scanhead_notice_kind {
     /* A frame with a correct header and a wrong payload: seq is its number, t_ns its time. n: its bytes up to the next
      * correct frame. Where bytes were lost, n is less than the frame's length field says. */
     SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
-    /* n bytes that belong to nothing: garbage, a frame with a broken header, a broken reply, replies after these up to
-     * the next frame. A whole run of them is one notice, before the next frame or reply. */
+    /* n bytes that belong to no frame or reply: garbage, a frame with a broken header, a broken reply, or replies
+     * between these and the next frame. A whole run of them is one notice, before the next frame or reply. */
     SCANHEAD_NOTICE_BAD_BYTES = 6,
     /* The connection or the recording ended within a frame or a reply, of which n bytes had come. seq: the frame's
      * number, if its header had come. */
@@ -217,7 +218,7 @@ struct scanhead_notice {
  * its reply, frames that came earlier may still be kept for scanhead_next. On this handle fn may only call
  * scanhead_get_stats, which already counts the notice. NULL, as at first: no function. Counters go on either way. */
 void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx);
-/* The kind in lower case, such as "bad payload"; "?" for another number. */
+/* Returns the kind in lower case, such as "bad payload"; "?" for another number. */
 const char *scanhead_notice_name(int kind);
 
 enum { SCANHEAD_NO_LABEL = 0xffff };
@@ -248,8 +249,8 @@ struct scanhead_columns {
     uint16_t *label;
     uint8_t *echo, *echo_count;
 };
-/* scanhead_points() into columns: the same figures, bit for bit, in less time. Columns need room for max figures each,
- * and must not overlap. Returns the number of points written, or a negative error. */
+/* Writes what scanhead_points() gives into columns: the same figures, bit for bit, in less time. Columns need room for
+ * max figures each, and must not overlap. Returns the number of points written, or a negative error. */
 int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      const struct scanhead_columns *to, uint32_t max);
 
@@ -263,7 +264,7 @@ struct scanhead_attribute {
  * many, or SCANHEAD_ESTATE where they are not those of the last points, because frames were lost. */
 int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                         struct scanhead_attribute *attributes, uint32_t max);
-/* 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the
+/* Returns 1: a frame of attributes follows each frame of points; 0: the head sends none; SCANHEAD_ESTATE before the
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
@@ -275,7 +276,7 @@ struct scanhead_colour {
  * points, and after their attributes where the head sends both. */
 int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      struct scanhead_colour *colours, uint32_t max);
-/* 1: a frame of colours follows each frame of points; else as scanhead_has_attributes. */
+/* Returns 1 if a frame of colours follows each frame of points; else as scanhead_has_attributes. */
 int scanhead_has_colours(const struct scanhead *sh);
 
 /* A head that finds echoes in waveforms reports how far the shape of each echo is from the pulse's, RMS over its
@@ -293,9 +294,8 @@ struct scanhead_wave {
     uint32_t first, n;      /* samples, by their number on the grid */
     const uint8_t *sample;  /* n counts of two bytes, little-endian; valid as the frame's payload is */
     double range_m, step_m; /* of the first sample; from one to the next */
-    /* In the polar layout this is the beam in the head's frame SOCS, of length one. In the geo layout it is the
-     * change of x, y and z in the CRS along a metre of range. So range times direction goes from the head (geo: the
-     * anchor, where the head stands) to the sample. */
+    /* Polar layout: the beam's direction in the head's frame SOCS, of length one. Geo layout: the change of x, y and z
+     * in the CRS along a metre of range. So range times direction leads to the sample, from the head (geo: anchor). */
     double direction[3];
     uint32_t sample_ps, bits; /* time between samples; bits of a count */
     double baseline;          /* the count without light */
@@ -320,11 +320,11 @@ struct scanhead_line_end {
     int64_t t0_ns, t1_ns;     /* since the scan's start: this line's first pulse, the next one's */
     uint32_t n_fired, n_cast; /* pulses of the whole sweep; those outside its blind part */
     uint32_t n_echoes;        /* echoes sent; this, n_crowded, n_faint and n_unfit are 0 where parts were lost */
-    uint32_t mirror_count, pan_count,
-        status;         /* encoders at its last pulse; bit 0: last of the frame, bit 1: stopped within */
-    uint32_t n_crowded; /* echoes left out, the weakest: a pulse had more than the head sends */
-    uint32_t n_faint;   /* hits that the head did not detect */
-    uint32_t n_unfit;   /* echoes too far for the stream's integers: sent as empty shots */
+    uint32_t mirror_count, pan_count; /* encoders at the line's last pulse */
+    uint32_t status;                  /* bit 0: last line of a pan sweep; bit 1: the scan was stopped in this line */
+    uint32_t n_crowded;               /* echoes left out, the weakest: a pulse had more than the head sends */
+    uint32_t n_faint;                 /* hits that the head did not detect */
+    uint32_t n_unfit;                 /* echoes too far for the stream's integers: sent as empty shots */
 };
 /* Decodes a frame of SCANHEAD_LINE_END. SCANHEAD_EINPUT for another type, SCANHEAD_EFORMAT for a wrong payload. */
 int scanhead_line_end(struct scanhead *sh, const struct scanhead_frame *frame, struct scanhead_line_end *end);
@@ -336,8 +336,8 @@ struct scanhead_info {
     int crs;           /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS, 3 geodetic */
     int epsg;          /* 0 for local */
     int geoid_heights; /* 1: heights of UTM and geodetic points are above the geoid; 0: ellipsoidal */
-    double anchor[3];  /* metres; geodetic: degrees, degrees, metres. Moves along with a head on a trajectory */
-    double scale_m;    /* a count on the wire is at most this on the ground */
+    double anchor[3];  /* metres; geodetic: degrees, degrees, metres. It moves along with a head on a trajectory */
+    double scale_m;    /* the step of coordinates on the wire is at most this long on the ground */
     double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m; /* the station on WGS 84, ellipsoidal height; 0 where no place is configured */
     double station_m[3];               /* the station in the scene frame */
@@ -349,7 +349,7 @@ struct scanhead_info {
     int stop;     /* 1: the station is a stop on a trajectory */
     double frame; /* of a stop: frame scalar of the trajectory; else 0 */
 };
-/* SCANHEAD_ESTATE before descriptor and anchor have come. */
+/* Fills in *info. SCANHEAD_ESTATE before descriptor and anchor have come. */
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info);
 
 /* How the pulses of a head are arranged. */
@@ -357,8 +357,8 @@ enum scanhead_emitter_kind {
     SCANHEAD_EMIT_LINE = 0,       /* a mirror sweeps lines, the pan turns; nothing else is set */
     SCANHEAD_EMIT_PLANAR = 1,     /* one plane, in steps; a line is a turn, from step 0 on */
     SCANHEAD_EMIT_BEAMS = 2,      /* a firing sequence of beams turns about the vertical; a line is a turn */
-    SCANHEAD_EMIT_SPHERE = 3,     /* rings of one elevation each; a line is a ring, a frame all of them */
-    SCANHEAD_EMIT_DIRECTIONS = 4, /* a list; a line is the list once */
+    SCANHEAD_EMIT_SPHERE = 3,     /* rings of one elevation each; a line is a ring, a scan frame has all of them */
+    SCANHEAD_EMIT_DIRECTIONS = 4, /* a list of directions; a line is the whole list once */
 };
 struct scanhead_beam {
     double elevation_deg, azimuth_deg; /* azimuth: clockwise from where the head looks when it fires */
@@ -368,24 +368,24 @@ enum { SCANHEAD_MAX_BEAMS = 128 };
 struct scanhead_emitter {
     int kind;       /* enum scanhead_emitter_kind */
     uint32_t steps; /* pulses of a line; beams: 0 */
-    /* planar: the steps that are cast, both included. front_step, of a sphere, too: the step that looks along y */
+    /* planar: the first and the last step that are cast. planar and sphere: the step that looks along y */
     int first_step, last_step, front_step;
     int turn;       /* +1: clockwise seen from above, -1: the other way */
-    uint32_t rings; /* sphere: how many rings a frame has */
+    uint32_t rings; /* sphere: how many rings a scan frame has */
     /* ring i has the elevation first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
     double first_ring_deg, ring_step_deg;
-    int echoes;                                /* the head sends of each pulse: 0 all, 1 first, 2 last, 3 strongest */
+    int echoes;                                /* which ones of a pulse are sent: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
     struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
 };
-/* SCANHEAD_ESTATE before the descriptor has come. The emitter holds for the points that follow. When settings change
- * within a scan, the head sends it again. */
+/* Fills in *emitter, which holds for the points that follow. SCANHEAD_ESTATE before the descriptor has come. When
+ * settings change within a scan, the head sends another emitter. */
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
-/* Where a moving head was. Between two poses of one frame of SCANHEAD_POSES the position goes along the
- * straight line, and the attitude turns the shorter way about one fixed axis at constant rate (slerp). The
- * head itself moves so. */
+/* The place and attitude of a moving head at a time. Between two poses of one frame of SCANHEAD_POSES it moves along
+ * the straight line, and turns the shorter way about one fixed axis at constant rate (slerp). This is no approximation:
+ * the head casts its pulses from these poses. */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */
@@ -398,8 +398,8 @@ enum scanhead_pose_flags {
     SCANHEAD_POSE_LATE = 2,         /* too long after the last pose: the head assumed that the platform stands */
     SCANHEAD_POSE_NONE = 4,         /* the head had not been given any yet */
 };
-/* The pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
- * SCANHEAD_ESTATE where the stream has not said it, or the head stands still. */
+/* Gets the pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
+ * SCANHEAD_ESTATE where the stream has not reported it, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
 /* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`.
  * Returns how many. */
@@ -407,23 +407,23 @@ int scanhead_poses(struct scanhead *sh, const struct scanhead_frame *frame, uint
                    uint32_t max);
 /* Takes points of the polar layout from the head's frame to the scene frame: x, y and z in place. Where the
  * head moves, each point goes with the pose of its own time. frame (may be NULL) gets the frame scalar of
- * each; where the head stands at a stop, that of the stop. Returns how many points had no pose, because
- * frames were lost; their coordinates and frame scalars are NaN. SCANHEAD_ESTATE for another layout. */
+ * each point; at a stop of the head, the stop's. Returns how many points had no pose, because frames were
+ * lost; their coordinates and frame scalars are NaN. SCANHEAD_ESTATE for another layout. */
 int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32_t n, double *frame);
 
-/* GPS time of t_ns since the scan's start (scanhead_point.t_ns) by the head's clock, in LAS's adjusted standard form:
- * seconds since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second
- * of week. It is valid for frames up to the one that scanhead_next returned last. It counts from the last time that the
- * head reported, at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the nanosecond
+/* Gets the GPS time of t_ns since the scan's start (scanhead_point.t_ns), in the adjusted standard form of LAS: seconds
+ * since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second of week.
+ * It is valid for frames up to the one that scanhead_next returned last. It counts from the last time of the head's
+ * clock, which comes at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the nanosecond
  * where the head's clock has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head
- * doesn't know the time, or before the time and the scan's start have come. Where the head knows the time, it comes
- * before the first points that can be placed. */
+ * doesn't know the time, or before the time and the scan's start have come. A head that knows the time sends it before
+ * the first points that can be decoded. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
-/* The same for n times, bit for bit. It is faster where all times lie within one second. */
+/* Does the same for n times, bit for bit. It is faster where all times lie within one second. */
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
                        double *adjusted_standard_gps_time_s);
 
-/* Name of a label: 1 and the two names (the handle's, until its next call), or 0 when they have not come yet. */
+/* Returns 1 and the two names of a label (the handle's, until its next call), or 0 when they have not come yet. */
 int scanhead_surface(const struct scanhead *sh, uint32_t label, const char **object, const char **material);
 
 struct scanhead_stats { /* over all connections of the handle */
@@ -433,14 +433,14 @@ struct scanhead_stats { /* over all connections of the handle */
     uint64_t pulses_lost; /* pulses the head says it could not compute */
     /* How often each notice came. seq_gaps above counts restarts, too. frames counts neither repeated nor late ones. */
     uint64_t repeated, late, restarts, cuts, echoes, late_replies, unasked, closed, reattached;
-    /* Frames of bad_payload that no gap shows: before the first frame, before a restart, and after the last frame. So
-     * seq_lost + bad_unseen frames are known to be lost on the way. */
+    /* Frames of bad_payload that no gap shows: before the first whole frame, before a restart, and after the last whole
+     * frame. So seq_lost + bad_unseen frames are known to be lost on the way. */
     uint64_t bad_unseen;
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 
-/* Hash of the stream so far, as COUNTS.md defines stream_sha256: 64 hex digits and a NUL. Counting starts
- * with scanhead_hash_start() and costs about a nanosecond per byte. */
+/* scanhead_hash_hex() gives the hash of the stream so far, as COUNTS.md defines stream_sha256: 64 hex digits and a NUL.
+ * It begins with the frames after scanhead_hash_start(), and costs about a nanosecond per byte. */
 void scanhead_hash_start(struct scanhead *sh);
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65]);
 

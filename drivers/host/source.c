@@ -18,6 +18,7 @@
 #include "drivers/host/source.h"
 
 enum { CONNECT_TIMEOUT_MS = 10000, RECEIVE_BUFFER = 4 << 20 };
+enum { IDLE_S = 10, INTERVAL_S = 5, PROBES = 3 }; /* of keep-alive: about 25 s, as the head has for its clients */
 
 static int fail_open(struct sh_err *err, int code, const char *name)
 {
@@ -76,11 +77,16 @@ static int split_address(const char *address, char host[256], char port[8], stru
     return 0;
 }
 
-/* Best effort: a small buffer costs speed, not correctness. */
+/* A head that vanishes without a word, as by a loss of power, ends the connection (ETIMEDOUT). Errors are ignored: a
+ * small buffer costs speed, not correctness. */
 static void tune_socket(int fd)
 {
-    int size = RECEIVE_BUFFER, on = 1;
+    const int size = RECEIVE_BUFFER, on = 1, idle_s = IDLE_S, interval_s = INTERVAL_S, probes = PROBES;
     setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle_s, sizeof idle_s);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval_s, sizeof interval_s);
+    setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
     setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);
 #ifdef SO_BUF_LOCK
     /* The system may have allowed far less than asked; then let it still grow the buffer by itself. */
@@ -105,6 +111,16 @@ static int wait_connected(int fd, int64_t deadline_ns)
     }
 }
 
+/* Whether the socket is connected to itself. TCP does that where nobody listens, and the system gives the socket the
+ * same port that it connects to. */
+static int is_own_end(int fd, const struct addrinfo *ai)
+{
+    struct sockaddr_storage own = {0};
+    socklen_t len = sizeof own;
+    return getsockname(fd, (struct sockaddr *)&own, &len) == 0 && len == ai->ai_addrlen &&
+           memcmp(&own, ai->ai_addr, len) == 0;
+}
+
 /* Returns a connected socket, or -1 with errno. */
 static int connect_one(const struct addrinfo *ai, int64_t deadline_ns)
 {
@@ -114,6 +130,7 @@ static int connect_one(const struct addrinfo *ai, int64_t deadline_ns)
     int error = 0;
     if (connect(fd, ai->ai_addr, ai->ai_addrlen) != 0)
         error = errno == EINPROGRESS ? wait_connected(fd, deadline_ns) : errno;
+    if (error == 0 && is_own_end(fd, ai)) error = ECONNREFUSED;
     if (error == 0) return fd;
     close(fd);
     errno = error;
@@ -134,7 +151,7 @@ static int open_tcp(const char *address, struct host_source *out, struct sh_err 
         n++;
     for (const struct addrinfo *ai = list; ai != NULL && out->fd < 0; ai = ai->ai_next, n--) {
         const int64_t now_ns = host_deadline_ns(0);
-        out->fd = connect_one(ai, now_ns + (deadline_ns - now_ns) / n); /* the others need some of the time */
+        out->fd = connect_one(ai, now_ns + (deadline_ns - now_ns) / n); /* the other addresses share what is left */
     }
     int error = errno;
     freeaddrinfo(list);

@@ -11,8 +11,8 @@
 
 #include "core/err.h"
 
-/* How bytes come and go, without blocking. Descriptors, USB, captured files and a head in this process have a table
- * each. */
+/* A kind of source: functions that move bytes without blocking. Descriptors, USB, captured files and a head in this
+ * process have such a table each. */
 struct host_source;
 struct scanhead;
 struct host_source_ops {
@@ -37,9 +37,9 @@ struct host_source {
     struct host_capture *capture; /* of a .pcapng; else NULL */
     void *ctx;                    /* of host_open()'s caller */
     int is_file, is_socket;
-    int unsettled;  /* lines may come that answer no command of ours: on a new terminal, after a time-out */
-    int asked;      /* *IDN? that went out to skip such lines, and have no answer yet */
-    char name[256]; /* for messages, and to open it again */
+    int unsettled;   /* lines may come that answer no command of ours: on a new terminal, after a time-out */
+    int asked;       /* *IDN? that went out to skip such lines, and have no answer yet */
+    char name[4112]; /* for messages, and to open it again: a path (PATH_MAX) after "tty:" */
 };
 
 /* host.c: a handle with a source that the caller has opened. NULL: no memory, and the source is still the caller's. */
@@ -61,10 +61,11 @@ int host_capture_open(struct host_source *source, struct sh_err *err);
  * not missed. */
 struct host_usb_watch *host_usb_watch_open(const char *source);
 void host_usb_watch_close(struct host_usb_watch *watch);
-/* rc: why the last try failed. 0: try again, or the deadline is over; -1: a signal came. */
+/* Waits before the next try. rc: why the last one failed. Returns 0: try again, or the deadline is over; -1: a signal
+ * came. */
 int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_ns);
 
-/* Nanoseconds of the monotonic clock at which timeout_ms from now is over; INT64_MAX for a negative one. */
+/* Returns when timeout_ms are over, in ns of the monotonic clock; INT64_MAX for a negative timeout. */
 int64_t host_deadline_ns(int timeout_ms);
 
 #endif

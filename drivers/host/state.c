@@ -58,17 +58,17 @@ static int absorb_anchor(struct scanhead *sh, const struct native_header *header
     return 0;
 }
 
-/* A new scan whose descriptor did not reach us: what we know belongs to the scan before. */
+/* Another scan has begun, and its descriptor did not reach us. So the state of the scan before is forgotten. */
 static void forget(struct scanhead *sh)
 {
     sh->have_descriptor = sh->have_anchor = 0;
     host_forget_poses(sh);
 }
 
-/* The parser hands out a number that goes back only where another sequence begins: the head has started again, or
- * recordings were put one after the other. What the stream said before does not hold there, nor do its times. It does
- * if the new sequence began with frames equal to those before: they were dropped as repeated, and said the same. And
- * what a descriptor for this reader alone has said just before, and the frames after it, is about the new sequence. */
+/* Forgets the state where another sequence of numbers begins: the head has started again, or recordings were put one
+ * after the other. The parser hands out a number that goes back only there. The state is kept in two cases. If the new
+ * sequence began with frames equal to those before, they were dropped as repeated, and said the same. If a descriptor
+ * for this reader alone (LOCAL) came just before, the state since then is that of the new sequence. */
 static void follow_sequence(struct scanhead *sh, const struct native_header *header)
 {
     const uint64_t repeated = sh->parser.stats.repeated;
@@ -120,7 +120,7 @@ static int absorb_waves(struct scanhead *sh, const struct native_header *header,
     return native_decode_waves(payload, header->length, &waves) != 0 ? bad(sh, "wrong waveforms") : 0;
 }
 
-/* The head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
+/* Notes the head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
 static void set_gps(struct scanhead *sh, uint64_t at_ns, uint64_t gps_ns)
 {
     sh->times.gps_at_ns = (int64_t)at_ns;
@@ -370,7 +370,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .seq_lost = s->seq_lost,
         .dropped = sh->dropped,
         .reader_lost = sh->reader_lost_before + sh->reader_lost,
-        /* both count the same losses; some events of either kind may not have come */
+        /* both count the same losses, and events of either kind may be lost; so the larger count is nearer */
         .pulses_lost = sh->pulses_lost_told > sh->pulses_lost_ended ? sh->pulses_lost_told : sh->pulses_lost_ended,
         .repeated = s->repeated,
         .late = s->late,

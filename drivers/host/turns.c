@@ -24,7 +24,7 @@ VEC_INLINE double floor_of(double x, uint64_t *bits)
     return near - (double)(int)above;
 }
 
-/* Finds the table's part that is nearest to u[i] >= 0 turns, and the rest beside it in radians. */
+/* Finds the entry of the table that is nearest to u[i] >= 0 turns, and the rest of the angle in radians. */
 VEC_CLONES static void split_turns(const double *restrict u, int n, uint32_t *restrict part, double *restrict rest_rad)
 {
     for (int i = 0; i < n; i++) {

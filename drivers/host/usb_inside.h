@@ -14,7 +14,7 @@ enum {
     USB_CLASS = 0xff,
     USB_SUBCLASS = 0x53,
     USB_PROTOCOL = 0x48,
-    USB_REQUEST_SESSION = 0x22, /* bmRequestType 0x41, wValue 1 opens, 0 closes, wIndex: the interface; 0xc1 asks */
+    USB_REQUEST_SESSION = 0x22, /* bmRequestType 0x41: wValue 1 opens, 0 closes; 0xc1 asks; wIndex: the interface */
     USB_CONTROL_MS = 5000,      /* USB 2.0, 9.2.6.1: no request takes longer */
 };
 
@@ -38,7 +38,7 @@ struct usb_found {
     char name[160]; /* usb:vid:pid:serial */
 };
 
-/* The vendor interface of a device's active configuration: 1, or 0 where there is none. */
+/* Finds the vendor interface of a device's active configuration. Returns 1, or 0 where there is none. */
 int host_usb_interface(libusb_device *device, struct usb_interface *interface);
 
 /* Opens the one head that is wanted; asked: the source as the caller wrote it, for errors. SH_ELOST: there is

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Source of bytes: the bulk pair of the head's vendor interface.
+/* A source of bytes: the bulk endpoints of the head's vendor interface.
  *
  * Several reads are always under way, so that the bus never waits for this program. They are a ring of
  * transfers, which the kernel completes in order, and which are read and submitted again in order. There is no
@@ -17,7 +17,7 @@
 /* A read is a multiple of every packet size (64, 512, 1024 bytes), so no packet is longer than the room that is
  * left. */
 enum { IN_TRANSFERS = 16, IN_BYTES = 64 << 10, OUT_BYTES = 2048, CANCEL_MS = 1000 };
-/* How long a bus may fail with the device still on it, as it does until the hub notices an unplugged device. */
+/* After FAILING_MS of failures the device counts as unplugged: transfers fail until the hub notices an unplug. */
 enum { FAILING_MS = 1000, FAILING_PAUSE_MS = 20, RELAPSE_MS = 10000 };
 
 struct in_transfer {
@@ -125,9 +125,9 @@ static int submit(struct in_transfer *in)
     return rc;
 }
 
-/* Starts an endpoint again that has stalled, or whose bus has garbled something. A device that is being
- * unplugged looks the same until the hub has noticed. So the second and later tries wait a moment. 0: worth
- * another try; ENODEV: the device is gone, or no transfer has succeeded for too long. */
+/* Starts an endpoint again that has stalled, or whose last transfer was garbled on the bus. A device that is being
+ * unplugged looks the same until the hub has noticed. So the second and later tries wait a moment. Returns 0: another
+ * transfer may succeed; ENODEV: the device is gone, or no transfer has succeeded for too long. */
 static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoint)
 {
     const struct timespec pause = {.tv_nsec = FAILING_PAUSE_MS * 1000000};
@@ -144,8 +144,8 @@ static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoi
     return rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : 0;
 }
 
-/* The same for the reads: all are taken back first, and those that failed along with this one need no
- * more. */
+/* The same for the reads: all are taken back first. Reads that failed along with this one count as cancelled, so that
+ * they don't start the endpoint again. */
 static int recover_reads(struct host_usb *usb)
 {
     cancel_reads(usb);
@@ -169,9 +169,9 @@ static int gone_or_reset(struct host_usb *usb)
     return n == sizeof status ? ECONNRESET : ENODEV;
 }
 
-/* Linux may end the transfers of a reset bus as if each had been answered by nothing. It takes new ones, and these
- * wait for a session that is over. So this asks the head whether the session is open. A head that doesn't know this
- * request stalls it. */
+/* After a reset of the bus Linux may end transfers as if each had been answered with no bytes. New transfers are
+ * accepted, but wait for ever, since the session is over. So this asks the head whether the session is open. A head
+ * that doesn't know this request stalls it. */
 static int session_is_over(struct host_usb *usb)
 {
     const uint8_t type = (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_IN;
@@ -197,7 +197,7 @@ static int usb_transfers_turn(struct host_usb *usb)
         return error;
     }
     usb->next = (usb->next + 1) % usb->n_in;
-    submit(in); /* where it fails, that shows when the ring comes round to it */
+    submit(in); /* if it fails, in->error is seen when the ring comes round to it */
     return 0;
 }
 
@@ -228,8 +228,8 @@ static ssize_t usb_read(struct host_source *source, void *to, size_t len)
     }
 }
 
-/* A write that failed is not repeated: the head may have got it. If not, its command times out; the next one
- * goes out after the endpoint has been started again. */
+/* A write that failed is not repeated, since the head may have got it. If it has not, the command times out. The next
+ * command goes out after the endpoint has been started again. */
 static ssize_t usb_write(struct host_source *source, const void *data, size_t len)
 {
     struct host_usb *usb = source->usb;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Waiting for a head to be plugged in: the system's hot-plug events, where it has them. */
+/* Waits for a head to be plugged in, by the system's hot-plug events where it has them. */
 #include <stdlib.h>
 #include <time.h>
 #include <unistd.h>
@@ -7,7 +7,7 @@
 #include "drivers/host/usb_inside.h"
 
 /* No event reports a permission that comes late, a configuration that the kernel sets, or another program
- * that closes the device. So for a while after a device has come, tries are frequent; else once a second. */
+ * that closes the device. So for HURRY_MS after a device has come, tries are frequent; else there is one a second. */
 enum { PAUSE_MS = 50, HURRY_MS = 2000, LOOK_MS = 1000 };
 
 struct host_usb_watch {

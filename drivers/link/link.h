@@ -40,7 +40,7 @@ struct link_spec {
     int baud;           /* pty: of the head's UART; clients with another rate get, and send, other bytes. 0: any rate */
     int protocol;       /* what its owner speaks on it; 0: the usual. Links don't look at it */
     int dialect;        /* of that protocol; 0: any. Links don't look at it either */
-    int units; /* 1: what is written are units. Each write has one of them, or the rest of one, up to its end */
+    int units;          /* 1: each write has one whole unit of the protocol (a telegram), or the rest of one */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
     int waits; /* enum link_waits; its owner sees to it */
     int latency_ms;               /* in real time bytes may wait this long for others; its owner sees to it */
@@ -88,7 +88,7 @@ enum link_fault {
     LINK_FAULT_REFUSE,            /* ends the session before a byte went out; to be called at LINK_OPENED */
     LINK_FAULT_SLOW_ENUMERATION,  /* usb: until changed, each control request takes for_ms; at LINK_PLUGGED */
     LINK_FAULT_DESCRIPTOR_LENGTH, /* usb: until changed, the configuration claims n bytes too many; at LINK_PLUGGED */
-    LINK_FAULT_PLUG,              /* ends LINK_FAULT_UNPLUG and LINK_FAULT_CABLE; n 1: resets what a cable left */
+    LINK_FAULT_PLUG,              /* ends UNPLUG and CABLE; n 1: also resets the connections that CABLE kept */
 };
 #define LINK_FAULT_BIT(fault) (UINT32_C(1) << (fault))
 
@@ -119,8 +119,8 @@ struct link_ops {
      * need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
-    /* Never block (except as said above). Bytes moved; 0: none now; SH_ECLOSED: the session is gone (a
-     * LINK_CLOSED follows from poll). */
+    /* They don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED: the
+     * session is gone (a LINK_CLOSED follows from poll). */
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
 

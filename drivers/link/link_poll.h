@@ -22,7 +22,8 @@ int link_wait(struct pollfd *fds, nfds_t n, int timeout_ms);
 /* Reports and drains wake_fd. slot is its entry after link_wait; an entry with fd -1 is ignored. */
 void link_take_wake(const struct pollfd *slot, struct link_events *events);
 
-/* The whole poll of links that always take bytes, never have any and never change by themselves. */
+/* Polls a link that has no descriptor to wait for. Reports LINK_WRITABLE of session 0 if `writable` is set, and the
+ * owner's wake-up. It waits only where there is no event yet. */
 int link_poll_sink(int wake_fd, int writable, int timeout_ms, struct link_events *events);
 
 #endif

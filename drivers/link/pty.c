@@ -15,9 +15,9 @@
  *   - No session: we wait for inotify only. An open event starts a session, even if the hang-up says that the
  *     client has left already: its bytes are still to be read (echo '*RST' > /dev/pts/3).
  *   - Session: we wait for the master as well. The session ends when the master hangs up and all that was
- *     written is read. A close event is queued before the close takes effect, and an open event after the
- *     open did. An open that comes after our hang-up is therefore still unread when the watch is set up
- *     again, or seen as "no hang-up".
+ *     written is read. A client that opens the slave just then is not missed: the kernel queues an open event
+ *     after the open took effect. So when the watch is set up again, either the master no longer hangs up, or
+ *     the event is still unread.
  *   - Session, and inotify reports that the last client went and another came before we looked: the hang-up
  *     never showed. Clients that come one after the other give open, close, open, ... without equal
  *     neighbours: nothing is merged, the count is exact, and we report LINK_CLOSED and LINK_OPENED. Only
@@ -47,7 +47,7 @@ struct pty_link {
     int is_deaf;                /* no new client can be seen: the next poll fails */
     int open;                   /* a session is on, as the caller knows or is about to learn */
     unsigned count;             /* clients of the session; 0 with open set: the last seems to be gone */
-    int open_event_due;         /* that client is counted, but its open event may be still to come */
+    int open_event_due;         /* its client is counted, but that client's open event may be still to come */
     int due_closed, due_opened; /* events that the caller still has to get, in this order */
 };
 
@@ -81,7 +81,7 @@ static void pty_note(struct pty_link *pty, uint32_t mask)
     const int counted = pty->open_event_due;
     pty->open_event_due = 0;
     if ((mask & IN_CLOSE) != 0 && pty->count > 0) pty->count--;
-    if ((mask & (IN_OPEN | IN_Q_OVERFLOW)) == 0 || counted) return;
+    if ((mask & (IN_OPEN | IN_Q_OVERFLOW)) == 0 || counted) return; /* an overflow may have hidden an open event */
     if (!pty->open) {
         pty_begin(pty, 1);
     } else if (pty->count > 0) {
@@ -157,15 +157,22 @@ static int pty_open(const struct link_spec *spec, void **link, struct sh_err *er
     return SH_OK;
 }
 
+/* Ends the session and stops watching the terminal. */
+static void pty_let_go(struct pty_link *pty)
+{
+    pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
+    pty->open = pty->due_opened = 0;
+    pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
+    pty->count = 0;
+    pty->line.n_out = 0;
+    inotify_rm_watch(pty->inotify, pty->watch);
+    pty_read_inotify(pty, 0);
+}
+
 /* All clients are gone and what they wrote is read. Clients that come meanwhile are found at the end. */
 static int pty_end(struct pty_link *pty)
 {
-    pty->open = pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
-    pty->count = 0;
-    pty->line.n_out = 0;
-    pty->due_closed = 1;
-    inotify_rm_watch(pty->inotify, pty->watch);
-    pty_read_inotify(pty, 0);
+    pty_let_go(pty);
     struct pty_device device = pty->device;
     int rc = pty_device_rest(&device);
     pty_set_device(pty, &device);
@@ -256,17 +263,6 @@ static int pty_unread(void *link, int session)
 }
 
 /* ---- injected faults */
-
-/* Ends the session and stops watching the terminal. */
-static void pty_let_go(struct pty_link *pty)
-{
-    pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
-    pty->open = pty->due_opened = pty->open_event_due = 0;
-    pty->count = 0;
-    pty->line.n_out = 0;
-    inotify_rm_watch(pty->inotify, pty->watch);
-    pty_read_inotify(pty, 0);
-}
 
 static int pty_cut(struct pty_link *pty)
 {

@@ -55,12 +55,12 @@ static int slave_rest(struct pty_device *device)
     return rc;
 }
 
-static int link_refuse(const char *path, const char *why, struct sh_err *err)
+static int symlink_refuse(const char *path, const char *why, struct sh_err *err)
 {
     return sh_fail(err, SH_EINPUT, "link pty:%s: exists and %s; remove it or choose another path", path, why);
 }
 
-static int link_errno(const char *path, struct sh_err *err)
+static int symlink_errno(const char *path, struct sh_err *err)
 {
     int code = errno == EACCES || errno == EPERM || errno == EROFS                              ? SH_EPERM
                : errno == ENOENT || errno == ENOTDIR || errno == ELOOP || errno == ENAMETOOLONG ? SH_EINPUT
@@ -77,46 +77,46 @@ static int is_left_over(const char *text, const struct stat *link, const struct 
     return made.tv_sec < born.tv_sec || (made.tv_sec == born.tv_sec && made.tv_nsec < born.tv_nsec);
 }
 
-/* 1: there is nothing at path, 0: a symlink that may be replaced, or an error. */
-static int link_look(const char *path, const char *slave, struct sh_err *err)
+/* Returns 1: there is nothing at path; 0: a symlink that may be replaced; or an error. */
+static int symlink_look(const char *path, const char *slave, struct sh_err *err)
 {
     struct stat self, target;
     char text[256];
-    if (lstat(path, &self) != 0) return errno == ENOENT ? 1 : link_errno(path, err);
-    if (!S_ISLNK(self.st_mode)) return link_refuse(path, "is not a symlink", err);
+    if (lstat(path, &self) != 0) return errno == ENOENT ? 1 : symlink_errno(path, err);
+    if (!S_ISLNK(self.st_mode)) return symlink_refuse(path, "is not a symlink", err);
     ssize_t n = readlink(path, text, sizeof text - 1);
-    if (n < 0) return link_errno(path, err);
+    if (n < 0) return symlink_errno(path, err);
     text[n] = '\0';
     if (strcmp(text, slave) == 0 || stat(path, &target) != 0 || is_left_over(text, &self, &target)) return 0;
-    return link_refuse(path,
-                       S_ISCHR(target.st_mode) ? "leads to a terminal in use by another program"
-                                               : "leads to something that is not a terminal of this program",
-                       err);
+    return symlink_refuse(path,
+                          S_ISCHR(target.st_mode) ? "leads to a terminal in use by another program"
+                                                  : "leads to something that is not a terminal of this program",
+                          err);
 }
 
 /* Replaces what is at path by the new symlink: 0, or -1 with errno. */
-static int link_replace(const char *path, const char *slave)
+static int symlink_replace(const char *path, const char *slave)
 {
-    char beside[300];
-    snprintf(beside, sizeof beside, "%s.%ld.tmp", path, (long)getpid());
-    if (symlink(slave, beside) != 0) return -1;
-    if (rename(beside, path) == 0) return 0;
+    char temporary[300];
+    snprintf(temporary, sizeof temporary, "%s.%ld.tmp", path, (long)getpid());
+    if (symlink(slave, temporary) != 0) return -1;
+    if (rename(temporary, path) == 0) return 0;
     int error = errno;
-    unlink(beside);
+    unlink(temporary);
     errno = error;
     return -1;
 }
 
 /* Both ways are atomic: a client finds the old target, ours, or nothing. */
-static int link_make(const char *path, const char *slave, struct sh_err *err)
+static int symlink_make(const char *path, const char *slave, struct sh_err *err)
 {
-    int rc = link_look(path, slave, err);
+    int rc = symlink_look(path, slave, err);
     if (rc < 0) return rc;
-    rc = rc == 1 ? symlink(slave, path) : link_replace(path, slave);
-    return rc == 0 ? SH_OK : link_errno(path, err);
+    rc = rc == 1 ? symlink(slave, path) : symlink_replace(path, slave);
+    return rc == 0 ? SH_OK : symlink_errno(path, err);
 }
 
-static int link_is_ours(const struct pty_device *device)
+static int symlink_is_ours(const struct pty_device *device)
 {
     char text[sizeof device->slave + 1];
     ssize_t n = readlink(device->path, text, sizeof text - 1);
@@ -135,7 +135,7 @@ int pty_device_open(struct pty_device *device, const char *path, struct sh_err *
     if (slave_rest(device) != 0)
         rc = sh_fail(err, SH_EIO, "link pty:%s: %s cannot be set up: %s", name, device->slave, strerror(errno));
     else if (path[0] != '\0')
-        rc = link_make(path, device->slave, err);
+        rc = symlink_make(path, device->slave, err);
     if (rc != SH_OK) {
         close(device->master);
         return rc;
@@ -148,9 +148,9 @@ int pty_device_renew(struct pty_device *device)
 {
     struct pty_device fresh = *device;
     if (pair_open(&fresh.master, fresh.slave, sizeof fresh.slave) != 0) return SH_EIO;
-    int ours = device->path[0] != '\0' && link_is_ours(device);
-    /* The old slave exists until its master is closed, so link_look would refuse the path. */
-    if (slave_rest(&fresh) != 0 || (ours && link_replace(fresh.path, fresh.slave) != 0)) {
+    int ours = device->path[0] != '\0' && symlink_is_ours(device);
+    /* The old slave exists until its master is closed, so symlink_look would refuse the path. */
+    if (slave_rest(&fresh) != 0 || (ours && symlink_replace(fresh.path, fresh.slave) != 0)) {
         close(fresh.master);
         return SH_EIO;
     }
@@ -166,6 +166,6 @@ int pty_device_rest(struct pty_device *device)
 
 void pty_device_close(struct pty_device *device)
 {
-    if (device->path[0] != '\0' && link_is_ours(device)) unlink(device->path);
+    if (device->path[0] != '\0' && symlink_is_ours(device)) unlink(device->path);
     close(device->master);
 }

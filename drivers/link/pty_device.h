@@ -14,9 +14,9 @@ struct pty_device {
     char path[256]; /* the symlink to the slave; empty: none */
 };
 
-/* Makes the pair, at rest, and the symlink (path may be empty). An existing path is replaced only where it is
- * a symlink that dangles, names our own slave, or was left by a head that was killed (it is older than the
- * terminal it names); anything else is SH_EINPUT. */
+/* Makes the pair, at rest, and the symlink (path may be empty). An existing path is replaced only where it is a symlink
+ * that dangles, names our own slave, or was left by a head that was killed. The latter is older than the terminal that
+ * it names. Anything else is SH_EINPUT. */
 int pty_device_open(struct pty_device *device, const char *path, struct sh_err *err);
 
 /* Brings the slave back to how a fresh client expects it: raw, nothing to read, no exclusive use, not

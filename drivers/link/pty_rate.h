@@ -6,9 +6,9 @@
 
 #include "drivers/link/uart.h"
 
-/* Whether bytes to the client, or from it, are read as others, since its rate differs from the head's; baud 0: from no
- * other. uart then has how they are read. A client that has set rate 0 (hang up), or whose rate can't be had, has the
- * head's. */
+/* Whether the receiver reads other bytes than were sent, since the client's rate differs from baud, the head's.
+ * to_client 1: of bytes to the client; 0: of bytes from it. *uart gets what uart_read needs. baud 0: the head takes any
+ * rate. A client that has set rate 0 (hang up), or whose rate can't be read, counts as one with the head's rate. */
 int pty_rate_differs(int master, uint32_t baud, int to_client, struct uart *uart);
 
 #endif

@@ -28,7 +28,7 @@ static unsigned level_at(const uint8_t *sent, size_t n, uint64_t bit)
 }
 
 /* Returns whether the driver passes the byte on. */
-static int take(const struct uart *uart, unsigned stop, uint8_t *byte)
+static int uart_take(const struct uart *uart, unsigned stop, uint8_t *byte)
 {
     if (stop != 0) return 1;
     if (*byte == 0) return !uart->drops_breaks;
@@ -56,9 +56,9 @@ size_t uart_read(const struct uart *uart, const uint8_t *sent, size_t n, uint8_t
                 byte |= (uint8_t)(level_at(sent, n, bit + bit_at(uart, k)) << (k - 1));
             last = STOP;
         }
-        bit += bit_at(uart, last);
+        bit += bit_at(uart, last); /* the receiver waits for the next edge from its last sample on */
         before = level_at(sent, n, bit++);
-        if (last == STOP && take(uart, before, &byte)) out[n_out++] = byte;
+        if (last == STOP && uart_take(uart, before, &byte)) out[n_out++] = byte;
     }
     return n_out;
 }

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* The UDP link: one session, open from the start. Each write is one datagram to the receiver.
  *
- * Unicast to any address; broadcast only from an interface that the configuration names, to that interface's own
- * broadcast address or to 255.255.255.255. The packets' source is then the interface's address. That address alone
- * does not direct 255.255.255.255 to the interface if a route says otherwise, so the interface's own broadcast address
- * takes its place. (SO_BINDTODEVICE would direct it, but takes a privilege.) Multicast, too, goes out only on an
- * interface that is named.
+ * It sends unicast to any address, but broadcast only from an interface that the configuration names: to that
+ * interface's own broadcast address, or to 255.255.255.255. The packets' source is then the interface's address. If a
+ * route says otherwise, packets to 255.255.255.255 would leave on another interface all the same. So they are sent to
+ * the interface's own broadcast address instead. (SO_BINDTODEVICE would direct them, but takes a privilege.)
+ * Multicast, too, goes out only on an interface that is named.
  *
  * A source port may be one that a receiver on this machine listens on, too. So addresses are shared (SO_REUSEADDR), and
  * the socket is connected: it gets only what its receiver sends back. It never has its receiver's own address and port,
- * since it would get its own packets. On the loopback, where the receiver has the port, the source is the address after
- * the receiver's. Receivers that don't share their port (MRPT, PCL) could not listen on this machine then. So the usual
- * port of a protocol is not used there unless the link names its source.
+ * since it would get its own packets. On the loopback, with the receiver's port as the source port, the source is the
+ * next address: 127.0.0.2 for a receiver at 127.0.0.1. A receiver on this machine that doesn't share its port (MRPT,
+ * PCL) could not listen while the link has that port. So for a receiver on this machine the usual source port of a
+ * protocol is not used, unless the link names its source.
  *
  * A receiver that is not there is no failure: datagrams to it are lost, as are those that the system has no room for.
  * Both are counted. A refused datagram counts when its refusal comes; several may share one refusal. Datagrams that
@@ -49,7 +50,7 @@ static const char *host_of(const struct link_spec *spec)
     return spec->address[0] != '\0' ? spec->address : "127.0.0.1";
 }
 
-/* A name with addresses of both kinds, such as localhost, leads to the IPv4 one: the receivers of these protocols often
+/* A name with addresses of both kinds, such as localhost, leads to the IPv4 one. The receivers of these protocols often
  * have no other, and no answer of theirs would show which one they listen on. */
 static int find_receiver(const struct link_spec *spec, struct sockaddr_storage *to, socklen_t *len, struct sh_err *err)
 {
@@ -113,8 +114,8 @@ static int find_network(const char *name, const struct sockaddr *to, struct netw
     return SH_OK;
 }
 
-/* Broadcasts go out on the interface that is named, and on no other. `to` becomes that interface's broadcast address
- * where it was that of all networks. *broadcast: whether it is a broadcast address. */
+/* Broadcasts go out on the interface that is named, and on no other. Where `to` is 255.255.255.255, it becomes that
+ * interface's broadcast address. *broadcast: whether it is a broadcast address. */
 static int check_receiver(const struct link_spec *spec, struct sockaddr *to, struct network *net, int *broadcast,
                           struct sh_err *err)
 {
@@ -248,7 +249,7 @@ static int bind_source(int fd, const struct link_spec *spec, const struct sockad
 {
     const int one = 1;
     const int own = spec->source_port != 0 && is_same_place(from, to);
-    errno = EADDRINUSE;
+    errno = EADDRINUSE; /* for a receiver with this very address, where bind() is not tried */
     if (spec->source_port != 0) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (!own && bind(fd, (struct sockaddr *)from, len) == 0) return 0;
     if (spec->source_port == 0 || !spec->usual_port || errno != EADDRINUSE) return -1;
@@ -284,7 +285,7 @@ static int connect_to(int fd, const struct link_spec *spec, const struct receive
     return connect(fd, (const struct sockaddr *)&to->at, to->len);
 }
 
-/* ", from 127.0.0.2:2368" or ", from port 2368" for errors. */
+/* Writes ", from 127.0.0.2:2368" or ", from port 2368", for errors. */
 static void source_text(const struct link_spec *spec, char *text, size_t size)
 {
     text[0] = '\0';

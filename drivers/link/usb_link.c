@@ -113,7 +113,7 @@ static int is_plugged_anew(const struct usb_link *self)
     return self->plugged != usb_device_attaches(self->head.device);
 }
 
-static int go_on(void *ctx)
+static int usb_link_go_on(void *ctx)
 {
     struct usb_link *self = ctx;
     scanhead_usb_update(&self->head);
@@ -123,13 +123,13 @@ static int go_on(void *ctx)
     return 1;
 }
 
-static void say(void *ctx, const char *text)
+static void usb_link_say(void *ctx, const char *text)
 {
     struct usb_link *self = ctx;
     snprintf(self->news, sizeof self->news, "%s", text);
 }
 
-static void refuse(void *ctx, const char *client)
+static void usb_link_refuse(void *ctx, const char *client)
 {
     struct usb_link *self = ctx;
     snprintf(self->refused, sizeof self->refused, "%s", client);
@@ -148,12 +148,12 @@ static void usb_link_report(struct usb_link *self, int i, uint32_t want_write, s
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
-/* The back end's news come first; of an unplug they say more than scanhead_usb_cut, which is then left out. */
+/* The back end's message comes first. About an unplug it says more than that of scanhead_usb_cut, which is left out. */
 static void report_news(struct usb_link *self, struct link_events *events)
 {
     if (self->news[0] != '\0' && self->head.cut == USB_END_UNPLUGGED) self->head.cut_due = 0;
     const char *cut = self->news[0] == '\0' ? scanhead_usb_cut(&self->head) : NULL;
-    if (cut != NULL) say(self, cut);
+    if (cut != NULL) usb_link_say(self, cut);
     if (self->news[0] != '\0' && link_events_push(events, LINK_NOTICE, 0, self->news)) self->news[0] = '\0';
     while (self->n_refused > 0 && link_events_push(events, LINK_REFUSED, 0, self->refused))
         self->n_refused--;
@@ -183,7 +183,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
 {
     struct usb_link *self = link;
     struct link_events events = {event, 0, max};
-    const struct usb_owner owner = {go_on, say, refuse, self};
+    const struct usb_owner owner = {usb_link_go_on, usb_link_say, usb_link_refuse, self};
     struct pollfd fds[1 + USB_BACKEND_MAX_FDS] = {{.fd = wake_fd, .events = POLLIN}};
     int n = self->ops->prepare(self->backend, fds + 1);
     int rc = link_wait(fds, (nfds_t)(1 + n), has_news(self, want_write) ? 0 : wait_ms(self, timeout_ms));

@@ -5,13 +5,13 @@
  * byte is ASCII (replies), else binary (frames). Messages of clients are text, whose lines are commands; the last line
  * of a message need not have an end. So frames, replies and commands are those of the protocol, and none is cut.
  *
- * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections, for the listening socket and for
- * the owner's wake-up, which are given to it as plain descriptors. All is done in the owner's thread.
+ * libwebsockets does HTTP and WebSocket, and waits (lws_service) for its connections. It also waits for the listening
+ * socket and for the owner's wake-up, which it gets as plain descriptors. All is done in the owner's thread.
  *
  * Another site's page must not read or command a head on somebody's machine. A browser sends Host, the name in its
- * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is refused
- * (DNS rebinding: a name of the other site that leads here), and an Origin that is not this link gets no byte. Programs
- * that aren't browsers have no Origin. */
+ * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is
+ * refused: it may be a name of the other site that leads here (DNS rebinding). An Origin that is not this link gets no
+ * byte. Programs that aren't browsers have no Origin. */
 #include <libwebsockets.h>
 #include <stdlib.h>
 #include <string.h>
@@ -168,7 +168,7 @@ static int is_closing(struct lws *wsi)
     return web_lws.lws_get_close_length(wsi) > 0;
 }
 
-static int take_text(struct web_conn *conn, struct lws *wsi, const void *in, size_t len)
+static int web_take_text(struct web_conn *conn, struct lws *wsi, const void *in, size_t len)
 {
     struct web_session *s = conn->session;
     if (web_lws.lws_frame_is_binary(wsi))
@@ -203,8 +203,8 @@ static int send_message(struct web_session *s, struct lws *wsi)
     return n < 0 ? -1 : 0;
 }
 
-/* HTTP and WebSocket. The request is that of the connection's web_request. */
-static int serve_client(struct web_conn *conn, enum lws_callback_reasons reason, void *in, size_t len)
+/* Handles libwebsockets' calls for HTTP and WebSocket. The request has been read before: conn->request. */
+static int web_serve_client(struct web_conn *conn, enum lws_callback_reasons reason, void *in, size_t len)
 {
     struct lws *wsi = conn->wsi;
     struct web_link *web = web_link_of(wsi);
@@ -217,7 +217,7 @@ static int serve_client(struct web_conn *conn, enum lws_callback_reasons reason,
         session_open(web, conn);
         return 0;
     case LWS_CALLBACK_RECEIVE:
-        return conn->session != NULL ? take_text(conn, wsi, in, len) : 0;
+        return conn->session != NULL ? web_take_text(conn, wsi, in, len) : 0;
     case LWS_CALLBACK_SERVER_WRITEABLE:
         if (is_closing(wsi)) return 0; /* a close frame is the last one */
         return conn->session != NULL ? send_message(conn->session, wsi) : turn_away(web, wsi);
@@ -241,7 +241,7 @@ static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void 
         entering->wsi = wsi;
     }
     struct web_conn *conn = web_lws.lws_get_opaque_user_data(wsi);
-    return conn != NULL && conn->wsi == wsi ? serve_client(conn, reason, in, len) : 0;
+    return conn != NULL && conn->wsi == wsi ? web_serve_client(conn, reason, in, len) : 0;
 }
 
 /* ---- the owner's side */
@@ -283,7 +283,7 @@ static void time_is_over(lws_sorted_usec_list_t *timer)
 }
 
 /* Has libwebsockets work, and wait for most_us at most (below 0: for ever; 0: not at all). Returns 0 or SH_EIO. */
-static int serve(struct web_link *web, lws_usec_t most_us)
+static int web_serve(struct web_link *web, lws_usec_t most_us)
 {
     if (most_us > 0) web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, most_us);
     const int rc = web_lws.lws_service(web->context, most_us == 0 ? -1 : 0);
@@ -298,7 +298,7 @@ static int web_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     if (web->is_silent) return link_poll_sink(wake_fd, 0, timeout_ms, &events);
     if (take_wake_fd(web, wake_fd) != SH_OK) return SH_EIO;
     web_report(web, want_write, &events);
-    if (serve(web, events.n > 0 ? 0 : (lws_usec_t)timeout_ms * 1000) != SH_OK) return SH_EIO;
+    if (web_serve(web, events.n > 0 ? 0 : (lws_usec_t)timeout_ms * 1000) != SH_OK) return SH_EIO;
     if (events.n == 0) web_report(web, want_write, &events);
     return events.n;
 }
@@ -357,7 +357,7 @@ static void say_goodbye(struct web_link *web)
     }
     lws_usec_t end = web_lws.lws_now_usecs() + (lws_usec_t)WEB_GOODBYE_MS * 1000;
     for (lws_usec_t now; any_session(web) && (now = web_lws.lws_now_usecs()) < end;)
-        if (serve(web, end - now) != SH_OK) return;
+        if (web_serve(web, end - now) != SH_OK) return;
 }
 
 static void web_close(void *link)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Connections until their first request is whole. The request is judged here as it comes, without taking it out of the
+/* Serves connections until their request is whole. The request is judged here as it comes, without taking it out of the
  * socket. A wrong one is answered at its first wrong byte, and libwebsockets never sees it. For a correct one
- * libwebsockets gets a new request with only the fields that it needs, and nothing of what follows the request. With
- * more fields or arguments than it has room for it would close without a word, and it would act on fields that we don't
- * support (h2c). */
+ * libwebsockets gets a new request with only the fields that it needs, and no byte from after the request. Given the
+ * client's own request, libwebsockets would act on fields that we don't support (h2c). It would also close the
+ * connection without an answer if the request had more fields or arguments than it has room for. */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
@@ -26,7 +26,7 @@ struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn)
     return wsi;
 }
 
-/* The bytes that the socket must have before it is looked at again: one more than it has. */
+/* The socket is not reported as readable again before it has more than `have` bytes. */
 static int wait_for_more(int fd, int have)
 {
     const int low = have + 1;
@@ -88,7 +88,7 @@ static void web_accept_make_room(struct web_link *web, struct web_conn *conn)
     web_conn_end(conn);
 }
 
-static void welcome(struct web_link *web, int fd, const struct sockaddr_storage *from, const char *peer)
+static void web_accept_welcome(struct web_link *web, int fd, const struct sockaddr_storage *from, const char *peer)
 {
     const int size = WEB_SEND_BUFFER;
     unsigned char address[sizeof web->conn->place.address];
@@ -127,7 +127,7 @@ static void accept_some(struct web_link *web)
         if (!socket_accept(web->listener.fd, &web->listener.reserve_fd, &fd, &from, &len)) return;
         socket_address_text((const struct sockaddr *)&from, len, peer, sizeof peer);
         if (fd >= 0)
-            welcome(web, fd, &from, peer);
+            web_accept_welcome(web, fd, &from, peer);
         else /* no descriptor is left */
             web_refused(web, peer);
     }
@@ -188,7 +188,7 @@ static int look_at_request(struct web_link *web, struct web_conn *conn)
     char request[WEB_MAX_REQUEST];
     const int fd = web_lws.lws_get_socket_fd(conn->wsi);
     struct pollfd peer = {.fd = fd, .events = POLLRDHUP};
-    const int ended = poll(&peer, 1, 0) > 0; /* before looking: then nothing comes after what is seen */
+    const int ended = poll(&peer, 1, 0) > 0; /* asked first: if it has ended, recv below sees all that will ever come */
     const ssize_t n = recv(fd, request, sizeof request, MSG_PEEK);
     if (n < 0 && (errno == EAGAIN || errno == EINTR)) return 0;
     if (n <= 0) return -1;
@@ -209,7 +209,7 @@ static int give_up(struct web_conn *conn)
     return linger(conn);
 }
 
-static int serve_client(struct web_link *web, struct web_conn *conn, enum lws_callback_reasons reason)
+static int web_accept_serve(struct web_link *web, struct web_conn *conn, enum lws_callback_reasons reason)
 {
     switch (reason) {
     case LWS_CALLBACK_TIMER:
@@ -228,7 +228,7 @@ int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
     struct web_conn *conn = web_lws.lws_get_opaque_user_data(wsi);
     uint64_t count;
     (void)user, (void)in, (void)len;
-    if (conn != NULL && conn->wsi == wsi) return serve_client(web, conn, reason);
+    if (conn != NULL && conn->wsi == wsi) return web_accept_serve(web, conn, reason);
     if (reason != LWS_CALLBACK_RAW_RX_FILE) return 0;
     if (wsi == web->listening)
         accept_some(web);

@@ -67,7 +67,7 @@ static int web_unplug(struct web_link *web)
 {
     if (web->listening == NULL) return SH_ESTATE;
     web->is_silent = 0;        /* what is left of its sockets ends here */
-    web_break(web->listening); /* first: a client that is cut off finds nobody there */
+    web_break(web->listening); /* first, so that a client that is cut off can't come back at once */
     web_break_all(web);
     web->listening = NULL;
     return SH_OK;

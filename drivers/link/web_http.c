@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Answers by HTTP, and their way out in pieces. One request, one connection: it ends with its first answer. */
+/* Answers requests by HTTP, in pieces. A connection ends after its first answer. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -28,8 +28,8 @@ static const char *reason_of(int status)
     return "Error";
 }
 
-/* As snprintf. Its fields bind a browser: nothing is loaded from elsewhere, no frame around the page, no type
- * guessed. */
+/* Writes and returns as snprintf. The fields forbid a browser to load anything from elsewhere, to show the page within
+ * another site's page, and to guess a type. */
 static int write_head(char *to, size_t room, int status, const char *type, size_t len)
 {
     const char *more = status == 405   ? "allow: GET, HEAD\r\n"
@@ -51,8 +51,8 @@ int web_http_words(char *to, size_t room, int status, const char *words, int hea
     return head_only ? n : n + snprintf(to + n, room - (size_t)n, "%s\n", words);
 }
 
-/* The content is what conn has. */
-static int answer(struct web_conn *conn, int status, const char *type)
+/* Answers with the content that conn has. */
+static int web_http_answer(struct web_conn *conn, int status, const char *type)
 {
     unsigned char text[LWS_PRE + WEB_TEXT_ROOM], *head = text + LWS_PRE;
     const int n = write_head((char *)head, WEB_TEXT_ROOM, status, type, conn->len);
@@ -68,7 +68,7 @@ static int web_http_say(struct web_conn *conn, int status, const char *words)
     conn->bytes = conn->owned = malloc(conn->len + 1);
     if (conn->owned == NULL) return -1;
     snprintf(conn->owned, conn->len + 1, "%s\n", words);
-    return answer(conn, status, plain);
+    return web_http_answer(conn, status, plain);
 }
 
 int web_http_begin(struct web_link *web, struct web_conn *conn)
@@ -80,7 +80,7 @@ int web_http_begin(struct web_link *web, struct web_conn *conn)
     if (web_page_at(asked->path, &page)) {
         conn->bytes = page.bytes;
         conn->len = page.len;
-        return answer(conn, 200, page.type);
+        return web_http_answer(conn, 200, page.type);
     }
     if (asked->query_long) return web_http_say(conn, 400, "the query after ? has more than 1023 bytes");
     int rc = SH_EINPUT;
@@ -90,7 +90,7 @@ int web_http_begin(struct web_link *web, struct web_conn *conn)
     conn->bytes = conn->owned = body.bytes;
     conn->lender = web->source;
     conn->len = body.len;
-    return answer(conn, 200, body.type);
+    return web_http_answer(conn, 200, body.type);
 }
 
 /* libwebsockets calls when the socket has taken all of the piece before. */

@@ -40,8 +40,8 @@
 
 LATE_LIBRARY(websockets, WEBSOCKETS_CALLS)
 
-/* libwebsockets, which brings OpenSSL (core/late.h); each link that is opened fills it in, always with the same. It
- * is global since libwebsockets' callbacks need it to find their link. */
+/* The functions of libwebsockets. It is loaded when the first link opens, since it brings OpenSSL (core/late.h). They
+ * are global since libwebsockets' callbacks need them to find their link. */
 extern struct websockets_lib web_lws;
 
 enum {
@@ -142,8 +142,8 @@ int web_fault(void *link, enum link_fault what, int session, uint32_t n, double 
 /* Ends the silence of a pulled cable, if it is pulled. resets: then its connections are reset, too. */
 void web_speak(struct web_link *web, int resets);
 
-/* web_accept.c: the protocol of descriptors that are not HTTP yet, no more, or never: the listening socket, the owner's
- * wake-up, connections whose request has not come whole or whose answer is out. */
+/* web_accept.c: libwebsockets' "protocol" of plain descriptors: the listening socket, the owner's wake-up, and
+ * connections whose request has not come whole or whose answer is out. */
 #define WEB_BARE "bare"
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
 /* Has lws_service wait for a descriptor. It is closed with the context, or at once if NULL is returned. */
@@ -156,7 +156,7 @@ void web_linger(struct web_link *web, struct web_conn *conn);
 int web_request_read(const struct web_link *web, const char *head, size_t len, struct web_request *out,
                      const char **words);
 
-/* web_http.c. As libwebsockets' callbacks: 0, or -1 to close the connection. */
+/* web_http.c. These two return as libwebsockets' callbacks do: 0, or -1 to close the connection. */
 int web_http_begin(struct web_link *web, struct web_conn *conn);
 int web_http_go_on(struct web_link *web, struct web_conn *conn);
 /* A whole answer in words, as snprintf. */

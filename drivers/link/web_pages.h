@@ -10,7 +10,7 @@ struct web_page {
     size_t len;
 };
 
-/* 0: there is none of that path. "/" is index.html. */
+/* Finds the file at a path; "/" is index.html. Returns 0: there is none. */
 int web_page_at(const char *path, struct web_page *out);
 
 #endif

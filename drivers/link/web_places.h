@@ -12,7 +12,7 @@
 enum {
     WEB_PLACES = 48,        /* connections at a time */
     WEB_PLACES_OF_ONE = 40, /* of one address; the others are left for the rest of the world */
-    WEB_GOODBYE_MS = 2000,  /* to take what was written, at an end; an answer that nobody takes for so long is silent */
+    WEB_GOODBYE_MS = 2000,  /* at an end, for clients to take what was written; and see web_places_take */
 };
 
 enum web_phase {
@@ -30,18 +30,19 @@ struct web_place {
     int64_t since_us;         /* ANSWERING: when it last took something. Else: when the phase began */
 };
 
-/* One address is: 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */
+/* Fills in what counts as one address: the 4 bytes of IPv4, also within IPv6, or the network's half of IPv6. */
 void web_address(const struct sockaddr_storage *from, unsigned char address[8]);
 
-/* WEB_PLACES of them, each `stride` bytes after the one before. */
+/* WEB_PLACES places, each `stride` bytes after the one before. */
 struct web_places {
     struct web_place *first;
     size_t stride;
 };
 
-/* The index of a place for a new client from this address. If its phase isn't NOBODY, its present client has to go: the
- * oldest silent one of that address if the address holds as many as it may, else of the address that holds the most.
- * -1: no client is silent. */
+/* Returns the index of a place for a new client from this address. If its phase isn't NOBODY, its present client has to
+ * go. It is one of this address if the address holds as many as it may, else one of the address that holds the most.
+ * Clients go in this order: those that are PARTING or LINGERING, those that are ASKING, and those that took nothing of
+ * their answer for WEB_GOODBYE_MS; the oldest first in each group. -1: no client may go. */
 int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_us);
 
 #endif

@@ -68,20 +68,20 @@ static int is_own_origin(const struct fields *f)
 {
     static const char scheme[] = "http://";
     const size_t n = sizeof scheme - 1;
-    return f->origin.len == n + f->host.len && strncasecmp(f->origin.s, scheme, n) == 0 &&
+    return f->host.len != 0 && f->origin.len == n + f->host.len && strncasecmp(f->origin.s, scheme, n) == 0 &&
            strncasecmp(f->origin.s + n, f->host.s, f->host.len) == 0;
 }
 
-/* An image or a script of another site's page sends no Origin, but browsers then say where it is from. Links to the
- * page itself are followed. */
+/* An image or a script of another site's page is asked for without an Origin, but browsers then say in Sec-Fetch-Site
+ * where it is from. Links from other sites to the page's own files work. */
 static int is_foreign_part(const struct fields *f, const char *path)
 {
     struct web_page page;
     return (http_text_is(f->site, "cross-site") || http_text_is(f->site, "same-site")) && !web_page_at(path, &page);
 }
 
-/* Decodes %41 and the like. 0; 1: the text is cut; 400. */
-static int decode(struct http_text in, char *out, size_t room)
+/* Decodes %41 and the like. Returns 0; 1 if the text is cut; or the status 400. */
+static int web_request_decode(struct http_text in, char *out, size_t room)
 {
     size_t n = 0;
     for (size_t i = 0; i < in.len; i++) {
@@ -99,7 +99,7 @@ static int decode(struct http_text in, char *out, size_t room)
     return n >= room;
 }
 
-/* 16 bytes as base64. */
+/* Whether a key is 16 bytes as base64. */
 static int is_key(struct http_text key)
 {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -108,7 +108,7 @@ static int is_key(struct http_text key)
     return key.len == 24;
 }
 
-/* RFC 6455 4.2.1. */
+/* Checks the fields that ask for a WebSocket (RFC 6455 4.2.1). */
 static int read_upgrade(const struct fields *f, struct web_request *out, const char **words)
 {
     *words = "/ws takes only a WebSocket of version 13, subprotocol scanhead-native-1";
@@ -166,9 +166,9 @@ int web_request_read(const struct web_link *web, const char *head, size_t len, s
     if (f.has_coding || f.length > 0) return f.has_coding && f.n_length > 0 ? 400 : 413;
     *words = "a path must begin with /, and %XX in it must be a byte in hexadecimal, but not 0";
     if (target.path.len == 0 || target.path.s[0] != '/') return 400;
-    if (decode(target.path, out->path, sizeof out->path) == 400) return 400;
+    if (web_request_decode(target.path, out->path, sizeof out->path) == 400) return 400;
     if (is_foreign_part(&f, out->path)) return WEB_FOREIGN;
-    const int query = decode(target.query, out->query, sizeof out->query);
+    const int query = web_request_decode(target.query, out->query, sizeof out->query);
     if (query == 400) return 400;
     out->query_long = query == 1;
     f.is_upgrade &= !out->head_only && line.minor > 0; /* RFC 6455 4.1: only a GET of HTTP/1.1 is one */

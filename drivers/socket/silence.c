@@ -50,7 +50,7 @@ static int silence(const int *fds, int n)
     for (int i = 0; i < n; i++) {
         if (fds[i] < 0) continue;
         if (take_from(fds[i], MOST_HOPS) != SH_OK) {
-            speak(fds, i + 1); /* of a socket of IPv6, one of the two may have been set */
+            speak(fds, i + 1); /* this one too: one of the two options of an IPv6 socket may have been set */
             return SH_ESTATE;
         }
         setsockopt(fds[i], SOL_SOCKET, SO_KEEPALIVE, &off, sizeof off);

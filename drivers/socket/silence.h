@@ -9,9 +9,9 @@
 #ifndef DRIVERS_SOCKET_SILENCE_H
 #define DRIVERS_SOCKET_SILENCE_H
 
-/* A listener, and n connections. Descriptors below 0 are left out. Waits up to 200 ms until the peers have confirmed
- * what was sent, and still hears them meanwhile. Keep-alive probes stop, so that a connection lasts. 0, or SH_ESTATE:
- * the system can't do it, and all sockets are as before. */
+/* Silences a listener and n connections; descriptors below 0 are left out. First it waits for up to 200 ms until the
+ * peers have confirmed what was sent to them. Keep-alive probes stop, so that a connection lasts. Returns 0, or
+ * SH_ESTATE: the system can't do it, and all sockets are as before. */
 int sockets_silence(int listener, const int *fds, int n);
 /* Ends it: the connections go on. */
 void sockets_speak(int listener, const int *fds, int n);

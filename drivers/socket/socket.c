@@ -40,7 +40,7 @@ int socket_is_group(const struct sockaddr *address)
                                           : IN_MULTICAST(ntohl(v4->sin_addr.s_addr));
 }
 
-static int start(int fd, const struct sockaddr *at, socklen_t len, int connecting)
+static int socket_start(int fd, const struct sockaddr *at, socklen_t len, int connecting)
 {
     const int one = 1;
     if (connecting) return connect(fd, at, len);
@@ -62,7 +62,7 @@ int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting)
 {
     int fd = socket(at->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     if (fd < 0) return -1;
-    const int is_open = start(fd, at, len, connecting) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0;
+    const int is_open = socket_start(fd, at, len, connecting) == 0 && fcntl(fd, F_SETFL, O_NONBLOCK) == 0;
     const int is_own = is_open && connecting && socket_is_own_end(fd);
     if (is_open && !is_own) return fd;
     int error = is_own ? ECONNREFUSED : errno;
@@ -214,6 +214,7 @@ enum socket_state socket_state(int fd, short revents)
     if ((revents & (POLLIN | POLLHUP | POLLERR | POLLNVAL)) == 0) return SOCKET_OPEN;
     char byte;
     ssize_t n = recv(fd, &byte, 1, MSG_DONTWAIT | MSG_PEEK);
-    if (n == 0) return (revents & (POLLHUP | POLLERR)) != 0 ? SOCKET_ENDED : SOCKET_SHUT;
+    if (n == 0)
+        return (revents & (POLLHUP | POLLERR)) != 0 ? SOCKET_ENDED : SOCKET_SHUT; /* POLLHUP: both sides are shut */
     return n < 0 && errno != EAGAIN && errno != EWOULDBLOCK && errno != EINTR ? SOCKET_ENDED : SOCKET_OPEN;
 }

@@ -20,21 +20,21 @@ struct socket_place {
     int connecting;   /* 1: connects, 0: listens */
 };
 
-/* The addresses of a host and port: *list, which freeaddrinfo releases, is not empty. type: SOCK_STREAM or SOCK_DGRAM.
- * Waits for names. SH_EINPUT. */
+/* Looks up the addresses of a host and port, and waits for them. type: SOCK_STREAM or SOCK_DGRAM. *list is not empty;
+ * freeaddrinfo releases it. SH_EINPUT. */
 struct addrinfo;
 int socket_resolve(const char *what, const char *host, int port, int type, struct addrinfo **list, struct sh_err *err);
 /* Whether an address of IPv4 or IPv6 is that of a multicast group. */
 int socket_is_group(const struct sockaddr *address);
 
-/* A listening or connected socket, not blocking. Waits for names and for the connection. name gets its own
- * address or, where it connects, that of its peer, as "127.0.0.1:40123" or "[::1]:40123". SH_EPERM, SH_EINPUT
- * (the address), SH_EIO. */
+/* Opens a listening or connected socket, which does not block. Waits for names and for the connection. name gets its
+ * own address or, where it connects, that of its peer, as "127.0.0.1:40123" or "[::1]:40123". SH_EPERM, SH_EINPUT (the
+ * address), SH_EIO. */
 int socket_open(const struct socket_place *place, int *fd, char *name, size_t len, struct sh_err *err);
-/* The same at a known address of any family: a descriptor, or -1 with errno. */
+/* Does the same at a known address of any family. Returns a descriptor, or -1 with errno. */
 int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting);
-/* Listens again where a listener has listened, whose socket is closed by now. So no name is looked up, which may lead
- * to several addresses. A descriptor, or -1 with errno. */
+/* Listens again at the address of a listener whose socket is closed by now. It does not look up the name again, which
+ * may lead to another address. Returns a descriptor, or -1 with errno. */
 struct socket_address {
     struct sockaddr_storage at;
     socklen_t len;
@@ -45,21 +45,21 @@ void socket_note_address(int listener, struct socket_address *at);
 /* Whether a socket is connected to itself. TCP does that where nobody listens on a port of this machine, and the system
  * gives that same port to the socket that connects to it. */
 int socket_is_own_end(int fd);
-/* SH_E for an errno of either. */
+/* Returns the SH_E for an errno of opening, binding or connecting a socket. */
 int socket_error_code(int error);
 
-/* A descriptor to be given up for a moment when there are no more; -1: none is left. */
+/* Returns a descriptor in reserve, which socket_accept closes for a moment when no other is left; -1: none is left. */
 int socket_reserve(void);
-/* The next client of a listener. 0: there is none. 1: *fd is its descriptor, which does not block, or -1 where the
- * process or the system had no descriptor left. Such a client is turned away, since it would wake the listener's thread
- * again and again otherwise. reserve: socket_reserve()'s; its owner closes it. from may be NULL. Listeners in several
- * threads take turns. */
+/* Accepts a listener's next client. Returns 0: there is none. 1: *fd is its descriptor, which does not block, or -1 if
+ * the process or the system had no descriptor left. Such a client is turned away, since it would wake the listener's
+ * thread again and again otherwise. reserve: socket_reserve()'s; its owner closes it. from may be NULL. Listeners in
+ * several threads take turns. */
 int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len);
 
-/* An address as "127.0.0.1:40123" or "[::1]:40123"; that of a Unix socket's client as "a local client". */
+/* Writes an address as "127.0.0.1:40123" or "[::1]:40123"; that of a Unix socket's client as "a local client". */
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size);
 
-/* For a connected TCP socket; others stay as they are. Small packets leave at once. A peer that has vanished
+/* Sets up a connected TCP socket; others stay as they are. Small packets leave at once. A peer that has vanished
  * without a word ends the connection after about 25 s. With bytes under way to it, that takes until the
  * system gives up repeating them (Linux: some 15 minutes). */
 void socket_tune(int fd);
@@ -67,12 +67,12 @@ void socket_tune(int fd);
  * That also cuts off a peer that only pauses for so long. */
 void socket_tune_impatient(int fd);
 
-/* Connected sockets, never blocking and never raising SIGPIPE. Bytes moved; 0: none now; SH_ECLOSED: end of
- * stream, reset or any other failure. */
+/* These two move bytes of a connected socket, and never block or raise SIGPIPE. They return how many bytes; 0: none
+ * now; SH_ECLOSED: end of stream, reset or any other failure. */
 ssize_t socket_read(int fd, void *buf, size_t len);
 ssize_t socket_write(int fd, const void *buf, size_t len);
-/* As socket_write, but 0 as long as a peer that has gone has bytes here that are not read: the last request of a client
- * that left is not lost. Only for callers that read whenever poll says so. */
+/* As socket_write, but when the peer has gone it returns 0 until all that the peer sent is read. So the last request of
+ * a client that left is not lost. Only for callers that read whenever poll says so. */
 ssize_t socket_write_heard(int fd, const void *buf, size_t len);
 /* Breaks a connected TCP socket: its peer sees a reset, and loses what it has not taken. The descriptor stays. */
 void socket_break(int fd);

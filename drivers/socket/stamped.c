@@ -61,7 +61,7 @@ static int is_broadcast(struct sockaddr_storage *at)
     return at->ss_family == AF_INET && v4(at)->sin_addr.s_addr == htonl(INADDR_BROADCAST);
 }
 
-/* interface 0: where the route leads. */
+/* Joins the group at `at`, on an interface by its number; 0: on the one that the route leads to. */
 static int join(int fd, struct sockaddr_storage *at, unsigned interface)
 {
     const int no = 0;
@@ -75,7 +75,7 @@ static int join(int fd, struct sockaddr_storage *at, unsigned interface)
     return setsockopt(fd, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group);
 }
 
-static int start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned interface)
+static int stamped_start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned interface)
 {
     const int one = 1, size = RECEIVE_BUFFER_BYTES, is_group = socket_is_group((const struct sockaddr *)at);
     if (setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size) != 0) /* needs CAP_NET_ADMIN */
@@ -93,7 +93,7 @@ static int start(int fd, struct sockaddr_storage *at, socklen_t len, unsigned in
     return is_group ? join(fd, at, interface) : 0;
 }
 
-/* "GROUP%INTERFACE" of IPv4, which getaddrinfo does not know. */
+/* Takes "GROUP%INTERFACE" of IPv4 apart, which getaddrinfo does not know. */
 static int split_interface(const char *host, char address[MAX_HOST], unsigned *interface, struct sh_err *err)
 {
     const char *percent = strchr(host, '%');
@@ -116,7 +116,7 @@ int stamped_open(const char *host, int port, struct stamped_socket *out, struct 
     if (rc != SH_OK) return rc;
     memcpy(&out->own, list->ai_addr, list->ai_addrlen);
     out->fd = socket(list->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (out->fd < 0 || start(out->fd, &out->own, list->ai_addrlen, interface) != 0 ||
+    if (out->fd < 0 || stamped_start(out->fd, &out->own, list->ai_addrlen, interface) != 0 ||
         getsockname(out->fd, (struct sockaddr *)&out->own, &out->own_len) != 0) {
         const int error = errno;
         rc = sh_fail(err, error == ENODEV ? SH_EINPUT : socket_error_code(error), "udp:%s:%d: %s%s", host, port,

@@ -21,9 +21,9 @@ struct stamped_socket {
     socklen_t own_len;
 };
 
-/* host: an address of this machine, 0.0.0.0 or :: for all of them, a broadcast, or a group; a group may have %INTERFACE
- * where its route leads elsewhere. Groups and 255.255.255.255 may be read by others at the same time. port 0: the
- * system chooses. SH_EINPUT (the address, the port is taken), SH_EPERM, SH_EIO. */
+/* Opens a socket. host: an address of this machine, 0.0.0.0 or :: for all of them, a broadcast, or a group; a group may
+ * have %INTERFACE where its route leads elsewhere. Other programs may read groups and 255.255.255.255 at the same time.
+ * port 0: the system chooses. SH_EINPUT (the address, the port is taken), SH_EPERM, SH_EIO. */
 int stamped_open(const char *host, int port, struct stamped_socket *out, struct sh_err *err);
 
 struct stamped_datagram {
@@ -33,16 +33,16 @@ struct stamped_datagram {
     uint32_t dropped; /* how many the kernel had thrown away before it, modulo 2^32 */
 };
 
-/* 1: one was taken; 0: none is there. SH_EIO. room: 65535 hold any. */
+/* Takes the next datagram. Returns 1, 0 if there is none, or SH_EIO. A room of 65535 bytes holds any datagram. */
 int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, struct stamped_datagram *out,
                  struct sh_err *err);
-/* How many the kernel threw away so far: it had no room, or their checksum was wrong. */
+/* Returns how many the kernel threw away so far: it had no room, or their checksum was wrong. */
 uint64_t stamped_dropped(const struct stamped_socket *socket);
 void stamped_close(struct stamped_socket *socket);
 
-/* Waits until the kernel stamps what comes, about a second at most: it begins some time after a socket first asked it
- * to. Earlier bytes have the time of reading. While `keeper` is open the kernel goes on stamping. Without a loopback it
- * does not wait. */
+/* Waits until the kernel stamps what comes, for about a second at most. The kernel begins to do so some time after a
+ * first socket asked for it; until then bytes get the time at which they are read. While `keeper` is open the kernel
+ * goes on stamping. Without a loopback interface this does not wait. */
 void stamped_begin(struct stamped_socket *keeper);
 
 /* ---- streams */
@@ -52,11 +52,11 @@ void stamped_begin(struct stamped_socket *keeper);
 int stamped_connect(const char *host, int port, int timeout_ms, int *fd, struct sh_err *err);
 /* Has a socket of socket.h report times of what comes, from now on. */
 void stamped_enable(int fd);
-/* Bytes; *t_ns: when the last of them came. 0: none now. SH_ECLOSED: the end of the stream. SH_ERESET: the connection
- * broke. */
+/* Returns how many bytes were read; *t_ns: when the last of them came. 0: none now. SH_ECLOSED: the end of the stream.
+ * SH_ERESET: the connection broke. */
 ssize_t stamped_read(int fd, void *buf, size_t room, int64_t *t_ns);
 
-/* UTC now. */
+/* Returns UTC now. */
 int64_t stamped_now_ns(void);
 
 #endif

@@ -25,8 +25,8 @@ struct usb_backend_spec {
     int retry_ms;     /* with attach: time between attempts to come back after the host has let go; 0: 1000 */
 };
 
-/* Faults of fault(). UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as
- * by a reset of the bus, or as near to that as the back end's host can be brought. */
+/* Faults of fault(). UNPLUG: the device and its endpoint are not there until PLUG. RESET: sessions end as by a reset of
+ * the bus, or by an unplug and a plug where the back end can't make the host see a reset. */
 enum usb_fault { USB_FAULT_UNPLUG, USB_FAULT_PLUG, USB_FAULT_RESET };
 
 /* Injected faults of transfers and requests, which a back end may lack. All back ends can unplug and reset. */
@@ -34,7 +34,7 @@ enum { USB_CAN_STALL = 1, USB_CAN_SHORTEN = 2, USB_CAN_ENUMERATE_WRONG = 4 };
 
 /* The owner of a back end, which handle() calls. */
 struct usb_owner {
-    int (*go_on)(void *ctx);
+    int (*go_on)(void *ctx);                       /* 0: the owner has to report something before the next act */
     void (*say)(void *ctx, const char *text);      /* a line for the person who runs the head */
     void (*refuse)(void *ctx, const char *client); /* it was turned away, for want of a descriptor */
     void *ctx;
@@ -51,13 +51,13 @@ struct usb_backend_ops {
     /* Fills descriptors to wait for (room for USB_BACKEND_MAX_FDS) and returns how many. */
     int (*prepare)(void *backend, struct pollfd *fds);
 
-    /* After poll(2) on exactly these. Works through what came; after each of the host's acts it asks
-     * owner->go_on, and stops where that is 0. The rest waits for the next call. Then `more` returns 1, so
-     * the owner calls again even if no descriptor is ready. SH_EIO ends the back end for good. */
+    /* To be called after poll(2) on exactly these descriptors. Carries out what the host has sent. After each of the
+     * host's acts it asks owner->go_on, and stops where that is 0. The rest waits for the next call. Then `more`
+     * returns 1, so the owner calls again even if no descriptor is ready. SH_EIO ends the back end for good. */
     int (*handle)(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner);
-    int (*more)(const void *backend); /* NULL: poll(2) says it all */
+    int (*more)(const void *backend); /* NULL: a descriptor is ready whenever something waits */
 
-    /* Sends what the core has completed, as far as the wire takes it. After usb_device_write and
+    /* Sends what the core has completed, as far as the wire takes it. To be called after usb_device_write and
      * usb_device_read. */
     void (*flush)(void *backend);
 
@@ -77,24 +77,24 @@ struct usb_backend_ops {
 /* NULL for an unknown type. */
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
 
-/* A listening or (attach) connected socket, not blocking. The path of a Unix socket whose process is gone is
- * taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. backend_socket.c */
+/* backend_socket.c: opens a listening or (attach) connected socket, which does not block. The path of a Unix socket
+ * whose process is gone is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
-/* The next client's descriptor, not blocking; -1: none. reserve: socket_reserve()'s. The owner hears of clients for
- * whom there is no descriptor. backend_socket.c */
+/* Returns the next client's descriptor, which does not block; -1: none. reserve: socket_reserve()'s. The owner hears of
+ * clients for whom there is no descriptor. */
 int usb_backend_accept(int listener, int *reserve, const struct usb_owner *owner);
 
-/* The address that a socket of usb_backend_socket is connected to. usb_backend_connect connects to it again,
- * without waiting or looking up names. 0: *fd is connected. EINPROGRESS: once poll(2) finds *fd writable,
- * usb_backend_connect_error says how it went. Any other errno: *fd is -1. backend_socket.c */
+/* usb_backend_peer notes the address that a socket of usb_backend_socket is connected to. usb_backend_connect connects
+ * to it again, without waiting or looking up names. It returns 0: *fd is connected. EINPROGRESS: once poll(2) finds *fd
+ * writable, usb_backend_connect_error says how it went. Any other errno: *fd is -1. */
 struct socket_address; /* drivers/socket/socket.h */
 void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket_address *out);
 int usb_backend_connect(const struct socket_address *to, int *fd);
 int usb_backend_connect_error(int fd);
 /* To be called before closing. Sends nothing more, and waits until the peer has read everything and hung up,
  * or until timeout_ms pass without a byte; eight times that at most. Closing with unread requests of the peer
- * would throw away replies on their way. backend_socket.c */
+ * would throw away replies on their way. */
 void usb_backend_hang_up(int fd, int timeout_ms);
 
 #endif

@@ -51,8 +51,8 @@ void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket
     if (getpeername(fd, (struct sockaddr *)&out->at, &out->len) != 0) out->len = 0;
 }
 
-/* Nobody answers on it: its owner is gone and has not removed it. A socket whose queue is full is alive; this
- * does not wait for it. */
+/* Whether nobody answers on the socket at that path, since its owner ended without removing it. A socket whose queue is
+ * full has an owner; this does not wait for it. */
 static int is_left_behind(const char *path, const struct socket_address *at)
 {
     struct stat st;
@@ -90,7 +90,7 @@ int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, in
 
 int usb_backend_accept(int listener, int *reserve, const struct usb_owner *owner)
 {
-    enum { AT_ONCE = 16 }; /* turned away; those that come without end have to wait for the next call */
+    enum { AT_ONCE = 16 }; /* clients that one call turns away; more of them wait for the next call */
     struct sockaddr_storage from;
     socklen_t len = sizeof from;
     char client[64];

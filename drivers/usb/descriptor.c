@@ -44,7 +44,7 @@ static void descriptor_put(struct sink *to, const void *bytes, size_t n)
 #define U16(v)       U8(v), U8((v) >> 8)
 #define U32(v)       U16(v), U16((v) >> 16)
 
-/* A length that was put before it was known. */
+/* Fills in a length that was not known when its place was put. */
 static void patch16(struct sink *to, size_t at, unsigned v)
 {
     if (at < to->room) to->out[at] = (uint8_t)v;
@@ -173,7 +173,7 @@ size_t usb_describe_bos(const struct usb_model *model, const struct usb_identity
 
 /* ---- strings */
 
-/* The next code point of UTF-8; anything malformed is one U+FFFD per byte. */
+/* Takes the next code point of UTF-8. A byte that begins none is U+FFFD. */
 static uint32_t take_utf8(const uint8_t **at)
 {
     const uint8_t *p = *at;
@@ -190,7 +190,7 @@ static uint32_t take_utf8(const uint8_t **at)
     return n > 0 && code <= 0x10ffff ? code : 0xfffd;
 }
 
-/* As many whole characters as fit into `max` bytes of UTF-16LE. */
+/* Puts as many whole characters as fit into `max` bytes of UTF-16LE. */
 static void put_utf16(struct sink *to, const char *text, size_t max)
 {
     const size_t end = to->len + max;

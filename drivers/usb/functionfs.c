@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The functionfs back end: the device on a real device controller of this machine (a board with a UDC), as a
- * gadget of the Linux kernel. The kernel answers the standard requests from the descriptors it was given;
- * what concerns our own interfaces comes as events on ep0. The core hears of a configuration as if it had
+ * gadget of the Linux kernel. The kernel answers the standard requests from the descriptors it was given.
+ * Requests to our own interfaces come as events on ep0. The core hears of a configuration as if it had
  * answered the requests itself.
  *
  * A device that is only a port has no ep0 of ours: the kernel's f_acm is all of it. Then the state of the controller,
@@ -67,6 +67,7 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
         take_apart(self);
         return rc;
     }
+    snprintf(self->udc, sizeof self->udc, "%s", self->gadget.udc);
     *backend = self;
     return SH_OK;
 }
@@ -74,7 +75,7 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
 static void functionfs_endpoint(const void *backend, char *buf, size_t len)
 {
     const struct functionfs *self = backend;
-    snprintf(buf, len, "functionfs:%s", self->gadget.udc);
+    snprintf(buf, len, "functionfs:%s", self->udc);
 }
 
 enum { AT_EP0, AT_AIO, AT_TTY, AT_TIMER, N_FDS };
@@ -92,13 +93,13 @@ static int functionfs_prepare(void *backend, struct pollfd *fds)
 }
 
 /* The kernel reports a reset, a configuration that was taken away and an unplugging alike. */
-static void disable(struct functionfs *self, int unplugged)
+static void functionfs_disable(struct functionfs *self, int unplugged)
 {
     ffs_pipes_stop(&self->pipes);
     if (unplugged)
         usb_device_detach(self->device);
     else
-        usb_device_reset(self->device, usb_device_rate(self->device));
+        usb_device_reset(self->device);
     ffs_console_stop(&self->console);
 }
 
@@ -120,11 +121,11 @@ static void look_at_addresses(struct functionfs *self)
 }
 
 /* The host has configured the device. */
-static void enable(struct functionfs *self)
+static void functionfs_enable(struct functionfs *self)
 {
     struct usb_ctrlrequest setup = {.bRequest = USB_REQ_SET_CONFIGURATION};
     le_put16(&setup.wValue, USB_CONFIGURATION);
-    disable(self, 0); /* the kernel leaves out the event before when it was not read in time */
+    functionfs_disable(self, 0); /* the kernel drops a DISABLE that was not read before ENABLE came */
     usb_device_attach(self->device, gadget_rate(&self->gadget), on_complete, self);
     usb_device_assume_address(self->device);
     usb_device_control(self->device, &setup, NULL, 0);
@@ -134,7 +135,7 @@ static void enable(struct functionfs *self)
 }
 
 /* A transfer in the wrong direction is FunctionFS's way to stall. */
-static void stall(struct functionfs *self, int in)
+static void functionfs_stall(struct functionfs *self, int in)
 {
     ssize_t n = in ? read(self->ep0, self->data, 0) : write(self->ep0, self->data, 0);
     (void)n; /* it fails, which is what stalls */
@@ -151,7 +152,7 @@ static void translate_index(const struct functionfs *self, struct usb_ctrlreques
     if (recipient == USB_RECIP_ENDPOINT) le_put16(&setup->wIndex, ffs_pipes_address(&self->pipes, index));
 }
 
-static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
+static void functionfs_answer(struct functionfs *self, struct usb_ctrlrequest setup)
 {
     const int in = (setup.bRequestType & USB_DIR_IN) != 0;
     const unsigned length = le_get16(&setup.wLength);
@@ -164,14 +165,15 @@ static void answer(struct functionfs *self, struct usb_ctrlrequest setup)
         n = usb_device_control(self->device, &setup, self->data, 0);
         if (n >= 0 && read(self->ep0, self->data, 0) == 0) return;
     } else if (length <= sizeof self->data && usb_device_control(self->device, &setup, NULL, length) == 0 &&
-               read(self->ep0, self->data, length) == (ssize_t)length) {
-        usb_device_control(self->device, &setup, self->data, length); /* the data are taken: too late to stall */
+               read(self->ep0, self->data, length) == (ssize_t)length) { /* reading accepts the request */
+        usb_device_control(self->device, &setup, self->data, length);    /* the data are taken: too late to stall */
         return;
     }
-    if (n == USB_STALL) stall(self, in);
+    if (n == USB_STALL) functionfs_stall(self, in);
 }
 
-/* Without ep0: follows the controller's state. If the port was hung up, the device was not configured in between. */
+/* Follows the controller's state, for a gadget without ep0. A port that was hung up shows that the device was not
+ * configured for a while, even if the state is "configured" again. */
 static void take_state(struct functionfs *self, int hung_up)
 {
     char text[32];
@@ -179,11 +181,11 @@ static void take_state(struct functionfs *self, int hung_up)
     if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return;
     const int was = usb_device_configuration(self->device) != 0;
     const int is = gadget_is_configured(&self->gadget, was);
-    if (was && (hung_up || !is)) disable(self, !gadget_is_on_bus(&self->gadget));
-    if (is && (hung_up || !was)) enable(self);
+    if (was && (hung_up || !is)) functionfs_disable(self, !gadget_is_on_bus(&self->gadget));
+    if (is && (hung_up || !was)) functionfs_enable(self);
 }
 
-/* One event of ep0; 0: there is none. */
+/* Takes one event of ep0; 0: there is none. */
 static int functionfs_take_event(struct functionfs *self)
 {
     struct usb_functionfs_event event;
@@ -191,16 +193,16 @@ static int functionfs_take_event(struct functionfs *self)
     if (read(self->ep0, &event, sizeof event) != sizeof event) return 0;
     switch (event.type) {
     case FUNCTIONFS_ENABLE:
-        enable(self);
+        functionfs_enable(self);
         break;
     case FUNCTIONFS_DISABLE:
-        disable(self, !gadget_is_on_bus(&self->gadget));
+        functionfs_disable(self, !gadget_is_on_bus(&self->gadget));
         break;
     case FUNCTIONFS_UNBIND:
-        disable(self, 1);
+        functionfs_disable(self, 1);
         break;
     case FUNCTIONFS_SETUP:
-        answer(self, event.u.setup);
+        functionfs_answer(self, event.u.setup);
         break;
     case FUNCTIONFS_SUSPEND:
     case FUNCTIONFS_RESUME:
@@ -250,21 +252,21 @@ static int functionfs_more(const void *backend)
 
 /* ---- injected faults */
 
-static int unplug(struct functionfs *self)
+static int functionfs_unplug(struct functionfs *self)
 {
-    if (self->unplugged[0] != '\0') return SH_ESTATE;
-    snprintf(self->unplugged, sizeof self->unplugged, "%s", self->gadget.udc);
+    if (self->unplugged) return SH_ESTATE;
+    self->unplugged = 1;
     gadget_unbind(&self->gadget);
-    disable(self, 1);
+    functionfs_disable(self, 1);
     return SH_OK;
 }
 
-static int plug(struct functionfs *self)
+static int functionfs_plug(struct functionfs *self)
 {
     struct sh_err err;
-    if (self->unplugged[0] == '\0') return SH_OK;
-    if (gadget_bind(&self->gadget, self->unplugged, &err) != SH_OK) return SH_ESTATE;
-    self->unplugged[0] = '\0';
+    if (!self->unplugged) return SH_OK;
+    if (gadget_bind(&self->gadget, self->udc, &err) != SH_OK) return SH_ESTATE;
+    self->unplugged = 0;
     return SH_OK;
 }
 
@@ -272,9 +274,9 @@ static int plug(struct functionfs *self)
 static int functionfs_fault(void *backend, enum usb_fault what)
 {
     struct functionfs *self = backend;
-    if (what == USB_FAULT_PLUG) return plug(self);
-    const int rc = unplug(self);
-    return what == USB_FAULT_UNPLUG || rc != SH_OK ? rc : plug(self);
+    if (what == USB_FAULT_PLUG) return functionfs_plug(self);
+    const int rc = functionfs_unplug(self);
+    return what == USB_FAULT_UNPLUG || rc != SH_OK ? rc : functionfs_plug(self);
 }
 
 static void functionfs_close(void *backend)

@@ -80,7 +80,8 @@ static void write_tx(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* Every second: where bytes wait and the host has taken none, its port is closed, and the rest is void. */
+/* Called every second. If bytes wait and the host has taken none of them since, the host's port counts as closed, and
+ * the waiting bytes are dropped. */
 static void look_at_host(struct ffs_console *console)
 {
     uint64_t count;
@@ -97,7 +98,9 @@ static void look_at_host(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* Native: a reader takes text only in step, after a whole frame (LOSSES.md, Resynchronisation). */
+/* Sends an event frame before the replies of a new session of the native protocol. The tty may still hold half a stream
+ * frame of the session before, and after that a reader takes text only once a whole frame has come (LOSSES.md,
+ * Resynchronisation). */
 static void lead_in(struct ffs_console *console)
 {
     const struct native_event event = {.code = NATIVE_EV_READER_LOST, .text = "the end of an earlier session"};
@@ -114,7 +117,7 @@ void ffs_console_start(struct ffs_console *console)
     if (console->number < 0) return;
     tty_path(console, path, sizeof path);
     if (console->fd < 0) console->fd = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (console->fd < 0) return; /* looked at when the link was opened */
+    if (console->fd < 0) return; /* ffs_console_open has checked the tty, and reported an error */
     if (tcgetattr(console->fd, &raw) == 0) {
         cfmakeraw(&raw);
         tcsetattr(console->fd, TCSANOW, &raw);

@@ -24,7 +24,7 @@ struct ffs_slot {
     enum ffs_slot_state state;
     struct iocb io, zero; /* zero: the packet of no bytes after it */
     int n_io;             /* of these, at the kernel */
-    uint32_t start;       /* which start they are from */
+    uint32_t start;       /* pipes->start when they were submitted */
     int failures;         /* in a row */
     uint8_t *buffer;
 };
@@ -50,6 +50,7 @@ struct ffs_pipes {
 int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const struct gadget *gadget, struct sh_err *err);
 /* The configuration has come up: puts all slots to use. */
 void ffs_pipes_start(struct ffs_pipes *pipes);
+/* The configuration is over: slots that the kernel gives back rest. */
 void ffs_pipes_stop(struct ffs_pipes *pipes);
 /* Takes one completion; 0: there is none. */
 int ffs_pipes_take(struct ffs_pipes *pipes);
@@ -60,16 +61,16 @@ void ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
 /* Waits until the host has taken what is at the kernel, as long as it takes something within timeout_ms. */
 void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms);
 void ffs_pipes_close(struct ffs_pipes *pipes);
-/* The first endpoint that the controller has given another address than the model's; 0: none, or it does not say.
- * While a configuration is up. */
+/* Returns the model's address of the first endpoint to which the controller has given another, and that in *given; 0:
+ * there is none, or the controller does not say. To be called while a configuration is up. */
 uint8_t ffs_pipes_moved(const struct ffs_pipes *pipes, uint8_t *given);
-/* The model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
+/* Returns the model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
- * and ends when the host has taken none of the waiting bytes for one or two seconds. Bytes that the tty then
- * still holds can't be taken back. The next reader gets them first; they may end within a stream frame. Then it gets an
- * event frame, which brings it into step. */
+ * and ends when the host has taken none of the waiting bytes for one or two seconds. Bytes that the tty then still
+ * holds can't be taken back, and may end within a stream frame. The next reader gets them first. Then it gets an event
+ * frame, from which on it reads frames and replies correctly. */
 struct ffs_console {
     struct usb_device *device;
     int fd;    /* of the tty; -1: not plugged in, or no console */
@@ -79,18 +80,23 @@ struct ffs_console {
     uint32_t tx_len, tx_pos;
     int cut; /* a session was given up; the tty holds the rest of it */
     uint32_t lead_len, lead_pos;
-    uint8_t lead[256];       /* goes before everything else */
-    uint64_t written, taken; /* bytes to the tty; of these, no longer in its buffer when last looked at */
+    uint8_t lead[256];       /* the event frame; it goes before everything else */
+    uint64_t written, taken; /* bytes written to the tty; how many of them had left its buffer at the last look */
     struct usb_transfer rx, tx;
     uint8_t rx_bytes[4096], tx_bytes[4096];
 };
 
 /* number: of the tty, -1 for none. Fails where the tty can't be used. */
 int ffs_console_open(struct ffs_console *console, struct usb_device *device, int number, struct sh_err *err);
+/* The configuration has come up: opens the tty. */
 void ffs_console_start(struct ffs_console *console);
+/* Closes the tty, and ends the session. */
 void ffs_console_stop(struct ffs_console *console);
+/* Returns the events of poll(2) to wait for on fd. */
 short ffs_console_events(const struct ffs_console *console);
+/* Moves bytes between the tty and the core. timed_out: the timer has expired. */
 void ffs_console_handle(struct ffs_console *console, short revents, int timed_out);
+/* The core gives a transfer back. Returns 0: it is not one of the console. */
 int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer);
 void ffs_console_close(struct ffs_console *console);
 
@@ -104,7 +110,8 @@ struct functionfs {
     int ep0;                       /* -1: nothing of the device is FunctionFS's */
     int has_said_moved;            /* some endpoint has another address than the device's */
     const struct usb_owner *owner; /* within handle() */
-    char unplugged[256];           /* unplugged from this controller by an injected fault; empty: it is not */
+    char udc[256];                 /* the controller; stays the same, so that other threads may read it */
+    int unplugged;                 /* by an injected fault */
     int backlog;                   /* stopped before everything was looked at */
     struct ffs_pipes pipes;
     struct ffs_console console;

@@ -99,7 +99,7 @@ static uint8_t take_string(struct gadget *gadget, const struct usb_model *model,
     return (uint8_t)(n + 1);
 }
 
-/* The model without its console, if it has one, numbered from 0. */
+/* Sets gadget->part: the model without its console, if it has one, numbered from 0. */
 static int take_part(struct gadget *gadget, const struct usb_model *model, struct sh_err *err)
 {
     struct usb_model *part = &gadget->part;
@@ -169,7 +169,7 @@ static int write_string(const char *dir, const char *file, const struct usb_mode
     return index != 0 ? sysfile_write(dir, file, "%s", model->string[index - 1]) : 0;
 }
 
-/* Here and below the first failure ends it: each step needs those before it, and errno is its own. */
+/* This and the next two end with the first step that fails, and errno is that step's: each step needs those before. */
 static int write_os_descriptors(const char *dir, const struct usb_model *model)
 {
     return sysfile_write(dir, "os_desc/use", "1") ||
@@ -214,7 +214,7 @@ static int set_console_protocol(const struct gadget *gadget, const struct usb_mo
     return sh_fail(err, SH_EIO, "functionfs: %s/%s: %s", gadget->dir, file, strerror(errno));
 }
 
-/* The console first: it has the first interfaces. */
+/* Makes a function, and adds it to the configuration. The console's comes first, since it has the first interfaces. */
 static int make_function(struct gadget *gadget, const char *kind, const struct usb_model *model, struct sh_err *err)
 {
     char function[80], link[96];

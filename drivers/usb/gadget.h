@@ -39,20 +39,21 @@ static inline int gadget_has_functionfs(const struct gadget *gadget)
 int gadget_describe(const struct gadget *gadget, int ep0, const struct usb_identity *id, struct sh_err *err);
 /* Plugs in: udc, or the first free controller where that is empty. */
 int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
-/* Without FunctionFS, after binding: state_fd, which poll(2) reports with POLLPRI when the state has changed. */
+/* Opens state_fd, on which poll(2) reports POLLPRI when the controller's state has changed. For gadgets without
+ * FunctionFS, once they are bound. */
 int gadget_watch_state(struct gadget *gadget, struct sh_err *err);
 /* Whether the host has configured it. before: the last answer, which still holds while the bus is suspended. */
 int gadget_is_configured(const struct gadget *gadget, int before);
-/* "full", "high", "super". */
+/* Returns "full", "high" or "super". */
 const char *gadget_rate_name(enum usb_rate rate);
-/* 0: its controller sees no host. */
+/* Whether its controller sees a host. */
 int gadget_is_on_bus(const struct gadget *gadget);
-/* The rate of the bus it is on. */
+/* Returns the rate of the bus it is on. */
 enum usb_rate gadget_rate(const struct gadget *gadget);
-/* SH_EINPUT: the controller it is bound to is not as fast. */
+/* Checks whether the controller it is bound to is as fast as that. SH_EINPUT: it is not. */
 int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err);
 void gadget_unbind(struct gadget *gadget);
-/* After ep0 and the endpoints are closed. */
+/* Removes the gadget. To be called after ep0 and the endpoints are closed. */
 void gadget_remove(struct gadget *gadget);
 
 #endif

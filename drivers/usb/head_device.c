@@ -43,7 +43,7 @@ static int set_line_state(struct scanhead_usb *head, int index, unsigned value)
 {
     const int dtr = (value & DTR) != 0;
     if ((value & ~3u) != 0) return USB_STALL;
-    if (dtr && !head->session[index].open) head->session[index].state_due = 1; /* to who opens the port */
+    if (dtr && !head->session[index].open) head->session[index].state_due = 1; /* for the client that opens the port */
     set_open(head, index, dtr);
     return 0;
 }

@@ -3,8 +3,8 @@
  * end sessions; requests to a CDC-ACM port are answered.
  *
  * Native: both the console and the stream take commands and give replies and stream frames. Sessions end when their
- * interface goes away; personalities.h says what else ends them. The request that begins the stream ends an open one
- * first. */
+ * interface goes away; personalities.h says what else ends them. The request that begins a stream session first ends
+ * one that is open. */
 #ifndef DRIVERS_USB_HEAD_DEVICE_H
 #define DRIVERS_USB_HEAD_DEVICE_H
 
@@ -33,7 +33,7 @@ int scanhead_usb_create(const struct usb_personality *personality, const struct 
 /* Does what follows from the host's transfers rather than from its requests: begins a session by data, sends the
  * notification of a port. To be called after each transfer. */
 void scanhead_usb_update(struct scanhead_usb *head);
-/* One line, each only once: what has cut sessions off. NULL: nothing. */
+/* Returns a line that says what has cut sessions off, once for each time; NULL: nothing has. */
 const char *scanhead_usb_cut(struct scanhead_usb *head);
 /* To be called once the end of a session has been reported to its owner. */
 void scanhead_usb_ended(struct scanhead_usb *head, int session);

@@ -54,7 +54,7 @@ struct usb_function_row {
 struct usb_model {
     uint8_t class, subclass, protocol; /* of the device */
     uint16_t bcd_device;
-    uint8_t self_powered; /* 1: although max_power_ma is above 0. With 0 it is self-powered in any case */
+    uint8_t self_powered; /* 1: also where max_power_ma is above 0. A device with max_power_ma 0 always is */
     uint16_t max_power_ma;
     const char *const *string;     /* by index from 1, UTF-8; NULL ends the list */
     uint8_t manufacturer, product; /* indices, 0 none; the serial number's is the one after the list */
@@ -94,7 +94,7 @@ size_t usb_describe_string(const struct usb_model *model, const struct usb_ident
                            size_t room);
 /* The Microsoft OS 2.0 descriptor set; 0 without compatible ids. */
 size_t usb_describe_ms_os(const struct usb_model *model, uint8_t *out, size_t room);
-/* Index of an endpoint in tables: 0 to 15 OUT, 16 to 31 IN. */
+/* Returns the index of an endpoint in tables: 0 to 15 OUT, 16 to 31 IN. */
 static inline unsigned usb_endpoint_index(unsigned address)
 {
     return (address & USB_ENDPOINT_NUMBER_MASK) + ((address & USB_DIR_IN) != 0 ? 16u : 0u);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A head's own USB identity, where none is configured. It has a serial number, which is the same whenever the head
- * starts again, and a number among the USB heads that run on this machine, for the bus id of USB/IP.
+ * starts again. It also has a number among the USB heads that run on this machine, for the bus id of USB/IP.
  *
  * The serial number follows from the machine and from whose head it is (its configuration). So it does not depend on
  * which other heads run. Where several of the same configuration run at a time, the second and later ones have serial

@@ -107,7 +107,7 @@ static const struct usb_model hokuyo_model = {
     .n_interfaces = 2,
 };
 
-/* Data begin it, too: for a host that does not raise DTR. */
+/* Data begin a session, too, for a host that does not raise DTR. */
 static const struct usb_session_row hokuyo_sessions[] = {{"usb port", CONSOLE_INTERFACE, CONSOLE_DATA_INTERFACE,
                                                           CONSOLE_IN, CONSOLE_OUT, CONSOLE_NOTIFY,
                                                           USB_BEGINS_DTR | USB_BEGINS_DATA}};
@@ -139,7 +139,7 @@ static const struct usb_model sick_model = {
     .fixed_addresses = 1,
 };
 
-/* Clients do not report when they come or go. */
+/* Only data begin a session, since a TiM's clients do not report when they come or go. */
 static const struct usb_session_row sick_sessions[] = {
     {"usb telegrams", TELEGRAM_INTERFACE, TELEGRAM_INTERFACE, TELEGRAM_IN, TELEGRAM_OUT, 0, USB_BEGINS_DATA}};
 

@@ -85,20 +85,21 @@ void usb_device_free(struct usb_device *device);
 
 typedef void (*usb_complete)(void *ctx, struct usb_transfer *transfer);
 
-/* Plugged in, state default. */
+/* The host has the device: it is in the state default, at that rate. */
 void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_complete complete, void *ctx);
-/* Unplugged: what is pending completes with USB_GONE. */
+/* The device is unplugged: transfers that are pending complete with USB_GONE. */
 void usb_device_detach(struct usb_device *device);
-/* Back to the state default, at that rate. */
-void usb_device_reset(struct usb_device *device, enum usb_rate rate);
+/* The bus is reset: the device goes back to the state default. */
+void usb_device_reset(struct usb_device *device);
 void usb_device_suspend(struct usb_device *device, int suspended);
 /* For back ends whose host gives no addresses: state default -> addressed. */
 void usb_device_assume_address(struct usb_device *device);
-/* A control transfer. data: OUT, the len bytes that came with it; IN, room for wLength bytes. Returns bytes
- * (IN), 0 (OUT) or USB_STALL. */
+/* Carries out a control transfer. data: OUT, the len bytes that came with it; IN, room for wLength bytes. Returns the
+ * number of bytes (IN), 0 (OUT) or USB_STALL. */
 int usb_device_control(struct usb_device *device, const struct usb_ctrlrequest *setup, uint8_t *data, uint32_t len);
 void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer);
-/* 1: it was pending and completed with USB_CANCELLED within the call; 0: it is not pending (any more). */
+/* Cancels a transfer. Returns 1: it was pending, and completed with USB_CANCELLED within the call; 0: it is not
+ * pending. */
 int usb_device_cancel(struct usb_device *device, uint64_t id);
 
 /* ---- for both */
@@ -106,12 +107,12 @@ int usb_device_cancel(struct usb_device *device, uint64_t id);
 const struct usb_model *usb_device_model(const struct usb_device *device);
 const struct usb_identity *usb_device_identity(const struct usb_device *device);
 enum usb_rate usb_device_rate(const struct usb_device *device);
-/* Why interfaces ended last, or are ending. */
+/* Returns why interfaces ended last, or are ending. */
 enum usb_end usb_device_end(const struct usb_device *device);
-/* 0: not configured. */
+/* Returns USB_CONFIGURATION, or 0 if the device is not configured. */
 int usb_device_configuration(const struct usb_device *device);
 
-/* How often it was attached. */
+/* Returns how often it was attached. */
 uint32_t usb_device_attaches(const struct usb_device *device);
 
 /* ---- injected faults */
@@ -121,14 +122,15 @@ void usb_device_restart(struct usb_device *device);
 /* After a restart, for an endpoint without a pending transfer: the host's next transfer ends as pending ones did, so
  * that the host learns of the reset. due 0 takes that back, since a new reader begins. */
 void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int due);
-/* Halts the endpoint, until the host clears it. 0: there is none now. */
+/* Halts the endpoint, until the host clears the halt. 0: there is no such endpoint now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
- * into the one after it. Until the interface ends. */
+ * into the one after it. This holds until the interface ends. */
 void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
 /* Sets how long each control request takes. 0: it is answered at once. */
 void usb_device_set_slow(struct usb_device *device, double ms);
-/* For back ends, which make requests wait. Whether a request has to; held: those that wait already. */
+/* This and the next four functions are for back ends, which keep the list `held` of requests that wait. Returns whether
+ * another request has to wait. */
 int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held);
 /* Appends a request, with its id set. They are answered one after the other; each takes the time asked for. */
 void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request);
@@ -136,7 +138,7 @@ void usb_hold(const struct usb_device *device, struct usb_transfer **held, struc
 struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id);
 /* Takes out the first request if its time has come; NULL: it has not, or there is none. */
 struct usb_transfer *usb_take_due(struct usb_transfer **held);
-/* When the first one is due; INT64_MAX: there is none. */
+/* Returns when the first one is due; INT64_MAX: there is none. */
 int64_t usb_due_ns(const struct usb_transfer *held);
 /* Makes the configuration descriptor claim n bytes more than it has, with back ends that ask the core for it. */
 void usb_device_lengthen(struct usb_device *device, uint32_t n);
@@ -144,12 +146,12 @@ void usb_device_lengthen(struct usb_device *device, uint32_t n);
 /* ---- for functions. An endpoint that is not there, or is halted, has no room and nothing to read. A suspended device
  * has no room. */
 
-/* Bytes taken by waiting IN transfers, maybe 0. */
+/* Writes to the waiting IN transfers. Returns how many bytes they took, maybe 0. */
 size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void *data, size_t len);
 int usb_device_can_write(const struct usb_device *device, uint8_t endpoint);
 /* Reads bytes of one epoch at a time. */
 size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, size_t len);
-/* Unread bytes of the oldest transfer; *epoch (may be NULL) gets its epoch. */
+/* Returns the number of unread bytes of the oldest transfer; *epoch (may be NULL) gets its epoch. */
 size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
 /* Drops what waits on an OUT endpoint from epochs before the present one. */
 void usb_device_drop(struct usb_device *device, uint8_t endpoint);

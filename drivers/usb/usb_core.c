@@ -116,11 +116,10 @@ void usb_device_detach(struct usb_device *device)
     if (device->state != USB_DETACHED) usb_enter(device, USB_DETACHED, USB_END_UNPLUGGED);
 }
 
-void usb_device_reset(struct usb_device *device, enum usb_rate rate)
+void usb_device_reset(struct usb_device *device)
 {
     if (device->state == USB_DETACHED) return;
     usb_enter(device, USB_DEFAULT, USB_END_RESET);
-    device->rate = rate;
     device->suspended = 0;
 }
 
@@ -162,7 +161,7 @@ void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer)
     }
     append(pipe, transfer);
     if (pipe->first != transfer) return;
-    /* A transfer of no bytes has nothing to wait for; neither has one that takes the end of the write before. */
+    /* A transfer of no bytes ends at once, and so does one that carries the zero-length packet of the write before. */
     if (transfer->length != 0 && !pipe->zero_due) return;
     pipe->zero_due = 0;
     usb_core_finish(device, pipe, USB_OK);
@@ -189,7 +188,7 @@ int usb_device_cancel(struct usb_device *device, uint64_t id)
     return 0;
 }
 
-/* About half of it, such that its last packet is a short one. */
+/* Returns about half of n, so that the last packet is a short one. */
 static uint32_t half_of(uint32_t n, uint32_t packet)
 {
     return n / 2 % packet != 0 ? n / 2 : n / 2 - 1;

@@ -38,9 +38,11 @@ struct usb_device {
 
 /* usb_core.c */
 struct usb_pipe *usb_pipe(struct usb_device *device, unsigned address);
+/* Goes to a state. Interfaces that are active end, and all of them begin if the state is USB_CONFIGURED. */
 void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why);
 /* Ends the interface and begins it again, as SET_INTERFACE does. */
 void usb_restart_interface(struct usb_device *device, unsigned interface);
+/* Halts an endpoint, whose pending transfers end with USB_STALLED; or clears the halt. */
 void usb_set_halt(struct usb_device *device, struct usb_pipe *pipe, int halted);
 
 #endif

@@ -32,7 +32,8 @@ struct usbip {
     int taken;
     uint64_t n_welcomed;
     struct usbip_conn conn[MAX_CONNS];
-    char name[USB_BACKEND_NAME_MAX];
+    char at[USB_BACKEND_NAME_MAX]; /* of the listener, as text */
+    _Atomic unsigned port;         /* of vhci_hcd, as long as it is attached here; other threads ask for the endpoint */
 };
 
 static int attach_here(struct usbip *self, struct sh_err *err)
@@ -54,16 +55,14 @@ static int attach_here(struct usbip *self, struct sh_err *err)
     }
     usbip_conn_start(&self->conn[0], pair[0], self->device, &self->taken);
     usbip_conn_import(&self->conn[0]);
-    snprintf(self->name, sizeof self->name, "usbip:vhci_hcd.0:%u", port);
+    self->port = port;
     return SH_OK;
 }
 
 static int listen_here(struct usbip *self, const struct usb_backend_spec *spec, struct sh_err *err)
 {
-    char at[USB_BACKEND_NAME_MAX - 8] = "";
-    int rc = usb_backend_socket(spec, "usbip", &self->listener, at, sizeof at, err);
+    int rc = usb_backend_socket(spec, "usbip", &self->listener, self->at, sizeof self->at, err);
     if (rc != SH_OK) return rc;
-    snprintf(self->name, sizeof self->name, "usbip:%s", at);
     socket_note_address(self->listener, &self->address);
     self->reserve = socket_reserve();
     return SH_OK;
@@ -93,7 +92,10 @@ static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *de
 static void usbip_endpoint(const void *backend, char *buf, size_t len)
 {
     const struct usbip *self = backend;
-    snprintf(buf, len, "%s", self->name);
+    if (self->here)
+        snprintf(buf, len, "usbip:vhci_hcd.0:%u", self->port);
+    else
+        snprintf(buf, len, "usbip:%s", self->at);
 }
 
 enum { AT_LISTENER = MAX_CONNS, AT_RETRY, N_FDS };
@@ -112,8 +114,8 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
-/* A free place, or that of the connection that has been here longest without importing. There always is one, since
- * at most one host has imported. */
+/* Returns a free place, or ends the connection that has been here longest without importing, and returns its place.
+ * There always is one, since at most one host has imported. */
 static struct usbip_conn *usbip_make_room(struct usbip *self)
 {
     struct usbip_conn *oldest = NULL;
@@ -126,7 +128,7 @@ static struct usbip_conn *usbip_make_room(struct usbip *self)
     return oldest;
 }
 
-static void welcome(struct usbip *self, const struct usb_owner *owner)
+static void usbip_welcome(struct usbip *self, const struct usb_owner *owner)
 {
     const int size = SEND_BUFFER_BYTES;
     for (int i = 0; i < MAX_CONNS; i++) {
@@ -177,7 +179,7 @@ static int usbip_handle(void *backend, const struct pollfd *fds, int n, const st
         if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], owner);
     for (int i = 0; i < MAX_CONNS; i++)
         if (self->conn[i].fd >= 0) usbip_conn_answer_slow(&self->conn[i], owner);
-    if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self, owner);
+    if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) usbip_welcome(self, owner);
     int rc = SH_OK;
     if (fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents) && !self->unplugged)
         rc = attach_again(self, owner);
@@ -196,18 +198,18 @@ static int64_t usbip_due_ns(const void *backend)
 
 /* ---- injected faults */
 
-static int unplug(struct usbip *self)
+static int usbip_unplug(struct usbip *self)
 {
     if (self->unplugged) return SH_ESTATE;
     self->unplugged = 1;
-    if (self->listener >= 0) close(self->listener); /* first: who is cut off finds nobody there */
+    if (self->listener >= 0) close(self->listener); /* first, so that a host that is cut off can't come back at once */
     self->listener = -1;
     for (int i = 0; i < MAX_CONNS; i++)
         usbip_conn_end(&self->conn[i]);
     return SH_OK;
 }
 
-static int plug(struct usbip *self)
+static int usbip_plug(struct usbip *self)
 {
     struct sh_err err;
     if (!self->unplugged) return SH_OK;
@@ -221,8 +223,8 @@ static int plug(struct usbip *self)
 static int usbip_fault(void *backend, enum usb_fault what)
 {
     struct usbip *self = backend;
-    if (what == USB_FAULT_UNPLUG) return unplug(self);
-    if (what == USB_FAULT_PLUG) return plug(self);
+    if (what == USB_FAULT_UNPLUG) return usbip_unplug(self);
+    if (what == USB_FAULT_PLUG) return usbip_plug(self);
     if (!self->taken) return SH_ESTATE;
     usb_device_restart(self->device);
     usbip_flush(self);

@@ -41,7 +41,7 @@ static int errno_of(enum usb_status status)
     return numbers[status];
 }
 
-/* An unlinked URB has no reply of its own: RET_UNLINK says it all. */
+/* An unlinked URB has no reply of its own: RET_UNLINK is the reply. */
 static void on_complete(void *ctx, struct usb_transfer *transfer)
 {
     struct usbip_conn *conn = ctx;
@@ -93,7 +93,7 @@ static int forget_control(struct usbip_conn *conn, uint32_t seqnum)
     return request != NULL;
 }
 
-/* All bytes of it are here. */
+/* Carries out a SUBMIT, once all its bytes are here. */
 static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
 {
     const unsigned number = be_get32(conn->head + 16);

@@ -78,8 +78,8 @@ int usbip_conn_is_full(const struct usbip_conn *conn);
 void usbip_conn_write(struct usbip_conn *conn);
 /* Answers control requests whose time has come, until go_on says 0. */
 void usbip_conn_answer_slow(struct usbip_conn *conn, const struct usb_owner *owner);
-/* Sends the queue and waits until the peer has taken it and hung up, timeout_ms at most for each step. Closing
- * with unread requests of the peer would throw away replies on their way. */
+/* Sends the queue and waits until the peer has taken it and hung up, timeout_ms at most for each step
+ * (usb_backend_hang_up). */
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
 /* Detaches the device if it was imported here, and frees everything. */
 void usbip_conn_end(struct usbip_conn *conn);
@@ -117,7 +117,7 @@ void usbip_queue_clear(struct usbip_conn *conn);
 
 /* ---- usbip_ops.c */
 
-/* Number of bytes that the operation needs, as far as those in conn->head say it. */
+/* Returns how many bytes the operation has, as far as those in conn->head say it. */
 uint32_t usbip_op_need(const struct usbip_conn *conn);
 /* Carries out the operation, whose bytes are all in conn->head. */
 void usbip_op_take(struct usbip_conn *conn);

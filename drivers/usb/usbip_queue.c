@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Memory of a connection, and its replies: in the order in which they were queued, whatever pieces the socket
- * takes. */
+/* Keeps the URBs of a connection within their limits, and sends its replies in the order in which they were queued. */
 #include <errno.h>
 #include <stdlib.h>
 #include <sys/socket.h>

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The usbredir back end: the device for a virtual machine (QEMU's usb-redir), over a Unix socket or TCP; no
- * root needed. One guest at a time; one that has not said hello yet gives way to the next that comes.
+ * root needed. It serves one guest at a time; one that has not sent its hello yet gives way to the next that comes.
  * libusbredirparser does the wire format, which spice/usbredir's usb-redirection-protocol.md describes; this
  * is its "usb-host" end.
  *
- * Connecting instead of listening (attach), the device connects again when the guest hangs up. */
+ * Where it connects instead of listening (attach), it connects again after the guest has hung up. */
 #include "drivers/usb/backend.h"
 
 #ifdef HAVE_USBREDIR
@@ -69,7 +69,7 @@ static void on_log(void *priv, int level, const char *text)
 /* ---- connections */
 
 /* fd is connected; SH_ENOMEM: it stays the caller's. */
-static int start(struct usbredir *self, int fd)
+static int usbredir_start(struct usbredir *self, int fd)
 {
     static char version[] = "scanhead";
     const int size = SEND_BUFFER_BYTES;
@@ -95,7 +95,7 @@ static int start(struct usbredir *self, int fd)
     return SH_OK;
 }
 
-static void stop(struct usbredir *self)
+static void usbredir_stop(struct usbredir *self)
 {
     if (self->parser != NULL) {
         usb_device_detach(self->device);
@@ -111,9 +111,9 @@ static void stop(struct usbredir *self)
 /* The attempt to connect self->fd has ended. error: 0, or the errno of its failure. */
 static int end_connect(struct usbredir *self, int error)
 {
-    if (error == 0 && start(self, self->fd) == SH_OK) return usb_retry_done(&self->retry, self->owner);
+    if (error == 0 && usbredir_start(self, self->fd) == SH_OK) return usb_retry_done(&self->retry, self->owner);
     usb_retry_failed(&self->retry, error != 0 ? strerror(error) : "no memory", self->owner);
-    stop(self);
+    usbredir_stop(self);
     return SH_OK;
 }
 
@@ -125,12 +125,12 @@ static int connect_again(struct usbredir *self)
     return error == EINPROGRESS ? SH_OK : end_connect(self, error);
 }
 
-static void welcome(struct usbredir *self)
+static void usbredir_welcome(struct usbredir *self)
 {
     int fd = usb_backend_accept(self->listener, &self->reserve, self->owner);
     if (fd < 0) return;
-    stop(self); /* one that has not said hello */
-    if (start(self, fd) != SH_OK) close(fd);
+    usbredir_stop(self); /* a guest that has not sent its hello */
+    if (usbredir_start(self, fd) != SH_OK) close(fd);
 }
 
 /* ---- the back end */
@@ -168,7 +168,7 @@ static int open_socket(struct usbredir *self, const struct usb_backend_spec *spe
     }
     usb_backend_peer(spec, fd, &self->peer);
     rc = usb_retry_open(&self->retry, "usbredir", spec->retry_ms, err);
-    if (rc == SH_OK && start(self, fd) != SH_OK) rc = sh_fail(err, SH_ENOMEM, "usbredir: no memory");
+    if (rc == SH_OK && usbredir_start(self, fd) != SH_OK) rc = sh_fail(err, SH_ENOMEM, "usbredir: no memory");
     if (rc != SH_OK) close(fd);
     return rc;
 }
@@ -221,13 +221,13 @@ static int usbredir_handle(void *backend, const struct pollfd *fds, int n, const
     else if (self->parser != NULL && (fds[AT_GUEST].revents & ~POLLOUT) != 0 &&
              usbredirparser_do_read(self->parser) != 0)
         self->broken = 1;
-    if (!self->greeted && fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) welcome(self);
+    if (!self->greeted && fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) usbredir_welcome(self);
     if (rc == SH_OK && fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents))
         rc = connect_again(self);
     usbredir_answer_slow(self);
     usbredir_flush(self);
     if (!self->broken) return rc;
-    stop(self);
+    usbredir_stop(self);
     return self->listener >= 0 || rc != SH_OK ? rc : usb_retry_start(&self->retry, self->owner);
 }
 
@@ -239,7 +239,7 @@ static int64_t usbredir_due_ns(const void *backend)
 
 /* ---- injected faults. The channel to the virtual machine stays: the device alone is unplugged from it. */
 
-static int unplug(struct usbredir *self)
+static int usbredir_unplug(struct usbredir *self)
 {
     if (self->unplugged) return SH_ESTATE;
     self->unplugged = 1;
@@ -251,7 +251,7 @@ static int unplug(struct usbredir *self)
     return SH_OK;
 }
 
-static int plug(struct usbredir *self)
+static int usbredir_replug(struct usbredir *self)
 {
     if (!self->unplugged) return SH_OK;
     self->unplugged = 0;
@@ -265,11 +265,11 @@ static int plug(struct usbredir *self)
 static int usbredir_fault(void *backend, enum usb_fault what)
 {
     struct usbredir *self = backend;
-    if (what == USB_FAULT_UNPLUG) return unplug(self);
-    if (what == USB_FAULT_PLUG) return plug(self);
+    if (what == USB_FAULT_UNPLUG) return usbredir_unplug(self);
+    if (what == USB_FAULT_PLUG) return usbredir_replug(self);
     if (!self->greeted || self->unplugged) return SH_ESTATE;
-    unplug(self);
-    return plug(self);
+    usbredir_unplug(self);
+    return usbredir_replug(self);
 }
 
 static void usbredir_close(void *backend)
@@ -284,7 +284,7 @@ static void usbredir_close(void *backend)
             usbredir_flush(self);
         if (!self->broken) usb_backend_hang_up(self->fd, CLOSE_WAIT_MS);
     }
-    stop(self);
+    usbredir_stop(self);
     remove_path(self);
     if (self->listener >= 0) close(self->listener);
     if (self->reserve >= 0) close(self->reserve);

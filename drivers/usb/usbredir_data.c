@@ -107,7 +107,7 @@ static const struct usb_endpoint_row *find_endpoint(const struct usbredir *self,
     return NULL;
 }
 
-/* A bulk packet to an endpoint of another type is refused; to one that is not there, it fails at the core. */
+/* Refuses a bulk packet to an endpoint of another type. One to an endpoint that is not there fails at the core. */
 static int refuse_bulk(struct usbredir *self, uint64_t id, struct usb_redir_bulk_packet_header *header)
 {
     const struct usb_endpoint_row *row = self->greeted ? find_endpoint(self, header->endpoint) : NULL;
@@ -142,7 +142,7 @@ static void on_bulk(void *priv, uint64_t id, struct usb_redir_bulk_packet_header
     usb_device_submit(self->device, &transfer->transfer);
 }
 
-/* The packet is an OUT; IN packets are received as started. No model has such an endpoint, so each is refused. */
+/* A guest sends such a packet only to an interrupt OUT endpoint. No model has one, so each packet is refused. */
 static void on_interrupt(void *priv, uint64_t id, struct usb_redir_interrupt_packet_header *header, uint8_t *data,
                          int len)
 {

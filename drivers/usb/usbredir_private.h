@@ -38,20 +38,20 @@ struct usbredir {
 
 /* usbredir_requests.c */
 void usbredir_take_requests(struct usbredirparser *parser);
-/* 1: the packet came before the hello, and the connection is now marked broken. The library passes on such packets. */
+/* Whether a packet came before the hello; the library passes on such packets. The connection is then marked broken. */
 int usbredir_is_early(struct usbredir *self);
 
-/* Gives the device to the guest, which has said hello. */
+/* Gives the device to the guest, whose hello has come. */
 void usbredir_plug(struct usbredir *self);
 /* Answers requests whose time has come, until go_on says 0. */
 void usbredir_answer_slow(struct usbredir *self);
-/* 1: the request was held, and is answered as cancelled. */
+/* Cancels a request that is held. Returns 1: it is answered as cancelled; 0: none of that id is held. */
 int usbredir_cancel_slow(struct usbredir *self, uint64_t id);
 void usbredir_forget_slow(struct usbredir *self);
 
 /* usbredir_data.c */
 void usbredir_take_data(struct usbredirparser *parser);
-/* usb_complete of all transfers. */
+/* This is the usb_complete of all transfers. */
 void usbredir_on_complete(void *ctx, struct usb_transfer *transfer);
 
 #endif

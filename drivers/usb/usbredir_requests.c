@@ -87,7 +87,7 @@ static void on_reset(void *priv)
 {
     struct usbredir *self = priv;
     if (usbredir_is_early(self)) return;
-    usb_device_reset(self->device, usb_device_rate(self->device));
+    usb_device_reset(self->device);
     usb_device_assume_address(self->device);
 }
 
@@ -148,7 +148,7 @@ struct redir_request {
 };
 
 /* Takes the data over. */
-static void answer(struct usbredir *self, struct redir_request *r)
+static void usbredir_requests_answer(struct usbredir *self, struct redir_request *r)
 {
     if (r->kind == SET_CONFIGURATION)
         set_configuration(self, r->id, &r->header);
@@ -178,7 +178,7 @@ static void usbredir_requests_take(struct usbredir *self, struct redir_request r
     if (usb_has_to_wait(self->device, self->held))
         hold(self, &r);
     else
-        answer(self, &r);
+        usbredir_requests_answer(self, &r);
 }
 
 static void free_held(struct usbredir *self, struct redir_request *r)
@@ -192,7 +192,7 @@ void usbredir_answer_slow(struct usbredir *self)
     struct usb_transfer *request;
     while (!self->broken && self->held != NULL && self->owner->go_on(self->owner->ctx) &&
            (request = usb_take_due(&self->held)) != NULL) {
-        answer(self, (struct redir_request *)request);
+        usbredir_requests_answer(self, (struct redir_request *)request);
         free_held(self, (struct redir_request *)request);
     }
 }

@@ -122,7 +122,7 @@ static void act(struct host *host, struct fuzz_bytes *in)
         usb_device_cancel(device, host->next_id - 1 - fuzz_u8(in));
         break;
     case 8:
-        usb_device_reset(device, rate);
+        usb_device_reset(device);
         break;
     case 9:
         usb_device_suspend(device, (int)(what >> 7));

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* libscanhead: commands over a socket pair, a pty and TCP. */
 #include <arpa/inet.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <pthread.h>
 
+#include "drivers/host/source.h"
 #include "tests/unit/host_rig.h"
 
 /* ---- commands: a thread plays the head, by script */
@@ -260,6 +262,53 @@ static void test_tcp6(void **state)
     check_tcp(AF_INET6, "[::1]");
 }
 
+/* ---- a source without a head, where a signal interrupts each wait */
+
+static ssize_t read_nothing(struct host_source *source, void *to, size_t len)
+{
+    (void)source, (void)to, (void)len;
+    errno = EAGAIN;
+    return -1;
+}
+
+static ssize_t write_all(struct host_source *source, const void *data, size_t len)
+{
+    (void)source, (void)data;
+    return (ssize_t)len;
+}
+
+enum { MOST_WAITS = 1000 }; /* more of them are waits without end */
+static int n_waits;
+
+static int interrupted_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
+{
+    (void)source, (void)events, (void)revents;
+    errno = ++n_waits < MOST_WAITS ? EINTR : EIO;
+    return deadline_ns < host_deadline_ns(0) ? 0 : -1;
+}
+
+static void close_nothing(struct host_source *source)
+{
+    (void)source;
+}
+
+static void test_signal(void **state)
+{
+    (void)state;
+    static const struct host_source_ops ops = {
+        .read = read_nothing, .write = write_all, .wait = interrupted_wait, .close = close_nothing};
+    for (int unsettled = 0; unsettled < 2; unsettled++) { /* 1: the wait is for the library's own question */
+        const struct host_source source = {.ops = &ops, .fd = -1, .unsettled = unsettled, .name = "tcp:test:1"};
+        struct scanhead *sh = host_open(&source);
+        char reply[64];
+        assert_non_null(sh);
+        n_waits = 0;
+        assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, -1), SCANHEAD_ETIMEOUT);
+        assert_string_equal(scanhead_error(sh), "tcp:test:1: a signal interrupted the wait");
+        scanhead_close(sh);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -269,6 +318,7 @@ int main(void)
         cmocka_unit_test(test_pty),
         cmocka_unit_test(test_tcp),
         cmocka_unit_test(test_tcp6),
+        cmocka_unit_test(test_signal),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* libscanhead's notices of connections that end and begin anew. */
 #include <arpa/inet.h>
+#include <errno.h>
 
+#include "drivers/host/source.h"
 #include "tests/unit/notices_rig.h"
 
 enum { EVENT = NOTICES_EVENT };
@@ -163,13 +165,42 @@ static void test_reattach(void **state)
     scanhead_close(sh);
 }
 
+static int read_error;
+
+static ssize_t failing_read(struct host_source *source, void *to, size_t len)
+{
+    (void)source, (void)to, (void)len;
+    errno = read_error;
+    return -1;
+}
+
+static void close_nothing(struct host_source *source)
+{
+    (void)source;
+}
+
+/* Each of these is how TCP gives a connection up (tcp(7), ip(7)): after it, reattaching is right. */
+static void test_ways_to_end(void **state)
+{
+    (void)state;
+    static const struct host_source_ops ops = {.read = failing_read, .close = close_nothing};
+    static const int errors[] = {ECONNRESET, ETIMEDOUT, EHOSTUNREACH, ENETUNREACH, ENETDOWN};
+    for (size_t i = 0; i < sizeof errors / sizeof errors[0]; i++) {
+        struct scanhead *sh = host_open(&(struct host_source){.ops = &ops, .fd = -1, .name = "tcp:test:1"});
+        struct scanhead_frame f;
+        assert_non_null(sh);
+        read_error = errors[i];
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_ECLOSED);
+        scanhead_close(sh);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_given_up_before),
-        cmocka_unit_test(test_identity_before),
-        cmocka_unit_test(test_reader_lost),
-        cmocka_unit_test(test_reattach),
+        cmocka_unit_test(test_given_up_before), cmocka_unit_test(test_identity_before),
+        cmocka_unit_test(test_reader_lost),     cmocka_unit_test(test_reattach),
+        cmocka_unit_test(test_ways_to_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <termios.h>
 #include <unistd.h>
 #include <cmocka.h>
@@ -269,11 +270,46 @@ static void test_slow_head(void **state)
     assert_true(head.identities >= 3);
 }
 
+/* Makes a terminal, and path a symlink to it. Returns its master. */
+static int make_terminal_at(const char *path)
+{
+    const int master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+    assert_true(master >= 0 && grantpt(master) == 0 && unlockpt(master) == 0);
+    unlink(path);
+    assert_int_equal(symlink(ptsname(master), path), 0);
+    return master;
+}
+
+/* A head is found again by the whole of its name. */
+static void test_long_path(void **state)
+{
+    (void)state;
+    char top[] = "/tmp/test_host_tty.XXXXXX", dir[300], path[600], source[620], err[256];
+    struct scanhead *sh;
+    struct scanhead_frame frame;
+    assert_non_null(mkdtemp(top));
+    snprintf(dir, sizeof dir, "%s/%0200d", top, 0);
+    snprintf(path, sizeof path, "%s/%0200d", dir, 0);
+    snprintf(source, sizeof source, "tty:%s", path);
+    assert_int_equal(mkdir(dir, 0700), 0);
+    int master = make_terminal_at(path);
+    assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
+    close(master);
+    assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ECLOSED);
+    master = make_terminal_at(path);
+    assert_int_equal(scanhead_reattach(sh, 0), 0);
+    scanhead_close(sh);
+    close(master);
+    unlink(path);
+    rmdir(dir);
+    rmdir(top);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_replies_in_order), cmocka_unit_test(test_slow_head), cmocka_unit_test(test_half_a_frame),
-        cmocka_unit_test(test_frames_after),     cmocka_unit_test(test_late_head),
+        cmocka_unit_test(test_frames_after),     cmocka_unit_test(test_late_head), cmocka_unit_test(test_long_path),
     };
     return cmocka_run_group_tests_name("host_tty", tests, NULL, NULL);
 }

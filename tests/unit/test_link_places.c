@@ -10,9 +10,11 @@
 #include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 
+#include "drivers/host/scanhead.h"
 #include "drivers/socket/socket.h"
 #include "drivers/socket/stamped.h"
 #include "drivers/usb/backend.h"
@@ -182,11 +184,12 @@ static void packets_come_from_the_receivers_network(void **state)
 
 static int own_port;                /* each socket gets this port; 0: the system's choice */
 static int is_interrupted, n_tries; /* connect() is; its calls */
+static int last_socket;             /* the newest one */
 
 int socket(int family, int type, int protocol)
 {
     const struct sockaddr_in at = loopback(own_port);
-    const int fd = (int)syscall(SYS_socket, family, type, protocol);
+    const int fd = last_socket = (int)syscall(SYS_socket, family, type, protocol);
     if (own_port != 0) assert_int_equal(bind(fd, (const struct sockaddr *)&at, sizeof at), 0);
     return fd;
 }
@@ -228,13 +231,24 @@ static int opens_stamped(const char *host, int port, struct sh_err *err)
     return rc == SH_OK;
 }
 
-static int (*const ways[])(const char *host, int port, struct sh_err *err) = {opens, opens_stamped};
+static int opens_host(const char *host, int port, struct sh_err *err)
+{
+    char source[64];
+    struct scanhead *sh;
+    snprintf(source, sizeof source, "tcp:%s:%d", host, port);
+    const int rc = scanhead_open(source, &sh, err->text, sizeof err->text);
+    scanhead_close(sh);
+    return rc == SCANHEAD_OK;
+}
+
+enum { WITH_SIGNALS = 2, ALL = 3 }; /* libscanhead does not block in connect(), so no signal interrupts it there */
+static int (*const ways[ALL])(const char *host, int port, struct sh_err *err) = {opens, opens_stamped, opens_host};
 
 /* The system gives the socket the port that it connects to, where nobody listens. */
 static void nobody_is_connected_to_itself(void **state)
 {
     (void)state;
-    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+    for (int i = 0; i < ALL; i++) {
         const int port = find_free_port();
         struct sh_err err = {0};
         own_port = port;
@@ -245,11 +259,41 @@ static void nobody_is_connected_to_itself(void **state)
     }
 }
 
+/* Returns the number of an option of the newest socket. */
+static int option(int level, int name)
+{
+    int value = 0;
+    socklen_t len = sizeof value;
+    assert_int_equal(getsockopt(last_socket, level, name, &value, &len), 0);
+    return value;
+}
+
+/* A head that loses power says nothing. So its client asks: 10 s of silence, then three questions 5 s apart. */
+static void a_client_learns_that_its_head_has_vanished(void **state)
+{
+    (void)state;
+    struct sockaddr_in at = loopback(0);
+    socklen_t len = sizeof at;
+    struct scanhead *sh;
+    char source[64], err[256];
+    const int door = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(door, (struct sockaddr *)&at, len), 0);
+    assert_int_equal(listen(door, 1), 0);
+    assert_int_equal(getsockname(door, (struct sockaddr *)&at, &len), 0);
+    snprintf(source, sizeof source, "tcp:127.0.0.1:%d", ntohs(at.sin_port));
+    assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
+    assert_int_equal(option(SOL_SOCKET, SO_KEEPALIVE), 1);
+    assert_int_equal(
+        option(IPPROTO_TCP, TCP_KEEPIDLE) + option(IPPROTO_TCP, TCP_KEEPINTVL) * option(IPPROTO_TCP, TCP_KEEPCNT), 25);
+    scanhead_close(sh);
+    close(door);
+}
+
 /* A signal ends the attempt: the name's second address is not tried. */
 static void a_signal_ends_all_attempts(void **state)
 {
     (void)state;
-    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+    for (int i = 0; i < WITH_SIGNALS; i++) {
         struct sh_err err = {0};
         is_interrupted = 1;
         n_tries = 0;
@@ -267,6 +311,7 @@ int main(void)
         cmocka_unit_test(datagrams_go_by_ipv4),
         cmocka_unit_test(packets_come_from_the_receivers_network),
         cmocka_unit_test(nobody_is_connected_to_itself),
+        cmocka_unit_test(a_client_learns_that_its_head_has_vanished),
         cmocka_unit_test(a_signal_ends_all_attempts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -165,7 +165,7 @@ static void test_effects(void **state)
         host_control(host, 0x82, 0, 0, 0x82, 2, NULL);
         assert_int_equal(le_get16(host_in), 0);
     }
-    usb_device_reset(host->device, USB_RATE_HIGH);
+    usb_device_reset(host->device);
     assert_true(!host->active[0] && !host->active[1]);
     assert_int_equal(host_control(host, 0x80, 8, 0, 0, 1, NULL), USB_STALL); /* default state */
     host_configure(host);
@@ -206,7 +206,7 @@ static void test_all(void **state)
                     fail_msg("request %02x %02x is answered", type, request);
                 if ((type & USB_TYPE_MASK) == USB_TYPE_MASK || (type & 0x1f) > 3) fail_msg("type %02x", type);
                 if (usb_device_configuration(host->device) == 0) {
-                    usb_device_reset(host->device, USB_RATE_SUPER);
+                    usb_device_reset(host->device);
                     host_configure(host);
                 }
             }

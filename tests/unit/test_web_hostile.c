@@ -89,6 +89,7 @@ static const struct {
     CASE("GET http://@/scene HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n", 200),
     CASE("GET http://elsewhere.example/scene HTTP/1.1\r\n" HOST "\r\n", 421),
     CASE("GET /scene HTTP/1.0\r\n\r\n", 421),
+    CASE("GET /scene HTTP/1.0\r\nOrigin: http://\r\n\r\n", 0), /* an Origin is never that of no Host: no byte */
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 8\r\n\r\n",
          426),
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n\r\n",
@@ -106,7 +107,7 @@ static void test_requests(void **state)
     for (size_t i = 0; i < sizeof requests / sizeof *requests; i++) {
         const int status = send_raw(&bench, place, requests[i].text, requests[i].len, answer, sizeof answer);
         if (status != requests[i].status) fail_msg("%s: %d, not %d", requests[i].text, status, requests[i].status);
-        assert_non_null(strstr(answer, "connection: close"));
+        if (status != 0) assert_non_null(strstr(answer, "connection: close"));
         if (status == 405) assert_non_null(strstr(answer, "\r\nallow: GET, HEAD\r\n"));
         if (status == 426) assert_non_null(strstr(answer, "\r\nsec-websocket-version: 13\r\n"));
     }

@@ -48,6 +48,9 @@ def misuse(path):
     head, theirs = pair()
     threading.Timer(0.05, theirs.close).start()
     refused(head.next_frame, 1e300)  # longer than poll() can wait
+    connected_to_itself()
+    keeps_alive()
+    oldest_gap()
     for lines in (["HEAD:PRR?"], [":*idn?"], ["HEAD:PRR?", "*IDN?"]):
         late_replies(lines)
     late_answer()
@@ -55,6 +58,42 @@ def misuse(path):
     dropped_frames()
     whole_frame()
     print("refused")
+
+
+def connected_to_itself():
+    """Where nobody listens, the system may give a socket the same port that it connects to. TCP then connects it to
+    itself. Here the socket asks for that port."""
+    connect = socket.create_connection
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    socket.create_connection = lambda at, timeout_s: connect(at, timeout_s, source_address=at)
+    try:
+        refused(scanhead.open, f"tcp:127.0.0.1:{port}")
+    finally:
+        socket.create_connection = connect
+
+
+def keeps_alive():
+    """A head that loses power says nothing. After 10 s of silence its client asks three times, 5 s apart."""
+    with socket.create_server(("127.0.0.1", 0)) as door:
+        with scanhead.open(f"tcp:127.0.0.1:{door.getsockname()[1]}") as head:
+            ours = head._source.owner
+            assert ours.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+            idle_s, interval_s, probes = (ours.getsockopt(socket.IPPROTO_TCP, option) for option in (
+                socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT))
+            assert idle_s + interval_s * probes == 25
+
+
+def oldest_gap():
+    """A late frame cuts the oldest of 64 gaps in two: the next oldest makes room, and frames of both parts are late."""
+    sequence = scanhead._Sequence()
+    assert sequence.take((0, 0, 0)) == ("", 0, 1)
+    for i in range(1, 65):
+        assert sequence.take((4 * i, 0, i)) == ("gap", 4 * i - 3, 3)
+    for seq in (2, 1, 3):
+        assert sequence.take((seq, 0, -seq)) == ("late", seq, 1)
+    assert sequence.take((6, 0, -6)) == ("restarted", 6, 1)
 
 
 def late_replies(lines):

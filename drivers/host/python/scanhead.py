@@ -21,6 +21,7 @@ Memory is bounded: one frame of bytes (64 KiB), 64 MiB of frames that came while
 import array
 import bisect
 import collections
+import errno
 import hashlib
 import math
 import os
@@ -57,10 +58,11 @@ _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
 _SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
 _FRAME_BYTES = 512  # memory of a kept frame beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
-_ANSWERS_S, _ASK_AGAIN_S = 0.2, 1.0  # after one answer to *IDN?, how long the others may take; without any
+_ANSWERS_S = 0.2  # how long further answers to *IDN? may take after the first one
+_ASK_AGAIN_S = 1.0  # how long the first one may take before *IDN? is asked again
 _SCANNING, _SPIN_DOWN = 4, 5  # states of the head
 _NAN = math.nan
-_NO_WAIT = -math.inf  # a deadline: bytes that are there are taken, all of them
+_NO_WAIT = -math.inf  # a deadline: all bytes that have come are taken, and nothing is waited for
 
 
 class ScanheadError(Exception):
@@ -117,9 +119,9 @@ def _crc_pure(data: bytes) -> int:
 
 
 def _crc_numpy(data: bytes) -> int:
-    """Rows of 256 bytes: each byte's share by its place, the rows then one after the other. Zeros before the
-    message add nothing, so the first row is filled up with them. The register's start is XORed into the
-    message's first 4 bytes."""
+    """Looks up the share of each byte by its place in a row of 256 bytes. Then it goes through the rows one after the
+    other. Zeros before the message add nothing, so the first row is filled up with them. The register's start is
+    XORed into the message's first 4 bytes."""
     rows = -(-len(data) // _ROW)
     padded = np.zeros(rows * _ROW, dtype=np.uint8)
     padded[rows * _ROW - len(data):] = np.frombuffer(data, dtype=np.uint8)
@@ -138,7 +140,8 @@ def crc32c(data: bytes) -> int:
 
 
 def _shift_tables() -> List[List[List[int]]]:
-    """Level k, place i: what byte i of a register becomes when 2^k zero bytes follow; linear."""
+    """Entry [k][i][v] is the register after 2^k zero bytes, if its byte i was v and the others were 0. The CRC is
+    linear: for a whole register the four entries are XORed."""
     levels = [[[_crc_table[0][v << 8 * i & 255] ^ v << 8 * i >> 8 for v in range(256)] for i in range(4)]]
     for _ in range(16):
         a, b, c, d = levels[-1]
@@ -149,7 +152,7 @@ def _shift_tables() -> List[List[List[int]]]:
 
 class _RunningCrc:
     """Sums each byte of a buffer once, and gives the CRC of any piece of it. Damaged and hostile streams need this:
-    their wrong payloads may overlap, up to 65536 for a byte."""
+    their wrong payloads may overlap, and a byte may lie in 65536 of them."""
     _shifts = None  # type: Optional[List[List[List[int]]]]
 
     def __init__(self) -> None:
@@ -241,7 +244,7 @@ def _take(layout, payload: bytes, offset: int) -> Dict[str, object]:
 
 
 def _decode(kind: int, payload: bytes) -> Dict[str, object]:
-    """The fixed part of a payload by its names. What follows the part that is known is left alone."""
+    """Returns the fields of a payload's fixed part. Bytes after the parts that are known are ignored."""
     form = _UNPACK[kind][0]
     if len(payload) < form.size:
         raise ScanheadError(f"a frame of type {kind} with {len(payload)} bytes; {form.size} are the least")
@@ -280,7 +283,7 @@ class Notice(NamedTuple):
         bad bytes    n bytes that belong to nothing
         cut          the stream ended within a frame or a line; n bytes of it
         echo         the command that was sent came back before its reply
-        late reply   a reply to a command that was given up; unasked: one to none
+        late reply   a reply to a command that was given up; unasked: a reply to no command
         closed       the connection is over
     at_byte: where it begins in all bytes that came; of a gap, the frame that came instead. t_ns: device time of
     the frame that it is about, or else of the last whole frame before; None: none came yet."""
@@ -336,6 +339,8 @@ class _Sequence:
             before = (seq - gap[0]) % 2**32
             if before < gap[1]:
                 rest, gap[1] = gap[1] - before - 1, before
+                if gap is self._gaps[0] and len(self._gaps) == _GAPS:
+                    self._gaps.rotate(-1)  # it stays, and the next oldest makes room for its second part
                 self._add_gap((seq + 1) % 2**32, rest)
                 return True
         return False
@@ -353,7 +358,7 @@ class _Sequence:
 
 
 class _Bad:
-    """Bytes that belong to nothing, one after the other. most: the length of a broken frame, as its header says."""
+    """A run of bytes that belong to no frame or line. most: the length of a broken frame, as its header says."""
 
     def __init__(self, kind: str, at_byte: int, t_ns: Optional[int], seq: Optional[int] = None,
                  most: float = math.inf) -> None:
@@ -444,7 +449,7 @@ class Parser:
         end = sync if sync >= 0 else len(self._bytes)
         at_byte, n = self._at_byte(), end - self._at
         self.bad_bytes += n
-        if self._bad is not None and self._bad.n + n > self._bad.most:  # what is beyond is another thing
+        if self._bad is not None and self._bad.n + n > self._bad.most:  # bytes beyond the broken frame: another run
             own = int(self._bad.most) - self._bad.n
             self._bad.n += own
             at_byte, n = at_byte + own, n - own
@@ -513,7 +518,7 @@ class Parser:
 
 
 class _Dropped:
-    """In place of a frame that is repeated or late."""
+    """Stands for a frame that is repeated or late, and not given."""
 
 
 _DROPPED = _Dropped()
@@ -611,8 +616,8 @@ if np is not None:
 
 
 def _sincos(turns):
-    """sin and cos of turns >= 0, a float or an array: whole 1/256 turns by table, the rest by its series,
-    whose next terms are below 2^-56. libscanhead computes the same, in the same order."""
+    """sin and cos of turns >= 0, a float or an array. A table has whole 1/256 turns, and a series the rest; its next
+    terms are below 2^-56. libscanhead computes the same, in the same order."""
     part = turns * _PARTS
     if np is not None and isinstance(turns, np.ndarray):
         k = (part + 0.5).astype(np.int64)
@@ -747,7 +752,7 @@ def _distance(a, b) -> float:
 # ---- poses of a moving head
 
 def _rotation(q) -> Tuple[float, ...]:
-    """Row by row, of the unit quaternion w, x, y, z."""
+    """The rotation matrix of the unit quaternion w, x, y, z, row by row."""
     w, x, y, z = q
     return (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
             2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
@@ -781,7 +786,7 @@ class Pose(NamedTuple):
 
 
 class _Leg(NamedTuple):
-    """From one pose to the next: the turn's axis is in the head's frame."""
+    """The motion from one pose to the next. The turn's axis is in the head's frame."""
     a: Pose
     b: Pose
     rotation: Tuple[float, ...]
@@ -845,7 +850,7 @@ class _Poses:
 
 
 def _place_moving(leg: _Leg, t_ns: int, v) -> Tuple[float, float, float]:
-    """Rodrigues' formula in the head's frame, then the rotation at the leg's begin."""
+    """Turns v by Rodrigues' formula in the head's frame, then by the rotation at the leg's begin."""
     f = leg.fraction(t_ns)
     angle = f * leg.angle_rad
     s, versine = math.sin(angle), 1 - math.cos(angle)
@@ -909,7 +914,8 @@ def _conformal(tau, m):
 
 
 def _geographic(tau_c, m):
-    """The way back, by Newton's method: five steps from anywhere (Karney's equations 19 to 21)."""
+    """The inverse of _conformal, by Newton's method. Five steps are enough at any latitude (Karney's equations 19 to
+    21)."""
     tau = tau_c / (1 - _E2)
     for _ in range(5):
         now = _conformal(tau, m)
@@ -970,7 +976,8 @@ class _Grid:
 
 
 def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
-    """The EPSG code of the grid in which the place has the station's coordinates: that of the scene."""
+    """Returns the EPSG code of the scene's grid: the one in which the place has the station's coordinates. None: the
+    scene is in no grid."""
     zone = int((lon_deg + 180) // 6)
     codes = [side + (zone + k) % 60 + 1 for side in (32600, 32700) for k in (-1, 0, 1)] + [32661, 32761]
     for epsg in codes:
@@ -981,8 +988,8 @@ def _grid_of(station_m, lat_deg: float, lon_deg: float) -> Optional[int]:
 
 
 class _Earth:
-    """From the scene to the CRS and back, as the anchor says: exact but for rounding, the series' 0.1 um, and
-    a geoid that is taken to be as high everywhere as at the station."""
+    """Takes places from the scene to the CRS and back, as the anchor says. Errors are those of rounding, 0.1 um of
+    the series, and the geoid, which is taken to be as high everywhere as at the station."""
 
     def __init__(self, anchor: Dict, layout: int) -> None:
         self.crs, self.station_m = anchor["crs"], anchor["station_m"]
@@ -1084,8 +1091,15 @@ def _open_source(name: str, timeout_s: float) -> _Source:
         if not host or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
             raise ScanheadError(f"{name}: not tcp:HOST:PORT with a port of 1 to 65535")
         connection = socket.create_connection((host.strip("[]"), int(port)), timeout_s)
+        if connection.getsockname() == connection.getpeername():  # nobody listens, and the system chose the same port
+            connection.close()
+            raise ConnectionRefusedError(errno.ECONNREFUSED, os.strerror(errno.ECONNREFUSED))
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)  # a head that vanishes ends the connection
+        for option, value in (("TCP_KEEPIDLE", 10), ("TCP_KEEPINTVL", 5), ("TCP_KEEPCNT", 3)):
+            if hasattr(socket, option):  # else after the system's own time
+                connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, option), value)
         return _Source(name, connection.fileno(), connection)
     if kind == "tty":
         return _Source(name, _open_tty(rest))
@@ -1130,7 +1144,7 @@ class Head:
         self._sha256 = hashlib.sha256()
         self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = self._points_time = None
         self._last_seq, self._last_repeated = None, 0  # of a frame that is not LOCAL; how many were repeated up to it
-        self._told_alone = False  # since then a descriptor came for this reader alone
+        self._told_alone = False  # whether a descriptor for this reader alone came after _last_seq
         self._scan, self.scan_over = None, False  # the number of the present scan; whether it ends with this frame
 
     def __enter__(self) -> "Head":
@@ -1304,7 +1318,7 @@ class Head:
             while done < len(data):
                 try:
                     done += os.write(self._source.fd, data[done:])
-                except BlockingIOError:  # a head that waits to write itself is read on
+                except BlockingIOError:  # the head may wait to write, too, so its bytes are read meanwhile
                     self._wait_writable(deadline_s)
         except Timeout:
             raise
@@ -1372,8 +1386,8 @@ class Head:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
-        """The next frame; None at a recording's end. Reply lines are noticed: nobody waits for them. timeout_s 0: a
-        frame that has come, in however many pieces."""
+        """The next frame; None at a recording's end. Nobody waits for reply lines here, so each gives a notice.
+        timeout_s 0: only a frame that has come whole, even if it came in many pieces."""
         deadline_s = None if timeout_s is None else _NO_WAIT if timeout_s <= 0 else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:
@@ -1408,9 +1422,10 @@ class Head:
         return frame
 
     def _follow_sequence(self, frame: Frame) -> None:
-        """Forgets what the stream said where its numbers go back: the head has started again, or recordings were put
-        one after the other. Where the new sequence began with frames equal to those before, they said the same. And what
-        a descriptor for this reader alone has said just before is about the new sequence."""
+        """Forgets the state where the numbers of frames go back: the head has started again, or recordings were put
+        one after the other. The state is kept in two cases. If the new sequence began with frames equal to those
+        before, they said the same. If a descriptor for this reader alone (LOCAL) came just before, the state since
+        then is that of the new sequence."""
         if frame.flags & LOCAL:
             return
         repeated = self.parser.repeated
@@ -1564,7 +1579,7 @@ class Head:
         return self.descriptor is not None and self.anchor is not None
 
     def _is_of_points(self, frame: Frame, after: int) -> bool:
-        """Whether the frame comes `after` numbers after the last points frame, and is about the same points."""
+        """Whether the frame's number is that of the last points frame plus `after`, and it belongs to these points."""
         keys = ("pulse0", "line", "n_points")
         return self._points_key == ((frame.seq - after + 1) % 2**32, *(frame.fields[k] for k in keys))
 
@@ -1628,8 +1643,8 @@ class Head:
                        (p.x, p.y, p.z))
 
     def to_crs(self, p: Points) -> Tuple:
-        """x, y, z in the CRS of the anchor: metres, or degrees, degrees, metres. Points of a tilted or moving
-        head in the polar layout go by the scene frame."""
+        """x, y, z in the CRS of the anchor: metres, or degrees, degrees, metres. Points of the polar layout are taken
+        to the scene frame first."""
         return (p.x, p.y, p.z) if p.layout == GEO else _by_row(self._earth_now().forward, self.to_scene(p))
 
     def _earth_now(self) -> _Earth:
@@ -1652,7 +1667,7 @@ class Head:
         return tuple(_column(c, len(rows)) for c in columns)
 
     def pose(self, t_ns: int) -> Optional[Pose]:
-        """Where a moving head was t_ns after the scan's start; None: the stream has not said it."""
+        """Where a moving head was t_ns after the scan's start; None: the stream has not reported it."""
         leg = self._poses.leg(t_ns)
         if leg is None:
             return None
@@ -1664,7 +1679,7 @@ class Head:
 
     def gps_time_ns(self, t_ns: int) -> Optional[int]:
         """GPS time of t_ns after the scan's start: ns since 1980-01-06T00:00:00Z without leap seconds. None:
-        the head does not know the time, or has not said it yet."""
+        the head does not know the time, or has not reported it yet."""
         if self._gps is None or self._scan_t0_ns is None:
             return None
         return self._gps[1] + self._scan_t0_ns + t_ns - self._gps[0]
