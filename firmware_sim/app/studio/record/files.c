@@ -236,7 +236,7 @@ static int check_parts_of_scans(const struct record_file *file, const char *end,
         snprintf(left, sizeof left, "%.*s%s", folder, file->path, entry->d_name);
         if (is_name_of_scan(file, path)) rc = check(left, path, err);
     }
-    if (dir != NULL) closedir(dir); /* without it, the file can't be opened either */
+    if (dir != NULL) closedir(dir); /* a missing folder is reported when the file is opened */
     return rc;
 }
 

@@ -29,7 +29,7 @@ struct record_files {
     } file[RECORD_MAX_FILES];
     int n;
     unsigned part;               /* number of the scan in split files, from 1 */
-    int has_points;              /* all present files took some */
+    int has_points;              /* a frame of points came for the present files */
     int spooling;                /* the frames of the present files wait for the limits */
     struct colour_spool **spool; /* one for each head that comes, in their order */
     uint32_t n_spools;
@@ -38,7 +38,7 @@ struct record_files {
 
 /* SH_EINPUT: more than RECORD_MAX_FILES, a path twice, an ending without a recorder. path must live on. */
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err);
-/* With files of each scan beside those of all: SH_EINPUT where two of them would have one name. */
+/* For --each: SH_EINPUT where the file of one scan would have the name of another file. */
 int record_files_check_each(const struct record_files *files, struct sh_err *err);
 /* To be called once all options are read: picks the format of each file according to them. */
 void record_files_shape(struct record_files *files);

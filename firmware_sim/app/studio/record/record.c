@@ -58,7 +58,7 @@ static int take_colour(void *values, const char *text)
     struct colour_choice *choice = &r->job.files.recorder.colour;
     int i, status = take_word("colour", colour_words, COLOUR_MODES, text, &i);
     if (status != APP_OK) return status;
-    r->job.texture = i == COLOUR_TEXTURE; /* which the head sends */
+    r->job.texture = i == COLOUR_TEXTURE; /* the head sends these colours */
     choice->given = !r->job.texture;
     choice->scale.mode = (enum colour_mode)i;
     r->job.files.own_limits = colour_has_limits(choice->scale.mode) && !r->limited;
@@ -125,7 +125,7 @@ static int take_las_version(void *values, const char *text)
     return status;
 }
 
-/* Meshes, and points spread over them. */
+/* Checks the options of meshes, and of points spread over them. */
 static int check_meshes(struct record_line *r)
 {
     const struct recorder_options *o = &r->job.files.recorder;

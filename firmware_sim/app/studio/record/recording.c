@@ -114,7 +114,7 @@ static int64_t ns_since(int64_t t_ns, int64_t from_ns)
     return (int64_t)((uint64_t)t_ns - (uint64_t)from_ns);
 }
 
-/* In a frame of the scan a sphere head fires a line for each of its rings. Any other head's scan_s needs no factor. */
+/* A sphere head fires one line per ring in each pan sweep, so its scan takes that many times longer. Other heads: 1. */
 static uint32_t lines_of_frame(const struct scanhead *sh)
 {
     struct scanhead_emitter e;
@@ -180,7 +180,7 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* Whether that result says that the head was unplugged, or its bus reset, and it is to be waited for. */
+/* Whether rc says that the head was unplugged or its bus reset, and --replug asks to wait for it. */
 static int is_gone(const struct recording *r, int rc)
 {
     return r->o->replug_s > 0.0 && (rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED);
@@ -351,7 +351,7 @@ static int is_endless(const struct recording *r)
            !info.moving;
 }
 
-/* Names what an interruption left out: of the scan at hand, and of the stations from it on. */
+/* Names what an interruption left out: the end of the scan at hand, and the scans from later stations. */
 static void name_missing(struct recording *r, uint32_t station)
 {
     char *text = r->result->missing;

@@ -13,7 +13,7 @@ enum { SOAK_MAX_REPLY_NOTES = 16, SOAK_REPLY_LEN = 600 };
 
 struct soak_ask {
     int active;   /* a question is out */
-    int settling; /* the library first comes into step, with questions of its own */
+    int settling; /* the library first resynchronises, with questions of its own */
     uint32_t n;   /* faults that hit replies since the question went out */
     struct fault_note note[SOAK_MAX_REPLY_NOTES];
     uint32_t echoes;             /* noticed since then */

@@ -44,7 +44,7 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
     case FAULT_PTP_JITTER:
         return "the noise of the path looks the same";
     case FAULT_PTP_NO_SYNC:
-        return "the follower's states remain; only its offset stands still";
+        return "the follower keeps its states; only its offset no longer changes";
     case FAULT_MIRROR_SLOW:
     case FAULT_MIRROR_STUCK:
     case FAULT_MIRROR_WOBBLE:
@@ -105,7 +105,7 @@ static void see(struct soak_link *link, struct soak_moment *m)
     *m = link->moment[--link->n_moments];
 }
 
-/* All of a kind that were at work within a time. */
+/* Notes as noticed all faults of a kind that were at work between two times. */
 static void see_kind(struct soak_link *link, enum fault_kind kind, int64_t from_ns, int64_t to_ns)
 {
     for (uint32_t i = link->n_moments; i-- > 0;) {
@@ -157,7 +157,7 @@ static void take_state(struct soak_link *link, const struct scanhead_frame *fram
     }
 }
 
-/* The client's first time has no other to compare with. */
+/* Hides faults from before the client's first time, which it has no earlier time to compare with. */
 static void hide_clock(struct soak_link *link, int64_t at_ns)
 {
     for (uint32_t i = link->n_moments; i-- > 0;) {
@@ -204,7 +204,7 @@ static void hide_pps(struct soak_link *link, int64_t first_ns)
             hide_moment(link, i, "it was before the client had a frame");
 }
 
-/* Notices a pulse that is late against the one before it by as much as the fault says, or early by that. */
+/* Notices a PPS pulse whose distance from the one before it is wrong by as much as the fault says. */
 static void see_jitter(struct soak_link *link, int64_t at_ns, int64_t gps_s)
 {
     const struct soak_times *t = &link->times;
@@ -309,7 +309,7 @@ static int is_seen_in(struct soak_link *link, const struct soak_moment *m, const
         return fabs(share - m->what.factor) < 0.25 * fabs(1.0 - m->what.factor);
     case FAULT_MIRROR_STUCK:
         return fabs(share) < 0.01;
-    case FAULT_MIRROR_WOBBLE: /* a quarter of what the rate changes by, at most */
+    case FAULT_MIRROR_WOBBLE: /* the threshold is a quarter of the largest change of rate */
         return fabs(rate - usual) > 0.25 * 2.0 * M_PI * m->what.hz * fabs(m->what.deg) * M_PI / 180.0;
     case FAULT_LASER_OFF:
         return is_all_empty(link, frame);
@@ -323,8 +323,8 @@ static int is_of_mirror(const struct soak_moment *m)
     return m->kind == FAULT_MIRROR_SLOW || m->kind == FAULT_MIRROR_STUCK || m->kind == FAULT_MIRROR_WOBBLE;
 }
 
-/* The rate at which the mirror turns when nothing is wrong with it. Faults of the mirror from before that rate is known
- * have nothing to be compared with. */
+/* Keeps the rate at which the mirror turns without a fault. Hides faults of the mirror from before that rate is known:
+ * there was nothing to compare them with. */
 static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
 {
     for (uint32_t i = 0; i < link->n_moments; i++)

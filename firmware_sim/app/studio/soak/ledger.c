@@ -21,7 +21,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/fault/fault.h"
 
-/* Blocks are computed so far ahead, at most. */
+/* AHEAD_NS: blocks are computed at most this far ahead. JUST_NS: an act may be reported this long after it was seen. */
 static const int64_t AHEAD_NS = 500000000, JUST_NS = 500000000;
 
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq)
@@ -203,7 +203,7 @@ void soak_heard(void *ctx, const struct fault_note *note)
 
 /* ---- what the client saw */
 
-/* Frames that came while there was no session. */
+/* Marks frames that came while there was no session. */
 static void mark_away(struct soak_link *link, soak_seq from, soak_seq to)
 {
     if (to > from + SOAK_RING / 2) from = to - SOAK_RING / 2;
@@ -347,7 +347,7 @@ void soak_saw_open(struct soak_link *link)
     pthread_mutex_unlock(&link->lock);
 }
 
-/* Acts on a session that has ended before them were not done. */
+/* Hides the acts from number `from` on: the session that they were meant for had already ended. */
 static void forget_acts(struct soak_link *link, uint32_t from)
 {
     for (uint32_t i = from; i < link->n_acts; i++)

@@ -82,7 +82,7 @@ static int is_head_seen(struct soak *soak)
 
 /* ---- the run */
 
-/* Time since from_ns: of the clock, in real time; else of the head, since its first points. */
+/* At pace realtime, the time since from_ns by the clock; else device time since the first points. */
 static double passed_s(struct soak *soak, int64_t from_ns)
 {
     if (soak->realtime) return 1e-9 * (double)(clock_now_ns() - from_ns);
@@ -197,7 +197,7 @@ static int open_head(struct soak_options *o, struct config *cfg, struct soak *so
     return rc;
 }
 
-/* A soak compares what went over the wire, not speed: a busy machine has the time to deliver everything, if later. */
+/* A soak compares frames, not speed. So the head of a busy machine gets the time to deliver all of them, even late. */
 static void be_patient(struct config *cfg)
 {
     static const double PATIENCE_MS = 3000.0;
@@ -315,7 +315,7 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "client-grace", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.grace_s),
      .help = "the client has to end within S seconds of SIGTERM (default 5)"},
     {APP_NUMBER, "match-mm", "MM", .min = 0.0, .max = 1e6, .at = AT(match_mm),
-     .help = "coordinates of points agree within MM and what the file rounds to (default 0.01; scip and cola 2, velodyne "
+     .help = "allow a difference of MM, and of the file's rounding, between coordinates of points (default 0.01; scip and cola 2, velodyne "
              "20)"},
     {APP_CALL, "allow", "CHECK", .apply = take_allowed, .choices = verdict_names, .n_choices = VERDICT_N_CHECKS,
      .help = "a finding of this check does not count; may be repeated"},

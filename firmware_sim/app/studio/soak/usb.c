@@ -54,7 +54,7 @@ static int is_serial(const char *folder, const char *serial)
     return n == len + 1 && memcmp(text, serial, len) == 0;
 }
 
-/* -1: it is not known. */
+/* Returns how many; -1: not known. */
 static int64_t excess_of(const char *serial)
 {
     glob_t found;

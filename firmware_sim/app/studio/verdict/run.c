@@ -133,7 +133,7 @@ static int has_points(struct run *r)
     return atomic_load(&r->stream.points_ns) != 0;
 }
 
-/* The time alone is waited for. */
+/* For waits that only the time ends. */
 static int never(struct run *r)
 {
     (void)r;
@@ -205,7 +205,7 @@ static int is_new(const struct run *r)
            now.st_mtim.tv_sec != r->before.st_mtim.tv_sec || now.st_mtim.tv_nsec != r->before.st_mtim.tv_nsec;
 }
 
-/* By how much a link's protocol rounds coordinates, m. SCIP and CoLa: half a millimetre of range, and angles.
+/* Returns by how much a link's protocol rounds coordinates, m. SCIP and CoLa: half a millimetre of range, and angles.
  * VLP-16: half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream
  * does not. */
 static double match_of(const struct run *r)
@@ -253,7 +253,7 @@ static int run_judge(struct run *r, struct sh_err *err)
         return run_compare(r, err);
     else {
         checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
-        sh_warn(&app_report_stderr, "soak: %s: its points are not judged, as --client-file asks: %s",
+        sh_warn(&app_report_stderr, "soak: %s: --client-file: the points are not judged: %s",
                 r->verdict->scenario, r->stream.short_of);
     }
     return SH_OK;
@@ -280,7 +280,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     int rc = open_head(r, err);
     if (rc == SH_OK) rc = run_serve(r, err);
     if (rc == SH_OK && r->watch.is_short) rc = sh_fail(err, SH_ENOMEM, "no memory for what the client does");
-    if (rc == SH_OK && app_interrupted()) rc = sh_fail_stopped(err); /* half a run is no verdict */
+    if (rc == SH_OK && app_interrupted()) rc = sh_fail_stopped(err); /* an interrupted run gives no verdict */
     if (rc == SH_OK) rc = run_judge(r, err);
     for (int check = 0; check < VERDICT_N_CHECKS; check++)
         if (verdict->check[check].state == VERDICT_FOUND && (options->allowed >> check & 1) != 0)
