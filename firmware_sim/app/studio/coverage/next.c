@@ -16,7 +16,7 @@ struct chooser {
     struct coverage_finder *f;
     struct coverage *coverage;
     struct coverage_gain *gain; /* [places] */
-    double (*open_m)[3];        /* places that are still open, and which they are */
+    double (*open_m)[3];        /* positions of the places that are open; then their numbers */
     uint32_t *open, n_open;
 };
 
@@ -30,14 +30,14 @@ static void next_turn(const double dir[3], double heading_rad, double out[3])
     out[2] = dir[2];
 }
 
-/* Places of one heading at a time: they share directions. */
+/* Estimates the gains of all places with one heading, which share their directions. */
 static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], struct sh_err *err)
 {
     const struct config_profile *profile = site_profile(c->f->site);
     c->n_open = 0;
     for (uint32_t i = 0; i < c->f->next->n; i++) {
         const struct coverage_next_place *p = &c->f->next->place[i];
-        if (p->out || p->heading_deg != heading_deg) continue;
+        if (p->state || p->heading_deg != heading_deg) continue;
         memcpy(c->open_m[c->n_open], p->position_m, sizeof *c->open_m);
         c->open[c->n_open++] = i;
     }
@@ -58,7 +58,7 @@ static int estimate_all(struct chooser *c, double *estimate_m2, struct sh_err *e
     for (uint32_t i = 0; i < next->n; i++)
         estimate_m2[i] = 0.0;
     for (uint32_t i = 0; i < next->n && rc == SH_OK; i++) {
-        if (done[i] || next->place[i].out) continue;
+        if (done[i] || next->place[i].state) continue;
         rc = estimate(c, next->place[i].heading_deg, turned, err);
         for (uint32_t k = 0; k < c->n_open && rc == SH_OK; k++) {
             estimate_m2[c->open[k]] = c->gain[k].gain_m2;
@@ -83,8 +83,8 @@ static void leave_out_bodies(struct chooser *c, double *estimate_m2)
     if (c->f->o->candidates != NULL || (double)front < LEAST_FRONT * (double)hits) return;
     for (uint32_t i = 0; i < c->f->next->n; i++) {
         struct coverage_next_place *p = &c->f->next->place[i];
-        if (p->out || !(p->front < LEAST_FRONT)) continue;
-        p->out = COVERAGE_PLACE_WITHIN;
+        if (p->state || !(p->front < LEAST_FRONT)) continue;
+        p->state = COVERAGE_PLACE_WITHIN;
         c->f->next->within++;
         estimate_m2[i] = 0.0;
     }
@@ -96,7 +96,7 @@ static uint32_t best_of(const struct coverage_next *next, const double *estimate
 {
     uint32_t best = next->n;
     for (uint32_t i = 0; i < next->n; i++) {
-        int tried = next->place[i].out != 0 || !(estimate_m2[i] > 0.0);
+        int tried = next->place[i].state != 0 || !(estimate_m2[i] > 0.0);
         for (uint32_t k = 0; k < round->n_tried; k++)
             tried |= round->tried[k] == i;
         if (!tried && (best == next->n || estimate_m2[i] > estimate_m2[best])) best = i;
@@ -104,7 +104,7 @@ static uint32_t best_of(const struct coverage_next *next, const double *estimate
     return best;
 }
 
-/* A whole scan from a place; its result waits. */
+/* Scans from a place as a whole. The result waits for coverage_keep, or is replaced by the next scan. */
 static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_err *err)
 {
     const struct coverage_next_place *p = &c->f->next->place[place];
@@ -178,7 +178,7 @@ static int choose(struct chooser *c, uint32_t number, struct sh_err *err)
     if (round->place != last) rc = scan(c, round->place, "next station, once more", err);
     if (rc != SH_OK) return rc;
     coverage_keep(c->coverage);
-    next->place[round->place].out = COVERAGE_PLACE_CHOSEN;
+    next->place[round->place].state = COVERAGE_PLACE_CHOSEN;
     round->none_m2 = none_m2(c->coverage);
     return 1;
 }

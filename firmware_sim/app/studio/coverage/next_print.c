@@ -105,7 +105,7 @@ static void put_place(struct json *json, const struct coverage_next *next, uint3
     page_put_vector(json, "position_m", p->position_m);
     json_double(json, "heading_deg", p->heading_deg);
     json_double(json, "floor_m", p->floor_m);
-    json_bool(json, "within_body", p->out == COVERAGE_PLACE_WITHIN);
+    json_bool(json, "within_body", p->state == COVERAGE_PLACE_WITHIN);
     json_double(json, "front", p->front);
     json_open_array(json, "estimate_m2");
     for (uint32_t r = 0; r < next->n_rounds; r++)

@@ -40,9 +40,10 @@ struct map_view_plan {
 /* SH_EINPUT with what is wrong with which option. */
 int map_view_read(const struct map_view_options *options, struct map_view_plan *plan, struct sh_err *err);
 
-/* cfg NULL: the cloud's coordinates are shown as they are. cloud NULL: the stations are scanned. */
+/* Scans the stations. */
 int map_view_scan(struct config *cfg, const struct map_view_plan *plan, const char *output, int quiet,
                   struct sh_err *err);
+/* Shows a recording. cfg NULL: its coordinates are shown as they are. */
 int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, const char *output,
                    int quiet, struct sh_err *err);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The options of map --perspective: words and numbers into a plan. */
+/* Turns the options of map --perspective into a plan. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -74,7 +74,7 @@ int picturing_look(struct picturing *p, const struct picturing_bounds *bounds, s
     if (!p->plan->has_look_at) memcpy(spec.camera.look_at_m, framed.look_at_m, sizeof framed.look_at_m);
     for (int i = 0; i < 3 && !p->plan->has_eye; i++)
         spec.camera.eye_m[i] = framed.eye_m[i] + spec.camera.look_at_m[i] - framed.look_at_m[i];
-    if (spec.point_m < 0) { /* a surface closes at 700 points along the longest side */
+    if (spec.point_m < 0) { /* with 700 points along the longest side a surface shows no gaps */
         spec.point_m = 0;
         for (int i = 0; i < 3; i++)
             spec.point_m = fmax(spec.point_m, (b.max_m[i] - b.min_m[i]) / 700);
@@ -183,7 +183,7 @@ static int check_figures(struct picturing *p, struct sh_err *err)
     if (!known && p->plan->colour == MAP_VIEW_REFLECTANCE)
         return sh_fail(err, SH_EINPUT,
                        "--colour reflectance: no point has one; --set signal.model=on gives them one in a scan");
-    if (!known) return sh_fail(err, SH_EINPUT, "--colour range: no point has one, as of a head that moves");
+    if (!known) return sh_fail(err, SH_EINPUT, "--colour range: no point has a range, as with a head that moves");
     if (p->plan->colour == MAP_VIEW_REFLECTANCE) {
         p->limit[0] = -30; /* colour_reflectance */
         p->limit[1] = 0;

@@ -16,7 +16,7 @@
 struct watch_break {
     uint32_t link; /* from 1 */
     enum fault_kind kind;
-    int64_t over_ns; /* from when on a client can come back */
+    int64_t over_ns; /* the earliest time at which a client can come back */
     int64_t back_ns; /* when one did */
     char peer[64];   /* of the session that ended */
 };
@@ -46,7 +46,7 @@ struct watch {
     struct links_observer observer;
     uint32_t n_links, chosen; /* chosen: the client's, from 1 */
     uint32_t must_ask;        /* bit per link: a client there is back with its first request, not with its connection */
-    int64_t limit_ns;         /* how long after a fault that leaves sessions their end still counts as caused by it */
+    int64_t limit_ns;         /* a fault that leaves sessions open counts as the cause of their end up to this long after it */
     int is_over;              /* 1: the run ends, so that sessions that end now are no client's doing */
     int is_short;             /* 1: there was no memory for something */
     struct watch_link link[CONFIG_MAX_LINKS];

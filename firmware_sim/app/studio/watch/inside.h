@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: the watch, and how its parts meet.
+/* Private to this folder: the watch and its parts.
  *
  *   scene.c    /scene, made once; /head and /plan, of now
  *   observe.c  the thread: frames of the stream to points in the scene's frame
@@ -35,7 +35,7 @@ struct watch_sample {
     double *distance_m;
     uint32_t *triangle;
     struct deviation_points points;
-    double point_ns, spent_ns; /* what comparing one costs, and all of them in this scan */
+    double point_ns, spent_ns; /* to compare one point; to compare all of them in this scan */
     double cell_m;             /* of densities */
 };
 
@@ -44,8 +44,8 @@ struct watch_scan {
     uint32_t scan, station; /* both from 1; 0: none */
     int over;
     uint64_t points, shots, empty; /* that came */
-    uint64_t left_out;             /* of the points: on what moves, on legs, in mirrors */
-    uint64_t sampled_points;       /* that the figures below are of: those of one of `every` pulses */
+    uint64_t left_out;             /* of the points: on moving bodies, on legs, in mirrors */
+    uint64_t sampled_points;       /* in the figures below: those of one in `every` pulses */
     uint32_t every;
     int in_scene; /* points could be taken to the scene's frame */
     struct figures figures;
@@ -78,14 +78,14 @@ struct watch {
     struct watch_options options;
     struct link_spec link;
     struct web_source source;
-    int link_given; /* its descriptor is the loop's */
-    int fd;         /* the observer's end; the handle's */
+    int link_given; /* the loop owns its descriptor */
+    int fd;         /* the observer's end, which the handle owns */
     struct scanhead *sh;
     pthread_t thread;
     int running;
     atomic_int ending;
 
-    /* the observer's, but for what is constant */
+    /* for the observer's thread alone, except for constants */
     struct distance *index;
     struct deviation_head *head; /* [n_stations] */
     struct deviation_head now;   /* of the scan at hand */
@@ -108,7 +108,7 @@ struct watch {
     char *scene_bytes;
     size_t scene_len;
 
-    /* what is asked for by other threads */
+    /* for answers to other threads */
     pthread_mutex_t lock;
     struct watch_scan shown;
     struct watch_scan *shown_station; /* [n_stations] the last scan of each; scan 0: none */
@@ -130,11 +130,11 @@ void *watch_observe(void *watch);
 int watch_sample_open(struct watch *w, struct sh_err *err);
 void watch_sample_close(struct watch *w);
 void watch_sample_begin(struct watch *w);
-/* A point of the scene, and its pulse's hash. */
+/* Adds a point in the scene's frame, with its pulse's hash. */
 void watch_sample_add(struct watch *w, const double p_m[3], uint32_t hash);
-/* Compares what has not been compared yet. SH_E where that fails; then the sample is as it was. */
+/* Compares the points that have not been compared yet. SH_E where that fails; then the sample is as it was. */
 int watch_sample_compare(struct watch *w, struct sh_err *err);
-/* The figures of w->at. */
+/* Fills in the figures of w->at. */
 int watch_sample_figures(struct watch *w, struct sh_err *err);
 
 /* ---- seen.c */

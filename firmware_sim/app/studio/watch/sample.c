@@ -9,7 +9,7 @@
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/base/clock.h"
 
-/* How far from a point the scene is looked for; as `scanhead report` has it, where nobody asks. */
+/* How far from a point the scene is looked for: the default of `scanhead report`. */
 #define REACH_M    10.0
 #define REACH_TEXT "10 m"
 
@@ -125,7 +125,7 @@ static void adapt(struct watch *w, size_t n, int64_t took_ns)
     if (!(share > 0.0)) return;
     const double budget_ns = share * ((double)(clock_now_ns() - w->began_ns) + 1e9);
     const double others_ns = (double)(clock_thread_ns() - w->began_thread_ns) - s->spent_ns;
-    /* Less than all of it: what is thinned out later has been paid for. */
+    /* Not all of it is used, since points that are thinned out later have cost time, too. */
     const double rest_ns = 0.6 * fmax(budget_ns - others_ns, 0.1 * budget_ns);
     while (s->every < WATCH_LEAST_SHARE && s->point_ns * (double)w->at.points / s->every > rest_ns)
         thin(s);

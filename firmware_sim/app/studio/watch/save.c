@@ -99,7 +99,7 @@ static int write_stream(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* A stream of points alone ends in the middle of a scan, for every reader. */
+/* This stream has no event of a scan's end, so for its reader it ends in the middle of a scan: SH_ECLOSED. */
 static int write_file(struct save *s, struct sh_err *err)
 {
     struct record_job *job = calloc(1, sizeof *job);
@@ -116,7 +116,7 @@ static int write_file(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* A recorder that fails leaves parts, from which `repair` makes a file; here nobody will. */
+/* A recorder that fails leaves parts, from which --repair could make a file. Here nobody asks for that. */
 static void empty_folder(const struct save *s)
 {
     DIR *folder = s->folder[0] != '\0' ? opendir(s->folder) : NULL;
