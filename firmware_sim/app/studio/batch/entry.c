@@ -20,7 +20,7 @@ static int take_text(const char *text, char *buf, size_t len)
     return (size_t)snprintf(buf, len, "%s", text) < len;
 }
 
-/* A name in the folder, and in no other. */
+/* Takes a file's name, which must lie in the campaign's folder itself. */
 static int take_file(json_t *from, struct batch_file *file)
 {
     const char *name, *sha;

@@ -117,7 +117,7 @@ static void put_scene(const struct init_text *t, FILE *out)
         fprintf(out, "  anchor: {source: geotiff} # %s; height_m: height of its 0 above the ellipsoid\n", t->mesh->crs);
 }
 
-/* A file can't decide what is glass: the line is a comment, whose # the user may remove. */
+/* A mesh file can't decide which surfaces are glass, so the line is a comment, whose # the user may remove. */
 static void put_clear(const struct scene *scene, FILE *out)
 {
     struct site_clear clear = {0};

@@ -30,7 +30,7 @@ struct preview_request {
     double step_deg, far_m, line_deg[2], pan_deg[2];
     int points; /* 0: only the cells are wanted */
     /* of PREVIEW_NEXT and PREVIEW_REACH */
-    uint32_t n_of, of[PREVIEW_MOST_OF]; /* numbers of previews, whose cells are seen already */
+    uint32_t n_named, named[PREVIEW_MOST_OF]; /* numbers of previews, whose cells count as seen */
     double height_m;                    /* of the head above the floor */
     struct preview_section section;     /* of PREVIEW_NEXT: only cells with their middles in it count */
 };
@@ -68,9 +68,9 @@ int preview_site_open(const struct preview_work *work, const struct preview_requ
 /* These make bodies, whose formats README.md has. number: the preview's. */
 int preview_look(const struct preview_work *work, const struct preview_request *request, uint32_t number,
                  struct web_body *out, struct sh_err *err);
-/* The cells stay in such a body; the hits are in its head. */
+/* Offsets in such a body: searches read cells and hits from there. */
 enum { PREVIEW_HEAD_BYTES = 72, PREVIEW_CELLS_AT = 72, PREVIEW_HITS_AT = 24, PREVIEW_FRONT_AT = 28 };
-/* seen has request->n_of previews. */
+/* seen has request->n_named previews. */
 int preview_next(const struct preview_work *work, const struct preview_request *request,
                  const struct preview_seen *seen, struct web_body *out, struct sh_err *err);
 int preview_reach(const struct preview_work *work, const struct preview_request *request,

@@ -13,7 +13,7 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/profile.h"
 
-/* The grid has about so many places. They are compared by rays so far apart, and SCANS of the best are scanned. */
+/* The grid has about PLACES places. They are compared by rays RAYS_DEG apart, and the best SCANS of them are scanned. */
 static const double PLACES = 250.0, LEAST_GRID_M = 0.25, RAYS_DEG = 3.0;
 enum { SCANS = 3, REACH_HEAD_BYTES = 16, REACH_VERSION = 1 };
 
@@ -102,7 +102,7 @@ static int keep_outside(struct coverage *coverage, const struct preview_section 
 
 /* This has the places to stand on, and the rays that they are compared by. */
 struct stand {
-    struct preview_site *of;
+    struct preview_site *scanner;
     struct coverage_next_options options;
     struct coverage_result result;
     struct coverage_next next;
@@ -116,15 +116,15 @@ static int stand_open(const struct preview_work *work, const struct preview_requ
                         .result = {.base = r->station, .cell_m = work->options->cell_m}};
     if (coverage_cells(work->coverage) == 0)
         return sh_fail(err, SH_ESTATE, "the scene has too many triangles for coverage, so no place can be suggested");
-    int rc = preview_site_open(work, r, &s->of, err);
+    int rc = preview_site_open(work, r, &s->scanner, err);
     if (rc != SH_OK) return rc;
     for (int i = 0; i < 3; i++)
         s->options.area_m[0][i] = s->options.area_m[1][i] = (double)NAN;
-    s->options.grid_m = grid_of(s->of->site.scene);
-    s->result.site = &s->of->site;
-    s->result.station = calloc(s->of->site.n_stations, sizeof *s->result.station);
+    s->options.grid_m = grid_of(s->scanner->site.scene);
+    s->result.site = &s->scanner->site;
+    s->result.station = calloc(s->scanner->site.n_stations, sizeof *s->result.station);
     if (s->result.station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
-    keep_seen(work->coverage, seen, r->n_of, &s->result.station[0].pulses);
+    keep_seen(work->coverage, seen, r->n_named, &s->result.station[0].pulses);
     if (isfinite(r->section.half_m[0])) rc = keep_outside(work->coverage, &r->section, err);
     if (rc != SH_OK) return rc;
     return coverage_next_open(&s->options, &s->result, &work->stop, &s->next, &s->finder, err);
@@ -135,7 +135,7 @@ static void stand_close(const struct preview_work *work, struct stand *s)
     coverage_forget(work->coverage);
     coverage_next_free(&s->next, &s->finder);
     free(s->result.station);
-    free(s->of);
+    free(s->scanner);
 }
 
 int preview_next(const struct preview_work *work, const struct preview_request *r, const struct preview_seen *seen,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The report as JSON. Keys that are there stay. */
+/* The report as JSON. No key is ever renamed or removed, since scripts read them. */
 #include <math.h>
 
 #include "firmware_sim/app/studio/report/report.h"

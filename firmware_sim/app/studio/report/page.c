@@ -83,7 +83,7 @@ const char *page_unit(double largest_m, double *per_m)
     return "nm";
 }
 
-/* Four digits, no more than the unit has decimals for. */
+/* Writes four digits, with three decimals at most. */
 static void put_digits(FILE *out, double v, int is_signed)
 {
     const double a = fabs(v);

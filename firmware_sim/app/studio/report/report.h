@@ -78,7 +78,7 @@ const struct scene_surface *report_worst_surface(const struct report *r);
 
 /* Fills r->f.station[].head: the setup and the errors of the head at each station. */
 void report_heads(struct report *r);
-/* After all figures: the verdicts of the stations, and of all. */
+/* Makes the verdicts on the stations, and on all together. To be called once all figures are there. */
 void report_judge(struct report *r);
 
 /* ---- text.c, json.c, html.c */

@@ -152,7 +152,7 @@ int report_put_surfaces(FILE *out, const struct report *r, struct sh_err *err)
         if (r->f.label[i].points > 0) ranked[n++] = (struct ranked){r->f.label[i].points, i};
     qsort(ranked, n, sizeof *ranked, by_points);
     fputs("<h2>Surfaces</h2>\n", out);
-    begin_table(out, "By surface: object | material; those with the most points first.", "surface", 0);
+    begin_table(out, "By surface: object | material; most points first.", "surface", 0);
     for (uint32_t k = 0; k < n && k < MOST_LABELS; k++) {
         char name[REPORT_SURFACE_LEN] = "surface not known";
         const uint32_t i = ranked[k].label;
@@ -190,8 +190,8 @@ void report_put_times(FILE *out, const struct report *r)
         fputs("<p>The file has no times.</p>\n", out);
     } else {
         fputs(
-            "<div class=\"wide\"><table><caption>Of the recording, by the points' own times. A pause is longer than two "
-            "lines of the station's scan take.</caption>\n<thead><tr><th>station</th><th>points</th><th>scans</th>"
+            "<div class=\"wide\"><table><caption>Times are those of the points. A pause is longer than two lines of the "
+            "station's scan.</caption>\n<thead><tr><th>station</th><th>points</th><th>scans</th>"
             "<th>time span, s</th><th>points/s</th><th>pauses</th><th>longest, s</th><th>it begins at, s</th></tr>"
             "</thead>\n<tbody>\n",
             out);

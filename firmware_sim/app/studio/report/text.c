@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The report as text. The first lines are those that scripts know. */
+/* The report as text. Its first lines stay as they are, since scripts read them. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>

@@ -10,7 +10,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
 
-/* Ghosts are counted, and become shots without echo. */
+/* Counts ghosts (points seen in mirrors), and makes them shots without echo. */
 static void leave_out_ghosts(struct report *r)
 {
     const struct site_detect *d = &r->site->detect;

@@ -18,7 +18,7 @@ const struct view_column view_columns[VIEWED_COLUMNS] = {
     [VIEWED_RGB] = {"rgb", NULL, VIEW_UINT8, 3},
 };
 
-static const struct view_column POSITION = {"xyz", "m", VIEW_FLOAT32, 3};
+const struct view_column view_position = {"xyz", "m", VIEW_FLOAT32, 3};
 static const char BINARY[] = "application/octet-stream";
 
 const char *view_type_name(enum view_type type)
@@ -104,7 +104,7 @@ static size_t lay_out(const struct slice *s, uint32_t n_columns, char *body)
     size_t at = VIEW_CLOUD_HEAD + (size_t)n_columns * VIEW_CLOUD_COLUMN, size;
     char *row = body != NULL ? body + VIEW_CLOUD_HEAD : NULL;
     if (body != NULL) {
-        put_row(row, &POSITION, at);
+        put_row(row, &view_position, at);
         put_positions(s, body + at);
     }
     at += 12 * (size_t)s->n;

@@ -24,8 +24,8 @@ struct view_column {
     enum view_type type;
     uint32_t components;
 };
-/* By enum viewed_column. */
-extern const struct view_column view_columns[VIEWED_COLUMNS];
+/* By enum viewed_column; and that of positions, which comes first. */
+extern const struct view_column view_columns[VIEWED_COLUMNS], view_position;
 const char *view_type_name(enum view_type type);
 
 /* Points first, first + every, ...: at most `most` of them, and no more than an answer holds. every >= 1. */

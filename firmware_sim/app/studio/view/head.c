@@ -39,10 +39,9 @@ static void put_column(struct json *json, const struct view_column *c, double lo
 
 static void put_columns(const struct viewed *v, struct json *json)
 {
-    static const struct view_column position = {"xyz", "m", VIEW_FLOAT32, 3};
     size_t size;
     json_open_array(json, "columns");
-    put_column(json, &position, (double)NAN, (double)NAN);
+    put_column(json, &view_position, (double)NAN, (double)NAN);
     for (int c = 0; c < VIEWED_COLUMNS; c++)
         if (viewed_array(&v->points, (enum viewed_column)c, &size) != NULL)
             put_column(json, &view_columns[c], v->low[c], v->high[c]);

@@ -6,7 +6,7 @@
 #include "core/grow.h"
 #include "firmware_sim/app/studio/view/viewed.h"
 
-/* A column's array, wherever it points to, and the bytes of a value. */
+/* Returns the address of a column's pointer; *size: bytes of a value. */
 static void *points_place_of(struct viewed_points *p, enum viewed_column column, size_t *size)
 {
     const struct {

@@ -22,7 +22,7 @@ struct viewed_stream {
     struct recording_counts counts;
 };
 
-/* The mesh of the present grid, as drivers/record/mesh.c makes it; the grid is empty afterwards. */
+/* Makes the mesh of the present grid, as drivers/record/mesh.c does; the grid is empty afterwards. */
 int viewed_end_grid(struct viewed_stream *stream, struct sh_err *err);
 
 #endif

@@ -15,7 +15,7 @@ struct view_options {
     int quiet;
 };
 
-/* Sessions get no data. What they send is read, and has no effect. */
+/* Sessions get no data. Their input is read, and has no effect. */
 static void view_take_event(const struct link_ops *ops, void *link, const struct link_event *event)
 {
     char said[4096];
