@@ -67,7 +67,8 @@ static int is_of_job(const struct batch *b, const char *name)
 {
     char *end;
     const unsigned long job = strtoul(name, &end, 10);
-    if (name[0] < '0' || name[0] > '9' || end - name < 4 || *end != '_') return 1; /* its name is not that of a job's file */
+    if (name[0] < '0' || name[0] > '9' || end - name < 4 || *end != '_')
+        return 1; /* its name is not that of a job's file */
     if (job == 0 || job > b->n_jobs) return 0;
     const struct batch_entry *entry = &b->job[job - 1].entry;
     for (uint32_t i = 0; i < entry->n_files; i++)

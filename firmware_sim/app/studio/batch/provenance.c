@@ -114,7 +114,7 @@ struct inputs {
 
 static const char *sha_of(struct inputs *in, const char *path)
 {
-    struct stat st;
+    struct stat st = {0};
     uint64_t bytes;
     struct batch_known *k = provenance_find(in->cache, path);
     if (k == NULL) {

@@ -22,8 +22,8 @@ enum coverage_place { COVERAGE_PLACE_OPEN, COVERAGE_PLACE_WITHIN, COVERAGE_PLACE
 
 struct coverage_next_place {
     double position_m[3], heading_deg;
-    double floor_m;          /* z; NaN: not known */
-    double front;            /* share of the hits that are on the front of a face */
+    double floor_m; /* z; NaN: not known */
+    double front;   /* share of the hits that are on the front of a face */
     /* Only OPEN places are compared. A place WITHIN a body sees mostly backs of faces. */
     enum coverage_place state;
 };
@@ -54,7 +54,7 @@ struct coverage_finder {
     const struct site *site;
     const struct sh_report *report;
     struct coverage_next *next;
-    size_t room;                /* of its places */
+    size_t room; /* of its places */
     /* Rays of a level head with heading 0, and the solid angle of each, as for coverage_gains. */
     double (*dir)[3], *each_sr;
     uint32_t n_dir;
@@ -65,7 +65,8 @@ struct coverage_finder {
 int coverage_next_open(const struct coverage_next_options *options, const struct coverage_result *result,
                        const struct sh_report *report, struct coverage_next *next, struct coverage_finder *finder,
                        struct sh_err *err);
-/* Compares the places. Figures of the stations must be in result; the coverage gets further stations, one for each round. */
+/* Compares the places. Figures of the stations must be in result; the coverage gets further stations, one for each
+ * round. */
 int coverage_next_find(struct coverage_finder *finder, struct coverage *coverage, struct sh_err *err);
 void coverage_next_free(struct coverage_next *next, struct coverage_finder *finder);
 

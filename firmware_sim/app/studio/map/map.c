@@ -81,8 +81,8 @@ static int choose_view(struct map_run *run, const struct site *site, struct sh_e
     return geoframe_to_enu(frame, run->origin_m, run->to_enu, err);
 }
 
-/* The height is that of the head's origin: above the ground under a tripod or above the floor, where one was looked for.
- * Else it is z, or the height above the ellipsoid where the scene is in ECEF. */
+/* The height is that of the head's origin: above the ground under a tripod or above the floor, where one was looked
+ * for. Else it is z, or the height above the ellipsoid where the scene is in ECEF. */
 static int add_station(struct map_run *run, const struct site_station *station, struct sh_err *err)
 {
     const struct placement *at = &station->at;

@@ -13,7 +13,8 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/profile.h"
 
-/* The grid has about PLACES places. They are compared by rays RAYS_DEG apart, and the best SCANS of them are scanned. */
+/* The grid has about PLACES places. They are compared by rays RAYS_DEG apart, and the best SCANS of them are
+ * scanned. */
 static const double PLACES = 250.0, LEAST_GRID_M = 0.25, RAYS_DEG = 3.0;
 enum { SCANS = 3, REACH_HEAD_BYTES = 16, REACH_VERSION = 1 };
 
@@ -80,6 +81,11 @@ static int is_within(const struct preview_section *s, const double sum_m[3], uin
            fabs(sum_m[2] / n - s->middle_m[2]) <= s->half_m[2];
 }
 
+static int has_section(const struct preview_section *s)
+{
+    return isfinite(s->half_m[0]) || isfinite(s->half_m[1]) || isfinite(s->half_m[2]);
+}
+
 /* Cells outside of the section are kept as seen, so that nothing is gained by them. The page counts by the same middles
  * (middlesOf in previews.js). */
 static int keep_outside(struct coverage *coverage, const struct preview_section *section, struct sh_err *err)
@@ -125,7 +131,7 @@ static int stand_open(const struct preview_work *work, const struct preview_requ
     s->result.station = calloc(s->scanner->site.n_stations, sizeof *s->result.station);
     if (s->result.station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
     keep_seen(work->coverage, seen, r->n_named, &s->result.station[0].pulses);
-    if (isfinite(r->section.half_m[0])) rc = keep_outside(work->coverage, &r->section, err);
+    if (has_section(&r->section)) rc = keep_outside(work->coverage, &r->section, err);
     if (rc != SH_OK) return rc;
     return coverage_next_open(&s->options, &s->result, &work->stop, &s->next, &s->finder, err);
 }

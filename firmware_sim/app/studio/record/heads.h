@@ -30,7 +30,7 @@ struct heads {
     struct heads_one one[CONFIG_MAX_STATIONS]; /* one[0]: of head.station */
     uint32_t n;
     uint32_t head_of[CONFIG_MAX_STATIONS]; /* index into `one`, by station from 0 */
-    struct heads_one *at;             /* the one that scans now */
+    struct heads_one *at;                  /* the one that scans now */
     double scan_s;
     int64_t said_ns; /* when progress was reported last */
     const struct sh_report *report;

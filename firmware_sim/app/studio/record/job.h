@@ -42,8 +42,8 @@ struct record_job {
 /* Checks a recording off line before the scene is loaded: SH_EINPUT where it is not possible. cfg is changed. */
 int record_job_check(struct record_job *job, struct config *cfg, struct sh_err *err);
 /* The head of cfg runs off line in this process, and so do those of other scanners that the stations have. cfg is
- * changed; the settings of --set that it was loaded with must still be there. SH_EINPUT: an option that such a recording can't
- * have. SH_ELOST and others as of recording_check_complete: the files keep the points that came. */
+ * changed; the settings of --set that it was loaded with must still be there. SH_EINPUT: an option that such a
+ * recording can't have. SH_ELOST and others as of recording_check_complete: the files keep the points that came. */
 int record_job_off_line(struct record_job *job, struct config *cfg, struct sh_err *err);
 /* A head on a wire, or a raw stream in a file. */
 int record_job_stream(struct record_job *job, struct sh_err *err);

@@ -11,8 +11,6 @@
 #include "firmware_sim/command/head.h"
 #include "firmware_sim/config/limits.h"
 
-static const double LONG_EDGE = 10;
-
 static int is_config(const char *source)
 {
     return app_ends_in(source, ".yaml") || app_ends_in(source, ".yml");
@@ -151,7 +149,7 @@ static int check_meshes(struct record_line *r)
         return app_usage(
             &app_record,
             "--long-edge: no mesh is among the files: .ply with --mesh or --sparse, .obj, .gltf, .glb, .fbx");
-    r->job.files.recorder.long_edge = r->long_edge >= 0 ? r->long_edge : LONG_EDGE;
+    r->job.files.recorder.long_edge = r->long_edge >= 0 ? r->long_edge : RECORD_LONG_EDGE;
     r->job.files.recorder.sparse_seed = r->sparse_seed >= 0 ? (uint64_t)r->sparse_seed : 1;
     return APP_OK;
 }

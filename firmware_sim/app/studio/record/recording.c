@@ -186,8 +186,8 @@ static int is_gone(const struct recording *r, int rc)
     return r->o->replug_s > 0.0 && (rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED);
 }
 
-/* Waits for a head that is gone. Where it scans no more when it is back, the scan ended meanwhile. Where it still scans,
- * the rest of the scan will come. Its state is in r->reply. */
+/* Waits for a head that is gone. Where it scans no more when it is back, the scan ended meanwhile. Where it still
+ * scans, the rest of the scan will come. Its state is in r->reply. */
 static int replug(struct recording *r, int why, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);

@@ -121,13 +121,9 @@ static uint32_t names_apart(const struct page_bars *b)
 {
     enum { LETTER = 7, GAP = 8 };
     const double wide = (double)(RIGHT - LEFT) / b->n_groups;
-    size_t longest = 0;
-    for (uint32_t g = 0; g < b->n_groups; g++) {
-        size_t letters = 0;
-        for (const char *c = b->group[g]; *c != 0; c++)
-            letters += ((unsigned char)*c & 0xc0) != 0x80;
-        longest = letters > longest ? letters : longest;
-    }
+    int longest = 0;
+    for (uint32_t g = 0; g < b->n_groups; g++)
+        if (page_letters(b->group[g]) > longest) longest = page_letters(b->group[g]);
     return (uint32_t)ceil((double)(longest * LETTER + GAP) / wide);
 }
 

@@ -123,6 +123,14 @@ void page_count(FILE *out, uint64_t n)
     }
 }
 
+int page_letters(const char *text)
+{
+    int n = 0;
+    for (; *text != 0; text++)
+        n += ((unsigned char)*text & 0xc0) != 0x80;
+    return n;
+}
+
 void page_number(FILE *out, double v)
 {
     if (!isfinite(v))

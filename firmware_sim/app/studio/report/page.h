@@ -22,6 +22,9 @@ void page_count(FILE *out, uint64_t n);
 /* Three or four digits; NaN: a dash. */
 void page_number(FILE *out, double v);
 
+/* Counts the characters of UTF-8. */
+int page_letters(const char *text);
+
 /* Returns a unit for all figures of an axis; *per_m: how many of it make a metre. */
 const char *page_unit(double largest_m, double *per_m);
 

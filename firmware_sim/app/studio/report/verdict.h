@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Judges whether deviations of points are those that follow from configuration and plan: at a station of a recording
- * (expect.c), and in a scan that still goes on (firmware_sim/app/studio/watch). In: the setup of the station's head, and the figures of
- * its points (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. Also the JSON of
- * both, which `report --json` and /quality share (json.c). */
+ * (expect.c), and in a scan that still goes on (firmware_sim/app/studio/watch). In: the setup of the station's head,
+ * and the figures of its points (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure.
+ * Also the JSON of both, which `report --json` and /quality share (json.c). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 

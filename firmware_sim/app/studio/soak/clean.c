@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* The clean stream: a reader within the head's own process, which faults of links don't reach. */
 #include <stdlib.h>
 
 #include "core/bytes.h"

@@ -12,8 +12,8 @@
 struct soak_datagrams;
 struct soak_link;
 
-/* Opens sockets for the datagrams of a link and of a second, clean link. *clean_link becomes that second link, which the
- * caller opens beside the first. NULL: not possible. */
+/* Opens sockets for the datagrams of a link and of a second, clean link. *clean_link becomes that second link, which
+ * the caller opens beside the first. NULL: not possible. */
 struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *clean_link);
 void soak_datagrams_close(struct soak_datagrams *datagrams);
 int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);

@@ -48,9 +48,9 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
 /* A datagram; the caller has the link's lock. */
 void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32_t len);
 void soak_saw_notice(void *link, const struct scanhead_notice *notice);
-void soak_saw_open(struct soak_link *link);    /* a connection began */
-void soak_saw_end(struct soak_link *link);     /* it ended */
-void soak_saw_no_open(struct soak_link *link); /* an attempt to connect failed */
+void soak_saw_open(struct soak_link *link);                           /* a connection began */
+void soak_saw_end(struct soak_link *link);                            /* it ended */
+void soak_saw_no_open(struct soak_link *link);                        /* an attempt to connect failed */
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq); /* NULL: not known */
 
 #endif

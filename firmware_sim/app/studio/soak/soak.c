@@ -197,14 +197,6 @@ static int open_head(struct soak_options *o, struct config *cfg, struct soak *so
     return rc;
 }
 
-/* A soak compares frames, not speed. So the head of a busy machine gets the time to deliver all of them, even late. */
-static void be_patient(struct config *cfg)
-{
-    static const double PATIENCE_MS = 3000.0;
-    if (cfg->loop.queue_ms < PATIENCE_MS) cfg->loop.queue_ms = PATIENCE_MS;
-    if (cfg->loop.late_ms < PATIENCE_MS) cfg->loop.late_ms = PATIENCE_MS;
-}
-
 static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct soak_options *o = ctx;
@@ -215,7 +207,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     app_warn_settings_file(cfg, "a soak has the settings of the configuration");
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    be_patient(cfg);
+    verdict_be_patient(cfg);
     soak->cfg = cfg;
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
     soak->faults = cfg->faults;
@@ -315,8 +307,8 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "client-grace", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.grace_s),
      .help = "the client has to end within S seconds of SIGTERM (default 5)"},
     {APP_NUMBER, "match-mm", "MM", .min = 0.0, .max = 1e6, .at = AT(match_mm),
-     .help = "allow a difference of MM, and of the file's rounding, between coordinates of points (default 0.01; scip and cola 2, velodyne "
-             "20)"},
+     .help = "allow a difference of MM, and of the file's rounding, between coordinates of points (default 0.01; scip and "
+             "cola 2, velodyne 20)"},
     {APP_CALL, "allow", "CHECK", .apply = take_allowed, .choices = verdict_names, .n_choices = VERDICT_N_CHECKS,
      .help = "a finding of this check does not count; may be repeated"},
     {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,

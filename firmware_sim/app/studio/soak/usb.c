@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that is attached to this machine by USB: how its client finds it, and enumerations that went wrong. */
 #include <glob.h>
 #include <stdio.h>
 #include <string.h>

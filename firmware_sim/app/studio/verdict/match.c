@@ -110,8 +110,8 @@ static int compare_spoiled(const void *left, const void *right)
     return a->seq != b->seq ? (a->seq < b->seq ? -1 : 1) : 0;
 }
 
-/* Counts the sessions to which the frame was sent. A session's time is taken two ticks longer at both ends, since frames there
- * may have been sent or not. */
+/* Counts the sessions to which the frame was sent. A session's time is taken two ticks longer at both ends, since
+ * frames there may have been sent or not. */
 static uint32_t count_sent(const struct watch *watch, int64_t tick_ns, const struct own_frame *frame)
 {
     uint32_t n = 0;

@@ -32,8 +32,8 @@ struct match_input {
 /* SH_ESTOPPED where report asks to stop. */
 int match_points(const struct match_input *in, struct match *match, struct sh_err *err);
 
-/* Returns the rounding of a file's coordinates: in text the unit of the last digit, in single precision two units in the
- * last place of the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
+/* Returns the rounding of a file's coordinates: in text the unit of the last digit, in single precision two units in
+ * the last place of the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
 double match_unit_m(const struct cloud *cloud, double limit_m);
 
 #endif

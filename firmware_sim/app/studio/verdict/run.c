@@ -43,12 +43,17 @@ struct run {
 
 /* ---- the head */
 
-static void run_prepare(struct run *r)
+void verdict_be_patient(struct config *cfg)
 {
-    static const double PATIENCE_MS = 3000.0; /* as a soak: a busy machine is no fault of the client's */
-    struct config *cfg = r->cfg;
+    static const double PATIENCE_MS = 3000.0;
     cfg->loop.queue_ms = fmax(cfg->loop.queue_ms, PATIENCE_MS);
     cfg->loop.late_ms = fmax(cfg->loop.late_ms, PATIENCE_MS);
+}
+
+static void run_prepare(struct run *r)
+{
+    struct config *cfg = r->cfg;
+    verdict_be_patient(cfg);
     if (r->options->file == NULL) return;
     uint32_t n = 0;
     for (uint32_t i = 0; i < cfg->faults.n; i++) {
@@ -253,8 +258,8 @@ static int run_judge(struct run *r, struct sh_err *err)
         return run_compare(r, err);
     else {
         checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
-        sh_warn(&app_report_stderr, "soak: %s: --client-file: the points are not judged: %s",
-                r->verdict->scenario, r->stream.short_of);
+        sh_warn(&app_report_stderr, "soak: %s: --client-file: the points are not judged: %s", r->verdict->scenario,
+                r->stream.short_of);
     }
     return SH_OK;
 }

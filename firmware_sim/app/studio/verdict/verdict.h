@@ -80,6 +80,9 @@ struct verdict_options {
     uint32_t allowed;    /* bit per check */
 };
 
+/* A soak compares frames, not speed. So this gives the head of a busy machine time to deliver all of them, even
+ * late. */
+void verdict_be_patient(struct config *cfg);
 /* Runs the client once. `verdict` begins with the scenario's name. On failure there is no verdict. */
 int verdict_run(struct config *cfg, const struct verdict_options *options, struct verdict *verdict, struct sh_err *err);
 

@@ -46,9 +46,9 @@ struct watch {
     struct links_observer observer;
     uint32_t n_links, chosen; /* chosen: the client's, from 1 */
     uint32_t must_ask;        /* bit per link: a client there is back with its first request, not with its connection */
-    int64_t limit_ns;         /* a fault that leaves sessions open counts as the cause of their end up to this long after it */
-    int is_over;              /* 1: the run ends, so that sessions that end now are no client's doing */
-    int is_short;             /* 1: there was no memory for something */
+    int64_t limit_ns; /* a fault that leaves sessions open counts as the cause of their end up to this long after it */
+    int is_over;      /* 1: the run ends, so that sessions that end now are no client's doing */
+    int is_short;     /* 1: there was no memory for something */
     struct watch_link link[CONFIG_MAX_LINKS];
     struct watch_break *broken;
     struct watch_span *span; /* of the chosen link */

@@ -6,11 +6,11 @@
 #include <string.h>
 
 #include "firmware_sim/app/studio/page_query.h"
+#include "firmware_sim/app/studio/record/line.h"
 #include "firmware_sim/app/studio/view/encode.h"
 #include "firmware_sim/app/studio/view/spread.h"
 
 enum { MAX_WORDS = 6 };
-static const double RECORD_LONG_EDGE = 10; /* the default of scanhead record */
 
 /* ---- resources */
 

@@ -219,7 +219,8 @@ int viewed_load_stream(struct viewed *v, const struct sh_report *report, struct 
     if (rc == SH_OK) rc = track_flush(&s->track, err);
     if (rc == SH_OK) rc = viewed_end_grid(s, err);
     if (rc == SH_OK) rc = take_names(s, err);
-    if (rc == SH_OK && v->points.n > 0) rc = viewed_points_room(&v->points, v->points.n, s->has, err); /* frees the rest */
+    if (rc == SH_OK && v->points.n > 0)
+        rc = viewed_points_room(&v->points, v->points.n, s->has, err); /* frees the rest */
     if (rc == SH_OK) look_for_losses(s, sh);
     if (rc == SH_OK && v->n_meshes == 0 && v->why_no_mesh[0] == '\0')
         snprintf(v->why_no_mesh, sizeof v->why_no_mesh, "no four points lie in neighbouring rows and lines");

@@ -106,8 +106,6 @@ int viewed_load_stream(struct viewed *viewed, const struct sh_report *report, st
 /* Whether a point of a file in this CRS has a place that can be shown: within 10^12 m, or in degrees with a latitude
  * within 90. Broken files hold larger numbers, which would not stay finite when they are turned. */
 int viewed_can_show(int64_t epsg, const double p[3]);
-/* Takes points and stations in ECEF or in degrees to metres east, north, up of the first point. */
-int viewed_turn(struct viewed *viewed, struct sh_err *err);
 /* Finds bounds, origin, and the columns' limits. */
 void viewed_measure(struct viewed *viewed);
 /* SH_ENOMEM. The text is copied. */

@@ -1,12 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: the watch and its parts.
- *
- *   scene.c    /scene, made once; /head and /plan, of now
- *   observe.c  the thread: frames of the stream to points in the scene's frame
- *   sample.c   these points: which are kept, how far they are from the scene, the figures of all of them
- *   seen.c     which cells of the surface they are on
- *   quality.c  /quality: the last figures as JSON
- *   past.c     /past: the frames of the last points */
+/* Private to this folder: the watch and its parts, which README.md lists. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_INSIDE_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_INSIDE_H
 
@@ -56,7 +49,6 @@ struct watch_scan {
     struct report_verdict verdict;
     struct deviation_terms expected;
     int expects; /* 0: expected is not known */
-    uint32_t cells_seen;
     double seen_share;
 };
 
@@ -142,8 +134,8 @@ int watch_seen_open(struct watch *w, struct sh_err *err);
 void watch_seen_close(struct watch_seen *seen);
 void watch_seen_begin(struct watch_seen *seen, uint32_t station);
 void watch_seen_mark(struct watch_seen *seen, uint32_t station, uint32_t triangle, const double p_m[3]);
-/* Counts the cells of a station, and those of all. */
-void watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations, uint32_t *cells, double *share);
+/* Counts the cells of all stations. Returns the share of the surface that this station has seen; NaN: not known. */
+double watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations);
 
 /* ---- quality.c */
 /* The observer: works out figures, and shows them. */

@@ -32,11 +32,11 @@ enum { PAST_PIECE = 1 << 20, PAST_MOST_BYTES = 320 << 20, PAST_HEAD_LEN = 56 };
 
 /* NULL: no memory. */
 struct past *past_create(const struct past_limits *limits);
-/* lost_frames: how many frames the taker has lost so far; readers get this number. Points for which there is no memory count as
- * gone. */
+/* lost_frames: how many frames the taker has lost so far; readers get this number. Points for which there is no memory
+ * count as gone. */
 void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames);
-/* Gives the frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece; one
- * beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
+/* Gives the frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece;
+ * one beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
 int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err);
 /* Reads the position of "from=POSITION"; of "" it is 0. Others are SH_EINPUT. */
 int past_read_position(const char *query, uint64_t *from, struct sh_err *err);

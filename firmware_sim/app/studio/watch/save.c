@@ -43,7 +43,7 @@ struct save {
 static int make_folder(struct save *s, struct sh_err *err)
 {
     const char *temporary = getenv("TMPDIR");
-    if (s->folder[0] != '\0') return SH_OK;
+    if (s->folder[0] != '\0' && access(s->folder, W_OK) == 0) return SH_OK; /* else a service may have removed it */
     snprintf(s->folder, sizeof s->folder, "%.300s/scanhead-save-XXXXXX",
              temporary != NULL && temporary[0] != '\0' ? temporary : "/tmp");
     if (mkdtemp(s->folder) != NULL) return SH_OK;
