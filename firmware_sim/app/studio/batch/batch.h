@@ -28,7 +28,7 @@ struct batch {
     /* as read */
     struct batch_stations stations;
     uint32_t shard, n_shards;
-    char *endings; /* the format with NULs for its commas */
+    char *endings; /* --format, with NULs in place of commas */
     const char *ending[RECORD_MAX_FILES];
     int n_endings;
     /* as planned */

@@ -14,7 +14,7 @@ void batch_entry_free(struct batch_entry *entry)
     *entry = (struct batch_entry){0};
 }
 
-/* Returns 0: it is too long. */
+/* Returns 0 where the text is too long. */
 static int take_text(const char *text, char *buf, size_t len)
 {
     return (size_t)snprintf(buf, len, "%s", text) < len;

@@ -90,7 +90,7 @@ static void leave_out_bodies(struct chooser *c, double *estimate_m2)
     }
 }
 
-/* The open place with the largest estimate of those not tried yet; n: none. */
+/* Returns the open place with the largest estimate among those not tried yet; n: there is none. */
 static uint32_t best_of(const struct coverage_next *next, const double *estimate_m2,
                         const struct coverage_next_round *round)
 {

@@ -28,11 +28,11 @@ struct coverage_next_place {
     enum coverage_place state;
 };
 
-/* A round: the best place, by a whole scan. */
+/* A round of choosing: the best place, found by whole scans. */
 struct coverage_next_round {
     uint32_t place, n_tried, tried[COVERAGE_MOST_SCANS]; /* by gain, the best one first */
     double seen_m2[COVERAGE_MOST_SCANS], gain_m2[COVERAGE_MOST_SCANS];
-    double none_m2; /* seen by none, with this one */
+    double none_m2; /* area that no station sees, nor this place */
 };
 
 struct coverage_next {

@@ -33,7 +33,7 @@ struct record_files {
     int spooling;                /* the frames of the present files wait for the limits */
     struct colour_spool **spool; /* one for each head that comes, in their order */
     uint32_t n_spools;
-    const struct scanhead *sh; /* that the last frame came from */
+    const struct scanhead *sh; /* the head from which the last frame came */
 };
 
 /* SH_EINPUT: more than RECORD_MAX_FILES, a path twice, an ending without a recorder. path must live on. */
@@ -69,7 +69,7 @@ int record_files_open(struct record_files *files, struct sh_err *err);
 int record_files_save(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);
-/* Closes all, also after a failure; keep 0: removes them. The first error, if any; err may be NULL. */
+/* Closes all, also after a failure; keep 0: removes them. Returns the first error, if any; err may be NULL. */
 int record_files_close(struct record_files *files, int keep, struct sh_err *err);
 
 #endif

@@ -11,7 +11,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 
-/* The number of the head that has the scanner of station i, from 0; heads->n: none of those so far. */
+/* Returns the number of the head with the scanner of station i, from 0; heads->n: no head has it yet. */
 static uint32_t heads_find(const struct heads *heads, uint32_t i)
 {
     const struct config_station *station = heads->one[0].cfg->station;

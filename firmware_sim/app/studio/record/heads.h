@@ -38,7 +38,7 @@ struct heads {
 };
 
 /* Loads the configurations of all scanners; nothing runs. heads begins as zeros, is large, and is to be closed, also
- * after an error. cfg must live on, and so must the sets that it was loaded with. */
+ * after an error. cfg must live on, and so must the settings of --set that it was loaded with. */
 int heads_load(struct config *cfg, struct heads *heads, struct sh_err *err);
 /* How many turns the heads take from station `first` to `last`: a head that scans again after another one counts again.
  * Returns 1 where `first` is 0. */
@@ -49,7 +49,7 @@ struct config *heads_config(const struct heads *heads, uint32_t i, uint32_t firs
 /* Starts the first head; scan_s as of offline_open. site: of its configuration, by offline_load; NULL: it loads one. */
 int heads_open(struct heads *heads, struct site *site, double scan_s, const struct sh_report *report,
                struct sh_err *err);
-/* recording_run, from each station with its own head. */
+/* Like recording_run, from each station with the head of its scanner. */
 int heads_record(struct heads *heads, const struct recording_options *options, struct recording_result *result,
                  struct sh_err *err);
 /* The site of the head that scans now. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The recording of `record --raw`: from open files to closed ones, whatever the source is. */
+/* The recording of `record --raw`, whatever the source is. */
 #include <errno.h>
 #include <netinet/in.h>
 #include <string.h>

@@ -33,7 +33,7 @@ struct recording {
     int stopping;                       /* the scan at hand is to end */
     int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
     int scan_over, cut_short, broken;
-    double scan_s, into_s; /* how long the scan lasts, 0: not known; how far it is */
+    double scan_s, into_s; /* how long the scan lasts, 0: not known; the time since its start */
     uint32_t station;      /* at hand */
 };
 

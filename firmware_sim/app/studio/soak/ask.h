@@ -21,6 +21,7 @@ struct soak_ask {
     uint64_t others;             /* faults of any other kind since then */
     int64_t ended_ns;            /* clock: when a session last ended, or a client was turned away; 0: not yet */
     char before[SOAK_REPLY_LEN]; /* the last reply that came */
+    /* hurt: replies lost or wrong beside another fault, or just after a session; odd: without such a reason */
     uint64_t asked, answered, timeouts, wrong, hurt, odd;
     uint32_t next;
 };

@@ -36,8 +36,8 @@ static const char *why_not(const struct link_place *place, const struct link_spe
 {
     if (strcmp(place->type, "usb") == 0)
         return soak_usb_is_here(spec) ? NULL
-                                      : "only a head of protocol native with backend usbip and attach on is on this "
-                                        "machine";
+                                      : "only a USB head with backend usbip, attach on and protocol native is attached "
+                                        "to this machine";
     if (strcmp(place->type, "udp") == 0) return "its packets go to another place, or their port is taken";
     if (strcmp(place->type, "pty") != 0 && strcmp(place->type, "tcp") != 0) {
         if (strcmp(place->type, "web") == 0) return "libscanhead does not support WebSocket";

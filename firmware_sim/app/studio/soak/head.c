@@ -18,7 +18,7 @@
  * are far above a nanosecond and far below a jump. PPS_WITHIN_S: the longest time between two pulses. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
 
-/* Kinds that a client can't notice by itself, and why. */
+/* Returns why a client can't notice faults of a kind; NULL: it can. */
 static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
 {
     const int has_mirror = soak->cfg->profile.emitter.kind == EMITTER_LINE && soak->cfg->output.layout == LINE_POLAR;
@@ -125,7 +125,8 @@ int soak_saw_power_go(struct soak_link *link, int64_t before_ns)
     return 0;
 }
 
-/* The event that ends a boot says that it was slow. */
+/* Whether a fault was over before this first frame, so that it can't be noticed. The event that ends a slow boot still
+ * shows it. */
 static int is_before(const struct soak_moment *m, const struct scanhead_frame *frame)
 {
     const int ends_boot = frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE;
@@ -362,7 +363,7 @@ void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame)
 
 /* ---- at the end */
 
-/* Why a fault may be over, or the run, before the client can notice it; NULL: it must be noticed. */
+/* Returns why a fault, or the run, may end before the client can notice the fault; NULL: it must be noticed. */
 static const char *why_unseen(const struct soak_link *link, enum fault_kind kind)
 {
     switch (kind) {
@@ -374,7 +375,7 @@ static const char *why_unseen(const struct soak_link *link, enum fault_kind kind
     case FAULT_PTP_STEP:
         return "the follower's state and offset showed nothing of it in that time";
     case FAULT_SLOW_BOOT:
-        return link->soak->realtime ? NULL : "out of real time it may end before a client connects";
+        return link->soak->realtime ? NULL : "at this pace it may end before a client connects";
     default:
         return NULL;
     }

@@ -106,7 +106,7 @@ static void judge_late(struct soak_link *link, const struct soak_fact *f)
         const uint64_t n = f->times[kinds[i]];
         if (n == 0) continue;
         if (!link->soak->realtime)
-            soak_hide(row, n, "out of real time no frame is late");
+            soak_hide(row, n, "no frame is late at this pace: only realtime has delays");
         else if (f->for_ms < LATE_MS)
             soak_hide(row, n, "shorter than 10 ms");
         else if (link->datagrams != NULL)
@@ -223,7 +223,7 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
     judge_late(link, f);
     judge_garbage(link, f);
     judge_same_bytes(link, f);
-    if ((is_wrong && f->resealed == 0) || f->got > 1) link->wrong_plain++; /* once is enough */
+    if ((is_wrong && f->resealed == 0) || f->got > 1) link->wrong_plain++; /* once, even where both hold */
 }
 
 void soak_judge(struct soak_link *link, int all)

@@ -365,7 +365,6 @@ static void end_by_act(struct soak_link *link)
 
 static void end_by_refusal(struct soak_link *link)
 {
-    link->refused++;
     if (link->n_refusals == 0) return; /* a disconnect for a while keeps clients out, too */
     link->row[link->refusal[0].kind].noticed++;
     memmove(link->refusal, link->refusal + 1, --link->n_refusals * sizeof *link->refusal);

@@ -11,7 +11,7 @@
 #include "firmware_sim/app/studio/soak/usb.h"
 #include "firmware_sim/fault/fault.h"
 
-/* Shorter ones can't be told from an enumeration on a busy machine. */
+/* Shorter delays can't be told from an enumeration on a busy machine. */
 static const double SLOW_MS = 10.0, MARGIN_MS = 5.0;
 /* Control requests by which libscanhead opens a device: two for its serial number, one for the session. */
 enum { OPEN_REQUESTS = 3, DEVICE_LEN = 18, CONFIG_HEADER_LEN = 4, DESCRIPTORS_LEN = 4096 };

@@ -22,7 +22,7 @@ static uint32_t n_scenarios(const struct verdicts *v)
     return v->n != 0 ? v->n : 1;
 }
 
-/* A scenario has its file's name without folder and ending; of several, the place in front makes each name unique. */
+/* A scenario has its file's name without folder and ending; several scenarios have their number in front. */
 static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t cap)
 {
     const char *path = v->n != 0 ? v->scenario[i] : "configuration", *slash = strrchr(path, '/');

@@ -79,7 +79,7 @@ static int open_head(struct run *r, struct sh_err *err)
         .extra = &r->stream.link, .report = &app_report_stderr, .observer = &r->watch.observer};
     int rc = site_load(cfg, &app_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = site_open_sights(r->site, 0, r->site->n_stations, &app_report_stderr, err);
-    cfg->head.settings.frames = 0; /* after the plan */
+    cfg->head.settings.frames = 0; /* only after the plan was made */
     if (rc == SH_OK) rc = device_create(r->site, &device, &r->device, err);
     if (rc == SH_OK) rc = own_stream_open(&r->stream, err);
     if (rc == SH_OK) rc = loop_create(r->site, r->device, &options, &r->loop, err);

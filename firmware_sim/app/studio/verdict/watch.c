@@ -114,7 +114,7 @@ static void on_heard(void *ctx, uint32_t session, const void *bytes, size_t len)
     pthread_mutex_unlock(&w->lock);
 }
 
-/* Whether a request was refused only since the head was in another state, or another session had control. A client
+/* Whether a request was refused only because the head was in another state, or another session had control. A client
  * can't know that beforehand. */
 static int is_of_state(const char *reply)
 {

@@ -64,7 +64,7 @@ struct watch {
 void watch_begin(struct watch *watch, uint32_t n_links, uint32_t chosen, double limit_s);
 void watch_end(struct watch *watch);
 void watch_free(struct watch *watch);
-/* The listener of the board. */
+/* The board of faults calls this for each fault. */
 void watch_note(void *watch, const struct fault_note *note);
 /* Whether all clients that a disturbance sent away are back, and the chosen link has a session. */
 int watch_is_whole(struct watch *watch);

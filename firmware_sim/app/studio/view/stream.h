@@ -17,7 +17,6 @@ struct viewed_stream {
     size_t room_at, room;
     unsigned has; /* columns */
     int no_mesh;
-    uint64_t n_lost; /* points whose pose was lost */
     double file_bytes;
     struct recording_counts counts;
 };

@@ -6,7 +6,8 @@
  * Each triangle has its edge ratio, by which the filter decides, so that any factor can be shown at once.
  *
  * Memory: 24 bytes a point; range, reflectance and amplitude 4 each, time 8, label and station 2 each, echo and echoes
- * 1 each, colour 3; of a mesh 20 a triangle, two a point. Constant after viewed_load; any thread. */
+ * 1 each, colour 3; a mesh takes 20 a triangle, and has up to two triangles a point. Constant after viewed_load; any
+ * thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 #define FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 
@@ -53,8 +54,8 @@ struct viewed_mesh {
     uint32_t first_point, n_points; /* its corners are among these points of the recording */
     uint32_t n_faces;
     uint32_t (*face)[3]; /* [n_faces] points, from first_point on; in the order of the grid */
-    float *ratio;    /* [n_faces] longest edge over mean edge, rounded upwards: a float f keeps it where it is <= f */
-    uint32_t *order; /* [n_faces] faces by rising ratio */
+    float *ratio;        /* [n_faces] longest edge over mean edge, rounded upwards: a factor f keeps faces up to f */
+    uint32_t *order;     /* [n_faces] faces by rising ratio */
     double mean_edge_m;
     uint64_t n_edges, n_flat;
 };

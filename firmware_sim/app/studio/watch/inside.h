@@ -42,7 +42,7 @@ struct watch_scan {
     uint32_t every;
     int in_scene; /* points could be taken to the scene's frame */
     struct figures figures;
-    double max_at_m[3];                 /* the point that figures.max_m is of; NaN: none */
+    double max_at_m[3];                 /* place of the point with the distance figures.max_m; NaN: none */
     struct figures_density_row density; /* of the points looked at, times `every` */
     double density_cell_m;
     struct figures_histogram histogram; /* of deviations along the beam, or of distances where there are none */
@@ -81,7 +81,7 @@ struct watch {
     struct distance *index;
     struct deviation_head *head; /* [n_stations] */
     struct deviation_head now;   /* of the scan at hand */
-    struct device_held held;     /* what `now` is of */
+    struct device_held held;     /* keeps the site of `now` */
     struct georef *now_georef;   /* of the scan at hand; NULL: its points are in the scene's frame, or nowhere */
     struct watch_sample sample;
     struct watch_seen seen;
