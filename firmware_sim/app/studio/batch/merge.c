@@ -13,7 +13,7 @@
 enum { MOST_LINES = 20 };
 
 /* Prints why a job is incomplete. */
-static void say_gap(uint32_t *n_gaps, uint32_t job, const char *name, const char *why)
+static void print_incomplete(uint32_t *n_gaps, uint32_t job, const char *name, const char *why)
 {
     if ((*n_gaps)++ < MOST_LINES) fprintf(stderr, "scanhead: job %u, %s: %s\n", job + 1, name, why);
 }
@@ -24,12 +24,12 @@ static int check_job(struct batch *b, uint32_t job, uint32_t *n_gaps, struct sh_
     struct sh_err why = {0};
     batch_job_name(b, job, name);
     if (!b->job[job].is_done) {
-        say_gap(n_gaps, job, name, b->job[job].other != NULL ? b->job[job].other : "missing");
+        print_incomplete(n_gaps, job, name, b->job[job].other != NULL ? b->job[job].other : "missing");
         return SH_OK;
     }
     const int rc = batch_check_files(b, job, &why);
     if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
-    if (rc != SH_OK) say_gap(n_gaps, job, name, why.text);
+    if (rc != SH_OK) print_incomplete(n_gaps, job, name, why.text);
     return SH_OK;
 }
 

@@ -34,7 +34,7 @@ static void take_hex(struct sha256_ctx *ctx, char hex[BATCH_SHA_LEN])
 }
 
 /* Hashes the text with its NUL, so that "ab", "c" differs from "a", "bc". */
-static void take_text(struct sha256_ctx *ctx, const char *text)
+static void hash_text(struct sha256_ctx *ctx, const char *text)
 {
     sha256_update(ctx, strlen(text) + 1, (const uint8_t *)text);
 }
@@ -133,8 +133,8 @@ static const char *sha_of(struct inputs *in, const char *path)
 static void take_file(struct inputs *in, const char *what, const char *path)
 {
     if (in->rc != SH_OK) return;
-    take_text(&in->ctx, what);
-    take_text(&in->ctx, sha_of(in, path));
+    hash_text(&in->ctx, what);
+    hash_text(&in->ctx, sha_of(in, path));
 }
 
 static int keep_sidecar(void *ctx, const char *name, const char *path)
@@ -209,6 +209,6 @@ void batch_provenance_job(struct batch_provenance *made, const char *const *text
     struct sha256_ctx ctx;
     sha256_init(&ctx);
     for (uint32_t i = 0; i < n; i++)
-        take_text(&ctx, text[i]);
+        hash_text(&ctx, text[i]);
     take_hex(&ctx, made->job);
 }

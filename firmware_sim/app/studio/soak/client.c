@@ -194,7 +194,7 @@ static void take_frame(struct recorder *r, const struct scanhead_frame *frame)
     if (frame->type == SCANHEAD_POINTS) r->points_ns = now_ns;
 }
 
-static void ask(struct recorder *r)
+static void client_ask(struct recorder *r)
 {
     const int64_t now_ns = clock_now_ns();
     if (now_ns - r->asked_ns < ASK_EVERY_NS || atomic_load(&r->link->soak->phase) == SOAK_ENDS) return;
@@ -251,7 +251,7 @@ static void *record(void *arg)
     while (!r.ended) {
         step(&r);
         see_whether_done(&r);
-        if (!r.ended && !is_over(link)) ask(&r);
+        if (!r.ended && !is_over(link)) client_ask(&r);
     }
     atomic_store(&link->done, 1);
     return NULL;

@@ -99,7 +99,7 @@ void soak_heard_head(struct soak_link *link, const struct fault_note *note)
 
 /* ---- what the client saw */
 
-static void see(struct soak_link *link, struct soak_moment *m)
+static void see_moment(struct soak_link *link, struct soak_moment *m)
 {
     link->row[m->kind].noticed++;
     *m = link->moment[--link->n_moments];
@@ -110,7 +110,7 @@ static void see_kind(struct soak_link *link, enum fault_kind kind, int64_t from_
 {
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
-        if (m->kind == kind && m->from_ns <= to_ns && m->to_ns >= from_ns) see(link, m);
+        if (m->kind == kind && m->from_ns <= to_ns && m->to_ns >= from_ns) see_moment(link, m);
     }
 }
 
@@ -119,7 +119,7 @@ int soak_saw_power_go(struct soak_link *link, int64_t before_ns)
     for (uint32_t i = 0; i < link->n_moments; i++) {
         struct soak_moment *m = &link->moment[i];
         if (m->kind != FAULT_POWER_CYCLE || m->from_ns > before_ns) continue;
-        see(link, m);
+        see_moment(link, m);
         return 1;
     }
     return 0;
@@ -154,7 +154,7 @@ static void take_state(struct soak_link *link, const struct scanhead_frame *fram
     if (frame->event_value[0] == HEAD_FAULT) see_kind(link, FAULT_SELF_TEST, INT64_MIN, frame->t_ns);
     for (uint32_t i = link->n_moments; i-- > 0 && frame->event_value[1] == HEAD_BOOT;) {
         struct soak_moment *m = &link->moment[i];
-        if (m->kind == FAULT_SLOW_BOOT && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms)) see(link, m);
+        if (m->kind == FAULT_SLOW_BOOT && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms)) see_moment(link, m);
     }
 }
 
@@ -182,7 +182,7 @@ static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
         const int seen = (m->kind == FAULT_CLOCK_JUMP && fabs(by_s - jump_s) < 0.5 * fabs(jump_s)) ||
                          (m->kind == FAULT_CLOCK_STOP && by_s < -STEP_S) ||
                          (m->kind == FAULT_CLOCK_DRIFT && fabs(by_s) > GAIN_S && fabs(by_s) < STEP_S);
-        if (seen) see(link, m);
+        if (seen) see_moment(link, m);
     }
     if (!t->have) hide_clock(link, at_ns);
     t->have = 1;
@@ -213,7 +213,8 @@ static void see_jitter(struct soak_link *link, int64_t at_ns, int64_t gps_s)
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
         const double late_s = 1e-3 * m->for_ms;
-        if (m->kind == FAULT_PPS_JITTER && m->from_ns <= at_ns && fabs(off_s - late_s) < 0.25 * late_s) see(link, m);
+        if (m->kind == FAULT_PPS_JITTER && m->from_ns <= at_ns && fabs(off_s - late_s) < 0.25 * late_s)
+            see_moment(link, m);
     }
 }
 
@@ -257,7 +258,7 @@ static int shows_ptp(const struct soak_link *link, const struct soak_moment *m, 
 static void take_ptp(struct soak_link *link, int64_t at_ns, const struct native_telemetry *t)
 {
     for (uint32_t i = link->n_moments; i-- > 0;)
-        if (shows_ptp(link, &link->moment[i], at_ns, t)) see(link, &link->moment[i]);
+        if (shows_ptp(link, &link->moment[i], at_ns, t)) see_moment(link, &link->moment[i]);
 }
 
 static void head_take_telemetry(struct soak_link *link, const struct scanhead_frame *frame)
@@ -347,7 +348,8 @@ static void head_take_points(struct soak_link *link, const struct scanhead_frame
     if (link->usual_rate == 0.0 && isfinite(rate)) take_usual_rate(link, frame->t_ns, rate);
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
-        if (m->from_ns <= frame->t_ns && frame->t_ns < m->to_ns && is_seen_in(link, m, frame, rate)) see(link, m);
+        if (m->from_ns <= frame->t_ns && frame->t_ns < m->to_ns && is_seen_in(link, m, frame, rate))
+            see_moment(link, m);
     }
 }
 

@@ -132,7 +132,7 @@ static int run_clients(const struct soak_options *o, struct soak *soak, struct s
 }
 
 /* Clients read on until the links are closed, which is when the loop is freed. */
-static int serve(const struct soak_options *o, struct soak *soak, struct soak_head *head, struct sh_err *err)
+static int soak_serve(const struct soak_options *o, struct soak *soak, struct soak_head *head, struct sh_err *err)
 {
     int rc = loop_start(head->loop, err);
     if (rc == SH_OK) rc = run_clients(o, soak, err);
@@ -213,7 +213,7 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     soak->faults = cfg->faults;
     open_clean_links(cfg, soak, o);
     int rc = open_head(o, cfg, soak, &head, err);
-    if (rc == SH_OK) rc = serve(o, soak, &head, err);
+    if (rc == SH_OK) rc = soak_serve(o, soak, &head, err);
     if (rc == SH_OK) rc = say_result(o, soak, err);
     loop_free(head.loop);
     soak_clients_close(soak);

@@ -233,7 +233,7 @@ static struct piece *past_find(struct past *past, uint64_t *from)
     return NULL;
 }
 
-static void put_head(const struct past *past, uint64_t next, uint8_t *to)
+static void past_put_head(const struct past *past, uint64_t next, uint8_t *to)
 {
     memcpy(to, "SHPA", 4);
     le_put32(to + 4, VERSION);
@@ -256,7 +256,7 @@ int past_get(struct past *past, const char *query, struct web_body *out, struct 
     const size_t len = piece != NULL ? piece->len - (size_t)(from - piece->base) : 0;
     *out = (struct web_body){"application/octet-stream", malloc(PAST_HEAD_LEN + len), PAST_HEAD_LEN + len};
     if (out->bytes != NULL) {
-        put_head(past, piece != NULL ? from + len : past->end, (uint8_t *)out->bytes);
+        past_put_head(past, piece != NULL ? from + len : past->end, (uint8_t *)out->bytes);
         if (len > 0) memcpy(out->bytes + PAST_HEAD_LEN, piece->bytes + (from - piece->base), len);
     }
     pthread_mutex_unlock(&past->lock);

@@ -171,7 +171,7 @@ static void put_surfaces(struct json *json, const struct site *site)
     json_close_array(json);
 }
 
-static void put_head(struct json *json, const void *ctx)
+static void scene_put_head(struct json *json, const void *ctx)
 {
     static const char *const paces[] = {[PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"};
     const struct watch *w = ctx;
@@ -199,7 +199,7 @@ static void put_head(struct json *json, const void *ctx)
 
 int watch_get_head(struct watch *w, struct web_body *out, struct sh_err *err)
 {
-    return page_json(put_head, w, out, err);
+    return page_json(scene_put_head, w, out, err);
 }
 
 static void put_plan(struct json *json, const void *ctx)
