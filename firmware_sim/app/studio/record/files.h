@@ -52,10 +52,8 @@ int record_files_have_colours(const struct record_files *files);
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
 /* For a stream in coordinates of the Earth: SH_EINPUT where a file's numbers are too coarse for them. */
 int record_files_check_floats(const struct record_files *files, struct sh_err *err);
-/* For a head that moves, in coordinates of the Earth: SH_EINPUT where a file is a mesh, which faces the head. */
-int record_files_check_facing(const struct record_files *files, struct sh_err *err);
-/* For a head that stands still and scans a single line: SH_EINPUT where a file is a mesh. */
-int record_files_check_surface(const struct record_files *files, struct sh_err *err);
+/* SH_EINPUT where a file is a mesh. why: follows "a mesh" in the error. */
+int record_files_refuse_meshes(const struct record_files *files, const char *why, struct sh_err *err);
 /* SH_EINPUT where a file is a grid, and a head of this kind fires without rows and columns. */
 int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err);
 /* SH_EINPUT where a file is the stream of one head, and several heads would send into it. */

@@ -235,8 +235,17 @@ static int check_meshes(const struct record_job *r, const struct config *cfg, st
     const int one_line = kind == EMITTER_PLANAR || (kind == EMITTER_LINE && cfg->head.settings.pan_udeg_s == 0) ||
                          (kind == EMITTER_SPHERE && cfg->profile.emitter.rings <= 1);
     int rc = on_earth ? record_files_check_floats(&r->files, err) : SH_OK;
-    if (rc == SH_OK && on_earth && moves) rc = record_files_check_facing(&r->files, err);
-    if (rc == SH_OK && one_line && !moves) rc = record_files_check_surface(&r->files, err);
+    if (rc == SH_OK && on_earth && moves)
+        rc = record_files_refuse_meshes(&r->files,
+                                        "faces the head, but the places of a moving head are known only in the "
+                                        "scene's frame; allowed output.crs: local, or output.layout: polar",
+                                        err);
+    if (rc == SH_OK && one_line && !moves)
+        rc = record_files_refuse_meshes(&r->files,
+                                        "needs a surface, but this head scans a single line: it neither pans nor "
+                                        "moves, and has one ring; allowed are .ply (without --mesh and --sparse) .las "
+                                        ".ptx .e57 .shs",
+                                        err);
     return rc == SH_OK ? record_files_check_emitter(&r->files, kind, err) : rc;
 }
 

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Asks the head questions whose right answers are known, and judges the answers. */
 #include <stdio.h>
 #include <string.h>
 

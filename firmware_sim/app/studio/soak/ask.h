@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The questions of a client, and how their answers are judged. */
+/* A client's questions, whose right answers are known, and the judging of the answers. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_ASK_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_ASK_H
 

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults in the head, as the client of a link notices them: by states, times and encoders of the frames that it got. */
 #include <math.h>
 #include <string.h>
 

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compares the faults injected into each frame of a link with what the client saw of it.
- *
- * A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of it, and the clean
+/* A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of it, and the clean
  * reader has it. */
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For each frame of a link: the injected faults, as the head reports them, and what the client saw of it.
- *
- * The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
+/* The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
  * numbers, which are the same on all links. */
 #include <stdlib.h>
 #include <string.h>

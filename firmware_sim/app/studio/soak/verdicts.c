@@ -25,8 +25,7 @@ static uint32_t n_scenarios(const struct verdicts *v)
 /* A scenario has its file's name without folder and ending; several scenarios have their number in front. */
 static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t cap)
 {
-    const char *path = v->n != 0 ? v->scenario[i] : "configuration", *slash = strrchr(path, '/');
-    const char *name = slash != NULL ? slash + 1 : path, *dot = strrchr(name, '.');
+    const char *name = basename(v->n != 0 ? v->scenario[i] : "configuration"), *dot = strrchr(name, '.');
     const int len = dot != NULL && dot != name ? (int)(dot - name) : (int)strlen(name);
     if (v->n > 1)
         snprintf(to, cap, "%u-%.*s", i + 1, len, name);

@@ -46,6 +46,13 @@ static uint32_t count_of(uint32_t n, uint32_t first, uint32_t every, uint32_t mo
     return there < asked ? there : asked;
 }
 
+/* Both answers have seven numbers after their first four letters. */
+static void put_words(char *to, const uint32_t words[7])
+{
+    for (size_t i = 0; i < 7; i++)
+        le_put32(to + 4 * i, words[i]);
+}
+
 /* ---- points */
 
 /* The points of an answer. */
@@ -134,8 +141,7 @@ int view_encode_points(const struct viewed_points *points, const double origin_m
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u points", s.n);
     memcpy(to, "SHCL", 4);
     const uint32_t head[] = {1, s.n, n_columns, part->first, part->every, points->n, 0};
-    for (size_t i = 0; i < sizeof head / sizeof head[0]; i++)
-        le_put32(to + 4 + 4 * i, head[i]);
+    put_words(to + 4, head);
     for (int k = 0; k < 3; k++)
         le_put_double(to + 32 + 8 * k, origin_m[k]);
     lay_out(&s, n_columns, to);
@@ -154,8 +160,7 @@ int view_encode_mesh(const struct viewed_mesh *m, uint32_t first, uint32_t most,
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u triangles", n);
     memcpy(to, "SHMS", 4);
     const uint32_t head[] = {1, n, first, m->n_faces, m->first_point, m->n_points, (uint32_t)m->n_edges};
-    for (size_t i = 0; i < sizeof head / sizeof head[0]; i++)
-        le_put32(to + 4 + 4 * i, head[i]);
+    put_words(to + 4, head);
     le_put_double(to + 32, m->mean_edge_m);
     char *face = to + VIEW_MESH_HEAD, *ratio = face + 12 * (size_t)n;
     for (uint32_t i = 0; i < n; i++) {

@@ -123,7 +123,7 @@ static void put_station(const struct viewed_station *s, struct json *json)
     json_close_object(json);
 }
 
-static void put_all(struct json *json, const void *ctx)
+void view_put_head(struct json *json, const void *ctx)
 {
     const struct viewed *v = ctx;
     json_open_object(json, NULL);
@@ -141,9 +141,4 @@ static void put_all(struct json *json, const void *ctx)
     page_put_bounds(json, v->min_m, v->max_m);
     page_put_vector(json, "origin", v->origin_m);
     json_close_object(json);
-}
-
-int view_encode_head(const struct viewed *v, struct web_body *body, struct sh_err *err)
-{
-    return page_json(put_all, v, body, err);
 }

@@ -4,10 +4,7 @@
  *
  * Shots without echo are counted, not held. Meshes are those of `scanhead record --mesh` before the long-edge filter.
  * Each triangle has its edge ratio, by which the filter decides, so that any factor can be shown at once.
- *
- * Memory: 24 bytes a point; range, reflectance and amplitude 4 each, time 8, label and station 2 each, echo and echoes
- * 1 each, colour 3; a mesh takes 20 a triangle, and has up to two triangles a point. Constant after viewed_load; any
- * thread. */
+ * README.md says how much memory they take. Constant after viewed_load; any thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 #define FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 

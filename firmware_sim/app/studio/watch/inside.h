@@ -112,8 +112,9 @@ struct watch {
 /* ---- scene.c */
 int watch_make_scene(struct watch *w, struct sh_err *err);
 int watch_get_scene(const struct watch *w, struct web_body *out, struct sh_err *err);
-int watch_get_head(struct watch *w, struct web_body *out, struct sh_err *err);
-int watch_get_plan(struct watch *w, struct web_body *out, struct sh_err *err);
+/* For page_json; ctx is the struct watch. */
+void watch_put_head(struct json *json, const void *ctx);
+void watch_put_plan(struct json *json, const void *ctx);
 
 /* ---- observe.c */
 void *watch_observe(void *watch);

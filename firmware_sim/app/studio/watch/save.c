@@ -4,6 +4,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -15,6 +16,7 @@
 
 #include "core/bytes.h"
 #include "firmware_sim/app/studio/page_json.h"
+#include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/app/studio/record/job.h"
 #include "firmware_sim/app/studio/watch/watch.h"
 
@@ -224,28 +226,18 @@ static int read_piece(const char *path, uint64_t from, struct web_body *out, str
     return rc;
 }
 
-/* "file=NUMBER&from=POSITION". */
-static int read_place(const char *query, uint64_t *number, uint64_t *from, struct sh_err *err)
-{
-    static const char name[] = "file=";
-    const size_t named = sizeof name - 1;
-    const size_t digits = strncmp(query, name, named) == 0 ? strspn(query + named, "0123456789") : 0;
-    if (digits < 1 || digits > 18 || query[named + digits] != '&')
-        return sh_fail(err, SH_EINPUT, "%.64s: allowed is file=NUMBER&from=POSITION", query);
-    *number = strtoull(query + named, NULL, 10);
-    return past_read_position(query + named + digits + 1, from, err);
-}
-
 int save_get_piece(struct save *s, const char *query, struct web_body *out, struct sh_err *err)
 {
-    uint64_t number = 0, from = 0;
-    int rc = read_place(query, &number, &from, err);
+    struct page_word words[] = {
+        {"file", 1, 1e9, 1, (double)NAN}, {"from", 0, PAST_MOST_POSITION, 1, 0}, {.name = NULL}};
+    int rc = page_read_query(words, query, err);
     if (rc != SH_OK) return rc;
+    const uint64_t number = (uint64_t)words[0].value;
     pthread_mutex_lock(&s->lock);
     if (number != s->number || s->state != SAVE_DONE)
         rc = sh_fail(err, SH_EINPUT, "file %" PRIu64 " is not there; /save has the number of the last one", number);
     else
-        rc = read_piece(s->file, from, out, err);
+        rc = read_piece(s->file, (uint64_t)words[1].value, out, err);
     pthread_mutex_unlock(&s->lock);
     return rc;
 }
