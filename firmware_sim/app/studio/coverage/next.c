@@ -98,7 +98,7 @@ static uint32_t best_of(const struct coverage_next *next, const double *estimate
     for (uint32_t i = 0; i < next->n; i++) {
         int tried = next->place[i].state != 0 || !(estimate_m2[i] > 0.0);
         for (uint32_t k = 0; k < round->n_tried; k++)
-            tried |= round->tried[k] == i;
+            tried |= round->tried[k].place == i;
         if (!tried && (best == next->n || estimate_m2[i] > estimate_m2[best])) best = i;
     }
     return best;
@@ -128,17 +128,12 @@ static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_e
 }
 
 /* Keeps the tried places in order of gain; of equal ones the first one tried comes first. */
-static void insert(struct coverage_next_round *round, uint32_t place, double seen_m2, double gain_m2)
+static void insert(struct coverage_next_round *round, const struct coverage_next_tried *tried)
 {
     uint32_t at = round->n_tried++;
-    for (; at > 0 && gain_m2 > round->gain_m2[at - 1]; at--) {
+    for (; at > 0 && tried->gain_m2 > round->tried[at - 1].gain_m2; at--)
         round->tried[at] = round->tried[at - 1];
-        round->seen_m2[at] = round->seen_m2[at - 1];
-        round->gain_m2[at] = round->gain_m2[at - 1];
-    }
-    round->tried[at] = place;
-    round->seen_m2[at] = seen_m2;
-    round->gain_m2[at] = gain_m2;
+    round->tried[at] = *tried;
 }
 
 static double none_m2(struct coverage *coverage)
@@ -158,27 +153,26 @@ static int choose(struct chooser *c, uint32_t number, struct sh_err *err)
     struct coverage_next *next = c->f->next;
     double *estimate_m2 = next->estimate_m2 + (size_t)number * next->n;
     struct coverage_next_round *round = &next->round[number];
+    struct coverage_next_tried tried = {.place = next->n};
     char what[64];
-    uint32_t last = next->n;
     int rc = estimate_all(c, estimate_m2, err);
     if (rc == SH_OK && number == 0) leave_out_bodies(c, estimate_m2);
     while (rc == SH_OK && round->n_tried < (uint32_t)c->f->o->scans) {
         const uint32_t best = best_of(next, estimate_m2, round);
-        double seen_m2, gain_m2;
         if (best == next->n) break;
         snprintf(what, sizeof what, "next station %u, scan %u of %ld", number + 1, round->n_tried + 1, c->f->o->scans);
         rc = scan(c, best, what, err);
         if (rc != SH_OK) break;
-        coverage_waiting(c->coverage, &seen_m2, &gain_m2);
-        insert(round, best, seen_m2, gain_m2);
-        last = best;
+        tried.place = best;
+        coverage_waiting(c->coverage, &tried.seen_m2, &tried.gain_m2);
+        insert(round, &tried);
     }
-    if (rc != SH_OK || round->n_tried == 0 || !(round->gain_m2[0] > 0.0)) return rc;
-    round->place = round->tried[0];
-    if (round->place != last) rc = scan(c, round->place, "next station, once more", err);
+    const uint32_t chosen = round->tried[0].place;
+    if (rc != SH_OK || round->n_tried == 0 || !(round->tried[0].gain_m2 > 0.0)) return rc;
+    if (chosen != tried.place) rc = scan(c, chosen, "next station, once more", err);
     if (rc != SH_OK) return rc;
     coverage_keep(c->coverage);
-    next->place[round->place].state = COVERAGE_PLACE_CHOSEN;
+    next->place[chosen].state = COVERAGE_PLACE_CHOSEN;
     round->none_m2 = none_m2(c->coverage);
     return 1;
 }

@@ -28,11 +28,15 @@ struct coverage_next_place {
     enum coverage_place state;
 };
 
-/* A round of choosing: the best place, found by whole scans. */
+/* A round of choosing: places that were scanned as a whole, by gain. The first one is the best, and is chosen. */
+struct coverage_next_tried {
+    uint32_t place;
+    double seen_m2, gain_m2;
+};
 struct coverage_next_round {
-    uint32_t place, n_tried, tried[COVERAGE_MOST_SCANS]; /* by gain, the best one first */
-    double seen_m2[COVERAGE_MOST_SCANS], gain_m2[COVERAGE_MOST_SCANS];
-    double none_m2; /* area that no station sees, nor this place */
+    uint32_t n_tried;
+    struct coverage_next_tried tried[COVERAGE_MOST_SCANS];
+    double none_m2; /* area that no station sees, nor the best place */
 };
 
 struct coverage_next {

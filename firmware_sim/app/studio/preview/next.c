@@ -27,14 +27,14 @@ static void put_next(struct json *json, const void *ctx)
         json_string(json, "place", NULL);
     else {
         const struct coverage_next_round *round = &next->round[0];
-        const struct coverage_next_place *place = &next->place[round->place];
+        const struct coverage_next_place *place = &next->place[round->tried[0].place];
         json_open_object(json, "place");
         json_double(json, "x_m", place->position_m[0]);
         json_double(json, "y_m", place->position_m[1]);
         json_double(json, "z_m", place->position_m[2]);
         json_double(json, "heading_deg", place->heading_deg);
         json_close_object(json);
-        json_double(json, "gain_m2", round->gain_m2[0]);
+        json_double(json, "gain_m2", round->tried[0].gain_m2);
         json_double(json, "none_m2", round->none_m2);
     }
     json_close_object(json);

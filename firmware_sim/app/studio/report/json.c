@@ -91,7 +91,7 @@ static void put_stations(struct json *json, const struct report *r)
         json_string(json, "name", r->site->station[s].station->name);
         report_put_figures(json, &st->figures);
         report_put_density(json, &st->density);
-        if (r->cloud.time_s != NULL) put_times(json, &st->times, st->gap_s);
+        if (r->f.times != NULL) put_times(json, &r->f.times[s], r->f.gap_s[s]);
         report_put_verdict(json, &st->verdict);
         json_close_object(json);
     }

@@ -186,7 +186,7 @@ static void put_echoes(FILE *out, const struct report *r)
 void report_put_times(FILE *out, const struct report *r)
 {
     fputs("<h2>Time and echoes</h2>\n", out);
-    if (r->cloud.time_s == NULL) {
+    if (r->f.times == NULL) {
         fputs("<p>The file has no times.</p>\n", out);
     } else {
         fputs(
@@ -196,7 +196,7 @@ void report_put_times(FILE *out, const struct report *r)
             "</thead>\n<tbody>\n",
             out);
         for (uint32_t s = 0; s < r->site->n_stations; s++) {
-            const struct figures_times *t = &r->f.station[s].times;
+            const struct figures_times *t = &r->f.times[s];
             if (t->points == 0) continue;
             fprintf(out, "<tr><td>%" PRIu32 " ", s + 1);
             picture_put_escaped(out, r->site->station[s].station->name);
