@@ -114,7 +114,7 @@ static int64_t ns_since(int64_t t_ns, int64_t from_ns)
     return (int64_t)((uint64_t)t_ns - (uint64_t)from_ns);
 }
 
-/* A sphere head fires one line per ring in each pan sweep, so its scan takes that many times longer. Other heads: 1. */
+/* Each of the `frames` of a sphere head has a line for every ring, so scan_s gets the number of rings as a factor. */
 static uint32_t lines_of_frame(const struct scanhead *sh)
 {
     struct scanhead_emitter e;

@@ -157,7 +157,7 @@ static void take_state(struct soak_link *link, const struct scanhead_frame *fram
     }
 }
 
-/* Hides faults from before the client's first time, which it has no earlier time to compare with. */
+/* Hides faults from before the client's first time, since there is no earlier time to compare that one with. */
 static void hide_clock(struct soak_link *link, int64_t at_ns)
 {
     for (uint32_t i = link->n_moments; i-- > 0;) {

@@ -110,7 +110,7 @@ static void soak_on(const struct soak_options *o, struct soak *soak)
 /* Ends the injection of faults, and gives clients the time to notice those so far. */
 static void drain(struct soak *soak)
 {
-    fault_board_remove(soak->board, 0);
+    fault_board_end(soak->board, 0, INT64_MIN); /* all, at once */
     wait_until(soak, is_head_seen, HEAD_SEEN_MS);
     atomic_store(&soak->until, soak_clean_top(soak) + 1);
     atomic_store(&soak->phase, SOAK_DRAINS);

@@ -167,7 +167,7 @@ static void run_client(struct run *r)
     const int there = (!c->has_sessions || wait_until(r, is_connected, in_s(o->limit_s))) &&
                       wait_until(r, has_points, in_s(o->limit_s));
     if (there) wait_until(r, never, in_s(o->duration_s));
-    fault_board_remove(device_faults(r->device), 0);
+    fault_board_end(device_faults(r->device), 0, INT64_MIN); /* all, at once */
     if (c->has_sessions ? is_connected(r) : there) run_settle(r);
     c->was_there = !client_has_ended(&r->client);
     c->holds = c->was_there && held_any(&r->watch);
