@@ -201,10 +201,9 @@ static int suggest(struct preview *p, const struct preview_request *request, str
     for (uint32_t i = 0; i < request->n_named && rc == SH_OK; i++)
         rc = copy_seen(p, request->named[i], &seen[i], err);
     pthread_mutex_unlock(&p->lock);
-    int (*const answer)(const struct preview_work *, const struct preview_request *, const struct preview_seen *,
-                        struct web_body *, struct sh_err *) =
-        request->kind == PREVIEW_NEXT ? preview_next : preview_reach;
-    if (rc == SH_OK) rc = answer(&p->work, request, seen, out, err);
+    if (rc == SH_OK)
+        rc = request->kind == PREVIEW_NEXT ? preview_next(&p->work, request, seen, out, err)
+                                           : preview_reach(&p->work, request, seen, out, err);
     for (uint32_t i = 0; i < request->n_named; i++)
         free(seen[i].cells);
     return rc;

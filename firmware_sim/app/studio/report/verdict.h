@@ -11,6 +11,10 @@
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/site/site.h"
 
+/* The first side of density cells, and the share of the points that lies within a histogram's bins. */
+#define REPORT_CELL_M 0.1
+#define REPORT_SHOWN  0.995
+
 enum report_judgement { REPORT_NONE, REPORT_WITHIN, REPORT_BEYOND };
 struct report_verdict {
     enum report_judgement judgement;

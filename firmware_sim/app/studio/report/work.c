@@ -215,15 +215,14 @@ static int tables(struct report *r, struct sh_err *err)
     return rc;
 }
 
-static const double CELL_M = 0.1;
-
 static int densities(struct report *r, struct sh_err *err)
 {
     struct report_figures *f = &r->f;
     const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
     const struct figures_on_scene in = {&compared, r->site->scene, r->points.range_m};
-    int rc = r->cell_m > 0.0 ? figures_density_of(&in, r->cell_m, &app_report_seconds, &f->density, err)
-                             : figures_density_fit(&in, CELL_M, &app_report_seconds, &f->density, &f->density_all, err);
+    int rc = r->cell_m > 0.0
+                 ? figures_density_of(&in, r->cell_m, &app_report_seconds, &f->density, err)
+                 : figures_density_fit(&in, REPORT_CELL_M, &app_report_seconds, &f->density, &f->density_all, err);
     if (rc != SH_OK) return rc;
     figures_density_within(&f->density, 0, 0.0, (double)INFINITY, &f->density_all);
     for (uint32_t k = 0; k < f->n_ranges; k++)
@@ -252,9 +251,6 @@ static int times(struct report *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* The share of the points that lies within a histogram's bins. */
-static const double SHOWN = 0.995;
-
 int report_work(struct report *r, struct sh_err *err)
 {
     int rc = work_load(r, err);
@@ -265,8 +261,8 @@ int report_work(struct report *r, struct sh_err *err)
     if (rc == SH_OK) rc = densities(r, err);
     if (rc == SH_OK) rc = times(r, err);
     if (rc != SH_OK) return rc;
-    figures_histogram_of(r->distance_m, r->cloud.n, SHOWN, &r->f.distances);
-    figures_histogram_of_signed(r->points.along_m, r->cloud.n, SHOWN, &r->f.along);
+    figures_histogram_of(r->distance_m, r->cloud.n, REPORT_SHOWN, &r->f.distances);
+    figures_histogram_of_signed(r->points.along_m, r->cloud.n, REPORT_SHOWN, &r->f.along);
     report_judge(r);
     return SH_OK;
 }
