@@ -24,7 +24,7 @@ static void add_batch(struct picturing *p)
 
 void picturing_add(struct picturing *p, const double xyz_m[3], const struct picturing_figures *f)
 {
-    if (xyz_m[2] > p->plan->below_m || xyz_m[2] < p->plan->above_m) {
+    if (xyz_m[2] > p->plan->given->below_m || xyz_m[2] < p->plan->given->above_m) {
         p->cut++;
         return;
     }
@@ -66,10 +66,10 @@ void picturing_include(struct picturing_bounds *b, const double p_m[3])
 int picturing_look(struct picturing *p, const struct picturing_bounds *bounds, struct sh_err *err)
 {
     struct picturing_bounds b = *bounds;
-    struct view_spec spec = {p->plan->camera, p->plan->point_m, p->plan->point_px};
+    struct view_spec spec = {p->plan->camera, p->plan->given->point_m, p->plan->given->point_px};
     struct view_camera framed = p->plan->camera;
-    b.max_m[2] = fmax(b.min_m[2], fmin(b.max_m[2], p->plan->below_m));
-    b.min_m[2] = fmin(b.max_m[2], fmax(b.min_m[2], p->plan->above_m));
+    b.max_m[2] = fmax(b.min_m[2], fmin(b.max_m[2], p->plan->given->below_m));
+    b.min_m[2] = fmin(b.max_m[2], fmax(b.min_m[2], p->plan->given->above_m));
     view_frame(b.min_m, b.max_m, p->plan->azimuth_rad, p->plan->elevation_rad, &framed);
     if (!p->plan->has_look_at) memcpy(spec.camera.look_at_m, framed.look_at_m, sizeof framed.look_at_m);
     for (int i = 0; i < 3 && !p->plan->has_eye; i++)
@@ -214,7 +214,7 @@ int picturing_finish(struct picturing *p, struct sh_err *err)
     struct picture picture = {0};
     struct sh_report report = app_report_seconds;
     if (p->quiet) report.progress = NULL;
-    const struct view_colours colours = {colour_of, p, p->plan->shade, {252, 252, 252}, &report};
+    const struct view_colours colours = {colour_of, p, p->plan->given->shade, {252, 252, 252}, &report};
     add_batch(p);
     int rc = check_figures(p, err);
     if (rc == SH_OK) rc = view_draw(p->view, &colours, &picture, err);
