@@ -181,6 +181,7 @@ static void test_refusals(void **state)
         {"/preview", "station=3&x_m=1&y_m=1&z_m=1&heading_deg=0", "station=3: allowed whole numbers from 1 to 2"},
         {"/preview", "station=1&x_m=1&y_m=1&heading_deg=0", "z_m is needed"},
         {"/preview", "station=1&x_m=1&y_m=1&z_m=1&heading_deg=0&step=1", "step: unknown; allowed station"},
+        {"/preview", "station=1&x_m=1&y_m=1&z_m=1&heading_deg=0&y_m=2", "y_m: given twice; allowed once"},
         {"/preview", "station=1&x_m=1&y_m=1&z_m=1&heading_deg=0&step_deg=0.1", "allowed are 1500000"},
         {"/preview", "station=1&x_m=1&y_m=1&z_m=1&heading_deg=0&line0_deg=-60", "lines from -60 to 60 deg: allowed is"},
         {"/preview", "station=1&x_m=1&y_m=1&z_m=1&heading_deg=0&pan1_deg=361", "pan from 0 to 361 deg: allowed is"},

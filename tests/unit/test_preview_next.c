@@ -65,6 +65,10 @@ static void test_next_in_section(void **state)
     assert_true(gain_m2 + room_number(json, "none_m2") < 14.4 + 8.0 + 0.1 * (2 * 2.4 + 2 * 2.0));
     next_within(&r, beside, "middle_x_m=1&middle_y_m=4&half_x_m=1&half_y_m=1.1&half_z_m=9&turn_deg=90", turned);
     assert_string_equal(turned, json);
+    /* A side that is not given has no limit. The scene is less than 9 m long. */
+    next_within(&r, beside, "middle_x_m=1&middle_y_m=4&half_x_m=9&half_y_m=1&half_z_m=9", json);
+    next_within(&r, beside, "middle_x_m=1&middle_y_m=4&half_y_m=1", turned);
+    assert_string_equal(turned, json);
     preview_release(r.preview, leg.bytes);
     room_close(&r);
 }

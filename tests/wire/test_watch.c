@@ -214,18 +214,19 @@ static void noise_is_expected(void **state)
 
 /* An observer that the head waits for is not the last to get a processor, as the head would stand still while others
  * work. In real time the head does not wait, and the observer is the last. Its priority is set before it has seen a
- * scan. */
+ * scan. A head that runs at the lowest priority itself, like this test, has no thread below it. */
 static void who_is_waited_for_is_not_last(void **state)
 {
     struct wire *wire = *state;
     char config[256];
+    const int is_lowest = getpriority(PRIO_PROCESS, 0) == 19;
     watch_prepare(wire, config);
     for (int waited = 0; waited < 2; waited++) {
         struct head head =
             head_start(wire, config, (const char *const[]){"--pace", waited ? "fast" : "realtime", NULL});
         struct scanhead *sh = client_open(head_endpoint(&head, "tcp"));
         free(watch_scan(&head, sh, 1, 1));
-        assert_int_equal(threads_below(&head), !waited);
+        assert_int_equal(threads_below(&head), !waited && !is_lowest);
         scanhead_close(sh);
         head_end(&head, SIGTERM);
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* JSON that a page asks for, of a head and of a recording alike: in memory, for a web link to send. Any thread. */
+/* JSON answers to a page, of a head and of a recording: made in memory, for a web link to send. Any thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_PAGE_JSON_H
 #define FIRMWARE_SIM_APP_STUDIO_PAGE_JSON_H
 

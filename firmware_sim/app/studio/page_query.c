@@ -11,6 +11,16 @@ static int page_fail_word(const struct page_word *w, const char *text, int len, 
                    w->whole ? "whole numbers" : "numbers", w->min, w->max);
 }
 
+/* Whether a name stands again in the rest of a query. */
+static int is_given_again(const char *name, size_t len, const char *rest)
+{
+    for (; *rest != '\0'; rest += strcspn(rest, "&")) {
+        rest += *rest == '&';
+        if (strncmp(rest, name, len) == 0 && rest[len] == '=') return 1;
+    }
+    return 0;
+}
+
 static int page_read_word(struct page_word *words, const char *text, size_t len, struct sh_err *err)
 {
     char known[256] = "", *end;
@@ -20,6 +30,8 @@ static int page_read_word(struct page_word *words, const char *text, size_t len,
         strncat(known, " ", sizeof known - strlen(known) - 1);
         strncat(known, w->name, sizeof known - strlen(known) - 1);
         if (strlen(w->name) != name_len || memcmp(w->name, text, name_len) != 0) continue;
+        if (is_given_again(w->name, name_len, text + len))
+            return sh_fail(err, SH_EINPUT, "%s: given twice; allowed once", w->name);
         const int value_len = equals != NULL ? (int)(len - name_len - 1) : 0;
         if (value_len == 0) return page_fail_word(w, "", 0, err);
         w->value = strtod(equals + 1, &end);

@@ -142,7 +142,7 @@ static struct app_option OPTIONS[APP_MAX_OPTIONS + 1] = {
 
 static int batch_run_command(int argc, char **argv)
 {
-    /* of record, as they are: those that name no files, and that make sense for one station off line */
+    /* These options are passed on to record: they name no file, and make sense for one station off line. */
     static const char *const passed[] = {
         "frames", "duration",  "ascii",  "ply-names",   "ply-columns", "colour",      "colour-limits", "colour-rgb",
         "mesh",   "long-edge", "sparse", "sparse-seed", "las-version", "empty-shots", "crs",           NULL};

@@ -15,7 +15,7 @@ struct batch_job {
     uint32_t combination, station; /* from 0; from 1 */
     int is_done;                   /* 1: `entry` has the files that it must have */
     struct batch_entry entry;
-    const char *other; /* an entry of it was made with these differences, in words; NULL: none */
+    const char *other; /* in words, how the inputs of an entry for this job differ; NULL: there is no such entry */
 };
 
 struct batch {
@@ -28,7 +28,7 @@ struct batch {
     /* as read */
     struct batch_stations stations;
     uint32_t shard, n_shards;
-    char *endings; /* the format with NULs for its commas */
+    char *endings; /* --format, with NULs in place of commas */
     const char *ending[RECORD_MAX_FILES];
     int n_endings;
     /* as planned */
@@ -44,7 +44,7 @@ struct batch {
 
 /* ---- plan.c */
 
-/* Checks every combination of values, and lists the jobs. What is wrong is printed; returns the exit status. */
+/* Checks every combination of values, and lists the jobs. Prints what is wrong, and returns the exit status. */
 int batch_plan(struct batch *b);
 void batch_free(struct batch *b);
 
@@ -53,13 +53,13 @@ static inline int batch_is_mine(const struct batch *b, uint32_t job)
     return job % b->n_shards == b->shard - 1;
 }
 
-/* The name of a job, from 0, and what it is made with. */
+/* Name and provenance of a job; jobs count from 0 here. */
 void batch_job_name(const struct batch *b, uint32_t job, char name[BATCH_NAME_LEN]);
 void batch_job_provenance(const struct batch *b, uint32_t job, struct batch_provenance *made);
-/* A setting that no byte of a recording depends on. */
+/* Whether no byte of a recording depends on this setting. */
 int batch_is_of_speed(const char *set);
 
-/* The command line of `record` that a job is. */
+/* The command line of `record` for a job. */
 struct batch_line {
     struct record_line line;
     char *word[2 * APP_MAX_OPTIONS + APP_MAX_SETS + BATCH_MAX_SWEEPS + RECORD_MAX_FILES + 8];

@@ -14,21 +14,21 @@ void batch_entry_free(struct batch_entry *entry)
     *entry = (struct batch_entry){0};
 }
 
-/* Returns 0: it is too long. */
-static int take_text(const char *text, char *buf, size_t len)
+/* Returns 0 where the text is too long. */
+static int entry_take_text(const char *text, char *buf, size_t len)
 {
     return (size_t)snprintf(buf, len, "%s", text) < len;
 }
 
-/* A name in the folder, and in no other. */
+/* Takes a file's name, which must lie in the campaign's folder itself. */
 static int take_file(json_t *from, struct batch_file *file)
 {
     const char *name, *sha;
     json_int_t bytes;
     if (json_unpack(from, "{s:s,s:I,s:s}", "name", &name, "bytes", &bytes, "sha256", &sha) != 0 || bytes < 0) return 0;
     file->bytes = (uint64_t)bytes;
-    return strchr(name, '/') == NULL && take_text(name, file->name, sizeof file->name) &&
-           take_text(sha, file->sha, BATCH_SHA_LEN);
+    return strchr(name, '/') == NULL && entry_take_text(name, file->name, sizeof file->name) &&
+           entry_take_text(sha, file->sha, BATCH_SHA_LEN);
 }
 
 static int take_files(json_t *from, struct batch_entry *entry)
@@ -55,11 +55,12 @@ static int take_entry(json_t *from, struct batch_entry *entry)
     entry->job = (uint32_t)job;
     entry->pulses = (uint64_t)pulses;
     entry->points = (uint64_t)points;
-    return take_text(program, made->program, sizeof made->program) &&
-           take_text(engine, made->engine, sizeof made->engine) &&
-           take_text(configuration, made->configuration, BATCH_SHA_LEN) &&
-           take_text(inputs, made->inputs, BATCH_SHA_LEN) && take_text(settings, made->job, BATCH_SHA_LEN) &&
-           take_text(stream, entry->stream_sha, BATCH_SHA_LEN) && take_files(files, entry);
+    return entry_take_text(program, made->program, sizeof made->program) &&
+           entry_take_text(engine, made->engine, sizeof made->engine) &&
+           entry_take_text(configuration, made->configuration, BATCH_SHA_LEN) &&
+           entry_take_text(inputs, made->inputs, BATCH_SHA_LEN) &&
+           entry_take_text(settings, made->job, BATCH_SHA_LEN) &&
+           entry_take_text(stream, entry->stream_sha, BATCH_SHA_LEN) && take_files(files, entry);
 }
 
 int batch_entry_read(const char *line, struct batch_entry *entry)

@@ -12,8 +12,8 @@ struct loading {
     struct batch_loaded *before, *now;
 };
 
-/* The site before, where now->cfg can share its scene. Else NULL, and the site before is freed first, so that there are
- * never two scenes at a time. */
+/* Returns the site before, where now->cfg can share its scene. Else frees that site first, so that there are never two
+ * scenes at a time, and returns NULL. */
 static const struct site *shared_site(struct loading *l)
 {
     struct batch_loaded *before = l->before;

@@ -28,7 +28,8 @@ struct batch_entry {
 };
 void batch_entry_free(struct batch_entry *entry);
 
-/* One line without its newline; *entry is to be freed. 0: it is none of ours, or not whole. */
+/* Reads a line without its newline; *entry is to be freed. Returns 0 where batch_manifest_add did not write it, or not
+ * all of it. */
 int batch_entry_read(const char *line, struct batch_entry *entry);
 
 /* Gives every entry of every manifest of the folder to `take`, file by file, in the order of their lines. A job may
@@ -37,7 +38,7 @@ int batch_entry_read(const char *line, struct batch_entry *entry);
 int batch_manifest_read(const char *dir, int (*take)(void *ctx, struct batch_entry *entry, struct sh_err *err),
                         void *ctx, const struct sh_report *report, struct sh_err *err);
 
-/* A shard's manifest, open to append; an unfinished last line is cut off. SH_ESTATE: another process has it. */
+/* Opens a shard's manifest to append; an unfinished last line is cut off. SH_ESTATE: another process has it. */
 int batch_manifest_open(const char *dir, uint32_t shard, uint32_t n_shards, int *fd, struct sh_err *err);
 int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err);
 

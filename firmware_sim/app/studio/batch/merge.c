@@ -12,8 +12,8 @@
 
 enum { MOST_LINES = 20 };
 
-/* A job that isn't there, or isn't what it was. */
-static void tell(uint32_t *n_gaps, uint32_t job, const char *name, const char *why)
+/* Prints why a job is incomplete. */
+static void print_incomplete(uint32_t *n_gaps, uint32_t job, const char *name, const char *why)
 {
     if ((*n_gaps)++ < MOST_LINES) fprintf(stderr, "scanhead: job %u, %s: %s\n", job + 1, name, why);
 }
@@ -24,12 +24,12 @@ static int check_job(struct batch *b, uint32_t job, uint32_t *n_gaps, struct sh_
     struct sh_err why = {0};
     batch_job_name(b, job, name);
     if (!b->job[job].is_done) {
-        tell(n_gaps, job, name, b->job[job].other != NULL ? b->job[job].other : "missing");
+        print_incomplete(n_gaps, job, name, b->job[job].other != NULL ? b->job[job].other : "missing");
         return SH_OK;
     }
     const int rc = batch_check_files(b, job, &why);
     if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
-    if (rc != SH_OK) tell(n_gaps, job, name, why.text);
+    if (rc != SH_OK) print_incomplete(n_gaps, job, name, why.text);
     return SH_OK;
 }
 
@@ -61,13 +61,14 @@ static int check_jobs(struct batch *b, uint32_t *n_gaps, struct sh_err *err)
     return SH_OK;
 }
 
-/* ---- files that begin with a job's number and are none of its files: of an earlier --force, say */
+/* ---- files with a job's number that are not the job's, such as those of jobs before --force */
 
 static int is_of_job(const struct batch *b, const char *name)
 {
     char *end;
     const unsigned long job = strtoul(name, &end, 10);
-    if (name[0] < '0' || name[0] > '9' || end - name < 4 || *end != '_') return 1; /* not by its name */
+    if (name[0] < '0' || name[0] > '9' || end - name < 4 || *end != '_')
+        return 1; /* its name is not that of a job's file */
     if (job == 0 || job > b->n_jobs) return 0;
     const struct batch_entry *entry = &b->job[job - 1].entry;
     for (uint32_t i = 0; i < entry->n_files; i++)
@@ -89,7 +90,7 @@ static void warn_of_strangers(const struct batch *b)
         sh_warn(&app_report_stderr, "%s: %u files belong to no job of this campaign, the first: %s", b->dir, n, first);
 }
 
-/* ---- the manifest: nothing in it depends on the shards, or on the time */
+/* ---- manifest.json: nothing in it depends on the shards, or on the time */
 
 static void put_job(struct json *json, const struct batch *b, uint32_t i)
 {

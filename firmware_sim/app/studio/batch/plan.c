@@ -106,7 +106,7 @@ void batch_job_provenance(const struct batch *b, uint32_t job, struct batch_prov
 
 /* ---- all combinations */
 
-/* Follows the reason, which may not name all values that it depends on. */
+/* Names the values of the combination after an error, whose text may not name them. */
 static void print_values(const struct batch *b, uint32_t combination)
 {
     const char *set[BATCH_MAX_SWEEPS];
@@ -148,7 +148,7 @@ static int is_chosen(const struct batch *b, uint32_t station)
     return b->stations.all;
 }
 
-/* Stations may have scanners of their own, which then make the recording. */
+/* Checks the other scanners that chosen stations have, since those record there. */
 static int check_other_heads(const struct batch *b, struct record_job *job, const struct config *cfg,
                              struct sh_err *err)
 {

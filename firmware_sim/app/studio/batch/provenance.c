@@ -34,7 +34,7 @@ static void take_hex(struct sha256_ctx *ctx, char hex[BATCH_SHA_LEN])
 }
 
 /* Hashes the text with its NUL, so that "ab", "c" differs from "a", "bc". */
-static void take_text(struct sha256_ctx *ctx, const char *text)
+static void hash_text(struct sha256_ctx *ctx, const char *text)
 {
     sha256_update(ctx, strlen(text) + 1, (const uint8_t *)text);
 }
@@ -114,7 +114,7 @@ struct inputs {
 
 static const char *sha_of(struct inputs *in, const char *path)
 {
-    struct stat st;
+    struct stat st = {0};
     uint64_t bytes;
     struct batch_known *k = provenance_find(in->cache, path);
     if (k == NULL) {
@@ -129,12 +129,12 @@ static const char *sha_of(struct inputs *in, const char *path)
     return k->sha;
 }
 
-/* A file with what it is for. */
+/* Hashes the contents of a file, and what it is for. */
 static void take_file(struct inputs *in, const char *what, const char *path)
 {
     if (in->rc != SH_OK) return;
-    take_text(&in->ctx, what);
-    take_text(&in->ctx, sha_of(in, path));
+    hash_text(&in->ctx, what);
+    hash_text(&in->ctx, sha_of(in, path));
 }
 
 static int keep_sidecar(void *ctx, const char *name, const char *path)
@@ -152,7 +152,7 @@ static int keep_sidecar(void *ctx, const char *name, const char *path)
     return SH_ENOMEM;
 }
 
-/* Takes what a mesh names; a large file is searched once. */
+/* Takes the files that a mesh names. A mesh is searched for them once, since it may be large. */
 static void take_sidecars(struct inputs *in, const char *path)
 {
     if (in->rc != SH_OK) return;
@@ -168,7 +168,7 @@ static void take_sidecars(struct inputs *in, const char *path)
         take_file(in, in->cache->known[at].sidecar[i], in->cache->known[at].sidecar[i + 1]);
 }
 
-/* Sidecars are looked for in lists of copies, too, which name none. */
+/* A key under scene.meshes may also be a list of copies. It is searched, too, and names no other file. */
 static int take_input(void *ctx, const char *key, const char *path, int is_written)
 {
     struct inputs *in = ctx;
@@ -178,7 +178,7 @@ static int take_input(void *ctx, const char *key, const char *path, int is_writt
     return in->rc;
 }
 
-/* Stations may have scanners of their own. */
+/* Takes the files of other scanners that stations have. */
 static void take_other_heads(struct inputs *in, const struct config *cfg)
 {
     struct config *own = calloc(1, sizeof *own);
@@ -209,6 +209,6 @@ void batch_provenance_job(struct batch_provenance *made, const char *const *text
     struct sha256_ctx ctx;
     sha256_init(&ctx);
     for (uint32_t i = 0; i < n; i++)
-        take_text(&ctx, text[i]);
+        hash_text(&ctx, text[i]);
     take_hex(&ctx, made->job);
 }

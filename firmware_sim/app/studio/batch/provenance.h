@@ -19,7 +19,7 @@ enum { BATCH_SHA_LEN = 65 };
 
 struct batch_provenance {
     char program[32];                  /* its version */
-    char engine[96];                   /* what finds hits on that machine (bvh_engine) */
+    char engine[96];                   /* Embree and instruction set of that machine (bvh_engine) */
     char configuration[BATCH_SHA_LEN]; /* the text of the file */
     char inputs[BATCH_SHA_LEN];        /* all files that the configuration names, and those that its meshes name */
     char job[BATCH_SHA_LEN];           /* station, values of keys, options */
@@ -39,7 +39,7 @@ struct batch_known {
     struct stat st;
     char sha[BATCH_SHA_LEN];
     int is_searched;
-    char **sidecar; /* of a mesh: the files that it names, each as it stands there and as a path */
+    char **sidecar; /* the files that a mesh names: for each its name in the mesh, then its path */
     size_t n_sidecars, sidecars_room;
 };
 struct batch_cache {

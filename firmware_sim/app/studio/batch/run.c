@@ -45,7 +45,8 @@ static int add_file(struct listing *l, const char *path)
     return batch_sha_file(path, file->sha, &file->bytes, NULL, l->err);
 }
 
-/* Files that a mesh names were written with it where they have the job's own name: materials, buffers, images. */
+/* Lists a file that a mesh names (material, buffer, image) where it has the job's name, so that it was written with the
+ * mesh. */
 static int add_sidecar(void *ctx, const char *name, const char *path)
 {
     struct listing *l = ctx;
@@ -69,7 +70,7 @@ static int list_files(const struct batch *b, uint32_t job, const struct record_j
     return rc;
 }
 
-/* The line comes last, so that files of all jobs in the manifest are whole. */
+/* Adds the job's line to the manifest last, so that all files that the manifest names are complete. */
 static int note_done(struct runner *r, uint32_t job, const struct record_job *done, int64_t start_ns,
                      struct sh_err *err)
 {
@@ -101,7 +102,7 @@ static void say_progress(struct runner *r, uint32_t job, const char *name)
             r->n_mine - r->n_todo + r->n_did, r->n_mine, left);
 }
 
-/* 0: done. Else the exit status, with the reason printed. */
+/* Returns 0 when the job is done, else the exit status with the reason printed. */
 static int run_job(struct runner *r, uint32_t job)
 {
     const struct batch_job *what = &r->b->job[job];
@@ -136,7 +137,7 @@ static int make_folder(const struct batch *b, struct sh_err *err)
                    "-o %s: the folder cannot be made: %s", b->dir, strerror(errno == EEXIST ? ENOTDIR : errno));
 }
 
-/* Inputs of the campaign may lie in its folder: an error where one has the name of a job's file. */
+/* Inputs of the campaign may lie in its folder. Fails where one of them has the name of a job's file. */
 static int check_inputs(const struct batch *b, struct sh_err *err)
 {
     struct stat folder, here;
@@ -176,7 +177,7 @@ static int check_done(struct runner *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* A manifest of the whole campaign is out of date when a job is done again. */
+/* Removes the manifest of the whole campaign, which is out of date once a job is done again. */
 static void drop_whole(const struct runner *r)
 {
     char path[PATH_MAX];

@@ -68,8 +68,8 @@ static int add_list(struct batch_sweep *s, const char *values, struct sh_err *er
     }
 }
 
-/* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Values are rounded where a double of the
- * range's size ends: 0.3 and not 0.30000000000000004, 0 and not 5.5e-17. */
+/* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Values are rounded to the last decimal that a
+ * double of the range's size has: 0.3 and not 0.30000000000000004, 0 and not 5.5e-17. */
 static int add_range(struct batch_sweep *s, const char *values, const double range[3], struct sh_err *err)
 {
     const double steps = floor((range[1] - range[0]) / range[2] + 1e-9);
@@ -91,7 +91,7 @@ static int add_range(struct batch_sweep *s, const char *values, const double ran
     return SH_OK;
 }
 
-/* a[0].b is a.0.b. */
+/* Skips ], so that a[0].b equals a.0.b where [ counts as a point. */
 static const char *next_letter(const char *p)
 {
     while (*p == ']')

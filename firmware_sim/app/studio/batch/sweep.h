@@ -25,14 +25,14 @@ struct batch_sweeps {
 };
 
 /* Adds KEY=A,B,... or KEY=FIRST:LAST:STEP: whole steps from FIRST, not beyond LAST. Commas within brackets, braces and
- * quotes belong to a value. A key that is there already is an error, and so is a value. */
+ * quotes belong to a value. A key or a value that is given twice is an error. */
 int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_err *err);
 void batch_sweeps_free(struct batch_sweeps *sweeps);
 
-/* Where a text begins with a key, in either spelling (a.0.b, a[0].b): the text after the key. NULL: it doesn't. */
+/* Returns the text after a key with which `text` begins, in either spelling (a.0.b, a[0].b); NULL: it does not. */
 const char *batch_after_key(const char *text, const char *key);
 
-/* How many combinations there are: 1 without sweeps. SH_EINPUT: more than BATCH_MAX_JOBS. */
+/* Counts the combinations: 1 without sweeps. SH_EINPUT: more than BATCH_MAX_JOBS. */
 int batch_sweeps_count(const struct batch_sweeps *sweeps, uint32_t *n, struct sh_err *err);
 /* The settings of a combination, from 0, in the order of the sweeps; the last sweep varies fastest. */
 void batch_sweeps_at(const struct batch_sweeps *sweeps, uint32_t combination, const char *set[BATCH_MAX_SWEEPS]);
@@ -46,8 +46,8 @@ struct batch_stations {
 /* "all", or numbers and ranges as 1,3-5. */
 int batch_stations_parse(const char *text, struct batch_stations *stations, struct sh_err *err);
 
-/* A job's name, of letters that are safe in names of files everywhere: its number with `digits` digits, the
- * station's number, then the settings. Other characters become _ ; the end of a long one becomes a hash of it. */
+/* Makes a job's name: its number with `digits` digits, the station's number, then the settings. Characters that are not
+ * safe in names of files everywhere become _, and the end of a long name becomes a hash of the whole. */
 enum { BATCH_NAME_LEN = 128 };
 void batch_name(uint32_t number, int digits, uint32_t station, const char *const *set, uint32_t n,
                 char name[BATCH_NAME_LEN]);

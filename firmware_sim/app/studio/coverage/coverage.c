@@ -131,7 +131,7 @@ static int show(struct coverage_run *r, struct sh_err *err)
     return rc;
 }
 
-/* Before minutes of work: whether the file can be written. */
+/* Checks before minutes of work whether the file can be written. */
 static int check_output(const struct coverage_run *r, struct sh_err *err)
 {
     if (r->output == NULL) return SH_OK;
@@ -248,7 +248,7 @@ static int check_options(struct coverage_run *r)
     return status == APP_GO_ON ? check_next(r) : status;
 }
 
-/* A .gltf has its numbers beside it. */
+/* A .gltf has its binary data in a .bin beside it. */
 static int add_numbers(struct coverage_run *r)
 {
     const struct app_file file = {"output", r->output, APP_WRITES, .n_ending = sizeof ".gltf" - 1, .ending = ".bin"};

@@ -13,7 +13,7 @@ struct coverage_result {
     double cell_m;
     struct coverage_sums sums;
     struct coverage_result_station {
-        double seen_m2, alone_m2;
+        double seen_m2, alone_m2; /* by this station; by no other one */
         struct coverage_pulses pulses;
     } * station;                     /* [site->n_stations] */
     struct coverage_of_label *label; /* [surfaces of the scene]; NULL: not asked for */
@@ -23,7 +23,7 @@ void coverage_print_text(const struct coverage_result *result);
 /* Members of an open object. */
 void coverage_put(struct json *json, const struct coverage_result *result);
 
-/* 100 part / whole; 0 of nothing. */
+/* Returns 100 part / whole; 0 where whole is 0. */
 double coverage_percent(double part, double whole);
 
 /* The scan of a station with the settings at power-up; a scan without end is one frame. It must not be moved or

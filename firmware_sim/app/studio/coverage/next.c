@@ -16,7 +16,7 @@ struct chooser {
     struct coverage_finder *f;
     struct coverage *coverage;
     struct coverage_gain *gain; /* [places] */
-    double (*open_m)[3];        /* places that are still open, and which they are */
+    double (*open_m)[3];        /* positions of the places that are open; then their numbers */
     uint32_t *open, n_open;
 };
 
@@ -30,14 +30,14 @@ static void next_turn(const double dir[3], double heading_rad, double out[3])
     out[2] = dir[2];
 }
 
-/* Places of one heading at a time: they share directions. */
+/* Estimates the gains of all places with one heading, which share their directions. */
 static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], struct sh_err *err)
 {
     const struct config_profile *profile = site_profile(c->f->site);
     c->n_open = 0;
     for (uint32_t i = 0; i < c->f->next->n; i++) {
         const struct coverage_next_place *p = &c->f->next->place[i];
-        if (p->out || p->heading_deg != heading_deg) continue;
+        if (p->state || p->heading_deg != heading_deg) continue;
         memcpy(c->open_m[c->n_open], p->position_m, sizeof *c->open_m);
         c->open[c->n_open++] = i;
     }
@@ -58,7 +58,7 @@ static int estimate_all(struct chooser *c, double *estimate_m2, struct sh_err *e
     for (uint32_t i = 0; i < next->n; i++)
         estimate_m2[i] = 0.0;
     for (uint32_t i = 0; i < next->n && rc == SH_OK; i++) {
-        if (done[i] || next->place[i].out) continue;
+        if (done[i] || next->place[i].state) continue;
         rc = estimate(c, next->place[i].heading_deg, turned, err);
         for (uint32_t k = 0; k < c->n_open && rc == SH_OK; k++) {
             estimate_m2[c->open[k]] = c->gain[k].gain_m2;
@@ -83,28 +83,28 @@ static void leave_out_bodies(struct chooser *c, double *estimate_m2)
     if (c->f->o->candidates != NULL || (double)front < LEAST_FRONT * (double)hits) return;
     for (uint32_t i = 0; i < c->f->next->n; i++) {
         struct coverage_next_place *p = &c->f->next->place[i];
-        if (p->out || !(p->front < LEAST_FRONT)) continue;
-        p->out = COVERAGE_PLACE_WITHIN;
+        if (p->state || !(p->front < LEAST_FRONT)) continue;
+        p->state = COVERAGE_PLACE_WITHIN;
         c->f->next->within++;
         estimate_m2[i] = 0.0;
     }
 }
 
-/* The open place with the largest estimate of those not tried yet; n: none. */
+/* Returns the open place with the largest estimate among those not tried yet; n: there is none. */
 static uint32_t best_of(const struct coverage_next *next, const double *estimate_m2,
                         const struct coverage_next_round *round)
 {
     uint32_t best = next->n;
     for (uint32_t i = 0; i < next->n; i++) {
-        int tried = next->place[i].out != 0 || !(estimate_m2[i] > 0.0);
+        int tried = next->place[i].state != 0 || !(estimate_m2[i] > 0.0);
         for (uint32_t k = 0; k < round->n_tried; k++)
-            tried |= round->tried[k] == i;
+            tried |= round->tried[k].place == i;
         if (!tried && (best == next->n || estimate_m2[i] > estimate_m2[best])) best = i;
     }
     return best;
 }
 
-/* A whole scan from a place; its result waits. */
+/* Scans from a place as a whole. The result waits for coverage_keep, or is replaced by the next scan. */
 static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_err *err)
 {
     const struct coverage_next_place *p = &c->f->next->place[place];
@@ -128,17 +128,12 @@ static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_e
 }
 
 /* Keeps the tried places in order of gain; of equal ones the first one tried comes first. */
-static void insert(struct coverage_next_round *round, uint32_t place, double seen_m2, double gain_m2)
+static void insert(struct coverage_next_round *round, const struct coverage_next_tried *tried)
 {
     uint32_t at = round->n_tried++;
-    for (; at > 0 && gain_m2 > round->gain_m2[at - 1]; at--) {
+    for (; at > 0 && tried->gain_m2 > round->tried[at - 1].gain_m2; at--)
         round->tried[at] = round->tried[at - 1];
-        round->seen_m2[at] = round->seen_m2[at - 1];
-        round->gain_m2[at] = round->gain_m2[at - 1];
-    }
-    round->tried[at] = place;
-    round->seen_m2[at] = seen_m2;
-    round->gain_m2[at] = gain_m2;
+    round->tried[at] = *tried;
 }
 
 static double none_m2(struct coverage *coverage)
@@ -158,27 +153,26 @@ static int choose(struct chooser *c, uint32_t number, struct sh_err *err)
     struct coverage_next *next = c->f->next;
     double *estimate_m2 = next->estimate_m2 + (size_t)number * next->n;
     struct coverage_next_round *round = &next->round[number];
+    struct coverage_next_tried tried = {.place = next->n};
     char what[64];
-    uint32_t last = next->n;
     int rc = estimate_all(c, estimate_m2, err);
     if (rc == SH_OK && number == 0) leave_out_bodies(c, estimate_m2);
     while (rc == SH_OK && round->n_tried < (uint32_t)c->f->o->scans) {
         const uint32_t best = best_of(next, estimate_m2, round);
-        double seen_m2, gain_m2;
         if (best == next->n) break;
         snprintf(what, sizeof what, "next station %u, scan %u of %ld", number + 1, round->n_tried + 1, c->f->o->scans);
         rc = scan(c, best, what, err);
         if (rc != SH_OK) break;
-        coverage_waiting(c->coverage, &seen_m2, &gain_m2);
-        insert(round, best, seen_m2, gain_m2);
-        last = best;
+        tried.place = best;
+        coverage_waiting(c->coverage, &tried.seen_m2, &tried.gain_m2);
+        insert(round, &tried);
     }
-    if (rc != SH_OK || round->n_tried == 0 || !(round->gain_m2[0] > 0.0)) return rc;
-    round->place = round->tried[0];
-    if (round->place != last) rc = scan(c, round->place, "next station, once more", err);
+    const uint32_t chosen = round->tried[0].place;
+    if (rc != SH_OK || round->n_tried == 0 || !(round->tried[0].gain_m2 > 0.0)) return rc;
+    if (chosen != tried.place) rc = scan(c, chosen, "next station, once more", err);
     if (rc != SH_OK) return rc;
     coverage_keep(c->coverage);
-    next->place[round->place].out = COVERAGE_PLACE_CHOSEN;
+    next->place[chosen].state = COVERAGE_PLACE_CHOSEN;
     round->none_m2 = none_m2(c->coverage);
     return 1;
 }

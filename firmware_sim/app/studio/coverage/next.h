@@ -8,13 +8,13 @@
 enum { COVERAGE_MOST_NEXT = 100, COVERAGE_MOST_SCANS = 20 };
 
 struct coverage_next_options {
-    long stations;          /* 0: nobody asks */
+    long stations;          /* how many to find; 0: none */
     double grid_m;          /* 0: no grid */
     double height_m;        /* above the floor */
-    double area_m[2][3];    /* of the grid: least, most x, y, floor; NaN: the scene's */
+    double area_m[2][3];    /* limits of the grid: [least, most][x, y, floor]; NaN: those of the scene */
     const char *candidates; /* a file of places instead; NULL: none */
     double step_deg;        /* between rays */
-    int step_given;         /* an error where rays are pulses of the head */
+    int step_given;         /* --step-deg is there, which is an error where rays are pulses of the head */
     long scans;             /* of the best places each round */
 };
 
@@ -22,16 +22,21 @@ enum coverage_place { COVERAGE_PLACE_OPEN, COVERAGE_PLACE_WITHIN, COVERAGE_PLACE
 
 struct coverage_next_place {
     double position_m[3], heading_deg;
-    double floor_m;          /* z; NaN: not known */
-    double front;            /* of what is seen, the share seen from the front */
-    enum coverage_place out; /* not OPEN: it is not compared. WITHIN: it sees mostly backs, so it lies within a body */
+    double floor_m; /* z; NaN: not known */
+    double front;   /* share of the hits that are on the front of a face */
+    /* Only OPEN places are compared. A place WITHIN a body sees mostly backs of faces. */
+    enum coverage_place state;
 };
 
-/* A round: the best place, by a whole scan. */
+/* A round of choosing: places that were scanned as a whole, by gain. The first one is the best, and is chosen. */
+struct coverage_next_tried {
+    uint32_t place;
+    double seen_m2, gain_m2;
+};
 struct coverage_next_round {
-    uint32_t place, n_tried, tried[COVERAGE_MOST_SCANS]; /* by gain, the best one first */
-    double seen_m2[COVERAGE_MOST_SCANS], gain_m2[COVERAGE_MOST_SCANS];
-    double none_m2; /* seen by none, with this one */
+    uint32_t n_tried;
+    struct coverage_next_tried tried[COVERAGE_MOST_SCANS];
+    double none_m2; /* area that no station sees, nor the best place */
 };
 
 struct coverage_next {
@@ -53,24 +58,26 @@ struct coverage_finder {
     const struct site *site;
     const struct sh_report *report;
     struct coverage_next *next;
-    size_t room;                /* of its places */
-    double (*dir)[3], *each_sr; /* of a level head with heading 0; coverage_gains */
+    size_t room; /* of its places */
+    /* Rays of a level head with heading 0, and the solid angle of each, as for coverage_gains. */
+    double (*dir)[3], *each_sr;
     uint32_t n_dir;
 };
 
-/* Before the stations scan: finds the places, or says why there are none. result needs its site and base.
+/* Finds the places, or says why there are none. To be called before the stations scan; result needs its site and base.
  * coverage_next_free is due in any case. */
 int coverage_next_open(const struct coverage_next_options *options, const struct coverage_result *result,
                        const struct sh_report *report, struct coverage_next *next, struct coverage_finder *finder,
                        struct sh_err *err);
-/* Compares them. Figures of the stations must be in result; the coverage gets further stations, one for each round. */
+/* Compares the places. Figures of the stations must be in result; the coverage gets further stations, one for each
+ * round. */
 int coverage_next_find(struct coverage_finder *finder, struct coverage *coverage, struct sh_err *err);
 void coverage_next_free(struct coverage_next *next, struct coverage_finder *finder);
 
 void coverage_next_print(const struct coverage_next *next, const struct coverage_result *result);
 void coverage_next_put(struct json *json, const struct coverage_next *next, const struct coverage_result *result);
 
-/* X0,Y0,X1,Y1 or with the floors' Z0,Z1. 0: it isn't that. */
+/* Reads X0,Y0,X1,Y1, or these and the floors' Z0,Z1. Returns 0 where the text is neither. */
 int coverage_next_area(const char *text, double area_m[2][3]);
 
 #endif

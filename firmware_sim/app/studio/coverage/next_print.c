@@ -19,6 +19,11 @@ static const char *ready_line(const struct coverage_next_place *p, uint32_t numb
     return line;
 }
 
+static double estimate_of(const struct coverage_next *next, uint32_t round, uint32_t place)
+{
+    return next->estimate_m2[(size_t)round * next->n + place];
+}
+
 /* The largest difference between a scan's gain and its estimate by rays. */
 static double largest_error_m2(const struct coverage_next *next)
 {
@@ -26,7 +31,7 @@ static double largest_error_m2(const struct coverage_next *next)
     for (uint32_t i = 0; i < next->n_rounds; i++) {
         const struct coverage_next_round *r = &next->round[i];
         for (uint32_t k = 0; k < r->n_tried; k++)
-            most_m2 = fmax(most_m2, fabs(r->gain_m2[k] - next->estimate_m2[(size_t)i * next->n + r->tried[k]]));
+            most_m2 = fmax(most_m2, fabs(r->tried[k].gain_m2 - estimate_of(next, i, r->tried[k].place)));
     }
     return most_m2;
 }
@@ -39,15 +44,17 @@ static void print_round(const struct coverage_next *next, const struct coverage_
     printf("%10s %10s %10s %9s %12s %8s %12s %12s\n", "x m", "y m", "z m", "height m", "gains m2", "%", "estimated",
            "sees m2");
     for (uint32_t k = 0; k < r->n_tried; k++) {
-        const struct coverage_next_place *p = &next->place[r->tried[k]];
+        const struct coverage_next_tried *tried = &r->tried[k];
+        const struct coverage_next_place *p = &next->place[tried->place];
         char height[24] = "-";
         if (!isnan(p->floor_m)) snprintf(height, sizeof height, "%.3f", p->position_m[2] - p->floor_m);
         printf("%10.3f %10.3f %10.3f %9s %12.3f %8.3f %12.3f %12.3f\n", p->position_m[0], p->position_m[1],
-               p->position_m[2], height, r->gain_m2[k], coverage_percent(r->gain_m2[k], result->sums.area_m2),
-               next->estimate_m2[(size_t)number * next->n + r->tried[k]], r->seen_m2[k]);
+               p->position_m[2], height, tried->gain_m2, coverage_percent(tried->gain_m2, result->sums.area_m2),
+               estimate_of(next, number, tried->place), tried->seen_m2);
     }
     printf("with the first of them %.3f m2 (%.3f %%) are seen by none:\n  - %s\n", r->none_m2,
-           coverage_percent(r->none_m2, result->sums.area_m2), ready_line(&next->place[r->place], number + 1, line));
+           coverage_percent(r->none_m2, result->sums.area_m2),
+           ready_line(&next->place[r->tried[0].place], number + 1, line));
 }
 
 void coverage_next_print(const struct coverage_next *next, const struct coverage_result *result)
@@ -74,24 +81,24 @@ static void put_round(struct json *json, const struct coverage_next *next, const
                       uint32_t number)
 {
     const struct coverage_next_round *r = &next->round[number];
-    const struct coverage_next_place *best = &next->place[r->place];
+    const struct coverage_next_place *best = &next->place[r->tried[0].place];
     char line[LINE_LEN];
     json_open_object(json, NULL);
     page_put_vector(json, "position_m", best->position_m);
     json_double(json, "heading_deg", best->heading_deg);
-    json_double(json, "gain_m2", r->gain_m2[0]);
-    json_double(json, "gain_percent", coverage_percent(r->gain_m2[0], result->sums.area_m2));
-    json_double(json, "seen_m2", r->seen_m2[0]);
+    json_double(json, "gain_m2", r->tried[0].gain_m2);
+    json_double(json, "gain_percent", coverage_percent(r->tried[0].gain_m2, result->sums.area_m2));
+    json_double(json, "seen_m2", r->tried[0].seen_m2);
     json_double(json, "none_m2", r->none_m2);
     json_double(json, "none_percent", coverage_percent(r->none_m2, result->sums.area_m2));
     json_string(json, "station", ready_line(best, number + 1, line));
     json_open_array(json, "tried");
     for (uint32_t k = 0; k < r->n_tried; k++) {
         json_open_object(json, NULL);
-        json_uint(json, "place", r->tried[k]);
-        json_double(json, "gain_m2", r->gain_m2[k]);
-        json_double(json, "estimate_m2", next->estimate_m2[(size_t)number * next->n + r->tried[k]]);
-        json_double(json, "seen_m2", r->seen_m2[k]);
+        json_uint(json, "place", r->tried[k].place);
+        json_double(json, "gain_m2", r->tried[k].gain_m2);
+        json_double(json, "estimate_m2", estimate_of(next, number, r->tried[k].place));
+        json_double(json, "seen_m2", r->tried[k].seen_m2);
         json_close_object(json);
     }
     json_close_array(json);
@@ -105,11 +112,11 @@ static void put_place(struct json *json, const struct coverage_next *next, uint3
     page_put_vector(json, "position_m", p->position_m);
     json_double(json, "heading_deg", p->heading_deg);
     json_double(json, "floor_m", p->floor_m);
-    json_bool(json, "within_body", p->out == COVERAGE_PLACE_WITHIN);
+    json_bool(json, "within_body", p->state == COVERAGE_PLACE_WITHIN);
     json_double(json, "front", p->front);
     json_open_array(json, "estimate_m2");
     for (uint32_t r = 0; r < next->n_rounds; r++)
-        json_double(json, NULL, next->estimate_m2[(size_t)r * next->n + i]);
+        json_double(json, NULL, estimate_of(next, r, i));
     json_close_array(json);
     json_close_object(json);
 }

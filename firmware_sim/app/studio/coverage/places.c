@@ -122,7 +122,7 @@ static int looks(const struct coverage_finder *f, const double dir[3])
     return site_scans(f->site, f->result->base, dir) && (t->from == NULL || -dir[2] <= t->cast.cos_opening);
 }
 
-/* Rings of equal steps, as far as the head scans. */
+/* Spreads directions over rings of equal steps, within the head's field of view. */
 static int spread_directions(struct coverage_finder *f, struct sh_err *err)
 {
     const double step_rad = angle_rad(f->o->step_deg);

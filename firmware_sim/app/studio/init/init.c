@@ -63,7 +63,7 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
 
 /* ---- the file */
 
-/* The mesh as seen from the configuration's folder; where they have nothing in common, from the root. */
+/* Finds the mesh's path from the configuration's folder; where the two share only the root, its absolute path. */
 static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], struct sh_err *err)
 {
     char folder[CONFIG_PATH_LEN], mesh[PATH_MAX], from[PATH_MAX];
@@ -127,7 +127,7 @@ static int write_checked(const struct init_run *run, const struct init_text *tex
     return rc;
 }
 
-/* As a shell takes it for one operand. */
+/* Prints a path with the quotes that a shell needs to take it for one operand. */
 static void put_operand(const char *path)
 {
     static const char plain[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./+-";
@@ -188,7 +188,7 @@ static int write_config(struct init_run *run, const struct scene *scene, struct 
 
 /* ---- the command */
 
-/* house.ifc becomes house.yaml, here. */
+/* The default for house.ifc is house.yaml in the working directory. */
 static int choose_output(struct init_run *run)
 {
     const char *base = base_of(run->wish.file), *dot = strrchr(base, '.');

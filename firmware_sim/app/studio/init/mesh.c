@@ -12,9 +12,9 @@
 #include "core/geotiff.h"
 #include "firmware_sim/app/app.h"
 
-/* Larger than this in metres, a mesh without a unit is taken to be in millimetres, but for a survey. */
+/* A mesh without a unit that would be larger than LARGEST_M is taken to be in millimetres, unless it is a survey. */
 static const double LARGEST_M = 2000.0, LARGEST_SURVEY_M = 50000.0;
-/* Less high than this, a mesh larger than LARGEST_M would be a plate of less than half a metre in millimetres. */
+/* In millimetres, a mesh less high than this would be a plate thinner than half a metre. */
 static const double LEAST_HEIGHT_MM = 500.0;
 
 double init_largest_m(const struct scene *scene)
@@ -31,7 +31,7 @@ static const char *said_by(const char *file)
     return dot != NULL && strcasecmp(dot, ".fbx") == 0 ? "as the file says" : "as the format defines it";
 }
 
-/* --up turns the mesh so that y or z becomes z. Other axes it can't mend. */
+/* --up turns the mesh so that y or z becomes z. It can do nothing about other axes. */
 static void warn_of_axes(const char *name, const struct scene_says *says, int y_up)
 {
     if (says->up == 1 || says->up < 0)
@@ -82,7 +82,8 @@ static int is_projected(const struct scene *scene, const double middle[3])
     return up_to >= large && second >= least && up_to >= times * init_largest_m(scene);
 }
 
-/* Wide, flat and level: walls stand upright, and furniture is not ten times as wide as it is high. */
+/* Whether a mesh is wide, flat and level, like a survey of ground. A building is higher, and furniture is not ten times
+ * as wide as it is high. */
 static int is_survey(const struct scene *scene, int y_up)
 {
     const double *low = scene->min_m, *high = scene->max_m;
@@ -91,7 +92,7 @@ static int is_survey(const struct scene *scene, int y_up)
     return init_largest_m(scene) <= LARGEST_SURVEY_M && height < LEAST_HEIGHT_MM && width > 10.0 * height;
 }
 
-/* Metres per unit, guessed from the mesh, and the reason. */
+/* Guesses metres per unit from the mesh. why: the reason, or empty. */
 static double guess_unit(const struct scene *scene, int y_up, char *why, size_t len)
 {
     double middle[3];
@@ -131,7 +132,7 @@ static void choose_scale(const struct init_wish *wish, const char *name, const s
             as->scale * size);
 }
 
-/* To metres, z up: what the configuration will do. */
+/* Turns the mesh to metres and z up, as loading the configuration will do. */
 static void mesh_turn(struct scene *scene, const struct init_mesh *as, double scale)
 {
     const int y_up = as->up == SCENE_UP_Y;
@@ -149,8 +150,8 @@ static void mesh_turn(struct scene *scene, const struct init_mesh *as, double sc
     }
 }
 
-/* Whether an error says by itself what to do, or what is allowed. Errors of rasters do: nobody turns one into a
- * mesh. */
+/* Whether an error already says what to do, or what is allowed. Errors of rasters get no advice, since nobody exports a
+ * raster as a mesh. */
 static int has_advice(const char *file, const char *text)
 {
     static const char *const words[] = {"export ", "convert ", "copy it", "allowed", "scene.", "join "};
@@ -185,7 +186,7 @@ static void keep_warning(void *ctx, const char *warning)
     fprintf(ctx, "%s\n", warning);
 }
 
-/* The reader's warnings come when the configuration is checked; where it fails, they are said now. */
+/* The reader's warnings come again when the configuration is checked, so they are printed here only where it fails. */
 static int read_mesh(const struct scene_mesh_spec *spec, struct scene **scene, struct sh_err *why)
 {
     const struct sh_report *all = &app_report_stderr;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Inspects a mesh file for `scanhead init`. In: its path, and what the user says of it. Out: the mesh in metres with z
- * up, the settings of the configuration for that, and the source of each. */
+ * up, the keys that make it so in a configuration, and the source of each. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_INIT_MESH_H
 #define FIRMWARE_SIM_APP_STUDIO_INIT_MESH_H
 
@@ -16,10 +16,10 @@ struct init_mesh {
     enum scene_up up;
     double scale;
     char up_from[64], scale_from[176]; /* the source of each, for comments */
-    char crs[16];                      /* of a GeoTIFF as it is, which PROJ can place; else empty */
+    char crs[16]; /* the CRS of a GeoTIFF that is taken as it is and that PROJ can place; else empty */
 };
 
-/* Warns of what is assumed, with `name` for the file. scene_free is due where it succeeds. */
+/* Loads the mesh. Warns of all that is assumed, with `name` for the file. scene_free is due where it succeeds. */
 int init_load_mesh(const struct init_wish *wish, const char *name, struct scene **scene, struct init_mesh *mesh,
                    struct sh_err *err);
 

@@ -92,7 +92,7 @@ static void put_quoted(const char *text, FILE *out)
     fputc('"', out);
 }
 
-static void put_head(const struct init_text *t, FILE *out)
+static void text_put_head(const struct init_text *t, FILE *out)
 {
     const struct init_scan *scan = &t->scan;
     fprintf(out, "head:\n  profile: %s # sees from %g to %g m; `scanhead list` shows others\n", t->profile->name,
@@ -117,7 +117,7 @@ static void put_scene(const struct init_text *t, FILE *out)
         fprintf(out, "  anchor: {source: geotiff} # %s; height_m: height of its 0 above the ellipsoid\n", t->mesh->crs);
 }
 
-/* A file can't decide what is glass: the line is a comment, whose # the user may remove. */
+/* A mesh file can't decide which surfaces are glass, so the line is a comment, whose # the user may remove. */
 static void put_clear(const struct scene *scene, FILE *out)
 {
     struct site_clear clear = {0};
@@ -147,7 +147,7 @@ void init_write_text(const struct init_text *t, FILE *out)
     const struct scene *s = t->scene;
     fprintf(out, "# %s: %.4g x %.4g x %.4g m, %u triangles. Change what does not fit.\n", t->mesh_name,
             s->max_m[0] - s->min_m[0], s->max_m[1] - s->min_m[1], s->max_m[2] - s->min_m[2], s->n_triangles);
-    put_head(t, out);
+    text_put_head(t, out);
     put_scene(t, out);
     put_clear(s, out);
     put_station(t, out);

@@ -14,7 +14,7 @@ struct config;
 /* A coarse scan of what the station sees. */
 struct init_scan {
     double prr_hz, lines_hz, pan_deg_s, step_deg, duration_s;
-    double pan_stop_deg, line_start_deg, line_stop_deg; /* outside: a part of the profile's */
+    double pan_stop_deg, line_start_deg, line_stop_deg; /* from a station outside: a part of the profile's view */
 };
 
 struct init_text {
@@ -27,7 +27,7 @@ struct init_text {
     struct init_scan scan;
 };
 
-/* Chooses the settings of a scan: within the profile, and of up to about 200,000 pulses that are cast. */
+/* Chooses the settings of a scan, within the profile's limits and with up to about 200,000 cast pulses. */
 void init_choose_scan(const struct config_profile *profile, const struct viewpoint *at, struct init_scan *scan);
 
 /* Where the head stands, in words. */

@@ -9,7 +9,7 @@
 struct config;
 struct placement;
 
-/* A line from a to b. Anything but SH_OK ends the lines. */
+/* Takes a line from a to b. A result other than SH_OK ends the walk. */
 typedef int field_line(void *ctx, const double a_prcs[3], const double b_prcs[3], struct sh_err *err);
 
 int field_lines_each(const struct config *cfg, const struct placement *at, field_line *take, void *ctx,

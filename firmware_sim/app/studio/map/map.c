@@ -81,8 +81,8 @@ static int choose_view(struct map_run *run, const struct site *site, struct sh_e
     return geoframe_to_enu(frame, run->origin_m, run->to_enu, err);
 }
 
-/* The height is that of the head's origin: above the ground of a tripod, or the floor, where that was looked for; else
- * z, or above the ellipsoid where the scene is in ECEF. */
+/* The height is that of the head's origin: above the ground under a tripod or above the floor, where one was looked
+ * for. Else it is z, or the height above the ellipsoid where the scene is in ECEF. */
 static int add_station(struct map_run *run, const struct site_station *station, struct sh_err *err)
 {
     const struct placement *at = &station->at;
@@ -149,7 +149,7 @@ static int prepare(void *ctx, uint32_t station, struct sh_err *err)
     return rc;
 }
 
-/* Includes the corners of their bounds, which are a little more than they take. */
+/* Includes the corners of their bounding boxes, which are a little larger than the copies. */
 static void include_copies(const struct map_run *run, const struct scene_copied *of, struct map_spec *spec)
 {
     for (uint32_t k = 0; k < of->n; k++)
@@ -283,9 +283,9 @@ static int draw(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-/* The map is in the scene's frame, whatever the configuration sends to its clients. The layout is no setting here:
- * protocols of links forbid geo, and no link is opened. */
-static int set_frame(struct app_sets *sets)
+/* The map is in the scene's coordinates, whatever the configuration sends to its clients. output.layout is set only in
+ * draw: as a setting it would be refused where a link's protocol forbids geo, although no link is opened. */
+static int set_scene_crs(struct app_sets *sets)
 {
     static const char *const SETS[] = {"output.crs=local", "output.utm_zone=0", "output.heights=ellipsoid"};
     int status = APP_OK;
@@ -327,7 +327,7 @@ static int run_view(struct map_run *run)
         const int rc = map_view_cloud(NULL, operand, &run->plan, run->output, run->quiet, &err);
         return rc == SH_OK ? APP_OK : app_fail(&err);
     }
-    if (run->view.cloud == NULL) status = set_frame(&run->in.sets);
+    if (run->view.cloud == NULL) status = set_scene_crs(&run->in.sets);
     return status == APP_OK ? app_with_config(&run->in, draw_view, run) : status;
 }
 
@@ -348,7 +348,7 @@ static int map_run_command(int argc, char **argv)
                          run.in.operand[0]);
     if (!app_ends_in(run.output, ".png") && !app_ends_in(run.output, ".svg"))
         return app_usage(&app_map, "-o %s: allowed are names that end in .png or .svg", run.output);
-    status = set_frame(&run.in.sets);
+    status = set_scene_crs(&run.in.sets);
     return status == APP_OK ? app_with_config(&run.in, draw, &run) : status;
 }
 

@@ -25,24 +25,25 @@ extern const char *const map_view_colours[6], *const map_view_winds[8];
 /* As the command line says it. */
 struct map_view_options {
     const char *cloud, *from, *eye, *look_at, *size, *colour, *limits;
-    double elevation_deg, fov_deg, point_m, point_px, below_m, above_m, shade;
+    double elevation_deg, fov_deg, point_m, point_px, below_m, above_m, shade; /* point_m < 0: by the scene's size */
 };
 extern const struct map_view_options map_view_default;
 
-/* The same, read and checked. */
+/* The same, read and checked. The options must live on. */
 struct map_view_plan {
     enum map_view_colour colour;
     struct view_camera camera; /* eye and look_at as given */
     int has_eye, has_look_at, has_limits;
     double azimuth_rad, elevation_rad, limit[2];
-    double point_m, point_px, below_m, above_m, shade; /* point_m < 0: by the scene's size */
+    const struct map_view_options *given; /* heights, widths of points and shade are used as given */
 };
 /* SH_EINPUT with what is wrong with which option. */
 int map_view_read(const struct map_view_options *options, struct map_view_plan *plan, struct sh_err *err);
 
-/* cfg NULL: the cloud's coordinates are shown as they are. cloud NULL: the stations are scanned. */
+/* Scans the stations. */
 int map_view_scan(struct config *cfg, const struct map_view_plan *plan, const char *output, int quiet,
                   struct sh_err *err);
+/* Shows a recording. cfg NULL: its coordinates are shown as they are. */
 int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, const char *output,
                    int quiet, struct sh_err *err);
 

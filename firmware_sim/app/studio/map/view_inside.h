@@ -34,7 +34,8 @@ struct picturing_bounds {
 /* A point with a coordinate that is not finite is left out. */
 void picturing_include(struct picturing_bounds *b, const double p_m[3]);
 
-/* Chooses the eye, unless it is given, so that these bounds are seen. Before points. */
+/* Chooses the eye, unless it is given, so that these bounds are seen. To be called before points
+ * are added. */
 int picturing_look(struct picturing *p, const struct picturing_bounds *bounds, struct sh_err *err);
 
 struct picturing_figures {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The options of map --perspective: words and numbers into a plan. */
+/* Turns the options of map --perspective into a plan. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -94,11 +94,7 @@ int map_view_read(const struct map_view_options *o, struct map_view_plan *plan, 
     plan->colour = (enum map_view_colour)colour;
     plan->elevation_rad = angle_rad(o->elevation_deg);
     plan->camera.fov_rad = angle_rad(o->fov_deg);
-    plan->point_m = o->point_m;
-    plan->point_px = o->point_px;
-    plan->below_m = o->below_m;
-    plan->above_m = o->above_m;
-    plan->shade = o->shade;
+    plan->given = o;
     int rc = read_direction(o->from, &plan->azimuth_rad, err);
     if (rc == SH_OK) rc = read_place("eye", o->eye, plan->camera.eye_m, &plan->has_eye, err);
     if (rc == SH_OK) rc = read_place("look-at", o->look_at, plan->camera.look_at_m, &plan->has_look_at, err);
@@ -106,8 +102,8 @@ int map_view_read(const struct map_view_options *o, struct map_view_plan *plan, 
     if (rc == SH_OK) rc = read_limits(o, plan, err);
     if (rc == SH_OK && plan->has_eye && o->from != NULL)
         rc = sh_fail(err, SH_EINPUT, "--eye and --from: both give the place of the eye; allowed is one of them");
-    if (rc == SH_OK && !(plan->below_m > plan->above_m))
-        rc = sh_fail(err, SH_EINPUT, "--below %g: allowed is a height above that of --above, %g", plan->below_m,
-                     plan->above_m);
+    if (rc == SH_OK && !(o->below_m > o->above_m))
+        rc = sh_fail(err, SH_EINPUT, "--below %g: allowed is a height above that of --above, %g", o->below_m,
+                     o->above_m);
     return rc;
 }

@@ -24,7 +24,7 @@ static void add_batch(struct picturing *p)
 
 void picturing_add(struct picturing *p, const double xyz_m[3], const struct picturing_figures *f)
 {
-    if (xyz_m[2] > p->plan->below_m || xyz_m[2] < p->plan->above_m) {
+    if (xyz_m[2] > p->plan->given->below_m || xyz_m[2] < p->plan->given->above_m) {
         p->cut++;
         return;
     }
@@ -66,15 +66,15 @@ void picturing_include(struct picturing_bounds *b, const double p_m[3])
 int picturing_look(struct picturing *p, const struct picturing_bounds *bounds, struct sh_err *err)
 {
     struct picturing_bounds b = *bounds;
-    struct view_spec spec = {p->plan->camera, p->plan->point_m, p->plan->point_px};
+    struct view_spec spec = {p->plan->camera, p->plan->given->point_m, p->plan->given->point_px};
     struct view_camera framed = p->plan->camera;
-    b.max_m[2] = fmax(b.min_m[2], fmin(b.max_m[2], p->plan->below_m));
-    b.min_m[2] = fmin(b.max_m[2], fmax(b.min_m[2], p->plan->above_m));
+    b.max_m[2] = fmax(b.min_m[2], fmin(b.max_m[2], p->plan->given->below_m));
+    b.min_m[2] = fmin(b.max_m[2], fmax(b.min_m[2], p->plan->given->above_m));
     view_frame(b.min_m, b.max_m, p->plan->azimuth_rad, p->plan->elevation_rad, &framed);
     if (!p->plan->has_look_at) memcpy(spec.camera.look_at_m, framed.look_at_m, sizeof framed.look_at_m);
     for (int i = 0; i < 3 && !p->plan->has_eye; i++)
         spec.camera.eye_m[i] = framed.eye_m[i] + spec.camera.look_at_m[i] - framed.look_at_m[i];
-    if (spec.point_m < 0) { /* a surface closes at 700 points along the longest side */
+    if (spec.point_m < 0) { /* with 700 points along the longest side a surface shows no gaps */
         spec.point_m = 0;
         for (int i = 0; i < 3; i++)
             spec.point_m = fmax(spec.point_m, (b.max_m[i] - b.min_m[i]) / 700);
@@ -183,7 +183,7 @@ static int check_figures(struct picturing *p, struct sh_err *err)
     if (!known && p->plan->colour == MAP_VIEW_REFLECTANCE)
         return sh_fail(err, SH_EINPUT,
                        "--colour reflectance: no point has one; --set signal.model=on gives them one in a scan");
-    if (!known) return sh_fail(err, SH_EINPUT, "--colour range: no point has one, as of a head that moves");
+    if (!known) return sh_fail(err, SH_EINPUT, "--colour range: no point has a range, as with a head that moves");
     if (p->plan->colour == MAP_VIEW_REFLECTANCE) {
         p->limit[0] = -30; /* colour_reflectance */
         p->limit[1] = 0;
@@ -214,7 +214,7 @@ int picturing_finish(struct picturing *p, struct sh_err *err)
     struct picture picture = {0};
     struct sh_report report = app_report_seconds;
     if (p->quiet) report.progress = NULL;
-    const struct view_colours colours = {colour_of, p, p->plan->shade, {252, 252, 252}, &report};
+    const struct view_colours colours = {colour_of, p, p->plan->given->shade, {252, 252, 252}, &report};
     add_batch(p);
     int rc = check_figures(p, err);
     if (rc == SH_OK) rc = view_draw(p->view, &colours, &picture, err);

@@ -1,11 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: requests, and the work that answers them.
- *
- *   preview.c  requests that wait, answers that are kept, the thread
- *   request.c  path and query to a request
- *   place.c    /preview: the scan from a place
- *   next.c     /next: the place that adds most; /reach: what can be seen from any place
- *   cells.c    /cells: the surface as cells, to be painted */
+/* Private to this folder: requests, and the work that answers them. README.md lists the files. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_PREVIEW_INSIDE_H
 #define FIRMWARE_SIM_APP_STUDIO_PREVIEW_INSIDE_H
 
@@ -19,7 +13,7 @@ enum preview_kind { PREVIEW_PLACE, PREVIEW_NEXT, PREVIEW_REACH, PREVIEW_CELLS };
 
 /* A box that is turned about the vertical, clockwise from above: half of its size to the right, ahead and up. */
 struct preview_section {
-    double middle_m[3], half_m[3], heading_deg; /* half_m[0] INFINITY: there is none */
+    double middle_m[3], half_m[3], heading_deg; /* half_m INFINITY: no limit in that direction */
 };
 
 /* Angles and lengths of a member that is INFINITY are those of the scanner at power-up. */
@@ -30,9 +24,9 @@ struct preview_request {
     double step_deg, far_m, line_deg[2], pan_deg[2];
     int points; /* 0: only the cells are wanted */
     /* of PREVIEW_NEXT and PREVIEW_REACH */
-    uint32_t n_of, of[PREVIEW_MOST_OF]; /* numbers of previews, whose cells are seen already */
-    double height_m;                    /* of the head above the floor */
-    struct preview_section section;     /* of PREVIEW_NEXT: only cells with their middles in it count */
+    uint32_t n_named, named[PREVIEW_MOST_OF]; /* numbers of previews, whose cells count as seen */
+    double height_m;                          /* of the head above the floor */
+    struct preview_section section;           /* of PREVIEW_NEXT: only cells with their middles in it count */
 };
 
 /* Returns SH_EINPUT with an empty text where nothing is at that path. */
@@ -68,9 +62,9 @@ int preview_site_open(const struct preview_work *work, const struct preview_requ
 /* These make bodies, whose formats README.md has. number: the preview's. */
 int preview_look(const struct preview_work *work, const struct preview_request *request, uint32_t number,
                  struct web_body *out, struct sh_err *err);
-/* The cells stay in such a body; the hits are in its head. */
+/* Offsets in such a body: searches read cells and hits from there. */
 enum { PREVIEW_HEAD_BYTES = 72, PREVIEW_CELLS_AT = 72, PREVIEW_HITS_AT = 24, PREVIEW_FRONT_AT = 28 };
-/* seen has request->n_of previews. */
+/* seen has request->n_named previews. */
 int preview_next(const struct preview_work *work, const struct preview_request *request,
                  const struct preview_seen *seen, struct web_body *out, struct sh_err *err);
 int preview_reach(const struct preview_work *work, const struct preview_request *request,

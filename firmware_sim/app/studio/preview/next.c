@@ -13,7 +13,8 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/profile.h"
 
-/* The grid has about so many places. They are compared by rays so far apart, and SCANS of the best are scanned. */
+/* The grid has about PLACES places. They are compared by rays RAYS_DEG apart, and the best SCANS of them are
+ * scanned. */
 static const double PLACES = 250.0, LEAST_GRID_M = 0.25, RAYS_DEG = 3.0;
 enum { SCANS = 3, REACH_HEAD_BYTES = 16, REACH_VERSION = 1 };
 
@@ -26,14 +27,14 @@ static void put_next(struct json *json, const void *ctx)
         json_string(json, "place", NULL);
     else {
         const struct coverage_next_round *round = &next->round[0];
-        const struct coverage_next_place *place = &next->place[round->place];
+        const struct coverage_next_place *place = &next->place[round->tried[0].place];
         json_open_object(json, "place");
         json_double(json, "x_m", place->position_m[0]);
         json_double(json, "y_m", place->position_m[1]);
         json_double(json, "z_m", place->position_m[2]);
         json_double(json, "heading_deg", place->heading_deg);
         json_close_object(json);
-        json_double(json, "gain_m2", round->gain_m2[0]);
+        json_double(json, "gain_m2", round->tried[0].gain_m2);
         json_double(json, "none_m2", round->none_m2);
     }
     json_close_object(json);
@@ -80,6 +81,11 @@ static int is_within(const struct preview_section *s, const double sum_m[3], uin
            fabs(sum_m[2] / n - s->middle_m[2]) <= s->half_m[2];
 }
 
+static int has_section(const struct preview_section *s)
+{
+    return isfinite(s->half_m[0]) || isfinite(s->half_m[1]) || isfinite(s->half_m[2]);
+}
+
 /* Cells outside of the section are kept as seen, so that nothing is gained by them. The page counts by the same middles
  * (middlesOf in previews.js). */
 static int keep_outside(struct coverage *coverage, const struct preview_section *section, struct sh_err *err)
@@ -102,7 +108,7 @@ static int keep_outside(struct coverage *coverage, const struct preview_section 
 
 /* This has the places to stand on, and the rays that they are compared by. */
 struct stand {
-    struct preview_site *of;
+    struct preview_site *scanner;
     struct coverage_next_options options;
     struct coverage_result result;
     struct coverage_next next;
@@ -116,16 +122,16 @@ static int stand_open(const struct preview_work *work, const struct preview_requ
                         .result = {.base = r->station, .cell_m = work->options->cell_m}};
     if (coverage_cells(work->coverage) == 0)
         return sh_fail(err, SH_ESTATE, "the scene has too many triangles for coverage, so no place can be suggested");
-    int rc = preview_site_open(work, r, &s->of, err);
+    int rc = preview_site_open(work, r, &s->scanner, err);
     if (rc != SH_OK) return rc;
     for (int i = 0; i < 3; i++)
         s->options.area_m[0][i] = s->options.area_m[1][i] = (double)NAN;
-    s->options.grid_m = grid_of(s->of->site.scene);
-    s->result.site = &s->of->site;
-    s->result.station = calloc(s->of->site.n_stations, sizeof *s->result.station);
+    s->options.grid_m = grid_of(s->scanner->site.scene);
+    s->result.site = &s->scanner->site;
+    s->result.station = calloc(s->scanner->site.n_stations, sizeof *s->result.station);
     if (s->result.station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
-    keep_seen(work->coverage, seen, r->n_of, &s->result.station[0].pulses);
-    if (isfinite(r->section.half_m[0])) rc = keep_outside(work->coverage, &r->section, err);
+    keep_seen(work->coverage, seen, r->n_named, &s->result.station[0].pulses);
+    if (has_section(&r->section)) rc = keep_outside(work->coverage, &r->section, err);
     if (rc != SH_OK) return rc;
     return coverage_next_open(&s->options, &s->result, &work->stop, &s->next, &s->finder, err);
 }
@@ -135,7 +141,7 @@ static void stand_close(const struct preview_work *work, struct stand *s)
     coverage_forget(work->coverage);
     coverage_next_free(&s->next, &s->finder);
     free(s->result.station);
-    free(s->of);
+    free(s->scanner);
 }
 
 int preview_next(const struct preview_work *work, const struct preview_request *r, const struct preview_seen *seen,

@@ -42,7 +42,7 @@ struct job {
     struct preview_request request;
     uint32_t number; /* from 1, never used again */
     int64_t asked_ns;
-    int passed;            /* so many others were worked on while this one waited */
+    int passed;            /* how many others were worked on while this one waited */
     struct answer *answer; /* NULL: none, or a refusal */
     int rc;
     struct sh_err err;
@@ -54,7 +54,7 @@ struct preview {
     struct preview_work work;
     struct coverage *blind;                       /* of a scene that has no coverage */
     struct sh_err why;                            /* why there is no `blind` either */
-    atomic_int ending, gives_way, is_place_asked; /* the work at hand; since it began */
+    atomic_int ending, gives_way, is_place_asked; /* the work at hand stops for a place; one was asked for since */
     pthread_t thread;
     int running;
     pthread_mutex_t lock;
@@ -112,8 +112,8 @@ static int is_named(const struct preview *p, uint32_t number)
         const struct job *job = &p->job[i];
         const int waits = job->state == JOB_WAITING && is_asked_within(job, FORGOTTEN_NS);
         if (!is_search(job) || !(waits || job->state == JOB_WORKING)) continue;
-        for (uint32_t k = 0; k < job->request.n_of; k++)
-            if (job->request.of[k] == number) return 1;
+        for (uint32_t k = 0; k < job->request.n_named; k++)
+            if (job->request.named[k] == number) return 1;
     }
     return 0;
 }
@@ -143,13 +143,13 @@ static struct job *free_slot(struct preview *p)
     return job;
 }
 
-/* A search that has let enough places pass. One that its page has left is not. */
+/* Whether a search has let enough places pass. One that its page has left is never due. */
 static int is_due(const struct job *job)
 {
     return is_search(job) && job->passed >= MOST_PASSED && is_asked_within(job, LATELY_NS);
 }
 
-/* The newest one that waits, unless a search is due. */
+/* Returns a search that is due, else the newest job that waits; NULL: none waits. */
 static struct job *next_waiting(struct preview *p)
 {
     struct job *next = NULL;
@@ -198,14 +198,13 @@ static int suggest(struct preview *p, const struct preview_request *request, str
     struct preview_seen seen[PREVIEW_MOST_OF] = {{.cells = NULL}};
     int rc = SH_OK;
     pthread_mutex_lock(&p->lock);
-    for (uint32_t i = 0; i < request->n_of && rc == SH_OK; i++)
-        rc = copy_seen(p, request->of[i], &seen[i], err);
+    for (uint32_t i = 0; i < request->n_named && rc == SH_OK; i++)
+        rc = copy_seen(p, request->named[i], &seen[i], err);
     pthread_mutex_unlock(&p->lock);
-    int (*const answer)(const struct preview_work *, const struct preview_request *, const struct preview_seen *,
-                        struct web_body *, struct sh_err *) =
-        request->kind == PREVIEW_NEXT ? preview_next : preview_reach;
-    if (rc == SH_OK) rc = answer(&p->work, request, seen, out, err);
-    for (uint32_t i = 0; i < request->n_of; i++)
+    if (rc == SH_OK)
+        rc = request->kind == PREVIEW_NEXT ? preview_next(&p->work, request, seen, out, err)
+                                           : preview_reach(&p->work, request, seen, out, err);
+    for (uint32_t i = 0; i < request->n_named; i++)
         free(seen[i].cells);
     return rc;
 }
@@ -359,7 +358,7 @@ int preview_create(const struct preview_options *options, struct preview **out, 
     pthread_mutex_init(&p->lock, NULL);
     pthread_cond_init(&p->wake, NULL);
     if (options->report != NULL) quiet = *options->report;
-    quiet.warn = NULL; /* of scanners that this run does not serve */
+    quiet.warn = NULL; /* no warnings about scanners that this run does not serve */
     int rc = sites_load_beside(options->cfg, options->site, &quiet, &p->sites, &why);
     p->work = (struct preview_work){.options = &p->options,
                                     .coverage = options->coverage,

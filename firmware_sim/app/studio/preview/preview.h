@@ -4,8 +4,7 @@
  *
  * In: requests of a page, as path and query (README.md has them and their answers). Out: bodies. A request that is
  * not answered yet gets an empty body at once, and the page asks again. One thread at the lowest priority does the
- * work, and is made with the first request. The pulses of a preview, the requests that wait, and the bytes of the
- * answers that are kept are limited. */
+ * work, within the limits that README.md has. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H
 #define FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H
 

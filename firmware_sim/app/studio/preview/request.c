@@ -77,7 +77,7 @@ static int read_next(const struct preview_options *o, enum preview_kind kind, co
         r->section.half_m[i] = kind == PREVIEW_NEXT ? w[HALF + i].value : (double)INFINITY;
     }
     for (uint32_t i = 0; i < PREVIEW_MOST_OF; i++)
-        if (w[OF + i].value != 0.0) r->of[r->n_of++] = (uint32_t)w[OF + i].value;
+        if (w[OF + i].value != 0.0) r->named[r->n_named++] = (uint32_t)w[OF + i].value;
     return SH_OK;
 }
 

@@ -52,7 +52,7 @@ int colour_spool_open(struct colour_spool *spool, const char *path, enum colour_
     }
     const int fd = mkstemp(spool->path);
     if (fd < 0) return fail_spool(spool, err);
-    unlink(spool->path); /* gone with its last user, however that ends */
+    unlink(spool->path); /* the file vanishes with this process, even a killed one */
     spool->file = fdopen(fd, "w+b");
     if (spool->file != NULL) return SH_OK;
     close(fd);

@@ -94,27 +94,11 @@ int record_files_check_floats(const struct record_files *files, struct sh_err *e
     return SH_OK;
 }
 
-int record_files_check_facing(const struct record_files *files, struct sh_err *err)
+int record_files_refuse_meshes(const struct record_files *files, const char *why, struct sh_err *err)
 {
     for (int i = 0; i < files->n; i++)
         if (files->file[i].ops->is_mesh)
-            return sh_fail(
-                err, SH_EINPUT,
-                "record: -o %s: a mesh faces the head, but the places of a moving head are known only in the scene's "
-                "frame; allowed output.crs: local, or output.layout: polar",
-                files->file[i].path);
-    return SH_OK;
-}
-
-int record_files_check_surface(const struct record_files *files, struct sh_err *err)
-{
-    for (int i = 0; i < files->n; i++)
-        if (files->file[i].ops->is_mesh)
-            return sh_fail(
-                err, SH_EINPUT,
-                "record: -o %s: a mesh needs a surface, but this head scans a single line: it neither pans nor moves, "
-                "and has one ring; allowed are .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
-                files->file[i].path);
+            return sh_fail(err, SH_EINPUT, "record: -o %s: a mesh %s", files->file[i].path, why);
     return SH_OK;
 }
 
@@ -236,7 +220,7 @@ static int check_parts_of_scans(const struct record_file *file, const char *end,
         snprintf(left, sizeof left, "%.*s%s", folder, file->path, entry->d_name);
         if (is_name_of_scan(file, path)) rc = check(left, path, err);
     }
-    if (dir != NULL) closedir(dir); /* without it, the file can't be opened either */
+    if (dir != NULL) closedir(dir); /* a missing folder is reported when the file is opened */
     return rc;
 }
 

@@ -29,16 +29,16 @@ struct record_files {
     } file[RECORD_MAX_FILES];
     int n;
     unsigned part;               /* number of the scan in split files, from 1 */
-    int has_points;              /* all present files took some */
+    int has_points;              /* a frame of points came for the present files */
     int spooling;                /* the frames of the present files wait for the limits */
     struct colour_spool **spool; /* one for each head that comes, in their order */
     uint32_t n_spools;
-    const struct scanhead *sh; /* that the last frame came from */
+    const struct scanhead *sh; /* the head from which the last frame came */
 };
 
 /* SH_EINPUT: more than RECORD_MAX_FILES, a path twice, an ending without a recorder. path must live on. */
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err);
-/* With files of each scan beside those of all: SH_EINPUT where two of them would have one name. */
+/* For --each: SH_EINPUT where the file of one scan would have the name of another file. */
 int record_files_check_each(const struct record_files *files, struct sh_err *err);
 /* To be called once all options are read: picks the format of each file according to them. */
 void record_files_shape(struct record_files *files);
@@ -52,10 +52,8 @@ int record_files_have_colours(const struct record_files *files);
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
 /* For a stream in coordinates of the Earth: SH_EINPUT where a file's numbers are too coarse for them. */
 int record_files_check_floats(const struct record_files *files, struct sh_err *err);
-/* For a head that moves, in coordinates of the Earth: SH_EINPUT where a file is a mesh, which faces the head. */
-int record_files_check_facing(const struct record_files *files, struct sh_err *err);
-/* For a head that stands still and scans a single line: SH_EINPUT where a file is a mesh. */
-int record_files_check_surface(const struct record_files *files, struct sh_err *err);
+/* SH_EINPUT where a file is a mesh. why: follows "a mesh" in the error. */
+int record_files_refuse_meshes(const struct record_files *files, const char *why, struct sh_err *err);
 /* SH_EINPUT where a file is a grid, and a head of this kind fires without rows and columns. */
 int record_files_check_emitter(const struct record_files *files, enum emitter_kind kind, struct sh_err *err);
 /* SH_EINPUT where a file is the stream of one head, and several heads would send into it. */
@@ -69,7 +67,7 @@ int record_files_open(struct record_files *files, struct sh_err *err);
 int record_files_save(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);
-/* Closes all, also after a failure; keep 0: removes them. The first error, if any; err may be NULL. */
+/* Closes all, also after a failure; keep 0: removes them. Returns the first error, if any; err may be NULL. */
 int record_files_close(struct record_files *files, int keep, struct sh_err *err);
 
 #endif

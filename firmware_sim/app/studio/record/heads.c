@@ -11,7 +11,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 
-/* The number of the head that has the scanner of station i, from 0; heads->n: none of those so far. */
+/* Returns the number of the head with the scanner of station i, from 0; heads->n: no head has it yet. */
 static uint32_t heads_find(const struct heads *heads, uint32_t i)
 {
     const struct config_station *station = heads->one[0].cfg->station;
@@ -24,9 +24,9 @@ static uint32_t heads_find(const struct heads *heads, uint32_t i)
 
 /* The number of the head that scans from station s, from 1. Stops without a trajectory go through all stations, again
  * and again. */
-static uint32_t of(const struct heads *heads, uint32_t s)
+static uint32_t head_of(const struct heads *heads, uint32_t s)
 {
-    return heads->of[(s - 1) % heads->one[0].cfg->n_stations];
+    return heads->head_of[(s - 1) % heads->one[0].cfg->n_stations];
 }
 
 int heads_load(struct config *cfg, struct heads *heads, struct sh_err *err)
@@ -43,7 +43,7 @@ int heads_load(struct config *cfg, struct heads *heads, struct sh_err *err)
             heads->n++;
             rc = config_load_scanner(cfg, i + 1, one->cfg, err);
         }
-        heads->of[i] = k;
+        heads->head_of[i] = k;
         one->last_station = i + 1;
     }
     return rc;
@@ -53,7 +53,7 @@ uint32_t heads_turns(const struct heads *heads, uint32_t first, uint32_t last)
 {
     uint32_t n = 1;
     for (uint32_t s = first + 1; first != 0 && s <= last; s++)
-        n += of(heads, s) != of(heads, s - 1);
+        n += head_of(heads, s) != head_of(heads, s - 1);
     return n;
 }
 
@@ -62,7 +62,7 @@ struct config *heads_config(const struct heads *heads, uint32_t i, uint32_t firs
     uint8_t is_used[CONFIG_MAX_STATIONS] = {0};
     if (first == 0 || heads->n == 1) return i == 0 ? heads->one[0].cfg : NULL;
     for (uint32_t s = first; s <= last && s < first + heads->one[0].cfg->n_stations; s++)
-        is_used[of(heads, s)] = 1;
+        is_used[head_of(heads, s)] = 1;
     for (uint32_t k = 0; k < heads->n; k++)
         if (is_used[k] && i-- == 0) return heads->one[k].cfg;
     return NULL;
@@ -99,7 +99,7 @@ int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err)
     return offline_prepare(&heads->at->offline, station, heads->report, err);
 }
 
-/* All of them are counts of 64 bits. */
+/* All members of these structs are counts of 64 bits. */
 static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *more)
 {
     uint64_t *to = (uint64_t *)(void *)sum;
@@ -142,11 +142,11 @@ static void say_progress(struct heads *heads, const struct recording_options *al
     heads->said_ns = now_ns;
 }
 
-/* From stations first to last, which have one scanner. */
+/* Records from stations first to last, which share one scanner. */
 static int record_some(struct heads *heads, const struct recording_options *all, uint32_t first, uint32_t last,
                        struct recording_result *sum, struct sh_err *err)
 {
-    struct heads_one *one = &heads->one[of(heads, first)];
+    struct heads_one *one = &heads->one[head_of(heads, first)];
     struct recording_options options = *all;
     struct recording_result result;
     say_progress(heads, all, first);
@@ -165,7 +165,7 @@ static int record_some(struct heads *heads, const struct recording_options *all,
     if (rc == SH_OK && all->second != NULL) rc = all->second(all->ctx, err); /* parts may be shorter than a second */
     int again = 0;
     for (uint32_t s = last + 1; s <= all->last_station; s++)
-        again |= of(heads, s) == (uint32_t)(one - heads->one);
+        again |= head_of(heads, s) == (uint32_t)(one - heads->one);
     if (!again && one != heads->one) offline_stop(&one->offline);
     return rc;
 }
@@ -176,7 +176,7 @@ static int check_fits(const struct heads *heads, uint32_t k, const struct site *
 {
     int rc = SH_OK;
     for (uint32_t s = first; s <= last && rc == SH_OK && heads->fits != NULL; s++)
-        if (of(heads, s) == k) rc = heads->fits(heads->ctx, site, s, err);
+        if (head_of(heads, s) == k) rc = heads->fits(heads->ctx, site, s, err);
     return rc;
 }
 
@@ -187,13 +187,13 @@ static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct 
 {
     uint8_t is_known[CONFIG_MAX_STATIONS] = {1};
     struct scanner_report report;
-    const uint32_t begins = of(heads, first);
+    const uint32_t begins = head_of(heads, first);
     int rc = check_fits(heads, 0, heads->first->site, first, last, err);
     if (rc == SH_OK) rc = open_one(heads, &heads->one[begins], err);
     if (rc == SH_OK && begins != 0) rc = check_fits(heads, begins, heads->one[begins].offline.site, first, last, err);
     is_known[begins] = 1;
     for (uint32_t s = first; s <= last && rc == SH_OK; s++) {
-        const uint32_t k = of(heads, s);
+        const uint32_t k = head_of(heads, s);
         struct site *site = NULL;
         if (is_known[k]) continue;
         is_known[k] = 1;
@@ -234,7 +234,7 @@ int heads_record(struct heads *heads, const struct recording_options *options, s
     rc = check_all(heads, options->first_station, last, err);
     for (uint32_t from = options->first_station, to; from <= last && rc == SH_OK && result->missing[0] == '\0';
          from = to + 1) {
-        for (to = from; to < last && of(heads, to + 1) == of(heads, from);)
+        for (to = from; to < last && head_of(heads, to + 1) == head_of(heads, from);)
             to++;
         rc = record_some(heads, options, from, to, result, err);
     }

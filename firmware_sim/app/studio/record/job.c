@@ -104,7 +104,7 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     struct sh_err why = {0};
     int rc = r->heads != NULL ? heads_record(r->heads, &r->recording, result, err)
                               : recording_run(sh, &r->recording, result, err);
-    const int is_cut = rc == SH_ERESET || rc == SH_ECLOSED; /* by the bus; the stream ended within a scan */
+    const int is_cut = rc == SH_ERESET || rc == SH_ECLOSED; /* a bus reset, or an end of the stream, within a scan */
     const int has_figures = rc == SH_OK || rc == SH_ELOST || is_cut;
     const int whole = rc == SH_OK && recording_check_complete(result, NULL) == SH_OK;
     const int has_points = result->points != 0 && r->files.has_points; /* a format may have refused the first ones */
@@ -157,7 +157,7 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     return rc == SH_OK ? recording_check_complete(result, err) : rc;
 }
 
-/* --crs takes the layout geo along: polar points are in no CRS. */
+/* --crs also sets the layout geo, since polar points are in no CRS. */
 static int set_layout(const struct record_job *r, struct config *cfg, struct sh_err *err)
 {
     if (!r->crs_given || cfg->output.layout == LINE_GEO) return SH_OK;
@@ -235,8 +235,17 @@ static int check_meshes(const struct record_job *r, const struct config *cfg, st
     const int one_line = kind == EMITTER_PLANAR || (kind == EMITTER_LINE && cfg->head.settings.pan_udeg_s == 0) ||
                          (kind == EMITTER_SPHERE && cfg->profile.emitter.rings <= 1);
     int rc = on_earth ? record_files_check_floats(&r->files, err) : SH_OK;
-    if (rc == SH_OK && on_earth && moves) rc = record_files_check_facing(&r->files, err);
-    if (rc == SH_OK && one_line && !moves) rc = record_files_check_surface(&r->files, err);
+    if (rc == SH_OK && on_earth && moves)
+        rc = record_files_refuse_meshes(&r->files,
+                                        "faces the head, but the places of a moving head are known only in the "
+                                        "scene's frame; allowed output.crs: local, or output.layout: polar",
+                                        err);
+    if (rc == SH_OK && one_line && !moves)
+        rc = record_files_refuse_meshes(&r->files,
+                                        "needs a surface, but this head scans a single line: it neither pans nor "
+                                        "moves, and has one ring; allowed are .ply (without --mesh and --sparse) .las "
+                                        ".ptx .e57 .shs",
+                                        err);
     return rc == SH_OK ? record_files_check_emitter(&r->files, kind, err) : rc;
 }
 
@@ -251,7 +260,7 @@ int record_job_check(struct record_job *r, struct config *cfg, struct sh_err *er
     return rc == SH_OK ? check_meshes(r, cfg, err) : rc;
 }
 
-/* Before anything is loaded: whether the files can hold the scans of all heads that will scan. */
+/* Checks before anything is loaded whether the files can hold the scans of all heads that will scan. */
 static int check_heads(struct record_job *r, const struct heads *heads, uint32_t last, struct sh_err *err)
 {
     const struct config *cfg;

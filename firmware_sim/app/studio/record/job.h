@@ -34,7 +34,7 @@ struct record_job {
     struct sh_report notes; /* of the recorders */
     struct heads *heads;    /* of a configuration */
     struct record_files parts;
-    struct recorder_scan first; /* of the scans, as the configuration says it */
+    struct recorder_scan first; /* the first scan, as the configuration describes it */
     int has_silent;             /* objects that give no echo (scene.target) */
     int interrupted;            /* a signal came before the files were completed; they are completed all the same */
 };
@@ -42,8 +42,8 @@ struct record_job {
 /* Checks a recording off line before the scene is loaded: SH_EINPUT where it is not possible. cfg is changed. */
 int record_job_check(struct record_job *job, struct config *cfg, struct sh_err *err);
 /* The head of cfg runs off line in this process, and so do those of other scanners that the stations have. cfg is
- * changed; the sets that it was loaded with must still be there. SH_EINPUT: an option that such a recording can't
- * have. SH_ELOST and others as of recording_check_complete: the files keep the points that came. */
+ * changed; the settings of --set that it was loaded with must still be there. SH_EINPUT: an option that such a
+ * recording can't have. SH_ELOST and others as of recording_check_complete: the files keep the points that came. */
 int record_job_off_line(struct record_job *job, struct config *cfg, struct sh_err *err);
 /* A head on a wire, or a raw stream in a file. */
 int record_job_stream(struct record_job *job, struct sh_err *err);

@@ -7,7 +7,7 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/record/job.h"
 
-enum { RECORD_MAX_REPAIRS = 64 };
+enum { RECORD_MAX_REPAIRS = 64, RECORD_LONG_EDGE = 10 /* the default of --long-edge */ };
 
 struct record_line {
     struct app_input in;

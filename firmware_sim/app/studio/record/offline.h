@@ -25,14 +25,14 @@ struct offline {
     int shares_site; /* it is the caller's */
 };
 
-/* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: it ends each scan after this device
+/* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: the head ends each scan after this device
  * time, to the pulse. cfg is changed (pace, links) and must live on. `offline` begins as zeros but for truth, and is to
  * be closed, also after an error. */
 int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
                  struct sh_err *err);
 /* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
- * gives the site, which is site_free's; offline_open_at takes it. beside: a site to share a scene with, as
- * site_load_for has it; NULL: none. */
+ * gives the site, which site_free frees; offline_open_at uses it. beside: a site to share a scene with, as for
+ * site_load_for; NULL: none. */
 int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
                  struct sh_err *err);
 int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *offline,
@@ -43,7 +43,7 @@ int offline_open_beside(struct config *cfg, const struct offline *other, double 
                         struct offline *offline, struct sh_err *err);
 /* The head ends; its scene and its threads are freed. The client's handle keeps what it knows. */
 void offline_stop(struct offline *offline);
-/* The head ends, and the file of the truth is whole: the first error in writing it. Site and handle stay. */
+/* Ends the head, and completes the file `truth`. Returns the first error in writing it. Site and handle stay. */
 int offline_finish(struct offline *offline, struct sh_err *err);
 /* Prepares a scan from a station, from 1; 0: the one at power-up. No scan may be running. */
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);

@@ -80,7 +80,7 @@ static int read_port(const char *text, const char **end)
     return (int)port;
 }
 
-/* "HOST:PORT[,PORT...]", "[::1]:PORT". 0: it is not. */
+/* Reads "HOST:PORT[,PORT...]", where HOST may be "[::1]". Returns 0 where the text is nothing like it. */
 static int read_place(const char *text, int max_ports, struct raw_place *place)
 {
     const char *colon = strrchr(text, ':');

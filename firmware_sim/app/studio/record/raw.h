@@ -78,9 +78,9 @@ int raw_record(int argc, char **argv);
 
 /* ---- inside */
 
-/* From open files to closed ones. SH_ELOST: something is missing, the file keeps the rest. */
+/* Makes the recording. SH_ELOST: something is missing, the file keeps the rest. */
 int raw_run(struct raw *r, struct sh_err *err);
-/* A frame to the file. payload: how many bytes of it count. */
+/* Writes a frame to the file. payload: how many of its bytes count as received. */
 int raw_write(struct raw *r, const struct capture_frame *frame, size_t payload, struct sh_err *err);
 struct ethernet_end raw_end_of(const struct sockaddr_storage *at);
 /* Turns a text with escapes into *len bytes; `out` has room for as many bytes as the text has. Returns NULL, or what is

@@ -3,7 +3,7 @@
 
 #include <stddef.h>
 
-/* Asks all that are empty, until none of them has anything new. */
+/* Asks all empty inputs, until none of them has a new piece. */
 static int raw_order_fill(struct raw_input *const *input, int n, struct sh_err *err)
 {
     for (int found = 1; found;) {

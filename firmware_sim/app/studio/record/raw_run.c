@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The recording of `record --raw`: from open files to closed ones, whatever the source is. */
+/* The recording of `record --raw`, whatever the source is. */
 #include <errno.h>
 #include <netinet/in.h>
 #include <string.h>
@@ -56,7 +56,7 @@ static void put_stats(struct json *json, const void *ctx)
 
 /* The first packet is waited for as long as --wait says, else --duration. Once it is there, the duration counts from
  * it. */
-static int64_t end_of(const struct raw *r, int64_t begin_ns)
+static int64_t deadline_of(const struct raw *r, int64_t begin_ns)
 {
     const double first_s = r->wait_s > 0.0 ? r->wait_s : r->duration_s;
     if (r->first_ns == 0) return first_s > 0.0 ? begin_ns + (int64_t)(1e9 * first_s) : INT64_MAX;
@@ -98,8 +98,8 @@ static int raw_run_follow(struct raw *r, struct sh_err *err)
     const int64_t begin_ns = clock_now_ns();
     int64_t next_ns = begin_ns + SECOND_NS, now_ns;
     int rc = SH_OK;
-    while (!r->over && !app_interrupted() && (now_ns = clock_now_ns()) < end_of(r, begin_ns)) {
-        if (wait_until(r, now_ns, end_of(r, begin_ns)) != SH_OK)
+    while (!r->over && !app_interrupted() && (now_ns = clock_now_ns()) < deadline_of(r, begin_ns)) {
+        if (wait_until(r, now_ns, deadline_of(r, begin_ns)) != SH_OK)
             return sh_fail(err, SH_EIO, "%s: cannot wait: %s", r->in.operand[0], strerror(errno));
         rc = r->ops->work(r, err);
         if (rc >= 0) rc = raw_run_report(r, clock_now_ns(), &next_ns, err);

@@ -30,12 +30,12 @@ struct talk {
     struct talk_end end[2];
     int is_used, is_over, was_reset;
     int next_send;             /* of r->send */
-    int64_t sent_ns, heard_ns; /* monotonic: when it was sent, and when the device said something last */
+    int64_t sent_ns, heard_ns; /* monotonic: of the last --send, and of the last bytes from the device */
     char name[80];             /* of end 0, for messages */
 };
 
-/* Both descriptors are taken; fd 0: -1, for this program itself. began_ns: UTC, when the connection was asked for. It
- * writes the handshake. */
+/* Takes over both descriptors; fd[0] is -1 where end 0 is this program. began_ns: UTC, when the connection was asked
+ * for. Writes the handshake. */
 int talk_open(struct talk *talk, struct raw *r, const int fd[2], int64_t began_ns, struct sh_err *err);
 /* Fills in the descriptors to be polled, up to two, with their events; returns how many. */
 int talk_wait_for(const struct talk *talk, struct pollfd *fds, int *timeout_ms);

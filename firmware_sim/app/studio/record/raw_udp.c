@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --raw` of UDP: a socket a port, and each datagram as a frame. */
+/* `record --raw` of UDP: one socket for each port. Each datagram becomes one Ethernet frame of the capture. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -67,7 +67,7 @@ static int open_port(struct raw *r, struct port *p, int number, struct sh_err *e
         &r->capture, p->name, "Datagrams that scanhead received, with rebuilt headers; times are the kernel's.", err);
 }
 
-/* An own address may come late: an interface that is not up yet. Where it does not come, open_port says why. */
+/* The address may appear late, with an interface that is not up yet. Where it never appears, open_port says why. */
 static void wait_for_address(const struct raw *r)
 {
     struct stamped_socket probe;

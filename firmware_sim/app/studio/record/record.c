@@ -11,8 +11,6 @@
 #include "firmware_sim/command/head.h"
 #include "firmware_sim/config/limits.h"
 
-static const double LONG_EDGE = 10;
-
 static int is_config(const char *source)
 {
     return app_ends_in(source, ".yaml") || app_ends_in(source, ".yml");
@@ -58,7 +56,7 @@ static int take_colour(void *values, const char *text)
     struct colour_choice *choice = &r->job.files.recorder.colour;
     int i, status = take_word("colour", colour_words, COLOUR_MODES, text, &i);
     if (status != APP_OK) return status;
-    r->job.texture = i == COLOUR_TEXTURE; /* which the head sends */
+    r->job.texture = i == COLOUR_TEXTURE; /* the head sends these colours */
     choice->given = !r->job.texture;
     choice->scale.mode = (enum colour_mode)i;
     r->job.files.own_limits = colour_has_limits(choice->scale.mode) && !r->limited;
@@ -125,7 +123,7 @@ static int take_las_version(void *values, const char *text)
     return status;
 }
 
-/* Meshes, and points spread over them. */
+/* Checks the options of meshes, and of points spread over them. */
 static int check_meshes(struct record_line *r)
 {
     const struct recorder_options *o = &r->job.files.recorder;
@@ -151,7 +149,7 @@ static int check_meshes(struct record_line *r)
         return app_usage(
             &app_record,
             "--long-edge: no mesh is among the files: .ply with --mesh or --sparse, .obj, .gltf, .glb, .fbx");
-    r->job.files.recorder.long_edge = r->long_edge >= 0 ? r->long_edge : LONG_EDGE;
+    r->job.files.recorder.long_edge = r->long_edge >= 0 ? r->long_edge : RECORD_LONG_EDGE;
     r->job.files.recorder.sparse_seed = r->sparse_seed >= 0 ? (uint64_t)r->sparse_seed : 1;
     return APP_OK;
 }

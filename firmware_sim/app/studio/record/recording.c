@@ -33,7 +33,7 @@ struct recording {
     int stopping;                       /* the scan at hand is to end */
     int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
     int scan_over, cut_short, broken;
-    double scan_s, into_s; /* how long the scan lasts, 0: not known; how far it is */
+    double scan_s, into_s; /* how long the scan lasts, 0: not known; the time since its start */
     uint32_t station;      /* at hand */
 };
 
@@ -114,7 +114,7 @@ static int64_t ns_since(int64_t t_ns, int64_t from_ns)
     return (int64_t)((uint64_t)t_ns - (uint64_t)from_ns);
 }
 
-/* In a frame of the scan a sphere head fires a line for each of its rings. Any other head's scan_s needs no factor. */
+/* Each of the `frames` of a sphere head has a line for every ring, so scan_s gets the number of rings as a factor. */
 static uint32_t lines_of_frame(const struct scanhead *sh)
 {
     struct scanhead_emitter e;
@@ -180,14 +180,14 @@ static int is_interrupted(struct recording *r)
     return r->interrupted;
 }
 
-/* Whether that result says that the head was unplugged, or its bus reset, and it is to be waited for. */
+/* Whether rc says that the head was unplugged or its bus reset, and --replug asks to wait for it. */
 static int is_gone(const struct recording *r, int rc)
 {
     return r->o->replug_s > 0.0 && (rc == SCANHEAD_ELOST || rc == SCANHEAD_ERESET || rc == SCANHEAD_ECLOSED);
 }
 
-/* Waits for a head that is gone. Where it scans no more when it is back, the scan ended meanwhile. Where it still scans,
- * the rest of the scan will come. Its state is in r->reply. */
+/* Waits for a head that is gone. Where it scans no more when it is back, the scan ended meanwhile. Where it still
+ * scans, the rest of the scan will come. Its state is in r->reply. */
 static int replug(struct recording *r, int why, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);
@@ -351,7 +351,7 @@ static int is_endless(const struct recording *r)
            !info.moving;
 }
 
-/* Names what an interruption left out: of the scan at hand, and of the stations from it on. */
+/* Names what an interruption left out: the end of the scan at hand, and the scans from later stations. */
 static void name_missing(struct recording *r, uint32_t station)
 {
     char *text = r->result->missing;

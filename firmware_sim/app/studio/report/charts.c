@@ -20,7 +20,7 @@ static void charts_begin(FILE *out, const char *title)
     fputs("</title>\n", out);
 }
 
-/* Lines of the grid, with their figures in a unit. */
+/* Draws the lines of the grid, with their figures in a unit. */
 static void put_scale(FILE *out, double most, double per_unit)
 {
     const double step = figures_nice(most / 6.5);
@@ -40,7 +40,7 @@ static void put_axis_name(FILE *out, const char *text)
     fputs("</p>\n", out);
 }
 
-/* Figures below the bins, at multiples of a step. */
+/* Writes figures below the bins, at multiples of a step. */
 static void put_bin_axis(FILE *out, const struct figures_histogram *h, char *name, size_t n)
 {
     const double span = h->bins * h->width, last = h->from + span;
@@ -116,18 +116,14 @@ static void put_legend(FILE *out, const struct page_bars *b)
     fputs("</p>\n", out);
 }
 
-/* How many groups share one name, so that names of the longest have room: a letter is up to LETTER wide. */
+/* Returns how many groups share one name, so that the longest name has room. A letter is up to LETTER wide. */
 static uint32_t names_apart(const struct page_bars *b)
 {
     enum { LETTER = 7, GAP = 8 };
     const double wide = (double)(RIGHT - LEFT) / b->n_groups;
-    size_t longest = 0;
-    for (uint32_t g = 0; g < b->n_groups; g++) {
-        size_t letters = 0;
-        for (const char *c = b->group[g]; *c != 0; c++)
-            letters += ((unsigned char)*c & 0xc0) != 0x80;
-        longest = letters > longest ? letters : longest;
-    }
+    int longest = 0;
+    for (uint32_t g = 0; g < b->n_groups; g++)
+        if (page_letters(b->group[g]) > longest) longest = page_letters(b->group[g]);
     return (uint32_t)ceil((double)(longest * LETTER + GAP) / wide);
 }
 

@@ -6,8 +6,8 @@
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/config/config.h"
 
-/* In LAS files of ours, points of the first scan's station are the stream's own counts; others are rounded once
- * more. */
+/* In a LAS file that `record` wrote, points of the first scan's station are the stream's own counts. Others were
+ * rounded once more. */
 static double file_count_m(const struct report *r, uint32_t station, int polar)
 {
     const struct cloud *c = &r->cloud;
@@ -19,25 +19,18 @@ void report_heads(struct report *r)
 {
     const int polar = r->cfg->output.layout == LINE_POLAR;
     for (uint32_t s = 0; s < r->site->n_stations; s++) {
-        struct deviation_head *head = &r->f.station[s].head;
-        report_head_of(sites_of(&r->sites, s), s, head);
-        head->file_count_m = file_count_m(r, s, polar);
+        report_head_of(sites_of(&r->sites, s), s, &r->f.head[s]);
+        r->f.head[s].file_count_m = file_count_m(r, s, polar);
     }
 }
 
 static void count_beyond(struct report *r)
 {
     for (size_t i = 0; i < r->cloud.n; i++) {
-        struct report_station *s = &r->f.station[cloud_station(&r->cloud, i) - 1];
-        report_count(&s->verdict, &s->head, r->distance_m[i], (double)r->points.along_m[i],
+        const uint32_t s = cloud_station(&r->cloud, i) - 1;
+        report_count(&r->f.station[s].verdict, &r->f.head[s], r->distance_m[i], (double)r->points.along_m[i],
                      (double)r->points.range_m[i]);
     }
-}
-
-static void judge_station(const struct report *r, struct report_station *s)
-{
-    const struct report_subject subject = {&s->figures, &s->head, r->site->moving, "--max-m"};
-    report_judge_one(&subject, &s->verdict);
 }
 
 static void judge_all(struct report *r)
@@ -73,7 +66,9 @@ static void judge_all(struct report *r)
 void report_judge(struct report *r)
 {
     if (!r->site->moving) count_beyond(r);
-    for (uint32_t s = 0; s < r->site->n_stations; s++)
-        judge_station(r, &r->f.station[s]);
+    for (uint32_t s = 0; s < r->site->n_stations; s++) {
+        const struct report_subject subject = {&r->f.station[s].figures, &r->f.head[s], r->site->moving, "--max-m"};
+        report_judge_one(&subject, &r->f.station[s].verdict);
+    }
     judge_all(r);
 }

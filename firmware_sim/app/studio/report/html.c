@@ -25,7 +25,7 @@ static const char *frame_name(const struct report *r)
     return names[r->cfg->output.crs];
 }
 
-/* One, or one for each station that has another than the station before. */
+/* Names the scanner; where stations have several, each of them with the station from which on it is used. */
 static void put_scanners(FILE *out, const struct report *r)
 {
     char what[48] = "Scanner", text[256];
@@ -125,7 +125,7 @@ static void put_cards(FILE *out, const struct report *r)
     fputs("</div>\n", out);
 }
 
-/* Points that are expected between two deviations: of each station's judged ones, by their RMS sigma. */
+/* Returns how many points are expected between two deviations: those of each station, spread by their RMS sigma. */
 static double expected_within(const void *ctx, double from, double to)
 {
     const struct report *r = ctx;
@@ -240,8 +240,8 @@ static void put_words(FILE *out, const struct report *r)
     fputs(
         "<h2>What the words mean</h2>\n<dl class=\"words\">\n"
         "<dt>Distance</dt><dd>From the point to the nearest surface of the scene, whatever the direction. Never "
-        "negative. The mean, the RMS (the root of the mean square) and the largest are of these. 95 % of the points "
-        "have no larger one.</dd>\n"
+        "negative. There are its mean, its RMS (the root of the mean square), the distance that 95 % of the points do "
+        "not exceed, and the largest one.</dd>\n"
         "<dt>Along the beam</dt><dd>The beam is followed from the station through the point to the scene. The "
         "deviation is the measured range minus the exact one. It is positive where the point lies beyond the "
         "surface.</dd>\n"
@@ -253,16 +253,16 @@ static void put_words(FILE *out, const struct report *r)
         "<dt>Expected</dt><dd>The RMS deviation along the beam that follows from the configured noise (of ranges, angles "
         "and places) and from the counts of encoders and numbers. It is worked out for each judged point from its range "
         "and incidence.</dd>\n"
-        "<dt>Bound</dt><dd>Without noise of unlimited size no point may be farther from the scene than this: the "
-        "errors that the plan promises, half a count an axis of the numbers on the wire, and half a count of the "
-        "encoders.</dd>\n",
+        "<dt>Bound</dt><dd>Noise with a normal distribution has no bound. Without it no point may be farther from "
+        "the scene than the sum of these: the errors that the plan allows, half a count per axis of the numbers on the "
+        "wire, and half a count of the encoders.</dd>\n",
         out);
     fprintf(
         out,
         "<dt>Density</dt><dd>Each surface is cut into squares with sides of %g m. A square's density is the number of "
         "one station's points in it, divided by its area. Half of the points lie where the density is the median or "
         "more. Squares at a border count as whole ones, so theirs is a lower limit.</dd>\n"
-        "<dt>Surfaces, triangles</dt><dd>How many of the scene's have at least one point.</dd>\n</dl>\n",
+        "<dt>Surfaces, triangles</dt><dd>How many of those in the scene have at least one point.</dd>\n</dl>\n",
         r->f.density.cell_m);
 }
 

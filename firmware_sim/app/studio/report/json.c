@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The report as JSON. Keys that are there stay. */
+/* The report as JSON. No key is ever renamed or removed, since scripts read them. */
 #include <math.h>
 
 #include "firmware_sim/app/studio/report/report.h"
@@ -91,7 +91,7 @@ static void put_stations(struct json *json, const struct report *r)
         json_string(json, "name", r->site->station[s].station->name);
         report_put_figures(json, &st->figures);
         report_put_density(json, &st->density);
-        if (r->cloud.time_s != NULL) put_times(json, &st->times, st->gap_s);
+        if (r->f.times != NULL) put_times(json, &r->f.times[s], r->f.gap_s[s]);
         report_put_verdict(json, &st->verdict);
         json_close_object(json);
     }

@@ -65,15 +65,8 @@ static void include_stations(const struct view *v, struct cloud_picture_spec *sp
     }
 }
 
-static int letters(const char *text)
-{
-    int n = 0;
-    for (; *text != 0; text++)
-        n += ((unsigned char)*text & 0xc0) != 0x80;
-    return n;
-}
-
-/* Right of the station, left of it, above or below: the first place within the map that is free of what is there. */
+/* Places a label right or left of the station, above or below: at the first of these places that lies within the map
+ * and is free. Returns 0 where none is. */
 static int place_label(const double at[2], double wide, double height, const struct picture_box *taken, uint32_t n,
                        struct picture_box *out)
 {
@@ -126,7 +119,7 @@ static uint32_t put_stations(FILE *out, const struct view *v, const struct cloud
         station_at(v, p, scale, s, at);
         snprintf(name, sizeof name, "%" PRIu32 " %s", s + 1, site->station[s].station->name);
         put_mark(out, at, name);
-        if (n > MOST_NAMES || !place_label(at, letter * letters(name), height, taken, n_taken, &box)) {
+        if (n > MOST_NAMES || !place_label(at, letter * page_letters(name), height, taken, n_taken, &box)) {
             left_out++;
             continue;
         }
@@ -146,7 +139,7 @@ static uint32_t put_stations(FILE *out, const struct view *v, const struct cloud
     return left_out;
 }
 
-/* Scale bar of 1, 2 or 5 times a power of ten, and the colours with their figures. */
+/* Draws a scale bar of 1, 2 or 5 times a power of ten, and the colours with their figures. */
 static void put_legend(FILE *out, double top, double m_per_unit, double most_m)
 {
     const double bar_m = figures_nice(0.12 * WIDTH * m_per_unit), bar = bar_m / m_per_unit;

@@ -83,7 +83,7 @@ const char *page_unit(double largest_m, double *per_m)
     return "nm";
 }
 
-/* Four digits, no more than the unit has decimals for. */
+/* Writes four digits, with three decimals at most. */
 static void put_digits(FILE *out, double v, int is_signed)
 {
     const double a = fabs(v);
@@ -121,6 +121,14 @@ void page_count(FILE *out, uint64_t n)
         if (i > 0 && (len - i) % 3 == 0) fputc(',', out);
         fputc(digits[i], out);
     }
+}
+
+int page_letters(const char *text)
+{
+    int n = 0;
+    for (; *text != 0; text++)
+        n += ((unsigned char)*text & 0xc0) != 0x80;
+    return n;
 }
 
 void page_number(FILE *out, double v)

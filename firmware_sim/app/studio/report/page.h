@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The elements of a page: its head and foot, lengths as text, charts. In: figures in metres. Out: HTML 5 and SVG, whole
- * by themselves: no script, nothing from elsewhere; light or dark as the reader's system is; fit for printing. */
+/* The elements of a page: its head and foot, lengths as text, charts. In: figures in metres. Out: HTML 5 and SVG that
+ * need no script and no other file. Pages are light or dark as the reader's system is, and fit for printing. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_PAGE_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_PAGE_H
 
@@ -17,20 +17,23 @@ void page_end(FILE *out);
 void page_length(FILE *out, double m);
 /* The same with its sign. */
 void page_signed_length(FILE *out, double m);
-/* With the thousands apart. */
+/* A number with commas between thousands. */
 void page_count(FILE *out, uint64_t n);
 /* Three or four digits; NaN: a dash. */
 void page_number(FILE *out, double v);
 
-/* A unit for all figures of an axis, and what to multiply metres by. */
+/* Counts the characters of UTF-8. */
+int page_letters(const char *text);
+
+/* Returns a unit for all figures of an axis; *per_m: how many of it make a metre. */
 const char *page_unit(double largest_m, double *per_m);
 
-/* Bars. curve(ctx, from, to): how many are expected from..to, drawn as a line; NULL: none. */
+/* Draws bars. curve(ctx, from, to): how many are expected from..to, drawn as a line; NULL: none. */
 void page_histogram(FILE *out, const char *title, const struct figures_histogram *h,
                     double (*curve)(const void *ctx, double from, double to), const void *ctx);
 
-/* Groups of bars side by side, one group for each place on the axis. value: [n_groups][n_series], NaN: none. The last
- * series is drawn as a line across its group, as what is expected. */
+/* Groups of bars side by side, one group for each place on the axis. value_m: [n_groups], NaN: none. The last series is
+ * the expected value, drawn as a line across its group. */
 enum { PAGE_SERIES = 4 };
 struct page_bars {
     const char *title, *axis; /* what the groups are, with their unit */

@@ -86,7 +86,7 @@ static const char NOTES[] =
     "that moved there are only distances, which are not judged. Where only smooth faces are judged (noise, a\n"
     "footprint), half of the points must lie there. A point farther than --max-m fails in any case.\n"
     "\n"
-    "Density: of the points of one station in squares of --cell-m on each surface. Squares at a border count as\n"
+    "Density is that of one station's points, in squares of --cell-m on each surface. Squares at a border count as\n"
     "whole ones. If there are more than 3 million, their side is doubled.\n"
     "\n"
     "Memory: about 90 bytes a point, 9 GB for 100 million points.\n"

@@ -17,11 +17,8 @@
 enum { REPORT_INCIDENCES = 9, REPORT_MAX_RANGES = 13 }; /* bins of 10 degrees; of ranges */
 
 struct report_station {
-    struct deviation_head head;
     struct figures figures;
     struct figures_density_row density;
-    struct figures_times times;
-    double gap_s; /* pauses longer than that are counted */
     struct report_verdict verdict;
 };
 
@@ -32,8 +29,11 @@ struct report_figures {
     int64_t epsg;    /* of the file */
     struct cloud_coverage coverage;
     struct figures all;
-    struct report_station *station; /* [site->n_stations] */
-    struct figures *label;          /* [n_surfaces + 1]: the last is of points whose surface is not known */
+    struct report_station *station; /* [site->n_stations], as are these: */
+    struct deviation_head *head;
+    struct figures_times *times; /* NULL: the file has no times */
+    double *gap_s;               /* pauses longer than that are counted */
+    struct figures *label;       /* [n_surfaces + 1]: the last is of points whose surface is not known */
     double range_step_m;
     uint32_t n_ranges;
     struct figures range[REPORT_MAX_RANGES], incidence[REPORT_INCIDENCES];
@@ -76,9 +76,9 @@ const struct scene_surface *report_worst_surface(const struct report *r);
 
 /* ---- expect.c */
 
-/* Fills r->f.station[].head: the setup and the errors of the head at each station. */
+/* Fills r->f.head: the setup and the errors of the head at each station. */
 void report_heads(struct report *r);
-/* After all figures: the verdicts of the stations, and of all. */
+/* Makes the verdicts on the stations, and on all together. To be called once all figures are there. */
 void report_judge(struct report *r);
 
 /* ---- text.c, json.c, html.c */

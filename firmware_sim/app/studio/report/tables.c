@@ -152,7 +152,7 @@ int report_put_surfaces(FILE *out, const struct report *r, struct sh_err *err)
         if (r->f.label[i].points > 0) ranked[n++] = (struct ranked){r->f.label[i].points, i};
     qsort(ranked, n, sizeof *ranked, by_points);
     fputs("<h2>Surfaces</h2>\n", out);
-    begin_table(out, "By surface: object | material; those with the most points first.", "surface", 0);
+    begin_table(out, "By surface: object | material; most points first.", "surface", 0);
     for (uint32_t k = 0; k < n && k < MOST_LABELS; k++) {
         char name[REPORT_SURFACE_LEN] = "surface not known";
         const uint32_t i = ranked[k].label;
@@ -186,17 +186,17 @@ static void put_echoes(FILE *out, const struct report *r)
 void report_put_times(FILE *out, const struct report *r)
 {
     fputs("<h2>Time and echoes</h2>\n", out);
-    if (r->cloud.time_s == NULL) {
+    if (r->f.times == NULL) {
         fputs("<p>The file has no times.</p>\n", out);
     } else {
         fputs(
-            "<div class=\"wide\"><table><caption>Of the recording, by the points' own times. A pause is longer than two "
-            "lines of the station's scan take.</caption>\n<thead><tr><th>station</th><th>points</th><th>scans</th>"
+            "<div class=\"wide\"><table><caption>Times are those of the points. A pause is longer than two lines of the "
+            "station's scan.</caption>\n<thead><tr><th>station</th><th>points</th><th>scans</th>"
             "<th>time span, s</th><th>points/s</th><th>pauses</th><th>longest, s</th><th>it begins at, s</th></tr>"
             "</thead>\n<tbody>\n",
             out);
         for (uint32_t s = 0; s < r->site->n_stations; s++) {
-            const struct figures_times *t = &r->f.station[s].times;
+            const struct figures_times *t = &r->f.times[s];
             if (t->points == 0) continue;
             fprintf(out, "<tr><td>%" PRIu32 " ", s + 1);
             picture_put_escaped(out, r->site->station[s].station->name);

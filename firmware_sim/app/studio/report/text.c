@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The report as text. The first lines are those that scripts know. */
+/* The report as text. Its first lines stay as they are, since scripts read them. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -168,13 +168,13 @@ static void print_tables(const struct report *r)
 
 static void print_time(const struct report *r)
 {
-    for (uint32_t s = 0; s < r->site->n_stations && r->cloud.time_s != NULL; s++) {
-        const struct figures_times *t = &r->f.station[s].times;
+    for (uint32_t s = 0; s < r->site->n_stations && r->f.times != NULL; s++) {
+        const struct figures_times *t = &r->f.times[s];
         if (t->points == 0) continue;
         char rate[32] = "-";
         if (t->span_s > 0.0) snprintf(rate, sizeof rate, "%.6g", (double)t->points / t->span_s);
         printf("%-10s station %" PRIu32 ": %.6g s, %s points/s; %zu pauses over %.3g s, the longest %.3g s at %.6f s\n",
-               "time", s + 1, t->span_s, rate, t->gaps, r->f.station[s].gap_s, t->longest_s, t->longest_at_s);
+               "time", s + 1, t->span_s, rate, t->gaps, r->f.gap_s[s], t->longest_s, t->longest_at_s);
     }
     if (!r->f.has_echoes) return;
     printf("%-10s", "echoes");

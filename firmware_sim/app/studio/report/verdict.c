@@ -85,8 +85,8 @@ static void judge_bound(struct report_verdict *v, const struct figures *f, int f
 enum { JUDGED_LEAST = 100 };
 
 /* z^2 of a normal deviation has a variance of 2; six standard errors of its mean are exceeded once in 5e8. A
- * fiftieth is added, since sigma is of first order, and the noisy points themselves decide where faces are smooth.
- * For the mean a hundredth of sigma is added. Counts add between nothing and three times their variance
+ * fiftieth is added, since sigma is exact only to first order, and the noisy points themselves decide where faces are
+ * smooth. For the mean a hundredth of sigma is added. Counts add between nothing and three times their variance
  * (core/studio/deviation.h). */
 static void judge_noise(struct report_verdict *v, const struct figures *f)
 {

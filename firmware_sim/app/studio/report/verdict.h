@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Whether the deviations of points are as configuration and plan let expect: of a recording's station (expect.c), and
- * of a scan that is still on (firmware_sim/app/studio/watch). In: the setup of the station's head, and the figures of
- * its points (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure. Also the JSON of
- * both, which `report --json` and /quality share (json.c). */
+/* Judges whether deviations of points are those that follow from configuration and plan: at a station of a recording
+ * (expect.c), and in a scan that still goes on (firmware_sim/app/studio/watch). In: the setup of the station's head,
+ * and the figures of its points (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure.
+ * Also the JSON of both, which `report --json` and /quality share (json.c). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 
@@ -10,6 +10,10 @@
 #include "core/studio/figures.h"
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/site/site.h"
+
+/* The first side of density cells, and the share of the points that lies within a histogram's bins. */
+#define REPORT_CELL_M 0.1
+#define REPORT_SHOWN  0.995
 
 enum report_judgement { REPORT_NONE, REPORT_WITHIN, REPORT_BEYOND };
 struct report_verdict {
@@ -31,17 +35,18 @@ void report_head_of(const struct site *site, uint32_t station, struct deviation_
 void report_count(struct report_verdict *v, const struct deviation_head *head, double distance_m, double along_m,
                   double range_m);
 
-/* After all points were counted. */
 struct report_subject {
     const struct figures *figures;
     const struct deviation_head *head;
     int moving;        /* the head moved while it scanned */
     const char *reach; /* how far the scene was looked for: "10 m" */
 };
+/* Judges the points, all of which were counted before. */
 void report_judge_one(const struct report_subject *subject, struct report_verdict *v);
 
-/* Members of an open object; the others are one member each. */
+/* Writes members of an open object. */
 void report_put_figures(struct json *json, const struct figures *f);
+/* Each of these writes one member. */
 void report_put_density(struct json *json, const struct figures_density_row *d);
 void report_put_verdict(struct json *json, const struct report_verdict *v);
 void report_put_histogram(struct json *json, const char *key, const struct figures_histogram *h);

@@ -10,7 +10,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
 
-/* Ghosts are counted, and become shots without echo. */
+/* Counts ghosts (points seen in mirrors), and makes them shots without echo. */
 static void leave_out_ghosts(struct report *r)
 {
     const struct site_detect *d = &r->site->detect;
@@ -92,7 +92,8 @@ static int prepare(struct report *r, struct sh_err *err)
     const struct site *site = r->site;
     r->georef = calloc(site->n_stations, sizeof *r->georef);
     r->f.station = calloc(site->n_stations, sizeof *r->f.station);
-    if (r->georef == NULL || r->f.station == NULL)
+    r->f.head = calloc(site->n_stations, sizeof *r->f.head);
+    if (r->georef == NULL || r->f.station == NULL || r->f.head == NULL)
         return sh_fail(err, SH_ENOMEM, "no memory for %u stations", site->n_stations);
     for (uint32_t i = 0; i < site->n_stations; i++)
         r->georef[i] = site->station[i].georef;
@@ -138,12 +139,7 @@ static int work_compare(struct report *r, struct sh_err *err)
     if (rc == SH_OK && site->moving) without_beams(r);
     if (rc == SH_OK && !site->moving) {
         const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
-        struct deviation_head *head = malloc(site->n_stations * sizeof *head);
-        for (uint32_t s = 0; s < site->n_stations && head != NULL; s++)
-            head[s] = r->f.station[s].head;
-        rc = head == NULL ? sh_fail(&why, SH_ENOMEM, "no memory")
-                          : deviation_along(&compared, head, &app_report_seconds, &r->points, &why);
-        free(head);
+        rc = deviation_along(&compared, r->f.head, &app_report_seconds, &r->points, &why);
     }
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
 }
@@ -219,15 +215,14 @@ static int tables(struct report *r, struct sh_err *err)
     return rc;
 }
 
-static const double CELL_M = 0.1;
-
 static int densities(struct report *r, struct sh_err *err)
 {
     struct report_figures *f = &r->f;
     const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
     const struct figures_on_scene in = {&compared, r->site->scene, r->points.range_m};
-    int rc = r->cell_m > 0.0 ? figures_density_of(&in, r->cell_m, &app_report_seconds, &f->density, err)
-                             : figures_density_fit(&in, CELL_M, &app_report_seconds, &f->density, &f->density_all, err);
+    int rc = r->cell_m > 0.0
+                 ? figures_density_of(&in, r->cell_m, &app_report_seconds, &f->density, err)
+                 : figures_density_fit(&in, REPORT_CELL_M, &app_report_seconds, &f->density, &f->density_all, err);
     if (rc != SH_OK) return rc;
     figures_density_within(&f->density, 0, 0.0, (double)INFINITY, &f->density_all);
     for (uint32_t k = 0; k < f->n_ranges; k++)
@@ -245,25 +240,16 @@ static int times(struct report *r, struct sh_err *err)
     if (f->has_echoes) figures_echoes_of(&r->cloud, f->shots);
     if (r->cloud.time_s == NULL) return SH_OK;
     const uint32_t n = r->site->n_stations;
-    struct figures_times *t = calloc(n, sizeof *t);
-    double *gap_s = calloc(n, sizeof *gap_s);
-    int rc = t == NULL || gap_s == NULL ? sh_fail(err, SH_ENOMEM, "no memory") : SH_OK;
-    for (uint32_t s = 0; s < n && rc == SH_OK; s++) {
+    f->times = calloc(n, sizeof *f->times);
+    f->gap_s = calloc(n, sizeof *f->gap_s);
+    if (f->times == NULL || f->gap_s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", n);
+    for (uint32_t s = 0; s < n; s++) {
         const int64_t lines_uhz = sites_of(&r->sites, s)->cfg->head.settings.lines_uhz;
-        gap_s[s] = lines_uhz > 0 ? 2.0 / (1e-6 * (double)lines_uhz) : 0.1;
+        f->gap_s[s] = lines_uhz > 0 ? 2.0 / (1e-6 * (double)lines_uhz) : 0.1;
     }
-    if (rc == SH_OK) figures_times_of(&r->cloud, n, gap_s, t);
-    for (uint32_t s = 0; s < n && rc == SH_OK; s++) {
-        f->station[s].times = t[s];
-        f->station[s].gap_s = gap_s[s];
-    }
-    free(t);
-    free(gap_s);
-    return rc;
+    figures_times_of(&r->cloud, n, f->gap_s, f->times);
+    return SH_OK;
 }
-
-/* The share of the points that lies within a histogram's bins. */
-static const double SHOWN = 0.995;
 
 int report_work(struct report *r, struct sh_err *err)
 {
@@ -275,8 +261,8 @@ int report_work(struct report *r, struct sh_err *err)
     if (rc == SH_OK) rc = densities(r, err);
     if (rc == SH_OK) rc = times(r, err);
     if (rc != SH_OK) return rc;
-    figures_histogram_of(r->distance_m, r->cloud.n, SHOWN, &r->f.distances);
-    figures_histogram_of_signed(r->points.along_m, r->cloud.n, SHOWN, &r->f.along);
+    figures_histogram_of(r->distance_m, r->cloud.n, REPORT_SHOWN, &r->f.distances);
+    figures_histogram_of_signed(r->points.along_m, r->cloud.n, REPORT_SHOWN, &r->f.along);
     report_judge(r);
     return SH_OK;
 }
@@ -294,6 +280,9 @@ void report_free(struct report *r)
     free(r->distance_m);
     free(r->triangle);
     free(r->f.station);
+    free(r->f.head);
+    free(r->f.times);
+    free(r->f.gap_s);
     free(r->f.label);
     figures_density_free(&r->f.density);
     deviation_points_free(&r->points);

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Asks the head questions whose right answers are known, and judges the answers. */
 #include <stdio.h>
 #include <string.h>
 
@@ -16,7 +15,7 @@
 enum { REPLY_MS = 5000, REPLY_LEN = SOAK_REPLY_LEN };
 static const double MARGIN_MS = 5.0;
 static const int64_t AFTER_END_NS = 1000000000;
-/* The library comes into step with questions of its own. It repeats one that has no answer after a second. */
+/* The library resynchronises with questions of its own. It repeats one that has no answer after a second. */
 static const double ASKED_AGAIN_MS = 900.0;
 
 static int is_count(const char *text)
@@ -83,7 +82,7 @@ static void judge_note(struct soak_link *link, const struct fault_note *note, co
     else if (note->kind == FAULT_WRONG_REPLY && a->is_same)
         soak_hide(row, 1, "the reply before was the same");
     else if (ask->settling)
-        soak_hide(row, 1, "it hit a question of the library itself, which comes into step");
+        soak_hide(row, 1, "it hit a question by which the library resynchronises");
     else
         row->missed++;
 }

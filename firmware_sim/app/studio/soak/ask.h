@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The questions of a client, and how their answers are judged. */
+/* A client's questions, whose right answers are known, and the judging of the answers. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_ASK_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_ASK_H
 
@@ -13,7 +13,7 @@ enum { SOAK_MAX_REPLY_NOTES = 16, SOAK_REPLY_LEN = 600 };
 
 struct soak_ask {
     int active;   /* a question is out */
-    int settling; /* the library first comes into step, with questions of its own */
+    int settling; /* the library first resynchronises, with questions of its own */
     uint32_t n;   /* faults that hit replies since the question went out */
     struct fault_note note[SOAK_MAX_REPLY_NOTES];
     uint32_t echoes;             /* noticed since then */
@@ -21,6 +21,7 @@ struct soak_ask {
     uint64_t others;             /* faults of any other kind since then */
     int64_t ended_ns;            /* clock: when a session last ended, or a client was turned away; 0: not yet */
     char before[SOAK_REPLY_LEN]; /* the last reply that came */
+    /* hurt: replies lost or wrong beside another fault, or just after a session; odd: without such a reason */
     uint64_t asked, answered, timeouts, wrong, hurt, odd;
     uint32_t next;
 };

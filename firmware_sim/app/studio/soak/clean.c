@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* The clean stream: a reader within the head's own process, which faults of links don't reach. */
 #include <stdlib.h>
 
 #include "core/bytes.h"
@@ -66,7 +65,7 @@ soak_seq soak_clean_top(struct soak *soak)
 }
 
 /* Asks for the head's identity and state. */
-static void ask(struct soak_clean *c)
+static void clean_ask(struct soak_clean *c)
 {
     if (scanhead_command(c->sh, "*IDN?", c->idn, sizeof c->idn, REPLY_MS) != SCANHEAD_OK) c->idn[0] = '\0';
     if (scanhead_command(c->sh, "HEAD:STATe?", c->state, sizeof c->state, REPLY_MS) != SCANHEAD_OK) c->state[0] = '\0';
@@ -82,7 +81,7 @@ static void *read_clean(void *arg)
     int rc;
     while ((rc = scanhead_next(c->sh, &frame, NEXT_MS)) == SCANHEAD_OK || rc == SCANHEAD_ETIMEOUT) {
         if (rc == SCANHEAD_OK) clean_keep(soak, &frame);
-        if (atomic_load(&c->want_health) == 1) ask(c);
+        if (atomic_load(&c->want_health) == 1) clean_ask(c);
     }
     if (atomic_load(&soak->phase) != SOAK_ENDS) snprintf(c->failed, sizeof c->failed, "%.255s", scanhead_error(c->sh));
     scanhead_hash_hex(c->sh, c->sha256);

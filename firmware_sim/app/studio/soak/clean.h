@@ -25,8 +25,8 @@ struct soak_clean {
     struct scanhead *sh;
     pthread_t thread;
     int running;
-    atomic_int want_health;   /* 1: asks the head how it is; 2: it has */
-    char idn[256], state[64]; /* as it answered then */
+    atomic_int want_health;   /* 1: the thread is to ask for identity and state; 2: it has asked */
+    char idn[256], state[64]; /* the answers; empty: none came */
     char sha256[65];
     uint64_t reader_lost;
     int64_t first_points_ns, last_t_ns; /* device time; 0: none so far */
@@ -35,7 +35,7 @@ struct soak_clean {
 
 int soak_clean_open(struct soak *soak, struct sh_err *err);
 int soak_clean_start(struct soak *soak, struct sh_err *err);
-/* After the head has ended. */
+/* To be called after the head has ended. */
 void soak_clean_join(struct soak *soak);
 void soak_clean_close(struct soak *soak);
 /* 0: the frame is not known (any more, or not yet). */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A client for each link: what a good recorder does. It starts a scan, reads all frames, asks now and then, opens the
- * head again when the connection goes, and starts the scan again when the head has forgotten it. */
+/* A client for each link, which behaves like a good recorder. It starts a scan, reads all frames, asks now and then,
+ * opens the head again when the connection goes, and starts the scan again when the head has forgotten it. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,8 +36,8 @@ static const char *why_not(const struct link_place *place, const struct link_spe
 {
     if (strcmp(place->type, "usb") == 0)
         return soak_usb_is_here(spec) ? NULL
-                                      : "only a head of protocol native with backend usbip and attach on is on this "
-                                        "machine";
+                                      : "only a USB head with backend usbip, attach on and protocol native is attached "
+                                        "to this machine";
     if (strcmp(place->type, "udp") == 0) return "its packets go to another place, or their port is taken";
     if (strcmp(place->type, "pty") != 0 && strcmp(place->type, "tcp") != 0) {
         if (strcmp(place->type, "web") == 0) return "libscanhead does not support WebSocket";
@@ -194,7 +194,7 @@ static void take_frame(struct recorder *r, const struct scanhead_frame *frame)
     if (frame->type == SCANHEAD_POINTS) r->points_ns = now_ns;
 }
 
-static void ask(struct recorder *r)
+static void client_ask(struct recorder *r)
 {
     const int64_t now_ns = clock_now_ns();
     if (now_ns - r->asked_ns < ASK_EVERY_NS || atomic_load(&r->link->soak->phase) == SOAK_ENDS) return;
@@ -251,7 +251,7 @@ static void *record(void *arg)
     while (!r.ended) {
         step(&r);
         see_whether_done(&r);
-        if (!r.ended && !is_over(link)) ask(&r);
+        if (!r.ended && !is_over(link)) client_ask(&r);
     }
     atomic_store(&link->done, 1);
     return NULL;

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A reader of a link that sends datagrams: it compares each with those of a second link, which has no faults.
- *
- * Both links speak the same protocol and begin at power-up. So datagram n of the clean one is unit n of the other,
+/* Both links speak the same protocol and begin at power-up. So datagram n of the clean one is unit n of the other,
  * before faults hit it. Datagrams have no numbers: each is found among the clean ones by its content, near the place
  * where it is expected. Datagrams wait a moment here, so that the clean one is there first. */
 #include <netinet/in.h>

@@ -12,8 +12,8 @@
 struct soak_datagrams;
 struct soak_link;
 
-/* Receives what a link sends, and what a second link of the same protocol will send, which is to be opened beside it.
- * NULL: it can't. */
+/* Opens sockets for the datagrams of a link and of a second, clean link. *clean_link becomes that second link, which
+ * the caller opens beside the first. NULL: not possible. */
 struct soak_datagrams *soak_datagrams_open(const struct link_spec *spec, struct link_spec *clean_link);
 void soak_datagrams_close(struct soak_datagrams *datagrams);
 int soak_datagrams_get(const struct soak_datagrams *datagrams, soak_seq seq, struct soak_clean_frame *out);
@@ -21,6 +21,7 @@ void soak_datagrams_step(struct soak_link *link);
 /* Waits for datagrams that are still on their way, and takes them. */
 void soak_datagrams_finish(struct soak_link *link);
 uint64_t soak_datagrams_top(struct soak_link *link);
+/* The number in the ledger of the datagram that has this number on its link, from 1. */
 soak_seq soak_unit(uint64_t number);
 
 #endif

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults in the head, as the client of a link notices them: by states, times and encoders of the frames that it got. */
 #include <math.h>
 #include <string.h>
 
@@ -18,7 +17,7 @@
  * are far above a nanosecond and far below a jump. PPS_WITHIN_S: the longest time between two pulses. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
 
-/* Kinds that a client can't notice by itself, and why. */
+/* Returns why a client can't notice faults of a kind; NULL: it can. */
 static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
 {
     const int has_mirror = soak->cfg->profile.emitter.kind == EMITTER_LINE && soak->cfg->output.layout == LINE_POLAR;
@@ -44,7 +43,7 @@ static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
     case FAULT_PTP_JITTER:
         return "the noise of the path looks the same";
     case FAULT_PTP_NO_SYNC:
-        return "the follower's states remain; only its offset stands still";
+        return "the follower keeps its states; only its offset no longer changes";
     case FAULT_MIRROR_SLOW:
     case FAULT_MIRROR_STUCK:
     case FAULT_MIRROR_WOBBLE:
@@ -99,18 +98,18 @@ void soak_heard_head(struct soak_link *link, const struct fault_note *note)
 
 /* ---- what the client saw */
 
-static void see(struct soak_link *link, struct soak_moment *m)
+static void see_moment(struct soak_link *link, struct soak_moment *m)
 {
     link->row[m->kind].noticed++;
     *m = link->moment[--link->n_moments];
 }
 
-/* All of a kind that were at work within a time. */
+/* Notes as noticed all faults of a kind that were at work between two times. */
 static void see_kind(struct soak_link *link, enum fault_kind kind, int64_t from_ns, int64_t to_ns)
 {
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
-        if (m->kind == kind && m->from_ns <= to_ns && m->to_ns >= from_ns) see(link, m);
+        if (m->kind == kind && m->from_ns <= to_ns && m->to_ns >= from_ns) see_moment(link, m);
     }
 }
 
@@ -119,13 +118,14 @@ int soak_saw_power_go(struct soak_link *link, int64_t before_ns)
     for (uint32_t i = 0; i < link->n_moments; i++) {
         struct soak_moment *m = &link->moment[i];
         if (m->kind != FAULT_POWER_CYCLE || m->from_ns > before_ns) continue;
-        see(link, m);
+        see_moment(link, m);
         return 1;
     }
     return 0;
 }
 
-/* The event that ends a boot says that it was slow. */
+/* Whether a fault was over before this first frame, so that it can't be noticed. The event that ends a slow boot still
+ * shows it. */
 static int is_before(const struct soak_moment *m, const struct scanhead_frame *frame)
 {
     const int ends_boot = frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_STATE;
@@ -153,11 +153,11 @@ static void take_state(struct soak_link *link, const struct scanhead_frame *fram
     if (frame->event_value[0] == HEAD_FAULT) see_kind(link, FAULT_SELF_TEST, INT64_MIN, frame->t_ns);
     for (uint32_t i = link->n_moments; i-- > 0 && frame->event_value[1] == HEAD_BOOT;) {
         struct soak_moment *m = &link->moment[i];
-        if (m->kind == FAULT_SLOW_BOOT && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms)) see(link, m);
+        if (m->kind == FAULT_SLOW_BOOT && frame->t_ns - m->from_ns >= (int64_t)(1e6 * m->for_ms)) see_moment(link, m);
     }
 }
 
-/* The client's first time has no other to compare with. */
+/* Hides faults from before the client's first time, since there is no earlier time to compare that one with. */
 static void hide_clock(struct soak_link *link, int64_t at_ns)
 {
     for (uint32_t i = link->n_moments; i-- > 0;) {
@@ -181,7 +181,7 @@ static void take_time(struct soak_link *link, int64_t at_ns, int64_t gps_ns)
         const int seen = (m->kind == FAULT_CLOCK_JUMP && fabs(by_s - jump_s) < 0.5 * fabs(jump_s)) ||
                          (m->kind == FAULT_CLOCK_STOP && by_s < -STEP_S) ||
                          (m->kind == FAULT_CLOCK_DRIFT && fabs(by_s) > GAIN_S && fabs(by_s) < STEP_S);
-        if (seen) see(link, m);
+        if (seen) see_moment(link, m);
     }
     if (!t->have) hide_clock(link, at_ns);
     t->have = 1;
@@ -204,7 +204,7 @@ static void hide_pps(struct soak_link *link, int64_t first_ns)
             hide_moment(link, i, "it was before the client had a frame");
 }
 
-/* Notices a pulse that is late against the one before it by as much as the fault says, or early by that. */
+/* Notices a PPS pulse whose distance from the one before it is wrong by as much as the fault says. */
 static void see_jitter(struct soak_link *link, int64_t at_ns, int64_t gps_s)
 {
     const struct soak_times *t = &link->times;
@@ -212,7 +212,8 @@ static void see_jitter(struct soak_link *link, int64_t at_ns, int64_t gps_s)
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
         const double late_s = 1e-3 * m->for_ms;
-        if (m->kind == FAULT_PPS_JITTER && m->from_ns <= at_ns && fabs(off_s - late_s) < 0.25 * late_s) see(link, m);
+        if (m->kind == FAULT_PPS_JITTER && m->from_ns <= at_ns && fabs(off_s - late_s) < 0.25 * late_s)
+            see_moment(link, m);
     }
 }
 
@@ -256,7 +257,7 @@ static int shows_ptp(const struct soak_link *link, const struct soak_moment *m, 
 static void take_ptp(struct soak_link *link, int64_t at_ns, const struct native_telemetry *t)
 {
     for (uint32_t i = link->n_moments; i-- > 0;)
-        if (shows_ptp(link, &link->moment[i], at_ns, t)) see(link, &link->moment[i]);
+        if (shows_ptp(link, &link->moment[i], at_ns, t)) see_moment(link, &link->moment[i]);
 }
 
 static void head_take_telemetry(struct soak_link *link, const struct scanhead_frame *frame)
@@ -309,7 +310,7 @@ static int is_seen_in(struct soak_link *link, const struct soak_moment *m, const
         return fabs(share - m->what.factor) < 0.25 * fabs(1.0 - m->what.factor);
     case FAULT_MIRROR_STUCK:
         return fabs(share) < 0.01;
-    case FAULT_MIRROR_WOBBLE: /* a quarter of what the rate changes by, at most */
+    case FAULT_MIRROR_WOBBLE: /* the threshold is a quarter of the largest change of rate */
         return fabs(rate - usual) > 0.25 * 2.0 * M_PI * m->what.hz * fabs(m->what.deg) * M_PI / 180.0;
     case FAULT_LASER_OFF:
         return is_all_empty(link, frame);
@@ -323,8 +324,8 @@ static int is_of_mirror(const struct soak_moment *m)
     return m->kind == FAULT_MIRROR_SLOW || m->kind == FAULT_MIRROR_STUCK || m->kind == FAULT_MIRROR_WOBBLE;
 }
 
-/* The rate at which the mirror turns when nothing is wrong with it. Faults of the mirror from before that rate is known
- * have nothing to be compared with. */
+/* Keeps the rate at which the mirror turns without a fault. Hides faults of the mirror from before that rate is known:
+ * there was nothing to compare them with. */
 static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
 {
     for (uint32_t i = 0; i < link->n_moments; i++)
@@ -346,7 +347,8 @@ static void head_take_points(struct soak_link *link, const struct scanhead_frame
     if (link->usual_rate == 0.0 && isfinite(rate)) take_usual_rate(link, frame->t_ns, rate);
     for (uint32_t i = link->n_moments; i-- > 0;) {
         struct soak_moment *m = &link->moment[i];
-        if (m->from_ns <= frame->t_ns && frame->t_ns < m->to_ns && is_seen_in(link, m, frame, rate)) see(link, m);
+        if (m->from_ns <= frame->t_ns && frame->t_ns < m->to_ns && is_seen_in(link, m, frame, rate))
+            see_moment(link, m);
     }
 }
 
@@ -362,7 +364,7 @@ void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame)
 
 /* ---- at the end */
 
-/* Why a fault may be over, or the run, before the client can notice it; NULL: it must be noticed. */
+/* Returns why a fault, or the run, may end before the client can notice the fault; NULL: it must be noticed. */
 static const char *why_unseen(const struct soak_link *link, enum fault_kind kind)
 {
     switch (kind) {
@@ -374,7 +376,7 @@ static const char *why_unseen(const struct soak_link *link, enum fault_kind kind
     case FAULT_PTP_STEP:
         return "the follower's state and offset showed nothing of it in that time";
     case FAULT_SLOW_BOOT:
-        return link->soak->realtime ? NULL : "out of real time it may end before a client connects";
+        return link->soak->realtime ? NULL : "at this pace it may end before a client connects";
     default:
         return NULL;
     }

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Compares the faults injected into each frame of a link with what the client saw of it.
- *
- * A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of it, and the clean
+/* A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of it, and the clean
  * reader has it. */
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"
@@ -18,6 +16,10 @@
 static const double LATE_MS = 10.0, MARGIN_MS = 5.0;
 enum { NEAR_FRAMES = 64 };
 static const int64_t NEAR_NS = 20000000, FAR_NS = 20000000000;
+
+/* Kinds that destroy a frame. */
+static const enum fault_kind destroying[] = {FAULT_DROP, FAULT_TRUNCATE, FAULT_FLIP};
+enum { N_DESTROYING = sizeof destroying / sizeof *destroying };
 
 static int is_destroyed(const struct soak_fact *f)
 {
@@ -41,12 +43,11 @@ static void decide(struct soak_row *row, uint64_t n, int was_noticed)
 
 /* ---- what each kind must show */
 
-/* It did not come, and its number is missing. */
+/* The frame must be missing, with a gap at its number. */
 static void judge_destroyed(struct soak_link *link, const struct soak_fact *f)
 {
-    static const enum fault_kind kinds[] = {FAULT_DROP, FAULT_TRUNCATE, FAULT_FLIP};
-    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
-        decide(&link->row[kinds[i]], f->times[kinds[i]], f->got == 0 && f->gap);
+    for (size_t i = 0; i < N_DESTROYING; i++)
+        decide(&link->row[destroying[i]], f->times[destroying[i]], f->got == 0 && f->gap);
 }
 
 static void judge_resealed(struct soak_link *link, const struct soak_fact *f, int is_known, int is_wrong)
@@ -103,7 +104,7 @@ static void judge_late(struct soak_link *link, const struct soak_fact *f)
         const uint64_t n = f->times[kinds[i]];
         if (n == 0) continue;
         if (!link->soak->realtime)
-            soak_hide(row, n, "out of real time no frame is late");
+            soak_hide(row, n, "no frame is late at this pace: only realtime has delays");
         else if (f->for_ms < LATE_MS)
             soak_hide(row, n, "shorter than 10 ms");
         else if (link->datagrams != NULL)
@@ -122,7 +123,7 @@ static int get_clean(struct soak_link *link, soak_seq seq, struct soak_clean_fra
                                    : soak_clean_get(link->soak, seq, out);
 }
 
-/* Bytes that belong to no frame, at about this place. */
+/* Takes n bytes that belong to no frame out of a run near this place. Returns 0 where there is none. */
 static int take_bytes(struct soak_link *link, const struct soak_fact *f, uint64_t n)
 {
     struct soak_clean_frame before;
@@ -163,7 +164,7 @@ static void judge_same_bytes(struct soak_link *link, const struct soak_fact *f)
 
 /* ---- a frame */
 
-/* Bytes that no reader can take for a frame or a reply. */
+/* Counts the bytes that no reader can take for a frame or a reply. */
 static uint64_t bad_bytes_of(const struct soak_link *link, const struct soak_fact *f,
                              const struct soak_clean_frame *clean)
 {
@@ -178,11 +179,10 @@ static uint64_t bad_bytes_of(const struct soak_link *link, const struct soak_fac
 
 static void judge_loss(struct soak_link *link, const struct soak_fact *f)
 {
-    static const enum fault_kind causes[] = {FAULT_DROP, FAULT_TRUNCATE, FAULT_FLIP};
     if (f->got != 0) return;
-    for (size_t i = 0; i < sizeof causes / sizeof *causes; i++) {
-        if (f->times[causes[i]] == 0) continue;
-        link->row[causes[i]].lost++;
+    for (size_t i = 0; i < N_DESTROYING; i++) {
+        if (f->times[destroying[i]] == 0) continue;
+        link->row[destroying[i]].lost++;
         return;
     }
     if (f->times[FAULT_REORDER] != 0 && f->late != 0)
@@ -221,7 +221,7 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
     judge_late(link, f);
     judge_garbage(link, f);
     judge_same_bytes(link, f);
-    if ((is_wrong && f->resealed == 0) || f->got > 1) link->wrong_plain++; /* once is enough */
+    if ((is_wrong && f->resealed == 0) || f->got > 1) link->wrong_plain++; /* once, even where both hold */
 }
 
 void soak_judge(struct soak_link *link, int all)

@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For each frame of a link: the injected faults, as the head reports them, and what the client saw of it.
- *
- * The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
+/* The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
  * numbers, which are the same on all links. */
 #include <stdlib.h>
 #include <string.h>
@@ -21,7 +19,7 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/fault/fault.h"
 
-/* Blocks are computed so far ahead, at most. */
+/* AHEAD_NS: blocks are computed at most this far ahead. JUST_NS: an act may be reported this long after it was seen. */
 static const int64_t AHEAD_NS = 500000000, JUST_NS = 500000000;
 
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq)
@@ -203,7 +201,7 @@ void soak_heard(void *ctx, const struct fault_note *note)
 
 /* ---- what the client saw */
 
-/* Frames that came while there was no session. */
+/* Marks frames that came while there was no session. */
 static void mark_away(struct soak_link *link, soak_seq from, soak_seq to)
 {
     if (to > from + SOAK_RING / 2) from = to - SOAK_RING / 2;
@@ -347,7 +345,7 @@ void soak_saw_open(struct soak_link *link)
     pthread_mutex_unlock(&link->lock);
 }
 
-/* Acts on a session that has ended before them were not done. */
+/* Hides the acts from number `from` on: the session that they were meant for had already ended. */
 static void forget_acts(struct soak_link *link, uint32_t from)
 {
     for (uint32_t i = from; i < link->n_acts; i++)
@@ -365,7 +363,6 @@ static void end_by_act(struct soak_link *link)
 
 static void end_by_refusal(struct soak_link *link)
 {
-    link->refused++;
     if (link->n_refusals == 0) return; /* a disconnect for a while keeps clients out, too */
     link->row[link->refusal[0].kind].noticed++;
     memmove(link->refusal, link->refusal + 1, --link->n_refusals * sizeof *link->refusal);

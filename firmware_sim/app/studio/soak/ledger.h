@@ -31,27 +31,27 @@ struct soak_fact {
     double for_ms;   /* delay, jitter and stall: the longest */
 };
 
-/* Bytes that belong to no frame, as the client noticed them: after the frame of that time. */
+/* Bytes that belong to no frame, which the client noticed after the frame of that time. */
 struct soak_run {
     int64_t t_ns;
     uint64_t n;
 };
 
+/* A fault that ends the connection, or refuses one. */
 struct soak_act {
     enum fault_kind kind;
     int64_t t_ns; /* device time */
 };
 
-/* The listener of the board. */
+/* The board of faults calls this for each fault. */
 void soak_heard(void *soak, const struct fault_note *note);
 void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, int64_t now_ns);
 /* A datagram; the caller has the link's lock. */
 void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32_t len);
 void soak_saw_notice(void *link, const struct scanhead_notice *notice);
-/* A connection came about; it ended; it did not even begin. */
-void soak_saw_open(struct soak_link *link);
-void soak_saw_end(struct soak_link *link);
-void soak_saw_no_open(struct soak_link *link);
+void soak_saw_open(struct soak_link *link);                           /* a connection began */
+void soak_saw_end(struct soak_link *link);                            /* it ended */
+void soak_saw_no_open(struct soak_link *link);                        /* an attempt to connect failed */
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq); /* NULL: not known */
 
 #endif

@@ -23,7 +23,7 @@ struct soak_link {
     uint32_t number; /* from 1 */
     char type[16], endpoint[512];
     char source[192];       /* what the client opens */
-    const char *not_soaked; /* why; NULL: it is */
+    const char *not_soaked; /* why the link has no client; NULL: it has one */
     int usable;             /* 1: it has a client */
     pthread_t thread;
     int running;
@@ -34,14 +34,14 @@ struct soak_link {
     struct soak_fact *fact;
     int begun, in_session;
     soak_seq judged, first, last, top; /* next to be judged; first and last that were received; newest with an entry */
-    uint64_t frames, bytes, refused_frames, sessions, closings, refused;
+    uint64_t frames, bytes, refused_frames, sessions, closings;
     uint64_t refused_now;       /* frames since the last one that was taken */
     uint64_t lost_plain;        /* frames that are missing without a fault */
     uint64_t reader_lost;       /* frames that the head says it left out, since the client was too slow */
     uint64_t wrong_plain;       /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;           /* the clean reader did not get them */
     uint64_t odd_closings;      /* the connection was closed without a fault */
-    int64_t odd_ns, no_open_ns; /* when that last was, and when there was no connection; 0: never */
+    int64_t odd_ns, no_open_ns; /* when that was last, and when an attempt to connect failed; 0: never */
     uint64_t away;              /* frames that came while there was no session */
     /* Bytes that belong to no frame: as the client counted them, and the least and the most that the faults explain.
      * The most includes frames that may not have arrived, and a reply that was destroyed with such bytes. */
@@ -63,7 +63,7 @@ struct soak_link {
     int have_offset;
     struct soak_ask ask;
     char failed[256];                 /* why the client gave up; empty: it did not */
-    uint64_t bad_units;               /* datagrams that are none of the clean ones */
+    uint64_t bad_units;               /* datagrams that equal no clean one */
     struct soak_datagrams *datagrams; /* NULL: the link speaks the native protocol */
     /* the client's own */
     struct scanhead *sh;

@@ -130,7 +130,8 @@ static void print_link(const struct soak_link *link, FILE *out)
             link->sessions, link->sessions == 1 ? "" : "s", link->ask.asked);
     if (link->away != 0) fprintf(out, "; %" PRIu64 " frames came while there was no session", link->away);
     if (link->reader_lost != 0) fprintf(out, "; %" PRIu64 " left out, the client was too slow", link->reader_lost);
-    if (link->ask.hurt != 0) fprintf(out, "; %" PRIu64 " replies were hurt beside frames", link->ask.hurt);
+    if (link->ask.hurt != 0)
+        fprintf(out, "; %" PRIu64 " replies were lost or wrong next to other faults", link->ask.hurt);
     if (link->unknown != 0) fprintf(out, "; %" PRIu64 " frames the clean reader did not get", link->unknown);
     if (link->failed[0] != '\0') fprintf(out, "; gave up: %s", link->failed);
     fprintf(out, "\n");
@@ -147,7 +148,7 @@ void soak_print(const struct soak *soak, FILE *out)
             " not noticed\n",
             "all", "", sum.injected, sum.noticed, sum.lost, sum.accepted, sum.hidden, sum.missed);
     if (soak->n_failures == 0)
-        fprintf(out, "verdict: good; frames wrongly accepted: %" PRIu64 ", none but resealed flips\n", sum.accepted);
+        fprintf(out, "verdict: good; frames wrongly accepted: %" PRIu64 ", all of them resealed flips\n", sum.accepted);
     for (uint32_t i = 0; i < soak->n_failures; i++)
         fprintf(out, "verdict: bad: %s\n", soak->failures[i]);
 }

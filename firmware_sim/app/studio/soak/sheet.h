@@ -12,7 +12,7 @@ struct soak;
 void soak_conclude(struct soak *soak);
 void soak_print(const struct soak *soak, FILE *out);
 void soak_put(struct json *json, const void *soak);
-/* A line on standard error. */
+/* Prints a line on standard error. */
 void soak_say_progress(struct soak *soak, double s);
 
 #endif

@@ -82,7 +82,7 @@ static int is_head_seen(struct soak *soak)
 
 /* ---- the run */
 
-/* Time since from_ns: of the clock, in real time; else of the head, since its first points. */
+/* At pace realtime, the time since from_ns by the clock; else device time since the first points. */
 static double passed_s(struct soak *soak, int64_t from_ns)
 {
     if (soak->realtime) return 1e-9 * (double)(clock_now_ns() - from_ns);
@@ -110,7 +110,7 @@ static void soak_on(const struct soak_options *o, struct soak *soak)
 /* Ends the injection of faults, and gives clients the time to notice those so far. */
 static void drain(struct soak *soak)
 {
-    fault_board_remove(soak->board, 0);
+    fault_board_end(soak->board, 0, INT64_MIN); /* all, at once */
     wait_until(soak, is_head_seen, HEAD_SEEN_MS);
     atomic_store(&soak->until, soak_clean_top(soak) + 1);
     atomic_store(&soak->phase, SOAK_DRAINS);
@@ -132,7 +132,7 @@ static int run_clients(const struct soak_options *o, struct soak *soak, struct s
 }
 
 /* Clients read on until the links are closed, which is when the loop is freed. */
-static int serve(const struct soak_options *o, struct soak *soak, struct soak_head *head, struct sh_err *err)
+static int soak_serve(const struct soak_options *o, struct soak *soak, struct soak_head *head, struct sh_err *err)
 {
     int rc = loop_start(head->loop, err);
     if (rc == SH_OK) rc = run_clients(o, soak, err);
@@ -186,7 +186,7 @@ static int open_head(struct soak_options *o, struct config *cfg, struct soak *so
     o->device.report = &app_report_stderr;
     int rc = site_load(cfg, &app_report_stderr, &head->site, err);
     if (rc == SH_OK) rc = site_open_sights(head->site, 0, head->site->n_stations, &app_report_stderr, err);
-    cfg->head.settings.frames = 0; /* after the plan, as `run --start --duration` */
+    cfg->head.settings.frames = 0; /* only after the plan was made, as with `run --start --duration` */
     if (rc == SH_OK) rc = device_create(head->site, &o->device, &head->device, err);
     if (rc == SH_OK) rc = soak_clean_open(soak, err);
     if (rc == SH_OK) rc = loop_create(head->site, head->device, &options, &head->loop, err);
@@ -195,14 +195,6 @@ static int open_head(struct soak_options *o, struct config *cfg, struct soak *so
     rc = soak_clients_open(soak, head->loop, (uint32_t)o->link, err);
     if (rc == SH_OK) fault_board_listen(soak->board, soak_heard, soak);
     return rc;
-}
-
-/* A soak compares what went over the wire, not speed: a busy machine has the time to deliver everything, if later. */
-static void be_patient(struct config *cfg)
-{
-    static const double PATIENCE_MS = 3000.0;
-    if (cfg->loop.queue_ms < PATIENCE_MS) cfg->loop.queue_ms = PATIENCE_MS;
-    if (cfg->loop.late_ms < PATIENCE_MS) cfg->loop.late_ms = PATIENCE_MS;
 }
 
 static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
@@ -215,13 +207,13 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     app_warn_settings_file(cfg, "a soak has the settings of the configuration");
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    be_patient(cfg);
+    verdict_be_patient(cfg);
     soak->cfg = cfg;
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
     soak->faults = cfg->faults;
     open_clean_links(cfg, soak, o);
     int rc = open_head(o, cfg, soak, &head, err);
-    if (rc == SH_OK) rc = serve(o, soak, &head, err);
+    if (rc == SH_OK) rc = soak_serve(o, soak, &head, err);
     if (rc == SH_OK) rc = say_result(o, soak, err);
     loop_free(head.loop);
     soak_clients_close(soak);
@@ -315,8 +307,8 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "client-grace", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.grace_s),
      .help = "the client has to end within S seconds of SIGTERM (default 5)"},
     {APP_NUMBER, "match-mm", "MM", .min = 0.0, .max = 1e6, .at = AT(match_mm),
-     .help = "coordinates of points agree within MM and what the file rounds to (default 0.01; scip and cola 2, velodyne "
-             "20)"},
+     .help = "allow a difference of MM, and of the file's rounding, between coordinates of points (default 0.01; scip and "
+             "cola 2, velodyne 20)"},
     {APP_CALL, "allow", "CHECK", .apply = take_allowed, .choices = verdict_names, .n_choices = VERDICT_N_CHECKS,
      .help = "a finding of this check does not count; may be repeated"},
     {APP_TEXT, "junit", "FILE", .at = AT(verdicts.junit), .file = APP_WRITES,

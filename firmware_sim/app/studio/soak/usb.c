@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that is attached to this machine by USB: how its client finds it, and enumerations that went wrong. */
 #include <glob.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,7 +11,7 @@
 #include "firmware_sim/app/studio/soak/usb.h"
 #include "firmware_sim/fault/fault.h"
 
-/* Shorter ones can't be told from an enumeration on a busy machine. */
+/* Shorter delays can't be told from an enumeration on a busy machine. */
 static const double SLOW_MS = 10.0, MARGIN_MS = 5.0;
 /* Control requests by which libscanhead opens a device: two for its serial number, one for the session. */
 enum { OPEN_REQUESTS = 3, DEVICE_LEN = 18, CONFIG_HEADER_LEN = 4, DESCRIPTORS_LEN = 4096 };
@@ -54,7 +53,7 @@ static int is_serial(const char *folder, const char *serial)
     return n == len + 1 && memcmp(text, serial, len) == 0;
 }
 
-/* -1: it is not known. */
+/* Returns how many; -1: not known. */
 static int64_t excess_of(const char *serial)
 {
     glob_t found;

@@ -24,12 +24,12 @@ struct soak_plugs {
     struct fault_note note[SOAK_MAX_PLUGS];
     uint32_t n;
 };
-/* `row` has the rows of the link; the caller has the link's lock. */
-/* A fault of an enumeration, as it begins. */
+/* In all three, `row` has the rows of the link, and the caller has the link's lock. */
+/* Notes a fault of an enumeration that begins. */
 void soak_usb_plugged(struct soak_plugs *plugs, struct soak_row *row, const struct fault_note *note);
 /* The client has opened the device, `source`. Notes what it noticed of the enumeration, by the time that this took. */
 void soak_usb_opened(struct soak_plugs *plugs, struct soak_row *row, const char *source, double opened_ms);
-/* No client will notice them. */
+/* Hides the faults so far: no client will notice them. */
 void soak_usb_forget(struct soak_plugs *plugs, struct soak_row *row, const char *why);
 
 #endif

@@ -22,11 +22,10 @@ static uint32_t n_scenarios(const struct verdicts *v)
     return v->n != 0 ? v->n : 1;
 }
 
-/* A scenario has its file's name without folder and ending; of several, the place in front makes each name unique. */
+/* A scenario has its file's name without folder and ending; several scenarios have their number in front. */
 static void name_scenario(const struct verdicts *v, uint32_t i, char *to, size_t cap)
 {
-    const char *path = v->n != 0 ? v->scenario[i] : "configuration", *slash = strrchr(path, '/');
-    const char *name = slash != NULL ? slash + 1 : path, *dot = strrchr(name, '.');
+    const char *name = basename(v->n != 0 ? v->scenario[i] : "configuration"), *dot = strrchr(name, '.');
     const int len = dot != NULL && dot != name ? (int)(dot - name) : (int)strlen(name);
     if (v->n > 1)
         snprintf(to, cap, "%u-%.*s", i + 1, len, name);
@@ -155,7 +154,8 @@ static int is_written(const struct verdict_options *o, const char *ending)
     return strcmp(ending, "points") != 0 || has_out(o->command) || has_out(o->file);
 }
 
-/* Adds what the runs write, so that none of them is another file of the command line. `paths` keeps their names. */
+/* Adds the files that the runs will write to those of the command line, where a file that is named twice is refused.
+ * `paths` keeps their names. */
 static int add_outputs(const struct verdicts *v, struct app_input *in, char (*paths)[N_ENDINGS][VERDICTS_PATH])
 {
     static const char *const endings[N_ENDINGS] = {"log", "stdout", "points"};
@@ -173,7 +173,7 @@ static int add_outputs(const struct verdicts *v, struct app_input *in, char (*pa
     return APP_OK;
 }
 
-/* A scenario that can't be loaded costs no run of another: all are checked before the first. */
+/* Checks all scenarios before the first run, so that one that can't be loaded is found before any time is spent. */
 static int run_all(struct verdicts_work *work, struct app_input *in)
 {
     const struct verdicts *v = work->verdicts;

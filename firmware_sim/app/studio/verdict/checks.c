@@ -240,8 +240,8 @@ void checks_points(struct verdict *v, const struct match *m, const double unknow
         m->sent, m->empty);
     if (m->unknown != 0)
         say(v, VERDICT_POINTS_KNOWN, VERDICT_FOUND,
-            "%zu of %zu points are none that a pulse had (frame: %s, within %.6g mm); the first is number %zu: %.9g %.9g "
-            "%.9g",
+            "%zu of %zu points are not known: no pulse had them (frame: %s, within %.6g mm); the first is number %zu: "
+            "%.9g %.9g %.9g",
             m->unknown, m->n, m->frame, 1e3 * m->within_m, m->first_unknown + 1, unknown[0], unknown[1], unknown[2]);
     else
         say(v, VERDICT_POINTS_KNOWN, VERDICT_PASSED, "all of them (frame: %s, within %.6g mm)", m->frame,
@@ -252,5 +252,5 @@ void checks_points(struct verdict *v, const struct match *m, const double unknow
         say(v, VERDICT_POINTS_ONCE, VERDICT_FOUND, "%zu more than were sent", m->repeated);
     else
         say(v, VERDICT_POINTS_ONCE, VERDICT_PASSED, "none is repeated%s",
-            2 * m->again < m->sent ? "" : "; but most were sent as near to others: a repeated one can go unseen");
+            2 * m->again < m->sent ? "" : "; but most were sent close to another one, so a repeated one can go unseen");
 }

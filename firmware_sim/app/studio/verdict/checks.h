@@ -15,13 +15,14 @@ struct checks {
     int has_sessions;           /* clients of the link connect to it; 0: it sends to whoever is there */
     int is_open;                /* the client has a session at the end, before it is ended */
     int scans, holds;           /* points came to the end; the client keeps a dead connection */
-    int64_t start_ns, ended_ns; /* of the client, and when its end was asked for */
+    int64_t start_ns, ended_ns; /* when the client was started, and when it was asked to end */
     int was_there;              /* the client had not ended by itself until then */
 };
 
 void checks_judge(const struct checks *checks, struct verdict *verdict);
-/* Why its points were not compared; or the figures, with `unknown` as the first unknown point. */
+/* The points were not compared; `why` says why. */
 void checks_no_points(struct verdict *verdict, enum verdict_state state, const char *why);
+/* The points were compared. unknown: the first unknown point. */
 void checks_points(struct verdict *verdict, const struct match *match, const double unknown[3]);
 
 #endif

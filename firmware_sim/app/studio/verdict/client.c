@@ -71,8 +71,8 @@ char *client_fill(const char *text, const struct client_words *words)
 
 /* ---- the process */
 
-/* In the new process, which has only the thread that forked: signals and descriptors as a new program expects them. It
- * ends with this program, however that ends. */
+/* Runs in the new process, which has only the thread that forked. Sets signals and descriptors as a new program expects
+ * them. The kernel kills the process when this program ends. */
 static void become_client(int in_fd, int log_fd, int out_fd, const char *line)
 {
     sigset_t none;
@@ -141,7 +141,7 @@ static int wait_for_end(struct client *client, double s)
 
 struct signal_to {
     int number;
-    pid_t group; /* has got it */
+    pid_t group; /* the signal was sent to it as a whole */
 };
 
 static int client_signal_one(void *ctx, pid_t pid)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The client's process. In: a command for sh -c. Out: whether it runs, and how it ended. The client is the shell and
- * all that descends from it. Only the shell ends with this program if that is killed: what has left the shell then goes
+ * all that descends from it. If this program is killed, only the shell ends with it: what the shell has started may go
  * on. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_CLIENT_H
@@ -15,12 +15,12 @@ struct client_words {
     const char *out;      /* a file for points */
 };
 
-/* Puts the values in place of {endpoint}, {host}, {port}, {path} and {out}; other braces stay. Returns what free()
- * takes; NULL: no memory. */
+/* Puts the values in place of {endpoint}, {host}, {port}, {path} and {out}; other braces stay. The result is
+ * to be freed; NULL: no memory. */
 char *client_fill(const char *text, const struct client_words *words);
 
 struct client {
-    int in_fd; /* its standard input, which stays open and has nothing: some clients end with it, or at a key */
+    int in_fd; /* its standard input, which stays open and empty: some clients end when it closes, or at a key */
     pid_t pid; /* of the shell, and of the group; 0: none was started */
     int64_t started_ns, ended_ns; /* ended_ns 0: some process of the client is there */
     int status;                   /* the shell's, as waitpid has it */

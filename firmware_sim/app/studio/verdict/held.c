@@ -12,10 +12,11 @@
 #include "firmware_sim/app/studio/verdict/family.h"
 #include "firmware_sim/app/studio/verdict/held.h"
 
-/* States of /proc/net/tcp (tcp_states.h of Linux): the client's end is open, or it has only not closed yet. */
+/* States of /proc/net/tcp (tcp_states.h of Linux): the client's end is open, and the head's is so, too, or has
+ * closed. */
 enum { STATE_ESTABLISHED = 1, STATE_CLOSE_WAIT = 8, PATH_BYTES = 320, MAX_ADDRESSES = 256 };
 
-/* Calls see for each line of a file until it returns 1; then that, else 0. */
+/* Calls `see` for each line of a file until a call returns 1. Returns 1 then, else 0. */
 static int any_line(const char *path, int (*see)(const char *line, uint64_t what), uint64_t what)
 {
     FILE *file = fopen(path, "r");
@@ -27,7 +28,7 @@ static int any_line(const char *path, int (*see)(const char *line, uint64_t what
     return seen;
 }
 
-/* The table has the host as its four bytes in memory are read. */
+/* The table prints the host's four bytes as one number in the byte order of this machine. */
 static uint64_t address_of(uint32_t host, unsigned port)
 {
     return (uint64_t)host << 16 | port;
@@ -51,7 +52,7 @@ static int has_inode(const char *line, uint64_t inode)
     return at != NULL;
 }
 
-/* Whether a socket is in no table: it was connected, and is so no more. */
+/* Whether a socket is in no table: it was connected, and no longer is. */
 static int is_dead(uint64_t inode)
 {
     static const char *const tables[] = {"tcp",  "tcp6",  "udp",     "udp6", "raw",   "raw6",

@@ -20,7 +20,7 @@ enum { TRIED_POINTS = 2000, MAX_WAYS = 4, LOOK_POINTS = 64 };
 
 /* ---- coordinate frames */
 
-/* Takes a point of the client's to the stream's frame. */
+/* A transformation from a coordinate frame that the client may use to the stream's. */
 struct way {
     const char *frame;
     int is_forward;        /* x forward, y left first becomes x right, y forward */
@@ -42,8 +42,8 @@ static struct way *add_way(struct way ways[MAX_WAYS], int *n, const char *frame,
     return way;
 }
 
-/* The stream's own frame is one. A head that stands, in a scene without a CRS, adds its own, and that with x
- * forward. */
+/* Lists the coordinate frames to try, the stream's own first. For a head that stands still, without a CRS, they are the
+ * scene, the head, and the head with x forward. */
 static int find_ways(const struct own_stream *stream, struct way ways[MAX_WAYS])
 {
     const struct scanhead_info *info = &stream->info;
@@ -78,7 +78,7 @@ static int is_empty(const double p[3])
     return isnan(p[0]) || (fabs(p[0]) + fabs(p[1]) + fabs(p[2]) <= 0.0);
 }
 
-/* The way by which most points agree, of some from all over the cloud. */
+/* Returns the transformation by which most points agree, of a sample from all over the cloud. */
 static const struct way *best_way(const struct match_index *index, const struct match_input *in, const struct way *ways,
                                   int n_ways)
 {
@@ -110,8 +110,8 @@ static int compare_spoiled(const void *left, const void *right)
     return a->seq != b->seq ? (a->seq < b->seq ? -1 : 1) : 0;
 }
 
-/* How many sessions were sent the frame. A session's time is taken two ticks longer at both ends, since frames there
- * may have been sent or not. */
+/* Counts the sessions to which the frame was sent. A session's time is taken two ticks longer at both ends, since
+ * frames there may have been sent or not. */
 static uint32_t count_sent(const struct watch *watch, int64_t tick_ns, const struct own_frame *frame)
 {
     uint32_t n = 0;
@@ -235,7 +235,7 @@ double match_unit_m(const struct cloud *cloud, double limit_m)
             char text[32];
             if (v > largest) largest = v;
             if (i % step != 0) continue;
-            /* 15 digits are what a double keeps of a decimal number; without zeros at their end: D.DDDDe-02 */
+            /* A double keeps 15 digits of a decimal number. Zeros at their end do not count: D.DDDD0000e-02. */
             snprintf(text, sizeof text, "%.14e", v);
             char *mark = strchr(text, 'e'), *end = mark;
             while (end[-1] == '0')
@@ -244,7 +244,7 @@ double match_unit_m(const struct cloud *cloud, double limit_m)
             if (n > digits) digits = n;
             if (n - 1 - exponent > decimals) decimals = n - 1 - exponent;
         }
-    /* A file has as many decimals for each coordinate, or as many digits. */
+    /* A file writes all coordinates with the same number of decimals, or of digits. */
     const int exponent = largest > 0.0 ? (int)floor(log10(largest)) : 0;
     const int last = decimals < digits - 1 - exponent ? decimals : digits - 1 - exponent;
     return pow(10.0, -last);

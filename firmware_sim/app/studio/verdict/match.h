@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A client's points beside those of the head. In: both, and which of the head's frames each session was sent. Out: how
- * many of the client's no pulse ever had, and how many it has more often than the head sent them. */
+/* Compares a client's points with those of the head. In: both, and which of the head's frames each session was sent.
+ * Out: how many of the client's points no pulse had, and how many it has more often than the head sent them. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
 
@@ -17,7 +17,7 @@ struct match {
     size_t again;            /* of `sent`, those that agree with another point: a repeated one may go unseen there */
     size_t first_unknown;    /* index in the cloud */
     const char *frame;       /* the coordinate frame in which they agree best */
-    double unit_m, within_m; /* what the file rounds to; how far a coordinate may differ */
+    double unit_m, within_m; /* the rounding of the file; how far a coordinate may differ */
 };
 
 struct match_input {
@@ -25,15 +25,15 @@ struct match_input {
     struct watch *watch;
     int64_t tick_ns; /* sessions begin and end with ticks */
     const struct cloud *cloud;
-    double match_m; /* beside what the file rounds to */
+    double match_m; /* how far a coordinate may differ, in addition to the rounding of the file */
     const struct sh_report *report;
 };
 
 /* SH_ESTOPPED where report asks to stop. */
 int match_points(const struct match_input *in, struct match *match, struct sh_err *err);
 
-/* Returns what a file's coordinates are rounded to: in text the unit of the last digit that the largest one has, in
- * single precision by the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
+/* Returns the rounding of a file's coordinates: in text the unit of the last digit, in single precision two units in
+ * the last place of the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
 double match_unit_m(const struct cloud *cloud, double limit_m);
 
 #endif

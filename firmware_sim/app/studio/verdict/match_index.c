@@ -5,7 +5,7 @@
 
 #include "firmware_sim/app/studio/verdict/match_index.h"
 
-/* A cell is as wide as a coordinate may differ in both directions, so all that agrees lies in the cells around. */
+/* A cell is twice as wide as a coordinate may differ. So all points that agree lie in the same cell or next to it. */
 static void cell_of(const struct match_index *index, const double p[3], int64_t cell[3])
 {
     for (int k = 0; k < 3; k++)

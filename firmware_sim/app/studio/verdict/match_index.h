@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The head's points by place: in cells, so that those near a point are found. Points at the same place are one
+/* The head's points, sorted into cells, so that those near a point are found fast. Points at the same place are one
  * entry. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_INDEX_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_INDEX_H

@@ -15,7 +15,7 @@
 struct own_frame {
     uint32_t seq;
     int64_t t_ns; /* device time of its first pulse */
-    size_t end;   /* its points end before this one */
+    size_t end;   /* index after its last point */
 };
 
 struct own_stream {
@@ -27,7 +27,7 @@ struct own_stream {
     _Atomic int64_t points_ns; /* device time of the last frame of points; 0: none so far */
     /* The thread has these, until it is joined: */
     struct own_frame *frame;
-    double (*xyz_m)[3]; /* in the stream's frame; of a head that moves, and polar, in the scene's */
+    double (*xyz_m)[3]; /* in the stream's coordinate frame; for polar points of a moving head, in the scene's */
     size_t n_frames, room_frames, n, room;
     struct scanhead_info info; /* of the first points */
     int have_info, is_moved;   /* is_moved: the head stood in several places */
@@ -36,7 +36,7 @@ struct own_stream {
 
 int own_stream_open(struct own_stream *stream, struct sh_err *err);
 int own_stream_start(struct own_stream *stream, struct sh_err *err);
-/* After the head has ended. */
+/* To be called after the head has ended. */
 void own_stream_join(struct own_stream *stream);
 void own_stream_close(struct own_stream *stream);
 

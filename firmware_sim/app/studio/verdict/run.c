@@ -43,12 +43,17 @@ struct run {
 
 /* ---- the head */
 
-static void run_prepare(struct run *r)
+void verdict_be_patient(struct config *cfg)
 {
-    static const double PATIENCE_MS = 3000.0; /* as a soak: a busy machine is no fault of the client's */
-    struct config *cfg = r->cfg;
+    static const double PATIENCE_MS = 3000.0;
     cfg->loop.queue_ms = fmax(cfg->loop.queue_ms, PATIENCE_MS);
     cfg->loop.late_ms = fmax(cfg->loop.late_ms, PATIENCE_MS);
+}
+
+static void run_prepare(struct run *r)
+{
+    struct config *cfg = r->cfg;
+    verdict_be_patient(cfg);
     if (r->options->file == NULL) return;
     uint32_t n = 0;
     for (uint32_t i = 0; i < cfg->faults.n; i++) {
@@ -74,7 +79,7 @@ static int open_head(struct run *r, struct sh_err *err)
         .extra = &r->stream.link, .report = &app_report_stderr, .observer = &r->watch.observer};
     int rc = site_load(cfg, &app_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = site_open_sights(r->site, 0, r->site->n_stations, &app_report_stderr, err);
-    cfg->head.settings.frames = 0; /* after the plan */
+    cfg->head.settings.frames = 0; /* only after the plan was made */
     if (rc == SH_OK) rc = device_create(r->site, &device, &r->device, err);
     if (rc == SH_OK) rc = own_stream_open(&r->stream, err);
     if (rc == SH_OK) rc = loop_create(r->site, r->device, &options, &r->loop, err);
@@ -133,7 +138,7 @@ static int has_points(struct run *r)
     return atomic_load(&r->stream.points_ns) != 0;
 }
 
-/* The time alone is waited for. */
+/* For waits that only the time ends. */
 static int never(struct run *r)
 {
     (void)r;
@@ -162,7 +167,7 @@ static void run_client(struct run *r)
     const int there = (!c->has_sessions || wait_until(r, is_connected, in_s(o->limit_s))) &&
                       wait_until(r, has_points, in_s(o->limit_s));
     if (there) wait_until(r, never, in_s(o->duration_s));
-    fault_board_remove(device_faults(r->device), 0);
+    fault_board_end(device_faults(r->device), 0, INT64_MIN); /* all, at once */
     if (c->has_sessions ? is_connected(r) : there) run_settle(r);
     c->was_there = !client_has_ended(&r->client);
     c->holds = c->was_there && held_any(&r->watch);
@@ -205,7 +210,7 @@ static int is_new(const struct run *r)
            now.st_mtim.tv_sec != r->before.st_mtim.tv_sec || now.st_mtim.tv_nsec != r->before.st_mtim.tv_nsec;
 }
 
-/* By how much a link's protocol rounds coordinates, m. SCIP and CoLa: half a millimetre of range, and angles.
+/* Returns by how much a link's protocol rounds coordinates, m. SCIP and CoLa: half a millimetre of range, and angles.
  * VLP-16: half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream
  * does not. */
 static double match_of(const struct run *r)
@@ -253,8 +258,8 @@ static int run_judge(struct run *r, struct sh_err *err)
         return run_compare(r, err);
     else {
         checks_no_points(r->verdict, VERDICT_NOT_JUDGED, r->stream.short_of);
-        sh_warn(&app_report_stderr, "soak: %s: its points are not judged, as --client-file asks: %s",
-                r->verdict->scenario, r->stream.short_of);
+        sh_warn(&app_report_stderr, "soak: %s: --client-file: the points are not judged: %s", r->verdict->scenario,
+                r->stream.short_of);
     }
     return SH_OK;
 }
@@ -280,7 +285,7 @@ int verdict_run(struct config *cfg, const struct verdict_options *options, struc
     int rc = open_head(r, err);
     if (rc == SH_OK) rc = run_serve(r, err);
     if (rc == SH_OK && r->watch.is_short) rc = sh_fail(err, SH_ENOMEM, "no memory for what the client does");
-    if (rc == SH_OK && app_interrupted()) rc = sh_fail_stopped(err); /* half a run is no verdict */
+    if (rc == SH_OK && app_interrupted()) rc = sh_fail_stopped(err); /* an interrupted run gives no verdict */
     if (rc == SH_OK) rc = run_judge(r, err);
     for (int check = 0; check < VERDICT_N_CHECKS; check++)
         if (verdict->check[check].state == VERDICT_FOUND && (options->allowed >> check & 1) != 0)

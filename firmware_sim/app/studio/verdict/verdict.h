@@ -40,7 +40,7 @@ struct verdict_result {
 
 struct verdict_points {
     uint64_t n, empty, unknown, repeated, sent;
-    double unit_m, match_m; /* what the file rounds to; how far coordinates may differ in all */
+    double unit_m, match_m; /* the rounding of the file; how far coordinates may differ in all */
     const char *frame;      /* in which they were compared; NULL: they were not */
 };
 
@@ -75,11 +75,14 @@ struct verdict_options {
     double duration_s;   /* from the first points on */
     double limit_s;      /* for the first connection, for each that follows a disturbance, and for points at the end */
     double grace_s;      /* from SIGTERM to SIGKILL */
-    double match_m;      /* beside what the file rounds to; negative: by the link's protocol */
+    double match_m;      /* in addition to the rounding of the file; negative: by the link's protocol */
     uint32_t link;       /* from 1 */
     uint32_t allowed;    /* bit per check */
 };
 
+/* A soak compares frames, not speed. So this gives the head of a busy machine time to deliver all of them, even
+ * late. */
+void verdict_be_patient(struct config *cfg);
 /* Runs the client once. `verdict` begins with the scenario's name. On failure there is no verdict. */
 int verdict_run(struct config *cfg, const struct verdict_options *options, struct verdict *verdict, struct sh_err *err);
 

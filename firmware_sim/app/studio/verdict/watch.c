@@ -8,7 +8,7 @@
 #include "firmware_sim/app/studio/verdict/watch.h"
 #include "firmware_sim/base/clock.h"
 
-/* Returns its number, from 1. */
+/* Returns the number of the session's link, from 1. */
 static uint32_t link_of(uint32_t session)
 {
     return (session - 1) / LINK_MAX_SESSIONS + 1;
@@ -49,14 +49,14 @@ static void begin_session(struct watch *w, uint32_t session, int64_t t_ns)
     w->span[w->n_span++] = (struct watch_span){session, t_ns, INT64_MAX};
 }
 
-/* A client may end its own session after some faults; others end it. */
+/* Whether a fault leaves sessions open. The client may then end its own. */
 static int leaves_sessions(enum fault_kind kind)
 {
     return kind == FAULT_STALL || kind == FAULT_CABLE || kind == FAULT_ENDPOINT_STALL || kind == FAULT_SHORT_PACKETS;
 }
 
-/* Whether the fault is why a session ends now. The client has its whole limit from the end on, so it makes no
- * difference on which side of a bound the end falls: what the fault did not cause is the client's own. */
+/* Whether the fault is why a session ends now. After a fault that leaves sessions open, an end within the limit counts
+ * as its effect, and the client has the whole limit again from there. A later end is the client's own. */
 static int is_caused(const struct watch *w, const struct watch_link *link, int64_t *over_ns)
 {
     const int64_t now_ns = clock_now_ns();
@@ -114,8 +114,8 @@ static void on_heard(void *ctx, uint32_t session, const void *bytes, size_t len)
     pthread_mutex_unlock(&w->lock);
 }
 
-/* The head was in another state, or another session had control: the request was right, and came at another time than
- * the client thought. A client can't know that beforehand. */
+/* Whether a request was refused only because the head was in another state, or another session had control. A client
+ * can't know that beforehand. */
 static int is_of_state(const char *reply)
 {
     const int number = strncmp(reply, "ERR ", 4) == 0 ? atoi(reply + 4) : 0;

@@ -16,7 +16,7 @@
 struct watch_break {
     uint32_t link; /* from 1 */
     enum fault_kind kind;
-    int64_t over_ns; /* from when on a client can come back */
+    int64_t over_ns; /* the earliest time at which a client can come back */
     int64_t back_ns; /* when one did */
     char peer[64];   /* of the session that ended */
 };
@@ -46,9 +46,9 @@ struct watch {
     struct links_observer observer;
     uint32_t n_links, chosen; /* chosen: the client's, from 1 */
     uint32_t must_ask;        /* bit per link: a client there is back with its first request, not with its connection */
-    int64_t limit_ns;         /* how long after a fault that leaves sessions their end still counts as caused by it */
-    int is_over;              /* 1: the run ends, so that sessions that end now are no client's doing */
-    int is_short;             /* 1: there was no memory for something */
+    int64_t limit_ns; /* a fault that leaves sessions open counts as the cause of their end up to this long after it */
+    int is_over;      /* 1: the run ends, so that sessions that end now are no client's doing */
+    int is_short;     /* 1: there was no memory for something */
     struct watch_link link[CONFIG_MAX_LINKS];
     struct watch_break *broken;
     struct watch_span *span; /* of the chosen link */
@@ -64,7 +64,7 @@ struct watch {
 void watch_begin(struct watch *watch, uint32_t n_links, uint32_t chosen, double limit_s);
 void watch_end(struct watch *watch);
 void watch_free(struct watch *watch);
-/* The listener of the board. */
+/* The board of faults calls this for each fault. */
 void watch_note(void *watch, const struct fault_note *note);
 /* Whether all clients that a disturbance sent away are back, and the chosen link has a session. */
 int watch_is_whole(struct watch *watch);

@@ -34,7 +34,7 @@ static void leave_out_empty(struct viewed *v)
     p->n = kept;
 }
 
-/* The arrays become the recording's. */
+/* Moves the arrays from the cloud to the recording. */
 static void cloud_take(struct viewed *v, struct cloud *c)
 {
     v->points = (struct viewed_points){.n = (uint32_t)c->n,

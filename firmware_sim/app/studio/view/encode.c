@@ -18,7 +18,7 @@ const struct view_column view_columns[VIEWED_COLUMNS] = {
     [VIEWED_RGB] = {"rgb", NULL, VIEW_UINT8, 3},
 };
 
-static const struct view_column POSITION = {"xyz", "m", VIEW_FLOAT32, 3};
+const struct view_column view_position = {"xyz", "m", VIEW_FLOAT32, 3};
 static const char BINARY[] = "application/octet-stream";
 
 const char *view_type_name(enum view_type type)
@@ -44,6 +44,13 @@ static uint32_t count_of(uint32_t n, uint32_t first, uint32_t every, uint32_t mo
     const uint32_t there = first < n ? (n - first - 1) / every + 1 : 0;
     const uint32_t asked = most < allowed ? most : allowed;
     return there < asked ? there : asked;
+}
+
+/* Both answers have seven numbers after their first four letters. */
+static void put_words(char *to, const uint32_t words[7])
+{
+    for (size_t i = 0; i < 7; i++)
+        le_put32(to + 4 * i, words[i]);
 }
 
 /* ---- points */
@@ -104,7 +111,7 @@ static size_t lay_out(const struct slice *s, uint32_t n_columns, char *body)
     size_t at = VIEW_CLOUD_HEAD + (size_t)n_columns * VIEW_CLOUD_COLUMN, size;
     char *row = body != NULL ? body + VIEW_CLOUD_HEAD : NULL;
     if (body != NULL) {
-        put_row(row, &POSITION, at);
+        put_row(row, &view_position, at);
         put_positions(s, body + at);
     }
     at += 12 * (size_t)s->n;
@@ -134,8 +141,7 @@ int view_encode_points(const struct viewed_points *points, const double origin_m
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u points", s.n);
     memcpy(to, "SHCL", 4);
     const uint32_t head[] = {1, s.n, n_columns, part->first, part->every, points->n, 0};
-    for (size_t i = 0; i < sizeof head / sizeof head[0]; i++)
-        le_put32(to + 4 + 4 * i, head[i]);
+    put_words(to + 4, head);
     for (int k = 0; k < 3; k++)
         le_put_double(to + 32 + 8 * k, origin_m[k]);
     lay_out(&s, n_columns, to);
@@ -154,8 +160,7 @@ int view_encode_mesh(const struct viewed_mesh *m, uint32_t first, uint32_t most,
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u triangles", n);
     memcpy(to, "SHMS", 4);
     const uint32_t head[] = {1, n, first, m->n_faces, m->first_point, m->n_points, (uint32_t)m->n_edges};
-    for (size_t i = 0; i < sizeof head / sizeof head[0]; i++)
-        le_put32(to + 4 + 4 * i, head[i]);
+    put_words(to + 4, head);
     le_put_double(to + 32, m->mean_edge_m);
     char *face = to + VIEW_MESH_HEAD, *ratio = face + 12 * (size_t)n;
     for (uint32_t i = 0; i < n; i++) {

@@ -7,6 +7,8 @@
 #include "drivers/link/web.h"
 #include "firmware_sim/app/studio/view/viewed.h"
 
+struct json;
+
 enum {
     VIEW_MAX_POINTS = 1 << 20,    /* in an answer */
     VIEW_MAX_TRIANGLES = 1 << 20, /* the same */
@@ -24,8 +26,8 @@ struct view_column {
     enum view_type type;
     uint32_t components;
 };
-/* By enum viewed_column. */
-extern const struct view_column view_columns[VIEWED_COLUMNS];
+/* By enum viewed_column; and that of positions, which comes first. */
+extern const struct view_column view_columns[VIEWED_COLUMNS], view_position;
 const char *view_type_name(enum view_type type);
 
 /* Points first, first + every, ...: at most `most` of them, and no more than an answer holds. every >= 1. */
@@ -38,7 +40,7 @@ int view_encode_points(const struct viewed_points *points, const double origin_m
 /* Triangles of a mesh by rising ratio, from `first` on. SH_ENOMEM. */
 int view_encode_mesh(const struct viewed_mesh *mesh, uint32_t first, uint32_t most, struct web_body *body,
                      struct sh_err *err);
-/* The JSON of /head. SH_ENOMEM. */
-int view_encode_head(const struct viewed *viewed, struct web_body *body, struct sh_err *err);
+/* Writes the JSON of /head, for page_json; viewed is the struct viewed. */
+void view_put_head(struct json *json, const void *viewed);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A mesh of a grid that is complete: triangles, and by which factor the long-edge filter drops each. */
+/* The mesh of a complete grid: its triangles, and for each the smallest factor with which the long-edge filter keeps
+ * it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +10,8 @@
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/view/stream.h"
 
-/* Rounded upwards, so that ratio <= f holds for a float f just where it holds for the exact one. */
+/* Returns the edge ratio, rounded upwards. For a float f, ratio <= f then holds just where it holds for the exact
+ * ratio. */
 static float ratio_of(const double (*xyz_m)[3], const uint32_t f[3], double mean_m)
 {
     const double *a = xyz_m[f[0]], *b = xyz_m[f[1]], *c = xyz_m[f[2]];

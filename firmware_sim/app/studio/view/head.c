@@ -39,10 +39,9 @@ static void put_column(struct json *json, const struct view_column *c, double lo
 
 static void put_columns(const struct viewed *v, struct json *json)
 {
-    static const struct view_column position = {"xyz", "m", VIEW_FLOAT32, 3};
     size_t size;
     json_open_array(json, "columns");
-    put_column(json, &position, (double)NAN, (double)NAN);
+    put_column(json, &view_position, (double)NAN, (double)NAN);
     for (int c = 0; c < VIEWED_COLUMNS; c++)
         if (viewed_array(&v->points, (enum viewed_column)c, &size) != NULL)
             put_column(json, &view_columns[c], v->low[c], v->high[c]);
@@ -124,7 +123,7 @@ static void put_station(const struct viewed_station *s, struct json *json)
     json_close_object(json);
 }
 
-static void put_all(struct json *json, const void *ctx)
+void view_put_head(struct json *json, const void *ctx)
 {
     const struct viewed *v = ctx;
     json_open_object(json, NULL);
@@ -142,9 +141,4 @@ static void put_all(struct json *json, const void *ctx)
     page_put_bounds(json, v->min_m, v->max_m);
     page_put_vector(json, "origin", v->origin_m);
     json_close_object(json);
-}
-
-int view_encode_head(const struct viewed *v, struct web_body *body, struct sh_err *err)
-{
-    return page_json(put_all, v, body, err);
 }

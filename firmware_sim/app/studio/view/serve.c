@@ -5,12 +5,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/page_query.h"
+#include "firmware_sim/app/studio/record/line.h"
 #include "firmware_sim/app/studio/view/encode.h"
 #include "firmware_sim/app/studio/view/spread.h"
 
 enum { MAX_WORDS = 6 };
-static const double RECORD_LONG_EDGE = 10; /* the default of scanhead record */
 
 /* ---- resources */
 
@@ -18,7 +19,7 @@ static int get_head(struct view_serve *s, const char *query, struct web_body *ou
 {
     struct page_word words[] = {{.name = NULL}};
     int rc = page_read_query(words, query, err);
-    return rc == SH_OK ? view_encode_head(s->viewed, out, err) : rc;
+    return rc == SH_OK ? page_json(view_put_head, s->viewed, out, err) : rc;
 }
 
 static int get_cloud(struct view_serve *s, const char *query, struct web_body *out, struct sh_err *err)

@@ -9,7 +9,7 @@
 
 struct view_serve {
     const struct viewed *viewed;
-    const struct sh_report *report; /* its stop ends what takes long; may be NULL */
+    const struct sh_report *report; /* its stop ends long computations; may be NULL */
     /* the last sparse points that were made, and by which request */
     struct viewed_points sparse;
     int made;

@@ -8,7 +8,7 @@
 #include "drivers/record/mesh_sparse.h"
 #include "firmware_sim/app/studio/view/encode.h"
 
-/* The triangles that the filter keeps, in the order of the grid, which says which point lies where. */
+/* Copies the triangles that the filter keeps, in the order of the grid, on which the random points depend. */
 static uint32_t keep_faces(const struct viewed_mesh *m, double long_edge, uint32_t (*face)[3])
 {
     uint32_t n = 0;
@@ -34,7 +34,7 @@ static int append(struct viewed_points *out, const struct mesh_points *from, int
     return rc;
 }
 
-/* The recording's arrays from the mesh's first point on, and its ranges as mesh_sparse takes them. */
+/* Returns the recording's arrays from the mesh's first point on. range_m gets the ranges in double. */
 static struct mesh_points points_of(const struct viewed *v, const struct viewed_mesh *m, double *range_m)
 {
     const struct viewed_points *p = &v->points;
@@ -49,7 +49,7 @@ static struct mesh_points points_of(const struct viewed *v, const struct viewed_
                                 .station = p->station + m->first_point};
 }
 
-/* Before points are made: there is a bound for all of them. */
+/* Checks before points are made that there will not be more than VIEW_MAX_SPARSE in all. */
 static int check_count(const struct mesh_points *points, const uint32_t (*face)[3], uint32_t n_faces,
                        const struct view_spread *wish, double *sum_m2, struct sh_err *err)
 {

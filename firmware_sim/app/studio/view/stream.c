@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Points and meshes of a .shs: the frames go through the track that recorders have, and grids are those of
+/* Points and meshes of a .shs. Its frames go through drivers/record/track.h, as for recorders, and grids are those of
  * drivers/record/mesh.c. */
 #include "firmware_sim/app/studio/view/stream.h"
 
@@ -30,8 +30,8 @@ static int place_station(struct viewed_stream *s, struct sh_err *err)
     return SH_OK;
 }
 
-/* Returns 0 where points of this track have no mesh; the reason is then that of recorders, without the path and without
- * what else could be recorded. */
+/* Returns 0 where points of this track have no mesh. The reason is that of the recorders, without the path and without
+ * the formats that they allow. */
 static int check_mesh(struct viewed_stream *s)
 {
     struct sh_err why = {0};
@@ -219,7 +219,8 @@ int viewed_load_stream(struct viewed *v, const struct sh_report *report, struct 
     if (rc == SH_OK) rc = track_flush(&s->track, err);
     if (rc == SH_OK) rc = viewed_end_grid(s, err);
     if (rc == SH_OK) rc = take_names(s, err);
-    if (rc == SH_OK && v->points.n > 0) rc = viewed_points_room(&v->points, v->points.n, s->has, err); /* no more */
+    if (rc == SH_OK && v->points.n > 0)
+        rc = viewed_points_room(&v->points, v->points.n, s->has, err); /* frees the rest */
     if (rc == SH_OK) look_for_losses(s, sh);
     if (rc == SH_OK && v->n_meshes == 0 && v->why_no_mesh[0] == '\0')
         snprintf(v->why_no_mesh, sizeof v->why_no_mesh, "no four points lie in neighbouring rows and lines");

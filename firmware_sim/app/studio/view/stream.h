@@ -17,12 +17,11 @@ struct viewed_stream {
     size_t room_at, room;
     unsigned has; /* columns */
     int no_mesh;
-    uint64_t n_lost; /* points whose pose was lost */
     double file_bytes;
     struct recording_counts counts;
 };
 
-/* The mesh of the present grid, as drivers/record/mesh.c makes it; the grid is empty afterwards. */
+/* Makes the mesh of the present grid, as drivers/record/mesh.c does; the grid is empty afterwards. */
 int viewed_end_grid(struct viewed_stream *stream, struct sh_err *err);
 
 #endif

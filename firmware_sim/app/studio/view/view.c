@@ -15,7 +15,7 @@ struct view_options {
     int quiet;
 };
 
-/* Sessions get no data. What they send is read, and has no effect. */
+/* Sessions get no data. Their input is read, and has no effect. */
 static void view_take_event(const struct link_ops *ops, void *link, const struct link_event *event)
 {
     char said[4096];
@@ -25,7 +25,7 @@ static void view_take_event(const struct link_ops *ops, void *link, const struct
     if (event->kind == LINK_NOTICE) sh_warn(&app_report_stderr, "%s", event->peer);
 }
 
-static int serve(const struct link_ops *ops, void *link, struct sh_err *err)
+static int serve_page(const struct link_ops *ops, void *link, struct sh_err *err)
 {
     enum { POLL_MS = 200 }; /* so long a signal may wait */
     struct link_event event[LINK_MAX_EVENTS];
@@ -81,7 +81,7 @@ static int show(const struct view_options *o, struct viewed *v, struct sh_err *e
         if (fflush(stdout) != 0) rc = sh_fail(err, SH_EIO, "standard output: %s", strerror(errno));
     }
     if (rc == SH_OK) rc = app_say_ready(o->ready_fd, put_endpoint, endpoint, err);
-    if (rc == SH_OK) rc = serve(ops, link, err);
+    if (rc == SH_OK) rc = serve_page(ops, link, err);
     ops->close(link);
     view_serve_free(&serving);
     return rc;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Loads a recording, by its ending and first bytes; what is done with all of them afterwards. */
+/* Loads a recording, by its ending and first bytes. Here are the steps that all formats share. */
 #include "firmware_sim/app/studio/view/viewed.h"
 
 #include <math.h>
@@ -53,27 +53,6 @@ static int look_at(const char *path, char head[4], struct sh_err *err)
     return n > 0 ? SH_OK : sh_fail(err, SH_EINPUT, "%s: the file is empty", path);
 }
 
-int viewed_load(struct viewed *v, const char *path, const struct sh_report *report, struct sh_err *err)
-{
-    char head[4];
-    *v = (struct viewed){.path = path, .complete = 1, .epsg = -1};
-    int rc = viewed_check_ending(path, err);
-    if (rc == SH_OK) rc = look_at(path, head, err);
-    if (rc != SH_OK) return rc;
-    v->format = app_is_recording(path) ? "shs" : memcmp(head, "LASF", 4) == 0 ? "las" : "ply";
-    rc = strcmp(v->format, "shs") == 0 ? viewed_load_stream(v, report, err) : viewed_load_cloud(v, report, err);
-    if (rc != SH_OK) return rc;
-    if (v->n_left_out > 0)
-        sh_warn(report, "%s: %llu echoes left out, since their place is not known", path,
-                (unsigned long long)v->n_left_out);
-    if (v->points.n == 0)
-        return sh_fail(err, SH_EINPUT, "%s: it has no points, but %llu shots without echo", path,
-                       (unsigned long long)v->n_empty);
-    rc = viewed_turn(v, err);
-    if (rc == SH_OK) viewed_measure(v);
-    return rc;
-}
-
 /* ---- places */
 
 int viewed_can_show(int64_t epsg, const double p[3])
@@ -107,7 +86,8 @@ static void turn_station(const struct geoframe *frame, struct viewed_station *s)
     pose_to_angles(quat, &s->heading_rad, &s->pitch_rad, &s->roll_rad);
 }
 
-int viewed_turn(struct viewed *v, struct sh_err *err)
+/* Takes points and stations in ECEF or in degrees to metres east, north, up of the first point. */
+static int turn_to_enu(struct viewed *v, struct sh_err *err)
 {
     static const double zero[3] = {0, 0, 0};
     const int is_geodetic = v->epsg == EPSG_GEODETIC;
@@ -211,6 +191,27 @@ struct viewed_station *viewed_add_station(struct viewed *v, uint32_t number, str
     }
     v->station[v->n_stations] = (struct viewed_station){.number = number};
     return &v->station[v->n_stations++];
+}
+
+int viewed_load(struct viewed *v, const char *path, const struct sh_report *report, struct sh_err *err)
+{
+    char head[4];
+    *v = (struct viewed){.path = path, .complete = 1, .epsg = -1};
+    int rc = viewed_check_ending(path, err);
+    if (rc == SH_OK) rc = look_at(path, head, err);
+    if (rc != SH_OK) return rc;
+    v->format = app_is_recording(path) ? "shs" : memcmp(head, "LASF", 4) == 0 ? "las" : "ply";
+    rc = strcmp(v->format, "shs") == 0 ? viewed_load_stream(v, report, err) : viewed_load_cloud(v, report, err);
+    if (rc != SH_OK) return rc;
+    if (v->n_left_out > 0)
+        sh_warn(report, "%s: %llu echoes left out, since their place is not known", path,
+                (unsigned long long)v->n_left_out);
+    if (v->points.n == 0)
+        return sh_fail(err, SH_EINPUT, "%s: it has no points, but %llu shots without echo", path,
+                       (unsigned long long)v->n_empty);
+    rc = turn_to_enu(v, err);
+    if (rc == SH_OK) viewed_measure(v);
+    return rc;
 }
 
 void viewed_free(struct viewed *v)

@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* A recording that is shown: its points, its meshes, and what the file says of itself. In: a file (.shs, .ply, .las).
- * Out: arrays, in metres, in one frame with z up.
+ * Out: arrays, in metres, in one coordinate frame with z up.
  *
  * Shots without echo are counted, not held. Meshes are those of `scanhead record --mesh` before the long-edge filter.
  * Each triangle has its edge ratio, by which the filter decides, so that any factor can be shown at once.
- *
- * Memory: 24 bytes a point; range, reflectance and amplitude 4 each, time 8, label and station 2 each, echo and echoes
- * 1 each, colour 3; of a mesh 20 a triangle, two a point. Constant after viewed_load; any thread. */
+ * README.md says how much memory they take. Constant after viewed_load; any thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 #define FIRMWARE_SIM_APP_STUDIO_VIEW_VIEWED_H
 
@@ -36,7 +34,7 @@ struct viewed_points {
     double (*xyz_m)[3];                             /* [n] */
     float *range_m, *reflectance_db, *amplitude_db; /* [n] NaN: none; NULL, as the others: the file has none */
     double *t_s;                                    /* [n] as the file counts it */
-    uint16_t *label, *station;                      /* [n] VIEWED_LABEL_NONE; from 1 */
+    uint16_t *label, *station;                      /* [n] label: VIEWED_LABEL_NONE where unknown; station: from 1 */
     uint8_t *echo, *echoes;                         /* [n] */
     uint8_t (*rgb)[3];                              /* [n] */
 };
@@ -49,12 +47,12 @@ int viewed_points_room(struct viewed_points *points, size_t n, unsigned has, str
 void viewed_points_free(struct viewed_points *points);
 
 struct viewed_mesh {
-    uint32_t station, scan, sweep;  /* the scan's number in its stream */
+    uint32_t station, scan, sweep;  /* scan: its number in the stream; sweep: its pan sweep */
     uint32_t first_point, n_points; /* its corners are among these points of the recording */
     uint32_t n_faces;
     uint32_t (*face)[3]; /* [n_faces] points, from first_point on; in the order of the grid */
-    float *ratio;    /* [n_faces] longest edge over mean edge, rounded upwards: a float f keeps it where it is <= f */
-    uint32_t *order; /* [n_faces] faces by rising ratio */
+    float *ratio;        /* [n_faces] longest edge over mean edge, rounded upwards: a factor f keeps faces up to f */
+    uint32_t *order;     /* [n_faces] faces by rising ratio */
     double mean_edge_m;
     uint64_t n_edges, n_flat;
 };
@@ -89,10 +87,10 @@ struct viewed {
     char idn[128], profile[64]; /* empty: not known */
     /* of all points: */
     double min_m[3], max_m[3], origin_m[3], t0_s;
-    double low[VIEWED_COLUMNS], high[VIEWED_COLUMNS]; /* over finite values (labels: those that are some); NaN: none */
+    double low[VIEWED_COLUMNS], high[VIEWED_COLUMNS]; /* over values that are known; NaN: none */
 };
 
-/* By the file's ending and first bytes. Errors name the file: SH_EINPUT where it is none of these, SH_ENOMEM,
+/* Loads by the file's ending and first bytes. Errors name the file: SH_EINPUT where it is no recording, SH_ENOMEM,
  * SH_ESTOPPED. viewed_free is due in any case. path must live on. */
 int viewed_load(struct viewed *viewed, const char *path, const struct sh_report *report, struct sh_err *err);
 void viewed_free(struct viewed *viewed);
@@ -106,14 +104,12 @@ int viewed_load_stream(struct viewed *viewed, const struct sh_report *report, st
 /* Whether a point of a file in this CRS has a place that can be shown: within 10^12 m, or in degrees with a latitude
  * within 90. Broken files hold larger numbers, which would not stay finite when they are turned. */
 int viewed_can_show(int64_t epsg, const double p[3]);
-/* Takes points and stations in ECEF or in degrees to metres east, north, up of the first point. */
-int viewed_turn(struct viewed *viewed, struct sh_err *err);
-/* Bounds, origin, and the columns' limits. */
+/* Finds bounds, origin, and the columns' limits. */
 void viewed_measure(struct viewed *viewed);
 /* SH_ENOMEM. The text is copied. */
 int viewed_add_surface(struct viewed *viewed, uint32_t label, const char *object, const char *material,
                        struct sh_err *err);
-/* The one of that number, made where there was none. NULL: no memory, with err filled. */
+/* Returns the station of that number, a new one where there was none. NULL: no memory, with err filled. */
 struct viewed_station *viewed_add_station(struct viewed *viewed, uint32_t number, struct sh_err *err);
 
 #endif

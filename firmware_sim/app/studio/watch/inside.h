@@ -1,12 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: the watch, and how its parts meet.
- *
- *   scene.c    /scene, made once; /head and /plan, of now
- *   observe.c  the thread: frames of the stream to points in the scene's frame
- *   sample.c   these points: which are kept, how far they are from the scene, the figures of all of them
- *   seen.c     which cells of the surface they are on
- *   quality.c  /quality: the last figures as JSON
- *   past.c     /past: the frames of the last points */
+/* Private to this folder: the watch and its parts, which README.md lists. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_INSIDE_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_INSIDE_H
 
@@ -35,7 +28,7 @@ struct watch_sample {
     double *distance_m;
     uint32_t *triangle;
     struct deviation_points points;
-    double point_ns, spent_ns; /* what comparing one costs, and all of them in this scan */
+    double point_ns, spent_ns; /* to compare one point; to compare all of them in this scan */
     double cell_m;             /* of densities */
 };
 
@@ -44,19 +37,18 @@ struct watch_scan {
     uint32_t scan, station; /* both from 1; 0: none */
     int over;
     uint64_t points, shots, empty; /* that came */
-    uint64_t left_out;             /* of the points: on what moves, on legs, in mirrors */
-    uint64_t sampled_points;       /* that the figures below are of: those of one of `every` pulses */
+    uint64_t left_out;             /* of the points: on moving bodies, on legs, in mirrors */
+    uint64_t sampled_points;       /* in the figures below: those of one in `every` pulses */
     uint32_t every;
     int in_scene; /* points could be taken to the scene's frame */
     struct figures figures;
-    double max_at_m[3];                 /* the point that figures.max_m is of; NaN: none */
+    double max_at_m[3];                 /* place of the point with the distance figures.max_m; NaN: none */
     struct figures_density_row density; /* of the points looked at, times `every` */
     double density_cell_m;
     struct figures_histogram histogram; /* of deviations along the beam, or of distances where there are none */
     struct report_verdict verdict;
     struct deviation_terms expected;
     int expects; /* 0: expected is not known */
-    uint32_t cells_seen;
     double seen_share;
 };
 
@@ -78,18 +70,18 @@ struct watch {
     struct watch_options options;
     struct link_spec link;
     struct web_source source;
-    int link_given; /* its descriptor is the loop's */
-    int fd;         /* the observer's end; the handle's */
+    int link_given; /* the loop owns its descriptor */
+    int fd;         /* the observer's end, which the handle owns */
     struct scanhead *sh;
     pthread_t thread;
     int running;
     atomic_int ending;
 
-    /* the observer's, but for what is constant */
+    /* for the observer's thread alone, except for constants */
     struct distance *index;
     struct deviation_head *head; /* [n_stations] */
     struct deviation_head now;   /* of the scan at hand */
-    struct device_held held;     /* what `now` is of */
+    struct device_held held;     /* keeps the site of `now` */
     struct georef *now_georef;   /* of the scan at hand; NULL: its points are in the scene's frame, or nowhere */
     struct watch_sample sample;
     struct watch_seen seen;
@@ -108,7 +100,7 @@ struct watch {
     char *scene_bytes;
     size_t scene_len;
 
-    /* what is asked for by other threads */
+    /* for answers to other threads */
     pthread_mutex_t lock;
     struct watch_scan shown;
     struct watch_scan *shown_station; /* [n_stations] the last scan of each; scan 0: none */
@@ -120,8 +112,9 @@ struct watch {
 /* ---- scene.c */
 int watch_make_scene(struct watch *w, struct sh_err *err);
 int watch_get_scene(const struct watch *w, struct web_body *out, struct sh_err *err);
-int watch_get_head(struct watch *w, struct web_body *out, struct sh_err *err);
-int watch_get_plan(struct watch *w, struct web_body *out, struct sh_err *err);
+/* For page_json; ctx is the struct watch. */
+void watch_put_head(struct json *json, const void *ctx);
+void watch_put_plan(struct json *json, const void *ctx);
 
 /* ---- observe.c */
 void *watch_observe(void *watch);
@@ -130,11 +123,11 @@ void *watch_observe(void *watch);
 int watch_sample_open(struct watch *w, struct sh_err *err);
 void watch_sample_close(struct watch *w);
 void watch_sample_begin(struct watch *w);
-/* A point of the scene, and its pulse's hash. */
+/* Adds a point in the scene's frame, with its pulse's hash. */
 void watch_sample_add(struct watch *w, const double p_m[3], uint32_t hash);
-/* Compares what has not been compared yet. SH_E where that fails; then the sample is as it was. */
+/* Compares the points that have not been compared yet. SH_E where that fails; then the sample is as it was. */
 int watch_sample_compare(struct watch *w, struct sh_err *err);
-/* The figures of w->at. */
+/* Fills in the figures of w->at. */
 int watch_sample_figures(struct watch *w, struct sh_err *err);
 
 /* ---- seen.c */
@@ -142,8 +135,8 @@ int watch_seen_open(struct watch *w, struct sh_err *err);
 void watch_seen_close(struct watch_seen *seen);
 void watch_seen_begin(struct watch_seen *seen, uint32_t station);
 void watch_seen_mark(struct watch_seen *seen, uint32_t station, uint32_t triangle, const double p_m[3]);
-/* Counts the cells of a station, and those of all. */
-void watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations, uint32_t *cells, double *share);
+/* Counts the cells of all stations. Returns the share of the surface that this station has seen; NaN: not known. */
+double watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations);
 
 /* ---- quality.c */
 /* The observer: works out figures, and shows them. */

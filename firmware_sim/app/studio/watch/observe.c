@@ -68,7 +68,7 @@ static void begin_unknown(struct watch *w, uint32_t scan, uint32_t station)
     watch_seen_begin(&w->seen, station);
 }
 
-/* The head's setup in this scan: as the device has it, at the place and the rate that the stream gives. */
+/* Sets up the head for this scan: as the device has it, with the place and the rate from the stream. */
 static void begin_scan(struct watch *w, const struct scanhead_info *info)
 {
     begin_unknown(w, info->scan, info->station);
@@ -127,14 +127,14 @@ static void take_point(struct watch *w, const struct scanhead_frame *frame, uint
     if (to_scene(w, &point, p_m)) watch_sample_add(w, p_m, hash);
 }
 
-/* Fibonacci hashing; neighbouring pulses, and those of neighbouring lines, have nothing in common. */
+/* Fibonacci hashing: the hashes of neighbouring pulses, and of those of neighbouring lines, are unrelated. */
 static uint32_t hash_of(uint64_t pulse)
 {
     const uint64_t h = pulse * 0x9e3779b97f4a7c15ULL;
     return (uint32_t)(h >> 32 ^ h >> 13);
 }
 
-/* Echoes of one pulse follow each other, at the same time. This is the only work for every point. */
+/* Echoes of one pulse follow each other, with the same time. Only this loop runs for every point. */
 static void observe_take_points(struct watch *w, const struct scanhead_frame *frame)
 {
     const uint32_t keeps = w->at.in_scene ? w->sample.every - 1 : 0, n_surfaces = w->site->scene->n_surfaces;
@@ -150,7 +150,7 @@ static void observe_take_points(struct watch *w, const struct scanhead_frame *fr
         if (p.echo_count == 0)
             empty++;
         else if (p.label >= n_surfaces && p.label != SCANHEAD_NO_LABEL)
-            left_out++; /* on what moves, on legs, in mirrors */
+            left_out++; /* on moving bodies, on legs, in mirrors */
         else if ((hash & keeps) == 0 && w->at.in_scene)
             take_point(w, frame, i, hash);
     }
@@ -163,7 +163,7 @@ static void observe_take_points(struct watch *w, const struct scanhead_frame *fr
 
 /* ---- the thread */
 
-/* The event of a scan's end may be among what is lost; so may all of its points, and that it began. */
+/* The events of a scan's start and end, and all of its points, may be among the lost frames. */
 static void take_telemetry(struct watch *w, const struct scanhead_frame *frame)
 {
     struct native_telemetry t;
@@ -212,7 +212,7 @@ static int is_due(const struct watch *w)
     return w->dirty && clock_now_ns() - w->published_ns >= (rest_ns > PUBLISH_NS ? rest_ns : PUBLISH_NS);
 }
 
-/* The next frame. Where none is there it rests first, unless the head would wait for that. */
+/* Takes the next frame. Where there is none yet it sleeps first, unless the head would wait for it. */
 static int next_frame(const struct watch *w, struct scanhead_frame *frame)
 {
     if (w->options.cpu_share > 0.0) {

@@ -7,6 +7,7 @@
 
 #include "core/bytes.h"
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/base/clock.h"
 
 enum {
@@ -209,19 +210,6 @@ void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t l
 
 /* ---- giving */
 
-int past_read_position(const char *query, uint64_t *from, struct sh_err *err)
-{
-    static const char name[] = "from=";
-    const size_t named = sizeof name - 1;
-    *from = 0;
-    if (query[0] == '\0') return SH_OK;
-    const size_t digits = strncmp(query, name, named) == 0 ? strspn(query + named, "0123456789") : 0;
-    if (digits < 1 || digits > 18 || query[named + digits] != '\0')
-        return sh_fail(err, SH_EINPUT, "%.64s: allowed is from=POSITION, a whole number of up to 18 digits", query);
-    *from = strtoull(query + named, NULL, 10);
-    return SH_OK;
-}
-
 static struct piece *past_find(struct past *past, uint64_t *from)
 {
     if (past->n == 0) return NULL;
@@ -233,7 +221,7 @@ static struct piece *past_find(struct past *past, uint64_t *from)
     return NULL;
 }
 
-static void put_head(const struct past *past, uint64_t next, uint8_t *to)
+static void past_put_head(const struct past *past, uint64_t next, uint8_t *to)
 {
     memcpy(to, "SHPA", 4);
     le_put32(to + 4, VERSION);
@@ -248,15 +236,16 @@ static void put_head(const struct past *past, uint64_t next, uint8_t *to)
 
 int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err)
 {
-    uint64_t from;
-    int rc = past_read_position(query, &from, err);
+    struct page_word words[] = {{"from", 0, PAST_MOST_POSITION, 1, 0}, {.name = NULL}};
+    const int rc = page_read_query(words, query, err);
     if (rc != SH_OK) return rc;
+    uint64_t from = (uint64_t)words[0].value;
     pthread_mutex_lock(&past->lock);
     const struct piece *piece = past_find(past, &from);
     const size_t len = piece != NULL ? piece->len - (size_t)(from - piece->base) : 0;
     *out = (struct web_body){"application/octet-stream", malloc(PAST_HEAD_LEN + len), PAST_HEAD_LEN + len};
     if (out->bytes != NULL) {
-        put_head(past, piece != NULL ? from + len : past->end, (uint8_t *)out->bytes);
+        past_put_head(past, piece != NULL ? from + len : past->end, (uint8_t *)out->bytes);
         if (len > 0) memcpy(out->bytes + PAST_HEAD_LEN, piece->bytes + (from - piece->base), len);
     }
     pthread_mutex_unlock(&past->lock);

@@ -9,7 +9,7 @@
  * second of them may be as long as all else. When there are more than `points` or `bytes`, the oldest piece goes, and
  * its points are counted as gone.
  *
- * Memory: a piece of PAST_PIECE bytes after the other as points come, up to `bytes`; nothing before the first points.
+ * Memory: pieces of PAST_PIECE bytes, allocated as points come, up to `bytes`; none before the first points.
  * Threads: one takes frames; any number of others read. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
@@ -27,19 +27,18 @@ struct past_limits {
     size_t bytes;    /* at least two pieces */
 };
 /* 10 million points of 20 bytes with their attributes, colours and headers take up to 320 MiB. */
-#define PAST_MOST_POINTS 10000000ULL
+#define PAST_MOST_POINTS   10000000ULL
+#define PAST_MOST_POSITION 1e15 /* of a query; a double holds it exactly */
 enum { PAST_PIECE = 1 << 20, PAST_MOST_BYTES = 320 << 20, PAST_HEAD_LEN = 56 };
 
 /* NULL: no memory. */
 struct past *past_create(const struct past_limits *limits);
-/* lost_frames: so many the taker has lost so far; readers get this number. Points for which there is no memory count as
- * gone. */
+/* lost_frames: how many frames the taker has lost so far; readers get this number. Points for which there is no memory
+ * count as gone. */
 void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames);
-/* The frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece; one
- * beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
+/* Gives the frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece;
+ * one beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
 int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err);
-/* Reads the position of "from=POSITION"; of "" it is 0. Others are SH_EINPUT. */
-int past_read_position(const char *query, uint64_t *from, struct sh_err *err);
 /* A number that another run of a head does not have. */
 uint64_t past_run(const struct past *past);
 void past_free(struct past *past);

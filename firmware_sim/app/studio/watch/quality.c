@@ -30,7 +30,7 @@ void watch_publish(struct watch *w)
     if (w->at.scan == 0) return;
     /* Where memory is short now, the figures before stay. */
     if (watch_sample_compare(w, &err) == SH_OK && watch_sample_figures(w, &err) == SH_OK) {
-        watch_seen_count(&w->seen, w->at.station, w->site->n_stations, &w->at.cells_seen, &w->at.seen_share);
+        w->at.seen_share = watch_seen_count(&w->seen, w->at.station, w->site->n_stations);
         scanhead_get_stats(w->sh, &stats);
         w->lost_frames = stats.reader_lost;
         show(w);

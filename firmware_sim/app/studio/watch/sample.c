@@ -9,12 +9,9 @@
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/base/clock.h"
 
-/* How far from a point the scene is looked for; as `scanhead report` has it, where nobody asks. */
+/* How far from a point the scene is looked for: the default of `scanhead report`. */
 #define REACH_M    10.0
 #define REACH_TEXT "10 m"
-
-/* As in the report: the first size of density cells, and the share of the points within the histogram. */
-static const double CELL_M = 0.1, SHOWN = 0.995;
 
 int watch_sample_open(struct watch *w, struct sh_err *err)
 {
@@ -30,7 +27,7 @@ int watch_sample_open(struct watch *w, struct sh_err *err)
         (s->xyz_m == NULL || s->hash == NULL || s->distance_m == NULL || s->triangle == NULL || s->points.met == NULL))
         rc = sh_fail(err, SH_ENOMEM, "no memory for the points that are looked at");
     s->every = 1;
-    s->cell_m = CELL_M;
+    s->cell_m = REPORT_CELL_M;
     return rc == SH_OK ? distance_create(w->site->scene, &w->index, err) : rc;
 }
 
@@ -49,7 +46,7 @@ void watch_sample_begin(struct watch *w)
 {
     w->sample.n = w->sample.done = 0;
     w->sample.every = 1;
-    w->sample.cell_m = CELL_M;
+    w->sample.cell_m = REPORT_CELL_M;
     w->sample.spent_ns = 0.0;
 }
 
@@ -125,7 +122,7 @@ static void adapt(struct watch *w, size_t n, int64_t took_ns)
     if (!(share > 0.0)) return;
     const double budget_ns = share * ((double)(clock_now_ns() - w->began_ns) + 1e9);
     const double others_ns = (double)(clock_thread_ns() - w->began_thread_ns) - s->spent_ns;
-    /* Less than all of it: what is thinned out later has been paid for. */
+    /* Not all of it is used, since points that are thinned out later have cost time, too. */
     const double rest_ns = 0.6 * fmax(budget_ns - others_ns, 0.1 * budget_ns);
     while (s->every < WATCH_LEAST_SHARE && s->point_ns * (double)w->at.points / s->every > rest_ns)
         thin(s);
@@ -162,7 +159,7 @@ static int density(struct watch *w, const struct cloud *cloud, struct sh_err *er
     const struct figures_on_scene in = {&compared, w->site->scene, s->points.range_m};
     struct figures_density all;
     /* While points come the cells get smaller bit by bit; in the end they are those of a report. */
-    const double first_m = w->at.over ? CELL_M : fmax(0.5 * s->cell_m, CELL_M);
+    const double first_m = w->at.over ? REPORT_CELL_M : fmax(0.5 * s->cell_m, REPORT_CELL_M);
     const int rc = figures_density_fit(&in, first_m, NULL, &all, &w->at.density, err);
     if (rc != SH_OK) return rc;
     w->at.density_cell_m = s->cell_m = all.cell_m;
@@ -206,9 +203,9 @@ int watch_sample_figures(struct watch *w, struct sh_err *err)
     if (rc == SH_OK) rc = density(w, &cloud, err);
     if (rc != SH_OK) return rc;
     if (w->at.figures.along > 0)
-        figures_histogram_of_signed(s->points.along_m, s->n, SHOWN, &w->at.histogram);
+        figures_histogram_of_signed(s->points.along_m, s->n, REPORT_SHOWN, &w->at.histogram);
     else
-        figures_histogram_of(s->distance_m, s->n, SHOWN, &w->at.histogram);
+        figures_histogram_of(s->distance_m, s->n, REPORT_SHOWN, &w->at.histogram);
     find_largest(w);
     sample_judge(w);
     w->at.expects = !w->site->moving && deviation_terms_of(&w->now, &w->at.expected);

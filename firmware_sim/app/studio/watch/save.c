@@ -4,6 +4,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -15,6 +16,7 @@
 
 #include "core/bytes.h"
 #include "firmware_sim/app/studio/page_json.h"
+#include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/app/studio/record/job.h"
 #include "firmware_sim/app/studio/watch/watch.h"
 
@@ -43,7 +45,7 @@ struct save {
 static int make_folder(struct save *s, struct sh_err *err)
 {
     const char *temporary = getenv("TMPDIR");
-    if (s->folder[0] != '\0') return SH_OK;
+    if (s->folder[0] != '\0' && access(s->folder, W_OK) == 0) return SH_OK; /* else a service may have removed it */
     snprintf(s->folder, sizeof s->folder, "%.300s/scanhead-save-XXXXXX",
              temporary != NULL && temporary[0] != '\0' ? temporary : "/tmp");
     if (mkdtemp(s->folder) != NULL) return SH_OK;
@@ -99,7 +101,7 @@ static int write_stream(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* A stream of points alone ends in the middle of a scan, for every reader. */
+/* This stream has no event of a scan's end, so for its reader it ends in the middle of a scan: SH_ECLOSED. */
 static int write_file(struct save *s, struct sh_err *err)
 {
     struct record_job *job = calloc(1, sizeof *job);
@@ -116,7 +118,7 @@ static int write_file(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* A recorder that fails leaves parts, from which `repair` makes a file; here nobody will. */
+/* A recorder that fails leaves parts, from which --repair could make a file. Here nobody asks for that. */
 static void empty_folder(const struct save *s)
 {
     DIR *folder = s->folder[0] != '\0' ? opendir(s->folder) : NULL;
@@ -224,28 +226,18 @@ static int read_piece(const char *path, uint64_t from, struct web_body *out, str
     return rc;
 }
 
-/* "file=NUMBER&from=POSITION". */
-static int read_place(const char *query, uint64_t *number, uint64_t *from, struct sh_err *err)
-{
-    static const char name[] = "file=";
-    const size_t named = sizeof name - 1;
-    const size_t digits = strncmp(query, name, named) == 0 ? strspn(query + named, "0123456789") : 0;
-    if (digits < 1 || digits > 18 || query[named + digits] != '&')
-        return sh_fail(err, SH_EINPUT, "%.64s: allowed is file=NUMBER&from=POSITION", query);
-    *number = strtoull(query + named, NULL, 10);
-    return past_read_position(query + named + digits + 1, from, err);
-}
-
 int save_get_piece(struct save *s, const char *query, struct web_body *out, struct sh_err *err)
 {
-    uint64_t number = 0, from = 0;
-    int rc = read_place(query, &number, &from, err);
+    struct page_word words[] = {
+        {"file", 1, 1e9, 1, (double)NAN}, {"from", 0, PAST_MOST_POSITION, 1, 0}, {.name = NULL}};
+    int rc = page_read_query(words, query, err);
     if (rc != SH_OK) return rc;
+    const uint64_t number = (uint64_t)words[0].value;
     pthread_mutex_lock(&s->lock);
     if (number != s->number || s->state != SAVE_DONE)
         rc = sh_fail(err, SH_EINPUT, "file %" PRIu64 " is not there; /save has the number of the last one", number);
     else
-        rc = read_piece(s->file, from, out, err);
+        rc = read_piece(s->file, (uint64_t)words[1].value, out, err);
     pthread_mutex_unlock(&s->lock);
     return rc;
 }

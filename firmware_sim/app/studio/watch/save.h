@@ -18,7 +18,8 @@ enum { SAVE_PIECE = 4 << 20 }; /* the most bytes of a piece */
 /* past must live on until save_free. NULL: no memory. */
 struct save *save_create(struct past *past);
 /* `/save?as=las` begins a file, `/save` asks for it: JSON (README.md).
- * SH_EINPUT: a format that it can't be, or one is being made. A file that could not be made is an error once. */
+ * SH_EINPUT: a format that it can't be, or one is being made. A file that could not be made is an error
+ * until the next one begins. */
 int save_get(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
 /* `/saved?file=NUMBER&from=POSITION` gives bytes of that file from that position; at the file's end it gives none.
  * SH_EINPUT: the file is not there. */

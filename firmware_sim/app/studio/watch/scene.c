@@ -171,7 +171,7 @@ static void put_surfaces(struct json *json, const struct site *site)
     json_close_array(json);
 }
 
-static void put_head(struct json *json, const void *ctx)
+void watch_put_head(struct json *json, const void *ctx)
 {
     static const char *const paces[] = {[PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"};
     const struct watch *w = ctx;
@@ -197,12 +197,7 @@ static void put_head(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-int watch_get_head(struct watch *w, struct web_body *out, struct sh_err *err)
-{
-    return page_json(put_head, w, out, err);
-}
-
-static void put_plan(struct json *json, const void *ctx)
+void watch_put_plan(struct json *json, const void *ctx)
 {
     const struct watch *w = ctx;
     struct device_version *version;
@@ -212,9 +207,4 @@ static void put_plan(struct json *json, const void *ctx)
     json_open_object(json, NULL);
     json_string(json, "text", text);
     json_close_object(json);
-}
-
-int watch_get_plan(struct watch *w, struct web_body *out, struct sh_err *err)
-{
-    return page_json(put_plan, w, out, err);
 }

@@ -104,17 +104,15 @@ static uint32_t seen_count(const struct watch_seen *seen, const uint64_t *bits, 
     return n;
 }
 
-void watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations, uint32_t *cells, double *share)
+double watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations)
 {
     double sum_m2;
-    *cells = 0;
-    *share = (double)NAN;
-    if (seen->coverage == NULL) return;
-    *cells = seen_count(seen, seen->bits + (station - 1) * seen->words, &sum_m2);
-    *share = sum_m2 / seen->area_m2;
+    if (seen->coverage == NULL) return (double)NAN;
+    seen_count(seen, seen->bits + (station - 1) * seen->words, &sum_m2);
     memset(seen->all, 0, seen->words * sizeof *seen->all);
     for (uint32_t s = 0; s < n_stations; s++)
         for (size_t i = 0; i < seen->words; i++)
             seen->all[i] |= seen->bits[s * seen->words + i];
     seen->n_seen = seen_count(seen, seen->all, &seen->seen_m2);
+    return sum_m2 / seen->area_m2;
 }

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/config/config.h"
@@ -18,8 +19,8 @@ static int get(void *ctx, const char *path, const char *query, struct web_body *
     if (strcmp(path, "/saved") == 0) return save_get_piece(w->save, query, out, err);
     if (strcmp(path, "/quality") == 0) return watch_get_quality(w, out, err);
     if (strcmp(path, "/scene") == 0) return watch_get_scene(w, out, err);
-    if (strcmp(path, "/head") == 0) return watch_get_head(w, out, err);
-    if (strcmp(path, "/plan") == 0) return watch_get_plan(w, out, err);
+    if (strcmp(path, "/head") == 0) return page_json(watch_put_head, w, out, err);
+    if (strcmp(path, "/plan") == 0) return page_json(watch_put_plan, w, out, err);
     return w->preview != NULL ? preview_get(w->preview, path, query, out, err) : SH_EINPUT;
 }
 

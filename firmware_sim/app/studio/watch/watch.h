@@ -3,9 +3,8 @@
  * plan (/plan), and how good the scan is while it is on (/quality). README.md has the formats.
  *
  * In: configuration and site. Out: a link for the loop (a client like any other, whose other end the observer
- * reads), and a source for web links. The observer is a thread at the lowest priority that looks at some of the
- * points. A loop waits for it only where the options say so; the thread then has the priority of the loop's threads.
- * Where nobody opens a watch, nothing of this costs anything. */
+ * reads), and a source for web links. README.md describes the observer. Where nobody opens a watch, nothing of this
+ * costs anything. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_WATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_WATCH_H
 
