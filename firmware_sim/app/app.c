@@ -112,7 +112,7 @@ void app_warn_settings_file(const struct config *cfg, const char *why)
 }
 
 static pthread_mutex_t messages_lock = PTHREAD_MUTEX_INITIALIZER;
-static const char *warned_of; /* NULL: the work is one */
+static const char *warned_of; /* the part of the work that warnings name; NULL: it has no parts */
 
 void app_warn_of(const char *what)
 {
@@ -168,7 +168,7 @@ void app_say(const char *fmt, ...)
     const int begin = snprintf(text, sizeof text, "%s: ", app_program);
     va_list ap;
     va_start(ap, fmt);
-    vsnprintf(text + begin, sizeof text - (size_t)begin - 1, fmt, ap); /* and the line's end */
+    vsnprintf(text + begin, sizeof text - (size_t)begin - 1, fmt, ap); /* the line's end has room, too */
     va_end(ap);
     sh_keep_line(text); /* a path may have any bytes, and so may texts of files */
     strcat(text, "\n");

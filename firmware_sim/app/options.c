@@ -263,7 +263,7 @@ const char *app_nearest(const char *word, const char *const *known, size_t n)
     return best;
 }
 
-/* The long option that a word without its dashes may have meant; a value after '=' is none of it. */
+/* Returns the long option that a word without its dashes may have meant. The word ends at '='. */
 static const char *nearest_option(const struct app_command *command, const char *word)
 {
     const char *known[APP_MAX_OPTIONS + 1] = {"help"};

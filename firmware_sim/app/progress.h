@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How far long work is, and how long it will take. In: what a stream or a report says. Out: a fraction, and
+/* How far long work has come, and how long it will take. In: what a stream or a report says. Out: a fraction, and
  * seconds left. Pure; the caller brings the time. */
 #ifndef FIRMWARE_SIM_APP_PROGRESS_H
 #define FIRMWARE_SIM_APP_PROGRESS_H

@@ -113,7 +113,7 @@ static void take_piece(struct line_writer *w, struct piece *piece)
     piece->len += len;
 }
 
-/* 0, or why it failed. */
+/* Returns 0, or the errno of the write that failed. */
 static int write_piece(int fd, const struct piece *piece)
 {
     for (size_t at = 0; at < piece->len;) {

@@ -43,7 +43,8 @@ static void note(const struct device_beam *beam, const struct device_beam_fault 
 
 /* ---- when faults strike */
 
-/* Pulses begin .. end of the scan, without end, by the segment's times; pulses before the segment don't matter. */
+/* Finds the pulses at which the fault strikes: from *begin up to the one before *end, by the segment's times. Pulses
+ * before the segment don't matter. */
 static void find_window(const struct device_beam *beam, const struct fault_entry *entry, uint64_t *begin, uint64_t *end)
 {
     const struct fault *f = &entry->fault;

@@ -319,7 +319,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
-    /* 0: if the run ends here all the same, its one scan is over, and this tick was part of it. */
+    /* 1: the run was to end before this tick. Else, where it is over, this tick was the last of its one scan. */
     const int told = device->ending || tick >= device->end_tick;
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;

@@ -56,8 +56,8 @@ struct device_disturbance {
     struct cast_disturbance cast;
 };
 
-/* The work of one tick. All members are copies, so that no thread waits for another. Frames leave in the
- * order of the members. */
+/* The work of one tick. All members are copies, so that no thread waits for another. Stream frames
+ * leave in the order of the members. */
 struct device_work {
     uint64_t tick;
     struct device_version *version; /* where stations stand: device_site_of, until device_done; NULL: as at power-up */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The head as a follower of a receiver's pulses and sentences: the state of the pulses, and the counter of time since
- * the top of the hour that data and position packets carry (VLP-16 User Manual, appendix G).
+/* The head as a follower of a receiver's pulses per second, called pulses here, and of its sentences: the state of the
+ * pulses, and the counter of time since the top of the hour that data and position packets carry (VLP-16 User Manual,
+ * appendix G).
  *
  * In: each pulse and each sentence as it arrives, in order of time, with the head's own clock at that moment. Out: both
  * at a device time.

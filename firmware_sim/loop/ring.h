@@ -56,7 +56,7 @@ struct ring_tick {
     uint64_t n_fired, n_cast, n_lines;
     struct ring_hits hits; /* of the whole tick */
     struct ring_hits tail; /* after the last mark */
-    int64_t shift_ns;      /* run's device time less that of the frames; only a recording's differ */
+    int64_t shift_ns;      /* the run's device time minus that of the frames; only a recording's differ */
 };
 
 struct ring_slot {

@@ -185,8 +185,8 @@ static int follows(const struct session *s, const struct ring_copy *tick)
     return !s->lost.have_seq || tick->first_seq == s->lost.next_seq;
 }
 
-/* Returns whether ticks are lent. In the paces that wait for this reader, the ring still has the last LENT_TICKS before
- * its cursor. */
+/* Returns whether ticks are lent to the link, which then reads them in the ring after this call (link_ops.lend). In the
+ * paces that wait for this reader, the ring still has the last LENT_TICKS before its cursor. */
 static int lends(const struct pump *pump)
 {
     return pump->ops->lend != NULL && pump->holds && pump->stream->waits;

@@ -91,7 +91,7 @@ static void add_front(struct replay *r, uint64_t tick)
 
 /* ---- time */
 
-/* Counts frames anew from this tick on: it is the first tick of a time, or of another head within the recording. */
+/* Counts frames anew from this tick on: it is the first tick of a round, or of another head within the recording. */
 static void rebase(struct replay *r, uint64_t tick)
 {
     r->start_tick = tick;
