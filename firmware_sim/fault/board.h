@@ -9,7 +9,10 @@
 
 #include "firmware_sim/fault/truth.h"
 
-enum { FAULT_KEPT = 2 * FAULT_MAX }; /* faults in the list, and those that were taken out last */
+enum {
+    FAULT_KEPT = 2 * FAULT_MAX,   /* faults in the list, and those that were taken out last */
+    FAULT_MOST_OF_A_RUN = 1000000 /* each number has a count until the run's end: this bounds their memory */
+};
 
 struct fault_entry {
     uint32_t number;  /* first member, for fault_find. From 1, in the order of adding; never used again */
@@ -43,7 +46,7 @@ uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entr
  * callers that keep a state per fault and take over a changed list. */
 const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t number);
 
-/* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX. */
+/* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX, or the run has had FAULT_MOST_OF_A_RUN. */
 int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,
                     struct sh_err *err);
 /* Takes out the fault of that number; 0: all. Frames from before device time t_ns are still hit, since they are on
