@@ -133,7 +133,7 @@ int app_is_given(const struct app_input *in, const char *option);
  * printed. */
 int app_add_file(struct app_input *in, const struct app_file *file);
 
-/* From now on --help of a command is what `print` makes of its table; NULL: the text. The parts of a help stay text. */
+/* From now on --help of a command calls `print` with its table; NULL: it prints the text. --help PART stays text. */
 void app_set_help(void (*print)(const struct app_command *command));
 
 /* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */

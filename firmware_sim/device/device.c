@@ -84,7 +84,7 @@ static int open_journals(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
-/* Parts that know nothing of the whole point to what they need of it. */
+/* Gives the parts that don't use struct device pointers to what they need of it. */
 static void set_parts(struct device *device)
 {
     device->events.tick_hz = device->overrun.tick_hz = device->tick_hz;
@@ -224,8 +224,7 @@ static void run_faults(struct device *device, uint64_t tick, struct device_work 
     const struct head_faults_tick at = {.t_ns = (int64_t)tick * device->tick_ns,
                                         .has_pulses = device->scan.on,
                                         .pulse0 = device->scan.pulse_next,
-                                        .n_pulses =
-                                            1}; /* from the tick on that begins with the fault's pulse or later */
+                                        .n_pulses = 1}; /* a fault waits for a tick that begins at its pulse or later */
     static const uint64_t kinds = HEAD_FAULTS_CLOCK | HEAD_FAULTS_SERVER | HEAD_FAULT(FAULT_POWER_CYCLE);
     if (head_faults_step(&device->head_faults, kinds, &at))
         device_run_clock_faults(&device->head_faults, &device->clock, &device->events, tick);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to the files of this folder: the state of the device, and what works on all of it. Parts that know nothing of
- * the whole have headers of their own. */
+/* Private to the files of this folder: the state of the device, and the functions that need all of it. Parts that don't
+ * use struct device have headers of their own. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_STATE_H
 #define FIRMWARE_SIM_DEVICE_DEVICE_STATE_H
 

@@ -20,7 +20,7 @@ void gnss_init(struct gnss *gnss, const struct site *site, const struct head_clo
     if (gnss->on) gnss->period_ns = UTC_SECOND_NS / cfg->gnss.rate_hz;
 }
 
-/* Number of the first position at or after a time since 1970; TAI's full seconds are UTC's. */
+/* Returns the number of the first position at or after a time since 1970. A full second of TAI is one of UTC, too. */
 static int64_t number_at(const struct gnss *gnss, int64_t tai_ns)
 {
     return (tai_ns + gnss->period_ns - 1) / gnss->period_ns;
@@ -44,7 +44,7 @@ struct gnss_place {
     double velocity_m_s[3]; /* east, north, up */
 };
 
-/* The place on the Earth of a point of the scene; 0: there is none. */
+/* Finds the place on the Earth of a point of the scene. 0: there is none. */
 static int locate(const struct site *site, const struct placement *at, const double p_prcs[3], double geodetic[3])
 {
     struct georef_place place;

@@ -41,7 +41,7 @@ void ptp_init(struct ptp *ptp, const struct config_ptp *cfg, uint64_t seed)
     ptp->key = rng_key(seed, RNG_PTP);
 }
 
-/* ---- what is said */
+/* ---- reports to telemetry and events */
 
 static void ptp_keep(struct ptp *ptp, int64_t t_ns)
 {

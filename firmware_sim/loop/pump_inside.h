@@ -79,7 +79,7 @@ struct pump {
     int wake_fd;
     struct stream_listener *listener;
     uint32_t index;                  /* of the link, from 0 */
-    uint32_t n_told, told[MAX_TOLD]; /* lines that a protocol told the user: their checksums */
+    uint32_t n_told, told[MAX_TOLD]; /* checksums of the lines that the user got from a protocol */
     uint32_t out_cap;                /* of each session */
     int holds;                       /* its readers hold back the paces fast and step */
     int is_clean;                    /* its readers see nothing of faults, power cycles included */

@@ -117,7 +117,7 @@ void session_close(struct pump *pump, struct session *s)
     leave(pump, s);
 }
 
-/* Leaves after the lines that wait for a step, a move or room are carried out. */
+/* The session leaves only after its lines that wait for a step, a move or room are carried out. */
 static void leave_when_done(struct pump *pump, struct session *s)
 {
     const struct session_commands *c = &s->commands;

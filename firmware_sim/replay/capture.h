@@ -22,7 +22,7 @@ struct capture_place {
     int source_port; /* UDP: the device's */
     char device[64]; /* its address */
     struct talk talk;
-    uint32_t n_messages, n_connections;
+    uint32_t n_messages;
 };
 
 struct capture_counts {

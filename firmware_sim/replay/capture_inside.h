@@ -18,7 +18,7 @@ struct capture_segment {
 struct capture_flow {
     int is_tcp;
     struct ethernet_end end[2]; /* 0: the end that sent the first packet */
-    int device, has_begin;      /* side of the device, which a SYN says */
+    int device, has_begin;      /* side of the device, known from a SYN */
     uint64_t n_sent[2], bytes_sent[2];
     struct capture_segment *segment; /* in the order of the file */
     size_t n, room;

@@ -104,7 +104,7 @@ static void set_shift(struct replay *r)
     r->shift_ns = (int64_t)((r->start_tick - (uint64_t)r->base) * (uint64_t)r->tick_ns);
 }
 
-/* The first time that it is played, the time of day becomes the recorded one. */
+/* In the first round, the time of day becomes the recorded one. */
 static void set_clock(struct replay *r)
 {
     set_shift(r);

@@ -49,8 +49,8 @@ struct replay {
     } change[REPLAY_CHANGES];
     uint32_t n_changes;
     struct sh_err failure; /* code 0: none */
-    /* Time of day at device time 0 of the run, ns since 1970. The first time that it is played sets it so that frames
-     * have the time that they were recorded with; it then goes on. INT64_MIN: the recording has none. */
+    /* Time of day at device time 0 of the run, ns since 1970. The first round sets it so that frames have the time
+     * that they were recorded with; it then goes on. INT64_MIN: the recording has none. */
     int64_t utc0_ns;
     struct native_anchor anchor; /* the last one */
 
