@@ -188,9 +188,17 @@ static void print_warning(void *ctx, const char *text)
         app_say("warning: %s: %s", warned_of, text);
 }
 
+static int is_quiet;
+
+void app_set_quiet(int quiet)
+{
+    is_quiet = quiet;
+}
+
 static void print_progress(void *ctx, const char *what, double fraction)
 {
     static struct progress_pace pace;
+    if (is_quiet) return;
     const double left_s = progress_left_s(&pace, what, fraction, clock_now_ns());
     char left[48] = "";
     (void)ctx;

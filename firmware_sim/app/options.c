@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "core/err.h"
+#include "firmware_sim/app/app.h"
 #include "firmware_sim/base/nearest.h"
 
 const char *app_program = "scanhead";
@@ -428,5 +429,6 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
     }
     for (; optind < argc; optind++)
         count_operand(words, &n, argv[optind]); /* after -- */
+    app_set_quiet(app_is_given(in, "quiet"));
     return take_operands(command, n, words, in);
 }
