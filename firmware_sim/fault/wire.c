@@ -224,7 +224,7 @@ static void look_at_frame(struct wire_item *item, struct wire_making *making)
 static void look_at(struct wire *wire, struct wire_item *item, struct wire_making *making)
 {
     making->spot.t_ns = item->t_ns;
-    making->kind = wire->spec.units ? WIRE_UNIT : item->of == FAULT_OF_REPLIES ? WIRE_TEXT : WIRE_FRAMES;
+    making->kind = item->of == FAULT_OF_REPLIES ? WIRE_REPLY : WIRE_FRAMES;
     if (wire->spec.native && item->of != FAULT_OF_REPLIES)
         look_at_frame(item, making);
     else
@@ -266,7 +266,7 @@ void wire_go_on(struct wire *wire)
 
 int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len)
 {
-    struct wire_piece *piece = wire_piece_new(wire->spec.units ? WIRE_UNIT : WIRE_FRAMES, bytes, len);
+    struct wire_piece *piece = wire_piece_new(WIRE_FRAMES, bytes, len);
     if (piece == NULL) return SH_ENOMEM;
     piece->alone = 1;
     return wire_queue_put(&wire->queue, piece);

@@ -3,7 +3,7 @@
  * and pauses between them. Beside the queue are pieces that are held back, until frames have overtaken them or their
  * time has come.
  *
- * A piece of text, of frames or of a unit is one write. Thread: one. Allocates as it grows. Times are of the owner's
+ * A piece of a reply, or of frames or units, is one write. Thread: one. Allocates as it grows. Times are of the owner's
  * clock, ns; only t_ns is device time. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_QUEUE_H
 #define FIRMWARE_SIM_FAULT_WIRE_QUEUE_H
@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum wire_piece_kind { WIRE_TEXT, WIRE_FRAMES, WIRE_UNIT, WIRE_ACT, WIRE_PAUSE };
+enum wire_piece_kind { WIRE_REPLY, WIRE_FRAMES, WIRE_ACT, WIRE_PAUSE };
 
 struct wire_piece {
     struct wire_piece *next;
