@@ -62,7 +62,7 @@ static int add_key(struct app_sets *sets, const char *key, const char *value)
     return app_add_set(sets, text);
 }
 
-/* The whole text as a number within the row's limits. */
+/* Reads the whole text as a number within the row's limits. */
 static int parse_number(const struct app_command *command, const struct app_option *row, const char *text, double *out)
 {
     char *end;

@@ -34,7 +34,7 @@ struct files {
 
 /* ---- the same file */
 
-/* The folder of a path, and the name in it. */
+/* Finds the folder of a path, and the name in it. */
 static int split(const char *path, struct stat *folder, const char **name)
 {
     char dir[PATH_MAX] = ".";
@@ -64,7 +64,8 @@ static int is_same_name(const struct named *a, const struct named *b)
            app_is_name_of_scan(name[1], b->n_ending, name[0]);
 }
 
-/* The same file, also under two names. Devices and pipes may be given twice, and so may -, which is standard output. */
+/* Whether both are the same file, also under two names. Devices and pipes may be given twice, and so may -, which is
+ * standard output. */
 static int outputs_is_same(const struct named *a, const struct named *b)
 {
     const int both = a->is_there && b->is_there;

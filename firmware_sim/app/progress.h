@@ -19,7 +19,8 @@ struct progress_pace {
  * where it is not known: the first report, an unknown fraction, or nothing done since. */
 double progress_left_s(struct progress_pace *pace, const char *what, double fraction, int64_t now_ns);
 
-/* How long a scan lasts by its descriptor, from the first pulse on; 0: it has no end, or the frame is no descriptor. */
+/* Returns how long a scan lasts by its descriptor, from the first pulse on; 0: it has no end, or the frame is no
+ * descriptor. */
 double progress_scan_s(const struct scanhead_frame *descriptor);
 
 #endif

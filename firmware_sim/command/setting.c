@@ -111,7 +111,7 @@ static void narrow_to_rates(const struct command_call *call, int64_t *min, int64
         if (rate[i] <= to) *max = rate[i];
 }
 
-/* The pulse rate of a head whose lines have a fixed number of pulses. */
+/* Returns the pulse rate of a head whose lines have a fixed number of pulses. */
 static int64_t rate_of_lines(const struct command_call *call)
 {
     return call->dev->settings.lines_uhz * head_line_pulses(&call->dev->limits, &call->dev->settings);
@@ -142,7 +142,7 @@ static int is_sphere(const struct command_call *call)
     return call->dev->limits.emitter == EMITTER_SPHERE;
 }
 
-/* The most lines of a sphere: with more pulses a line, the largest pulse rate allows fewer lines. */
+/* Returns the most lines of a sphere: with more pulses a line, the largest pulse rate allows fewer lines. */
 static int64_t most_lines_of_sphere(const struct command_call *call)
 {
     return call->dev->limits.prr_max_uhz / head_line_pulses(&call->dev->limits, &call->dev->settings);

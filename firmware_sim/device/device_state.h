@@ -168,7 +168,7 @@ void device_take_move(struct device *device, int64_t t_ns, struct command_result
 void device_end_move(struct device *device);
 
 /* live_pose.c */
-/* The end of the head's path, since the scan's start; INT64_MAX: there is none. */
+/* Returns the end of the head's path, since the scan's start; INT64_MAX: there is none. */
 int64_t device_path_end_ns(const struct device *device);
 /* The head's pose at a device time; 0: it stands at its station. A trajectory runs from the start of the
  * last scan to its end; then the platform stands there until the next scan begins. */

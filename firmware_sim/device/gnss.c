@@ -86,7 +86,7 @@ static void set_velocity(const double before[3], const double here[3], const dou
     if (locate_axes(&place[1], at_ecef, enu, NULL) == SH_OK) mat3_apply_transposed(enu, d, velocity_m_s);
 }
 
-/* The antenna's place, with its error shift_m east, north and up. 0: it is nowhere on the Earth. */
+/* Finds the antenna's place, with its error shift_m east, north and up. 0: it is nowhere on the Earth. */
 static int gnss_position(const struct gnss *gnss, uint32_t station, const struct gnss_track *track,
                          const double shift_m[3], struct gnss_place *out)
 {

@@ -48,7 +48,7 @@ void pps_power_up(struct pps *pps, struct pps_moment at, int64_t hour_ns, int pu
 void pps_take(struct pps *pps, struct pps_moment edge);
 /* A sentence came that names this second of the hour, 0..3600. */
 void pps_take_sentence(struct pps *pps, struct pps_moment at, int64_t second);
-/* The state at `at`, and the counter then, 0..3599999999999. Before power-up: absent, and 0. */
+/* Returns the state at `at`, and the counter then, 0..3599999999999. Before power-up: absent, and 0. */
 enum protocol_pps pps_at(const struct pps *pps, struct pps_moment at, int64_t *hour_ns);
 
 #endif

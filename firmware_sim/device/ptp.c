@@ -97,7 +97,7 @@ void ptp_text(const struct ptp_status *status, char text[PTP_TEXT_LEN])
 
 /* ---- what faults do */
 
-/* The faults of a kind that hold at a device time of the tick, one after the other. */
+/* Returns the fault of a kind that holds at a device time of the tick and comes next in the list. */
 static const struct head_fault *ptp_next(const struct ptp *ptp, enum fault_kind kind, int64_t t_ns,
                                          const struct head_fault *before)
 {
@@ -131,7 +131,7 @@ static const struct head_fault *fault_of(const struct ptp *ptp, uint64_t identit
     return last;
 }
 
-/* The identity of the best grandmaster. Of several faults, the last one in the list decides. */
+/* Returns the identity of the best grandmaster. Of several faults, the last one in the list decides. */
 static uint64_t best_master(const struct ptp *ptp, int64_t t_ns)
 {
     const struct head_fault *f = NULL;
@@ -293,7 +293,7 @@ static int64_t least_of(int64_t a_ns, int64_t b_ns)
     return a_ns < b_ns ? a_ns : b_ns;
 }
 
-/* The first multiple of an interval that is not before a time. */
+/* Returns the first multiple of an interval that is not before a time. */
 static int64_t next_multiple(int64_t t_ns, int64_t interval_ns)
 {
     const int64_t rest_ns = t_ns % interval_ns;
@@ -305,7 +305,7 @@ static int64_t lost_at(const struct ptp *ptp)
     return ptp->announce_ns + PTP_INTERVALS_TO_LOSE * ptp->cfg->announce_ms * MS_NS;
 }
 
-/* The first moment in [t_ns, end_ns) at which something may happen; or end_ns. */
+/* Returns the first moment in [t_ns, end_ns) at which something may happen; or end_ns. */
 static int64_t next_moment(const struct ptp *ptp, int64_t t_ns, int64_t end_ns)
 {
     const struct head_fault *f = NULL;

@@ -36,7 +36,7 @@ void fault_board_free(struct fault_board *board);
 
 /* Changes with the list; 0: it has always been empty. Real-time safe. */
 uint32_t fault_board_version(const struct fault_board *board);
-/* A copy of the list, of the version that it returns. */
+/* Copies the list, and returns its version. */
 uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[FAULT_MAX], uint32_t *n);
 
 /* The same, with the faults that were taken out last. These still hit frames from before they were taken out. */
@@ -57,9 +57,9 @@ uint32_t fault_board_remove(struct fault_board *board, uint32_t number);
 
 /* Notes an injection: counts it, writes it to the truth, and passes it to the listeners. */
 void fault_board_note(struct fault_board *board, const struct fault_note *note);
-/* The number of the fault that was added last; 0: there never was one. */
+/* Returns the number of the fault that was added last; 0: there never was one. */
 uint32_t fault_board_last(struct fault_board *board);
-/* How often the fault of that number was injected; 0: all together. Those that were taken out count, too. */
+/* Returns how often the fault of that number was injected; 0: all together. Those that were taken out count, too. */
 uint64_t fault_board_injected(struct fault_board *board, uint32_t number);
 /* Adds a listener, which is called for each note in the thread that injected it. Before the run; up to 4. */
 void fault_board_listen(struct fault_board *board, void (*heard)(void *ctx, const struct fault_note *note), void *ctx);

@@ -138,7 +138,7 @@ uint32_t fault_n(const struct fault *fault);
 
 /* Whether it strikes there, without regard to its count. index: in the list; link: the spot's. */
 int fault_strikes(const struct fault *fault, uint32_t index, uint32_t link, const struct fault_spot *spot);
-/* A random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
+/* Returns a random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
 uint64_t fault_random(const struct fault *fault, uint32_t index, uint32_t link, uint64_t number, uint32_t draw);
 
 #endif

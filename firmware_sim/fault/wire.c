@@ -54,7 +54,7 @@ void wire_renew(struct wire *wire, uint64_t ahead)
 
 enum { LAST_RANK = 4 };
 
-/* The order in which faults strike at a frame. */
+/* Returns the fault's place in the order in which faults strike at a frame. */
 static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
@@ -75,7 +75,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
     }
 }
 
-/* How often the fault has struck: an act of the link counts for all its sessions. */
+/* Returns the count of how often the fault has struck: an act of the link counts for all its sessions. */
 static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
 {
     return fault_is_act(fault->entry.fault.kind) && wire->spec.tally != NULL

@@ -261,7 +261,7 @@ static void session_fill(struct pump *pump, struct session *s)
     stream_move_reader(pump->stream, s->reader, s->cursor);
 }
 
-/* The end of what is written next. On a link with messages, replies and frames go into messages of their own. */
+/* Returns the end of what is written next. On a link with messages, replies and frames have messages of their own. */
 static uint32_t write_to(const struct pump *pump, const struct session *s)
 {
     if (!pump->ops->messages) return s->out_len;

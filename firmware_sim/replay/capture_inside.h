@@ -66,7 +66,7 @@ struct capture_list {
 };
 int capture_add_messages(struct replay_capture *capture, const struct capture_flow *flow, uint32_t side,
                          const struct talk_kind *kind, struct capture_store *store, struct capture_list *list);
-/* The first bytes that a side sent, at most room. */
+/* Copies the first bytes that a side sent, at most room. Returns how many. */
 size_t capture_first_bytes(const struct capture_flow *flow, uint32_t side, uint8_t *to, size_t room);
 
 /* capture.c: frees what a place has. */

@@ -270,7 +270,7 @@ static int build_place(struct replay_capture *c, const struct capture_flow *firs
     return rc;
 }
 
-/* The first flow of a place: those before it are of others. */
+/* Whether it is the first flow of its place: those before it are of other places. */
 static int is_first(const struct replay_capture *c, const struct capture_flow *f)
 {
     for (const struct capture_flow *before = c->flow; before < f; before++)

@@ -111,7 +111,7 @@ static void set_clock(struct replay *r)
     if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns = native_since_ns(r->utc0_ns, r->shift_ns);
 }
 
-/* The tick with which the next frame goes out. */
+/* Returns the tick with which the next frame goes out. */
 static uint64_t due_tick(struct replay *r, uint64_t tick)
 {
     const int64_t at = tick_of(r, r->frame.t_ns);
