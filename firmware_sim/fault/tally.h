@@ -17,5 +17,7 @@ struct fault_tally {
 void fault_tally_renew(struct fault_tally *tally, const struct fault_entry *entry, uint32_t n);
 /* Returns the count of a fault that is in the list. */
 uint64_t *fault_tally_hits(struct fault_tally *tally, uint32_t number);
+/* Takes back one count: what it stands for was not carried out. */
+void fault_tally_take_back(struct fault_tally *tally, uint32_t number);
 
 #endif

@@ -23,6 +23,9 @@ struct wire *wire_create(const struct wire_spec *spec)
 void wire_free(struct wire *wire)
 {
     if (wire == NULL) return;
+    for (const struct wire_piece *left = wire->queue.first; left != NULL; left = left->next)
+        if (left->kind == WIRE_ACT && wire->spec.tally != NULL)
+            fault_tally_take_back(wire->spec.tally, wire_act_note(left)->fault);
     wire_queue_clear(&wire->queue);
     free(wire->unit);
     free(wire->mask);

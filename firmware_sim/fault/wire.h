@@ -43,6 +43,7 @@ struct wire_spec {
 
 /* NULL: no memory. */
 struct wire *wire_create(const struct wire_spec *spec);
+/* Acts that were not carried out no longer count in the tally. */
 void wire_free(struct wire *wire);
 
 /* A frame, unit or reply that the session would write. t_ns: device time. Native frames have their own time and
