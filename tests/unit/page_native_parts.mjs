@@ -5,6 +5,7 @@ import {CommandError, Replies} from '../../drivers/link/web/replies.js';
 import {Losses} from '../../drivers/link/web/losses.js';
 import {PointHash} from '../../drivers/link/web/native_points.js';
 import {Poses} from '../../drivers/link/web/native_poses.js';
+import {Sequence} from '../../drivers/link/web/native_sequence.js';
 import {fitCubic, geodeticToEcef, gridOf, toScene} from '../../drivers/link/web/native_earth.js';
 import {equal, near} from './page_rig.mjs';
 import {test} from './page_tap.mjs';
@@ -21,6 +22,14 @@ test('the hash of points: pulse numbers of more than 32 bits go on', () => {
   };
   const both = of(2, -1, 0), first = of(1, -1, 0), second = of(1, 0, 1, 1);
   both.forEach((sum, i) => equal(sum, (first[i] + second[i]) | 0, `sum ${i}`));
+});
+
+test('the oldest of the 64 gaps that are remembered is cut in two by a late frame, and both parts stay', () => {
+  const sequence = new Sequence();
+  const take = (seq) => sequence.take({seq, flags: 0, type: 3, length: 0, payload_crc: seq, t_ns: BigInt(seq)});
+  equal(take(0), '', 'frame 0');
+  for (let k = 0; k < 64; k++) equal(take(4 + 2 * k), 'gap', `gap ${k}`); // 1 to 3 are missing, then 5, 7, ...
+  for (const seq of [2, 1, 3]) equal(take(seq), 'late', `frame ${seq}`);
 });
 
 test('poses: from the first to the last of a frame, both included', () => {

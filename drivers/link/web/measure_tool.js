@@ -74,7 +74,7 @@ export class MeasureTool {
 
   // The view asks these two for a click and a key on the picture.
   tap(p) {
-    this.#expected.ask(); // for the points of a scan since
+    this.#expected.ask(); // a newer scan may have other errors
     this.#stop?.();
     if (this.#kind === 'flatness' && this.#picked.length >= 3 && this.#isAt(this.#picked[0], p)) {
       this.#endOutline();
@@ -243,7 +243,7 @@ export class MeasureTool {
   }
 }
 
-// Writes two figures.
+// Writes a length in millimetres, with two significant digits.
 const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
 
 // Flatness stands beside the flatness that noise alone gives.

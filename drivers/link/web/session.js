@@ -87,7 +87,7 @@ export class Session extends EventTarget {
     this.#changed();
   }
 
-  // again_s is the time until the next attempt; words say why the connection ended.
+  // words say why the connection ended.
   #closed({words = '', wasOpen = true} = {}) {
     if (wasOpen || this.link === 'opening') this.since = new Date();
     if (wasOpen || this.words === '') this.words = words;

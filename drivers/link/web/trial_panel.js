@@ -67,7 +67,7 @@ export class TrialPanel {
     this.#open.hidden = !hasPreviews || this.#view === null || this.#trial !== null;
   }
 
-  // ---- what there is, made once
+  // ---- the elements, made once
 
   #make() {
     const button = (id, name, click, more = {}) => make('button', {type: 'button', id, click, ...more}, name);
@@ -165,7 +165,7 @@ export class TrialPanel {
     return this.#trial.change(station, {x_m: x, y_m: y, z_m: z, heading_deg});
   }
 
-  // ---- what is shown
+  // ---- showing
 
   #show() {
     const trial = this.#trial;
@@ -249,7 +249,7 @@ export class TrialPanel {
     this.#within();
   }
 
-  // A suggestion is about what is in the section.
+  // A suggestion counts only what is in the section.
   #cut() {
     this.#trial.section = this.#view.camera.section;
     this.#trial.next = null;
@@ -309,7 +309,7 @@ export class TrialPanel {
     return `${percent(next.gain_m2 / all_m2)} more of the section, ${percent((seen_m2 + next.gain_m2) / all_m2)} in all`;
   }
 
-  // ---- what is done
+  // ---- actions
 
   #suggestSoon() {
     clearTimeout(this.#timer);

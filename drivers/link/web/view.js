@@ -101,7 +101,7 @@ export class View extends EventTarget {
     this.#frames.bare();
   }
 
-  // ---- what the page asks for
+  // ---- for the page
 
   setScene(bytes) {
     this.#solids.setScene(bytes);
@@ -236,7 +236,7 @@ export class View extends EventTarget {
   // Draws again only the layers over the picture.
   redraw() { this.#frames.ask('overlay'); }
 
-  // ---- what follows from the cloud
+  // ---- following the cloud
 
   // Returns whether too many drawn points are gone, or the colours' limits have changed.
   #follow() {

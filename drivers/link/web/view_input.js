@@ -65,7 +65,7 @@ export class Input {
       this.#moved = 0;
       const hit = e.button === 0 && !view.tool && !view.once ? view.stations.hit(view.camera, p.x, p.y) : null;
       if (hit && view.movable) {
-        view.stations.grab(view.camera, hit, p.x, p.y);
+        view.stations.grab(hit, p.x, p.y);
         this.#gesture = {kind: 'station'};
       } else {
         if (hit) view.stations.select(hit.number);
@@ -172,7 +172,7 @@ export class Input {
     const factor = Math.exp(Math.max(-300, Math.min(300, e.deltaY * lines)) * 0.0016);
     const now = performance.now();
     const w = this.#wheeled;
-    // One turn of the wheel keeps one place.
+    // As long as the wheel turns, the view zooms about the same place.
     if (w === null || now - w.time > 400 || Math.hypot(p.x - w.x, p.y - w.y) > 4) {
       this.#wheeled = {...p, place: camera.inside ? null : grip(cloud, camera, p.x, p.y)};
     }

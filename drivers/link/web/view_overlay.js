@@ -124,7 +124,7 @@ export class Overlay {
     }
   }
 
-  // Draws a field as far as it is before the eye.
+  // Draws the part of a field that lies before the eye.
   #field(camera, stations, station, {outline_m}) {
     const ends = inScene(stations.placeOf(station), station, outline_m).map((at) => camera.project(at));
     let run = [];
@@ -178,7 +178,7 @@ export class Overlay {
     if (points.every(({w}) => w > 0.01)) this.#line(points.map(({x, y}) => [x, y]), 1.25, this.colours.ink, [3, 5]);
   }
 
-  // Draws a square mark on its corner, filled where two scans have it in common.
+  // Draws a diamond, filled if two scans have the target in common.
   #target(camera, {at, name, isSeen}) {
     const {x, y, w} = camera.project(at);
     if (w <= 0.05) return;

@@ -47,7 +47,8 @@ void main() {
 #endif
   gl_FragDepth = depth_of(v_seen.z, 1.001);
   if (gl_FrontFacing == u_turned) discard;
-  bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1; // a cell that nobody sees has every other pixel
+  // Every other pixel of a cell that nobody sees is drawn.
+  bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1;
   if (v_colour.a == 0.0 && odd) discard;
   vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
 #ifdef FLAT
@@ -94,7 +95,7 @@ export class CellsPart {
     this.#counts = gl.createTexture();
   }
 
-  // Draws these pieces alone: where there is no GPU, each triangle costs as much as two points.
+  // Draws only these pieces, because without a GPU each triangle costs as much as two points.
   #choose(isDrawn) {
     const {gl, cell} = this;
     const corners = new Uint32Array(6 * cell.length);
