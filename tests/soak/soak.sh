@@ -77,5 +77,5 @@ elif [ $guest != 0 ]; then
     status=1
     echo "usb BAD: the guest did not get to its end; $out/guest.log"
 fi
-echo "accepted are resealed flips, which no reader can see; $out has the sheets"
+echo "accepted are flips whose checksum was made right, which no reader can see; $out has the sheets"
 exit $status

@@ -73,14 +73,6 @@ export class Session extends EventTarget {
     this.#changed();
   }
 
-  take() {
-    return this.head.takeControl();
-  }
-
-  release() {
-    return this.head.releaseControl();
-  }
-
   #opened() {
     this.link = 'open';
     this.since = null;

@@ -2,7 +2,7 @@
 // The overlay has the scale bar, axes with north, stations' names and handles, and the point under the pointer. It is
 // a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's colour.
 
-import {roundBelow} from './view_camera.js';
+import {degrees, roundBelow} from './view_camera.js';
 import {inScene} from './view_stations.js';
 
 const FONT = '12px system-ui, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
@@ -105,8 +105,7 @@ export class Overlay {
 
   #looking(camera) {
     const deg = (rad) => (rad * 180 / Math.PI);
-    const heading = ((deg(camera.azimuth) % 360) + 360) % 360;
-    this.#text(`${heading.toFixed(0)}° · ${deg(camera.elevation).toFixed(0).replace('-', '−')}° · field ${deg(camera.fov).toFixed(0)}°`, 16,
+    this.#text(`${degrees(camera.azimuth).toFixed(0)}° · ${deg(camera.elevation).toFixed(0).replace('-', '−')}° · field ${deg(camera.fov).toFixed(0)}°`, 16,
       camera.height - 18, {align: 'left'});
   }
 
