@@ -46,9 +46,8 @@ struct bench_rays {
     double *dx, *dy, *dz; /* unit vectors, prcs */
     float *fx, *fy, *fz;  /* the same for Embree */
 };
-/* Sets a turn of so many lines, with BENCH_LINE_PULSES each, or with `pulses` each. */
-void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec);
-void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec);
+/* Sets a turn of so many lines, with `pulses` each. */
+void bench_schedule(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec);
 /* The first makes room for some lines of a turn. The second fills in the rays of the lines from first_line on. */
 int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
                     struct sh_err *err);
@@ -144,7 +143,7 @@ enum { BENCH_LEAK_MESHES = 4 };
 struct bench_leaks {
     const char *mesh;
     uint32_t triangles;
-    uint64_t rays, leaks, passed; /* passed: met the inside of the mesh behind the target, which is wrong as well */
+    uint64_t rays, leaks, passed; /* passed: hit the inside of the mesh behind the target, which is wrong as well */
     double ns_per_ray;            /* processor time */
     struct cast_counters counters;
     uint64_t plain_rays, plain_leaks;               /* Embree alone, robust, in packets */
