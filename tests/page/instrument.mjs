@@ -249,13 +249,13 @@ export async function testInstrument(browser) {
       for (const panel of document.querySelectorAll('.panel')) panel.open = true;
       window.shown = () => [...document.querySelectorAll('a, button, input, select, summary, [tabindex]')].filter((e) =>
         e.tabIndex >= 0 && !e.disabled && e.getClientRects().length > 0 && e.checkVisibility() && !e.closest('dialog:not([open])'));
-      window.met = new Set();
+      window.visited = new Set();
       window.dim = [];
       window.note = () => {
         const e = document.activeElement, {outlineStyle, outlineWidth} = getComputedStyle(e);
-        window.met.add(e);
+        window.visited.add(e);
         if (e !== document.body && (outlineStyle === 'none' || parseFloat(outlineWidth) < 1)) window.dim.push(e.id || e.outerHTML.slice(0, 60));
-        return window.shown().every((one) => window.met.has(one) || one.type === 'radio');
+        return window.shown().every((one) => window.visited.has(one) || one.type === 'radio');
       };
     })()`);
     const n = await page.eval('shown().length');
@@ -264,7 +264,7 @@ export async function testInstrument(browser) {
       await page.key('Tab');
       all = await page.eval('note()');
     }
-    const missed = await page.eval('shown().filter((e) => !met.has(e)).map((e) => e.id || e.outerHTML.slice(0, 80)).join()');
+    const missed = await page.eval('shown().filter((e) => !visited.has(e)).map((e) => e.id || e.outerHTML.slice(0, 80)).join()');
     is(all && n > 40, `${n} controls; not come to: ${missed}`);
     equal(await page.eval('dim.join()'), '', 'without a sign of the focus');
   });

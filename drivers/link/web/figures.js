@@ -27,7 +27,7 @@ const PAGE = [
   ['decode', 'To decode a point'],
   ['held', 'Points held'],
   ['gone', 'Points gone', 'The oldest, which had no room any more, and those of scans that were made again'],
-  ['past', 'Points from before', 'Of the time before this page was opened: the head keeps the last ones'],
+  ['past', 'Points from before', 'From before this page was opened: the head keeps the last ones'],
   ['drawn', 'Pictures a second', 'Drawn of late; none are drawn while nothing changes'],
 ];
 

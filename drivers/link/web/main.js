@@ -136,7 +136,7 @@ function startHead(cloud, view, names, keepsPast) {
     if (view) view.stations.fields = info.fields ?? [];
     stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true, info.run)).catch(() => {}); // it is gone again
     showPlan();
-    display.setScene(await fetchScene());
+    view?.setScene(await fetchScene());
   };
   stations.addEventListener('tell', ({detail}) => {
     bar.notice(detail.text, 6000, detail.kind);

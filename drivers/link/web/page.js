@@ -91,6 +91,9 @@ export function metres(value) {
   return `${sign}${three(size)}\u00a0m`;
 }
 
+// Writes the place of a station for people, to a centimetre.
+export const placeText = ({x_m, y_m, z_m}) => [x_m, y_m, z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−');
+
 // Writes seconds for people: nanoseconds up to minutes.
 export function duration(value_s) {
   if (!known(value_s)) return NONE;
