@@ -26,8 +26,8 @@ struct bench_target {
 /* Returns the number of triangles that a name like 10k, 1M or 25000 stands for. Returns 0 if it is no number of 100 to
  * 100M. */
 uint32_t bench_count(const char *name);
-int bench_is_house(const char *name); /* one of the two below that need its file */
-int bench_is_made(const char *name);  /* one that is generated and is no terrain */
+int bench_is_house(const char *name); /* whether it is house or garden, which need the IFC file */
+int bench_is_made(const char *name);  /* whether it is foliage or huge, which are generated */
 /* "house" reads the IFC file and is seen from its living room, "garden" from outside. A number makes closed terrain,
  * 200 m wide and 3 m rough, seen from 4.7 m above its middle. "foliage" is three crowns of 20,000 leaves in a box.
  * "huge" is a triangle of 1,000 km below 4,000 triangles of some centimetres. */
@@ -70,7 +70,7 @@ uint32_t bench_rays_block(const struct bench_rays *rays, uint32_t first, struct 
 struct bench_case {
     const struct bench_target *target;
     const struct bench_rays *rays;
-    struct embree_alone *embree, *fast; /* robust: the measure of all; without that flag */
+    struct embree_alone *embree, *fast; /* robust, which all is compared with; without that flag */
     struct bvh *bvh;
     double seconds; /* it measures for so long, but at least BENCH_MIN_ROUNDS */
 };
