@@ -52,8 +52,6 @@ export class MeasureTool {
     this.#choose('distance');
   }
 
-  isOn() { return false; }
-
   start() {
     this.#expected.ask();
     this.#view.tool = this;
@@ -66,7 +64,7 @@ export class MeasureTool {
     this.#view.tool = null;
     this.#picked = [];
     this.#view.overlay.layers.delete(this.#layer);
-    this.#view.hover(null);
+    this.#view.pointed.at(null);
     this.#show();
   }
 

@@ -24,8 +24,6 @@ function scaleBar(camera, most = 150) {
 export class Overlay {
   targets = []; // {at, name, isSeen: by two stations or more}
   constructor(canvas) {
-    const parent = canvas.parentElement;
-    if (getComputedStyle(parent).position === 'static') parent.style.position = 'relative';
     this.canvas = document.createElement('canvas');
     this.canvas.setAttribute('aria-hidden', 'true');
     this.canvas.style.cssText = 'position:absolute;pointer-events:none';
@@ -47,7 +45,7 @@ export class Overlay {
     this.ratio = ratio;
   }
 
-  // all: {camera, colours: {ground, ink, soft, accent, panel}, stations (or null), marked: point or null}
+  // all: {camera, colours: {ground, ink, accent}, stations (or null), marked: point or null}
   draw({camera, colours, stations, marked}) {
     const c = this.context;
     c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
