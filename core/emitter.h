@@ -44,7 +44,7 @@ struct emitter_firing {
 struct emitter {
     enum emitter_kind kind;
     uint32_t steps;                             /* pulses of a line; line and beams: 0 */
-    uint32_t first_step, last_step, front_step; /* planar: cast, both included; looks along y */
+    uint32_t first_step, last_step, front_step; /* planar: the first and the last cast; the one that looks along y */
     int turn;                                   /* +1: clockwise seen from above; -1: the other way */
     /* sphere: `rings` of elevations -90 + 180 (first_ring + i) / gaps deg; gaps 0: one, at circle_udeg */
     uint32_t rings, first_ring, gaps;
@@ -75,7 +75,7 @@ static inline uint32_t emitter_sphere_steps(int64_t step_udeg)
 {
     return (uint32_t)((360000000 + step_udeg / 2) / step_udeg);
 }
-/* Whether the step of a sphere divides both, so that nothing was rounded. */
+/* Whether a sphere's step divides a turn and half a turn, so that nothing was rounded. */
 int emitter_sphere_is_exact(const struct emitter *emitter);
 /* Limits a sphere to the rings from start to stop, elevations of -90 to 90 deg, start <= stop. A ring within
  * a micro-degree of a limit counts as inside. Where both limits are the same, it is a circle: one ring, at

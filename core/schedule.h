@@ -19,16 +19,16 @@
 
 #include "core/emitter.h"
 
-enum { SCHEDULE_PACKET = 16 }; /* pulses are cut at multiples of this from the line's first pulse */
+enum { SCHEDULE_PACKET = 16 }; /* pulses of a packet; packets are counted from the line's first pulse */
 
 struct schedule_spec {
-    int64_t prr_uhz, lines_uhz, pan_udeg_s;  /* micro-hertz, micro-degrees per second; lines <= pulses */
+    int64_t prr_uhz, lines_uhz, pan_udeg_s;  /* micro-hertz, lines_uhz <= prr_uhz; micro-degrees per second */
     int64_t fov_min_udeg, sweep_udeg;        /* line angle at phase 0, and how far the whole sweep goes */
-    int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included; of a sphere also across azimuth 0 */
+    int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included; a sphere's may cross azimuth 0 */
     int64_t pan_start_udeg, pan_stop_udeg;
     uint32_t frames; /* 0: without end */
-    /* NULL: a line head. Else the pan keeps still; prr_uhz is steps * lines_uhz where the emitter has steps, and
-     * only for show where it has a table; line angles count from azimuth 0 on (planar: emitter_step_udeg) */
+    /* NULL: a line head. With an emitter the pan stands still, and line angles count from azimuth 0, those of a
+     * planar head as emitter_step_udeg counts. prr_uhz is then steps * lines_uhz; for beams it has no effect. */
     const struct emitter *emitter;
 };
 
@@ -66,10 +66,11 @@ struct schedule_run {
     double pan0_turn, pan_step_turn; /* pan = pan0 + (in_line + j) * step, of the line's first pulse */
     uint64_t ns_acc, ns_rem, ns_den; /* dt(j) = j*ns_quot + floor((ns_acc + j*ns_rem) / ns_den) */
     int64_t ns_quot;
-    /* Where angles or times come from a table, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings.
-     * It fires d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick
-     * ticks after the first one: put d for j in dt above. (Directions: one pulse a tick, sequence_ticks is 0, and
-     * dt as it stands.) mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r + firing[i].pan_turn */
+    /* The table of beams or directions, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings:
+     * mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r + firing[i].pan_turn.
+     * A head of beams fires pulse j d ticks after the run's first one, so d replaces j in dt above:
+     * d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick.
+     * A list of directions has a pulse each tick: its sequence_ticks is 0, and dt holds as it stands. */
     const struct emitter_firing *firing;
     uint32_t n_firings, firing_at;
     uint64_t sequence_ticks;
@@ -90,9 +91,9 @@ struct schedule_line {
 /* First segment of a scan: pulse 0 at time 0, line 0, phase 0. The spec must have been checked. */
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec);
 
-/* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the
- * mirror its phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the
- * first end of a line at or beyond the new pan stop. No pulse is lost or doubled. seg may be `before`. */
+/* Makes the segment that follows `before` from pulse k on, with a new spec. The pulse keeps its time, the mirror
+ * its phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees). The frame ends with the first line
+ * whose end is at or beyond the new pan stop. No pulse is lost or doubled. seg may be `before`. */
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
                      const struct schedule_spec *spec, uint64_t k);
 

@@ -56,8 +56,8 @@ static void set_sector(struct schedule_segment *seg, const struct schedule_spec 
     seg->r_last = ahead + last < n ? ahead + last : n - 1;
 }
 
-/* Steps of a planar head or a sphere lie at line angles that need not be whole micro-degrees: those within one of a
- * limit count as inside. */
+/* Steps of a planar head or a sphere need not lie at whole micro-degrees. A step within a micro-degree of a limit
+ * counts as inside. */
 static void set_window(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     const struct emitter *e = spec->emitter;
@@ -89,7 +89,7 @@ static void set_spec(struct schedule_segment *seg, const struct schedule_spec *s
     if (kind_of(seg) == EMITTER_SPHERE) seg->frame_lines = spec->emitter->rings;
 }
 
-/* More pulses than 64 bits can count are without end. */
+/* A scan of more pulses than 64 bits can count has no end. */
 static void set_end(struct schedule_segment *seg)
 {
     if (seg->spec.frames == 0) {
@@ -171,7 +171,7 @@ uint64_t schedule_line_of(const struct schedule_segment *seg, uint64_t k)
     return seg->line0 + (uint64_t)(((u128)seg->r0 + (u128)firing_ticks(seg, k) * seg->num) / seg->den);
 }
 
-/* Where all steps of a ring look along one line. */
+/* All steps of a ring at a pole look along one line. */
 static int is_pole(const struct schedule_segment *seg, uint64_t n)
 {
     const struct emitter *e = seg->spec.emitter;

@@ -84,9 +84,8 @@ static inline uint32_t frame_of_line(const struct schedule_segment *seg, uint64_
     return seg->frame0 + 1 + (uint32_t)f;
 }
 
-/* angles.c: pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and
- * 2^-24 parts. It is rounded up, so that a frame that a change cuts in two never needs another line because
- * of rounding. */
+/* angles.c: the pan at pulse k in 2^-24 micro-degrees. first_line is the first line of the pulse's frame. The pan is
+ * rounded up, so that rounding never adds a line to a frame that a change cuts in two. */
 int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line);
 
 #endif
