@@ -45,10 +45,10 @@ struct plan_row {
 /* A choice to be made. */
 struct plan_choice {
     const char *stage;
-    const struct plan_option *option; /* [n], from rough to exact */
+    const struct plan_option *option; /* [n], the most exact one last */
     uint32_t n;
     int forced;      /* number of the option that the configuration names; -1: none */
-    const char *key; /* that names it */
+    const char *key; /* the configuration's key for this choice */
     struct plan_tolerance tolerance;
 };
 
@@ -66,8 +66,7 @@ struct plan_georef_need {
     enum georef_method forced; /* GEOREF_AUTO: the cheapest one whose bound meets the tolerance, else exact */
 };
 
-/* Chooses the method and fills row. SH_EINPUT: what is forced has no bound here. The georef is not
- * changed. */
+/* Chooses the method and fills row. SH_EINPUT: the forced method has no bound here. The georef is not changed. */
 int plan_georef(const struct georef *georef, const struct plan_georef_need *need, enum georef_method *method,
                 struct plan_row *row, struct sh_err *err);
 /* Georeferencing where points leave as range and angles. */
@@ -78,9 +77,9 @@ void plan_georef_polar(struct plan_row *row);
 /* A place that the head fires from, with its setup and the pulses of a scan there. */
 struct plan_place {
     struct cast_setup setup; /* as the run's */
-    struct cast_beam *beam;  /* its footprint; NULL: none. Mode and pattern are changed. outlines NULL: not adaptive */
+    struct cast_beam *beam;  /* its footprint; NULL: none. Sampling leaves another mode and pattern in it. */
     struct schedule_segment segment;
-    uint64_t pulses; /* to draw from, those outside the field of view included */
+    uint64_t pulses; /* the number to draw from; it includes pulses outside the field of view */
     /* Sets the poses of head and bodies at a time of the scan; NULL: nothing moves. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
@@ -116,16 +115,16 @@ void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_
 /* The figures that decide whether a map of the directions from a station (core/sight.h) pays. */
 struct plan_sight_need {
     double pulses;         /* cast from a station in a scan */
-    double share;          /* of all directions that the map shows */
+    double share;          /* the part of all directions that the map shows, 0..1 */
     double n_triangles;    /* of the scene */
     uint32_t packet;       /* rays per Embree call */
     uint64_t memory_bytes; /* that a map may take */
-    int forced;            /* by cast.sight, 1: a map; 0: none; -1: not */
-    const char *why_not;   /* no map is possible; NULL: it is */
+    int forced;            /* cast.sight asks for a map: 1; for none: 0; for neither: -1 */
+    const char *why_not;   /* why no map is possible; NULL: one is */
 };
 
 /* Shares of the pulses, by the cell of the map that they lie in. The cell shows one triangle, nothing, a few triangles,
- * or many (ask). small: its triangles are met by so few rays that the map leaves them to the BVH. */
+ * or so many that the BVH is asked. small: so few rays hit its triangles that the map leaves them to the BVH. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */
@@ -158,7 +157,7 @@ void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *o
 
 /* The row of the mesh: the error of its vertices, see struct scene. */
 void plan_mesh(double error_m, struct plan_row *row);
-/* The row of the cast: what is always done. packet: rays per Embree call. */
+/* Fills the row of the cast, which leaves no choice. packet: rays per Embree call. */
 void plan_cast(uint32_t packet, struct plan_row *row);
 
 /* The settings of the head that the remaining rows depend on. */
@@ -180,7 +179,7 @@ size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_RO
 /* Processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and the rest of
  * the work for each pulse. Rows have the cost of methods beyond that. */
 double plan_pulse_ns(double n_triangles, uint32_t packet);
-/* A row about which there is nothing to choose. */
+/* Fills a row with these figures. */
 void plan_say(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
               const char *why);
 
