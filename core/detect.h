@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Detection: from the light that comes back to the echoes that the head reports. Arrays have one entry per
- * echo, and several per pulse.
+ * echo, so a pulse may have several.
  *
  * Signal. The range equation for a target that the beam doesn't miss (W. Wagner et al., Gaussian
  * decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser scanner,
@@ -22,8 +22,7 @@
  * ratio at the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the
  * pulses see a target at the data sheet's range. Reflectance, relative to a white Lambertian target at that
  * range, hit head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the
- * threshold, as a head measures it, is
- * 10 log10 (A + n/k): 0 dB or more of what is detected.
+ * threshold, as a head measures it, is 10 log10 (A + n/k). A detected echo has 0 dB or more.
  *
  * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik,
  * Introduction to radar systems, 1980), and a part that no signal makes smaller (clock, digits):
@@ -31,7 +30,7 @@
  *     sigma^2 = floor^2 + (X^2 - floor^2) (A_Y / A)^2,  and a part per distance added to sigma
  *
  * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on. With k below 8 noise
- * alone may be detected, where A is nearly 0: A counts as DETECT_LEAST_AMPLITUDE or more here, so that ranges stay finite.
+ * alone may be detected, where A is nearly 0. A counts as DETECT_LEAST_AMPLITUDE or more here: ranges stay finite.
  *
  * Random numbers are keyed by (seed, scan, pulse, echo, purpose): nothing depends on what else was detected.
  * Entries without echo stay so. Pure; any thread; allocates nothing. */
@@ -59,15 +58,15 @@ struct detect_signal_spec {
     int sharp;             /* no noise on the signal: detected where A >= 1 */
     double overlap_m;      /* R_o; 0: all light is caught at any range */
     double extinction_1_m; /* beyond that of the data sheet's day; may be below 0 */
-    /* X at Y m on a target of that reflectance; and what is left at any signal */
+    /* X at Y m on a target of that reflectance; sigma_floor_m is the part that no signal makes smaller */
     double sigma_m, sigma_at_m, sigma_reflectance, sigma_floor_m, sigma_ppm;
     uint64_t seed;
 };
 
 struct detect_signal {
-    uint32_t n; /* of the following: pieces of g */
-    double g0, at_m[DETECT_MAX_REACHES],
-        more_1_m[DETECT_MAX_REACHES]; /* g = g0 + sum of more (R - at): the first everywhere, others where R > at */
+    /* g = g0 + sum over n pieces of more_1_m (R - at_m): the first holds everywhere, the others where R > at_m */
+    uint32_t n;
+    double g0, at_m[DETECT_MAX_REACHES], more_1_m[DETECT_MAX_REACHES];
     double per_overlap2, extinction2_1_m;
     double per_snr;         /* 1/k; 0: sharp */
     double floor2, jitter2; /* of sigma^2: constant, and at A = 1 */

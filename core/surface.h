@@ -78,7 +78,7 @@ int surface_table_by_vertex(struct surface_table *table, uint32_t label, struct 
 /* Labels of hits hold the surface in their low 16 bits. Where a texture holds the reflectance, the
  * high ones are 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
-/* Likewise of a hit with that colour, sRGB. */
+/* The same for a hit with that colour, sRGB, in place of a texel. */
 uint32_t surface_texel_of(uint32_t label, const uint8_t rgb[3]);
 static inline uint32_t surface_of_label(uint32_t label)
 {
@@ -96,7 +96,7 @@ struct surface_colours {
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
 void surface_colours_free(struct surface_colours *colours);
-/* Each entry is set first. */
+/* Sets an entry. This comes before its image. */
 void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named);
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,

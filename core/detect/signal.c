@@ -14,7 +14,7 @@ static int by_range(const void *a, const void *b)
     return (x->range_m > y->range_m) - (x->range_m < y->range_m);
 }
 
-/* g through the reaches: slopes between them, and how much each is more than the one before. */
+/* Fits g through the reaches. more_1_m is by how much a slope exceeds the one before. */
 static int fit_reaches(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err)
 {
     struct detect_reach reach[DETECT_MAX_REACHES];
@@ -28,8 +28,8 @@ static int fit_reaches(const struct detect_signal_spec *spec, struct detect_sign
         const struct detect_reach *a = &reach[i], *b = &reach[i + 1];
         double slope =
             (log(b->reflectance / a->reflectance) - 2.0 * log(b->range_m / a->range_m)) / (b->range_m - a->range_m);
-        /* A data sheet rounds its figures to a few percent: a deviation from R^2 of less than 10 % is no
-         * claim of it. */
+        /* A data sheet rounds its figures to a few percent, so a deviation from R^2 of less than 10 % is taken for
+         * rounding. */
         if (!(b->range_m > a->range_m) || slope * (b->range_m - a->range_m) < -0.1)
             return sh_fail(
                 err, SH_EINPUT,
