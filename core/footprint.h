@@ -11,9 +11,9 @@
  *
  * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit
  * plane, with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a
- * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc;
- * equal areas of energy in the disc are equal areas of energy in every footprint. Its range counts along
- * itself from the exit plane.
+ * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc. A part
+ * of the disc has the same share of the energy in every footprint. A sub-ray's range counts along itself from the
+ * exit plane.
  * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same
  * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the
  * irradiance: (1 - exp(-2 rho^2)) / (1 - exp(-2)).)
@@ -22,17 +22,17 @@
  * than the range resolution (c tau / 2 of the pulse width tau) begins a new echo. An echo's range is the
  * energy-weighted mean of its returns: the centroid of equal pulses that overlap, whatever their shape. Two
  * surfaces closer than the resolution make a mixed pixel. An echo's energy is the sum of its returns'; its
- * surface is the one that sends most of it back. Less than 1 % of the footprint's energy is no echo. Where
+ * surface is the one that sends most of it back. Returns of less than 1 % of the footprint's energy make no echo. Where
  * there are more echoes than the head can report, the weakest are left out, and counted. Where surfaces are
  * modelled (core/surface.h), the weight of a return is the power that comes back: energy times the surface's
  * return, times the share that glass and mirrors before it let through. The 1 % is still of the footprint's
- * energy. Where nothing comes back of any return, energy is the weight.
+ * energy. Where no return sends anything back, energy is the weight.
  *
  * Width. An echo's width adds two widths as squares: that of the pulse, resolution_m, and 2.355 sigma of its
  * ranges (full widths at half maximum of Gaussians). A return may stand for a part of the footprint, or for
  * the area around a sub-ray. The ranges within it count as well, to first order on its plane: the standard
- * deviation is short by half of (s tan i)^2 of it, s = theta / 2. Where lines cross in the footprint it is
- * short by a few percent more, as its parts are then known by sample places.
+ * deviation comes out too small, by a share of (s tan i)^2 / 2, with s = theta / 2. Where lines cross in the footprint
+ * it is a few percent smaller still, since the parts are then made of sample places.
  *
  * One ray for the whole footprint. Where the footprint lies on one plane at incidence i, its mean range is
  * not that of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho
@@ -87,13 +87,13 @@ struct beam {
 /* Lengths and angles as above; the pulse width in seconds. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
-/* Replaces the range at a footprint's centre by the mean of the footprint's ranges. It lies on one plane, with steep =
- * 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. Where the plane is within a
- * footprint's angle of the beam, beyond s / cos i = 1/2, x is that of 1/2. */
+/* Replaces the range at a footprint's centre by the mean of the footprint's ranges. The footprint lies on one plane,
+ * with steep = 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. Beyond
+ * s / cos i = 1/2, where the plane is nearly along the beam, x stays as it is there. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
-/* The width of its echo: for pulses of beam->resolution_m. */
+/* Sets the widths of the echoes of such footprints, for pulses of beam->resolution_m. */
 void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
-/* Width of an echo whose ranges vary so: pulse_m is the pulse's own, c tau / 2. */
+/* Width of an echo whose ranges have this variance. pulse_m is the pulse's own width, c tau / 2. */
 double beam_echo_width(double pulse_m, double variance_m2);
 
 /* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
@@ -105,7 +105,7 @@ void beam_half_squares(const struct beam *beam, double h, double *along, double 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
-    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* whole words of bits; from n on: nothing */
+    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* 0 from n on; the room is a multiple of 64 */
     double rest; /* variance of x (and of y) around a place: that of the footprint minus that of the places */
 };
 /* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
@@ -213,7 +213,7 @@ enum { BEAM_NEAR_MOST = 1024 };
 /* A pulse whose footprint may reach outlines first .. end. */
 struct beam_near {
     uint32_t pulse, first, end;
-    double next_m; /* beam_find_lines */
+    double next_m; /* set by beam_find_lines */
 };
 /* Finds such pulses, at any range, among n <= BEAM_NEAR_MOST unit directions. Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam,
@@ -231,12 +231,12 @@ struct beam_line {
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
                          const struct beam_sight *sight, double limit_m, struct beam_line *line);
 
-/* A part of the footprint: its energy, the centre of that, and how it spreads about it: variances and
- * covariance of x and y, where they are asked for. */
+/* A part of the footprint: its energy, the centre of its energy, and the spread about that centre. The spread is the
+ * variances and the covariance of x and y, where they are asked for. */
 struct beam_part {
     double energy, x, y, xx, xy, yy;
 };
-/* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy
+/* The parts that lines cut the footprint into. Each lies on one surface, and is convex, so that its centre of energy
  * is in it. */
 struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */

@@ -9,7 +9,8 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-/* t = rho^2 over the footprint: density proportional to exp(-2 t) on 0 .. 1. Means of t and t^2, by parts. */
+/* t = rho^2 over the footprint has a density proportional to exp(-2 t) on 0 .. 1. Its means, and those of t^2 and t^3,
+ * follow by integration by parts. */
 static double mean_t(void)
 {
     return 0.5 - exp(-2.0) / (1.0 - exp(-2.0));
@@ -140,8 +141,8 @@ void beam_plane_widths(const struct beam *beam, const float *restrict steep, con
     }
 }
 
-/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1): how the range changes
- * with x and y, to first order. */
+/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1). by_x and by_y are how its range
+ * changes with x and y, to first order. */
 float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
                       const struct beam_part *part)
 {
@@ -163,7 +164,7 @@ double beam_echo_width(double pulse_m, double variance_m2)
     return variance_m2 == 0.0 ? pulse_m : sqrt(pulse_m * pulse_m + 8.0 * M_LN2 * variance_m2);
 }
 
-/* Where h lies in the tables. */
+/* Returns the row of the tables for h, and the part of the way from there to the next row. */
 static uint32_t look_up(double h, double *part)
 {
     double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS);

@@ -9,8 +9,8 @@
 #include "core/vec3.h"
 
 enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
-#define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
-#define PIECE     0.1  /* the longest piece of an edge, by its distance */
+#define NEAREST_M 0.02 /* nearer pieces of edges are left out: they are near to most directions */
+#define PIECE     0.1  /* length of the longest piece of an edge, as a share of its distance */
 
 /* Count into first[c + 1]; write at first[c]++; mark in around. */
 enum draw_what { COUNT, FILL, AROUND };

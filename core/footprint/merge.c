@@ -37,7 +37,8 @@ static double weight_of(const struct beam_return *r, int by_back)
     return by_back ? r->back : r->energy;
 }
 
-/* A return of the surface that most power comes back from: many weak returns may be of one surface. */
+/* Returns the index of a return of the surface that most power comes back from. Many weak returns may be of one
+ * surface. */
 static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
 {
     uint32_t best = 0;

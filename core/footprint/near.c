@@ -16,7 +16,7 @@ static float longest_step2(const struct vec3_floats *dir, uint32_t n)
     uint32_t most = 0;
     for (uint32_t i = 0; i + 1 < n; i++) {
         float x = dx[i + 1] - dx[i], y = dy[i + 1] - dy[i], z = dz[i + 1] - dz[i], step2 = x * x + y * y + z * z;
-        uint32_t bits; /* in the order of the numbers, which are not negative */
+        uint32_t bits; /* they have the order of the floats, since none is negative */
         memcpy(&bits, &step2, sizeof bits);
         most = bits > most ? bits : most;
     }
@@ -52,8 +52,8 @@ static int is_set(const uint32_t *bits, uint32_t cell)
     return bits[cell / 32] >> cell % 32 & 1;
 }
 
-/* Lists pulses with outlines somewhere around them: of up to TOGETHER pulses on either side, only the
- * middle one is looked up. */
+/* Lists pulses that may have outlines near them. Only the middle one of a group is looked up; the group has up to
+ * TOGETHER pulses on either side of it. */
 static uint32_t list_around(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n, struct few *few,
                             uint32_t *pulse)
 {
@@ -75,7 +75,7 @@ static uint32_t list_around(const struct beam_outlines *o, const struct vec3_flo
     return found;
 }
 
-/* Pulses in cells that lead to edges; near->first: the cell. */
+/* Finds the pulses whose cells list edges; near->first: the cell. */
 static uint32_t in_cells(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n,
                          struct beam_near *near)
 {
@@ -105,8 +105,8 @@ static void look_up(const struct beam_outlines *o, struct beam_near *near, uint3
     }
 }
 
-/* Most cells lead to no edge, and most of the others are wider than the footprint. Ranges are compared
- * later. */
+/* Most cells list no edge, and most others are wider than the footprint. So each edge's plane is compared with the
+ * beam; its range is compared later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const struct vec3_floats *dir,
                             uint32_t n, struct beam_near *near)
 {

@@ -5,8 +5,7 @@
 #include "core/footprint/outlines.h"
 #include "core/vec3.h"
 
-/* Rays pass beside the edge by this share of the footprint's radius: anything thinner could not make an
- * echo. */
+/* Rays pass the edge at this share of the footprint's radius: a thinner part of the scene could not make an echo. */
 #define BESIDE 2e-3
 /* Steeper surfaces than this look like a step, and count as one. */
 #define SLOPE 20.0
@@ -60,7 +59,7 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
         int same = prober->kind[2 * i] == prober->kind[2 * i + 1];
         seen[i] = is_step(prober->range_m[2 * i], prober->range_m[2 * i + 1], same, sqrt(vec3_dot(at, at)), beside_m);
     }
-    for (uint32_t i = 0; i < n; i++) /* and a part on either side */
+    for (uint32_t i = 0; i < n; i++) /* parts next to a step count, too */
         prober->counts[i] = (uint8_t)(seen[i] | (i > 0 ? seen[i - 1] : 0) | (i + 1 < n ? seen[i + 1] : 0));
     return n;
 }
