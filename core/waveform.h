@@ -44,9 +44,9 @@ struct waveform_spec {
     double saturation;      /* the receiver gives no more than this signal, in thresholds; 0: no limit */
     double dead_s;          /* after a saturated sample the receiver gives nothing for so long; 0: none */
     double noise;           /* sigma, in thresholds: 1/k of detect.h */
-    /* Windows. A window is kept around all returns whose signal reaches `keep` thresholds, from before_s ahead of it to
-     * after_s behind it; windows that touch are one. Where near_m < far_m, one window from near_m to far_m is kept in
-     * place of these, whatever comes back. */
+    /* Windows. A window is kept around all samples whose signal reaches `keep` thresholds, from before_s before the
+     * first to after_s after the last; windows that touch are one. Where near_m < far_m, one window from near_m to
+     * far_m is kept in place of these, whatever comes back. */
     double keep, before_s, after_s;
     double near_m, far_m;
     uint64_t seed;

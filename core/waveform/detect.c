@@ -9,7 +9,7 @@
 #include "core/light.h"
 #include "core/waveform/waveform_inside.h"
 
-/* Signals of a window's samples. Returns the largest. */
+/* Computes the signals of a window's samples. Returns the largest. */
 static double detect_signals(const struct finder *finder, double baseline, const uint16_t *sample, uint32_t n,
                              double *y)
 {
@@ -45,7 +45,7 @@ static double detect_prominence(const struct finder *finder, double y)
     return fmax(6.5 * finder->noise, 0.15 * y);
 }
 
-/* Where the signal is within a sigma of nothing, an echo has ended, however weak it was, and another may begin. */
+/* Where the signal is within a sigma of zero, an echo has ended, however weak it was, and another may begin. */
 static int detect_fell(const struct finder *finder, double high, double y)
 {
     return y < fmax(high - detect_prominence(finder, high), finder->noise);
@@ -85,9 +85,9 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
     return n;
 }
 
-/* The parabola through the logarithms of three samples is exact for a Gaussian. Where pulses are short beside
- * the sampling, noise may make a neighbour zero or less: it counts as 2 % of the top. A neighbour above the top is
- * noise, too, and says nothing of a top: the parabola through it may have its top anywhere. */
+/* The parabola through the logarithms of three samples is exact for a Gaussian. Where pulses are short compared with
+ * the time between samples, noise may make a neighbour zero or less: it counts as 2 % of the top. A neighbour above the
+ * top is noise, too: then no parabola is used, since its top may be anywhere. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place)
 {
     const double y = run->y[top], least = 0.02 * y;
@@ -109,7 +109,7 @@ static double detect_crossing(const double *y, uint32_t a, uint32_t b, double le
     return (double)a + u * ((double)b - (double)a);
 }
 
-/* A spike that is no echo may rise and fall within a sample. No width is below half of one. */
+/* A spike that is no echo may rise and fall within a sample. Its width counts as half a sample. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2])
 {
     const double level = 0.5 * height;
@@ -163,7 +163,7 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
 }
 
 /* Keeps echoes of all detectors in the order of range. Where there is no room, the weakest is left out. */
-static void detect_put(struct finder_list *list, const struct waveform_echo *echo)
+static void detect_insert(struct finder_list *list, const struct waveform_echo *echo)
 {
     if (list->n == list->most) {
         list->crowded++;
@@ -221,7 +221,7 @@ void finder_add(const struct finder_run *run, const struct finder_found *found, 
         .deviation = detect_deviation(run, found, mix, self),
         .saturated = found->saturated,
     };
-    detect_put(list, &echo);
+    detect_insert(list, &echo);
 }
 
 void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,

@@ -277,6 +277,6 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     finder_mix_fit(&task, mix);
     while (mix->n < FINDER_MIX && !decompose_enough(&task, mix) && decompose_more(&task, least, mix)) {
     }
-    /* The bits of open components would have to move with them. */
+    /* decompose_fewer changes the components' order, which bits of mix->open would not follow. */
     if (mix->n > n + 1 && mix->open == 0) decompose_fewer(&task, least, mix);
 }

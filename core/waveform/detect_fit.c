@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One term goes through the samples of one maximum. Nearly all echoes are found so, so it has to be cheap.
+/* One term goes through the samples of one maximum. Nearly all echoes are found in this way, so it has to be cheap.
  *
  * The half maxima give a first term. Gauss's and Newton's steps then minimise the squares of the residual within
  * FINDER_NEAR sigma of its centre. Samples further out would lower the variance of the range by 0.6 % (the part of
@@ -102,7 +102,7 @@ double finder_fit_near(const struct finder_run *run, const struct finder_peak *p
     g->sigma = fmax((side[1] - side[0]) / FINDER_FWHM, 0.5);
     for (int i = 0; i < FIT_STEPS; i++) {
         struct fit_sums sums;
-        /* A sample at the border might go in and out for ever. */
+        /* Later steps keep their samples: one at the border might go in and out for ever. */
         if (i < 3 && !fit_samples(peak, g, &lo, &hi)) return -1.0;
         fit_sum(run, g, lo, hi, &sums);
         double gain = fit_step(&sums, g->peak, p);

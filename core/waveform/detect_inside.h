@@ -21,7 +21,7 @@ enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
-#define FINDER_SHAPE_LAG  8.0          /* and behind it */
+#define FINDER_SHAPE_LAG  8.0          /* widths of the pulse after it */
 
 /* Fits add up terms. A term is a Gaussian, or h stretched, where h is no Gaussian. Its middle is between its half
  * maxima, and its sigma is that of a Gaussian of the same width. */
@@ -58,8 +58,8 @@ struct finder {
     double reach[2];              /* so many sigmas before and after its middle a term ends */
     double area, variance, third; /* of h: its sum over the samples, and central moments */
     double shape[FINDER_SHAPE];   /* h over its peak */
-    uint32_t top;                 /* entry of the first maximum above a half in it */
-    double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* the logarithm of that, and its derivative by widths */
+    uint32_t top;                 /* entry of shape: its first maximum above a half */
+    double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* logarithm of shape, and its derivative by widths */
 };
 
 /* Returns the value of a table of h, so many widths after its centroid. */
@@ -78,7 +78,7 @@ double finder_lead(const struct finder *finder, double part);
 
 /* Fills `finder` from the signals of a waveform that is otherwise complete. */
 void finder_learn(const struct waveform *waveform, struct finder *finder);
-/* Find the echo whose term has this sigma, and the echo of this width. */
+/* Interpolate the figures of the echo whose term has this sigma, or of the echo of this width. */
 void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread);
 void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread);
 
@@ -123,7 +123,7 @@ double finder_noise2(const struct finder *finder, double n);
 
 /* A sum of terms. `open`: bit j is set where component j is limited, or cut by the window's end. */
 struct finder_mix {
-    uint32_t n, open, limited; /* limited: the same bits, only of those that are limited */
+    uint32_t n, open, limited; /* limited: bit j is set where component j is limited */
     struct finder_term g[FINDER_MIX];
     double chi2;
 };

@@ -23,7 +23,7 @@ struct learn_echo {
     uint32_t n, top;
 };
 
-/* The signal of an echo of amplitude 1, x samples after its centroid. */
+/* Returns the signal of an echo of amplitude 1, x samples after its centroid. */
 static double learn_signal(const struct waveform *waveform, double metre, double extent_m, double x)
 {
     const double far_m = 1e6 * metre; /* no bend of a near plane */
@@ -40,7 +40,7 @@ static void learn_sample(const struct waveform *waveform, double metre, double e
     }
 }
 
-/* Width and rising half maximum of what was sampled, in its steps. */
+/* Finds width and rising half maximum of a sampled echo, in its steps. */
 static double learn_half(const struct finder *finder, const struct learn_echo *echo, double *rise)
 {
     const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
@@ -138,7 +138,7 @@ double finder_lead(const struct finder *finder, double part)
     return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
 }
 
-/* The RMS that a term leaves near its middle. */
+/* Returns the RMS that a term leaves near its middle. */
 static double learn_rest(const struct finder *finder, const struct learn_echo *echo, const struct finder_term *g)
 {
     double sum = 0.0, n = 0.0;
@@ -207,7 +207,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 5.0 * finder->noise);
 }
 
-/* Sets `spread` between those of the tilts k and k + 1, at share u of the way. */
+/* Interpolates `spread` between the tilts k and k + 1, at share u of the way. */
 static void learn_between(const struct finder *finder, uint32_t k, double u, struct finder_spread *spread)
 {
     const struct finder_spread *a = &finder->spread[k], *b = a + 1;

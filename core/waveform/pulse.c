@@ -69,9 +69,9 @@ static double parts_of(const struct outgoing *o, double fine_s)
     return o->pieces * ceil((o->to_s - o->from_s) / o->pieces / fine_s);
 }
 
-/* Returns sigma of the receiver's answer to an impulse. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f /
- * B)^2), to which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays
- * nothing here (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
+/* Returns sigma of the receiver's impulse response. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to
+ * which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays nothing here
+ * (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
 static double receiver_sigma_s(double bandwidth_hz)
 {
     return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;
@@ -102,9 +102,9 @@ static double scale_of(const struct outgoing *o, double sigma_s)
     return scale_s;
 }
 
-/* Fills h on n steps, the first of them at from_s. The receiver's answers to all of the pulse lie within them. The
- * pulse is taken finely enough for itself and for the answer. Answers shorter than 1/64 of a step would change h by
- * less than 1e-6. */
+/* Fills h on n steps, the first of them at from_s: the pulse convolved with the impulse response, which lies within
+ * them. The pulse is summed finely enough for both. A response shorter than 1/64 of a step would change h by less than
+ * 1e-6. */
 static void fill_steps(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
 {
     const double fine_s = fmin(o->fine_s, sigma_s), reach_s = GAUSSIAN_END * sigma_s;

@@ -25,7 +25,7 @@ struct sampling {
     double signal[WAVEFORM_MAX_SAMPLES];
 };
 
-/* These windows were found in a stretch. */
+/* The windows found in a piece of a stretch. */
 struct found {
     struct span window[WAVEFORM_MAX_WINDOWS];
     uint32_t n;

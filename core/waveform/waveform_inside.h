@@ -14,8 +14,8 @@
 struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
-    double lead, lag;               /* its first and last step before and behind the centroid, in samples */
-    double scale;                   /* in samples: sigma of the Gaussian with 1e-5 in its spectrum where h has it */
+    double lead, lag;               /* from its first step to the centroid, from there to its last one; in samples */
+    double scale;                   /* in samples: sigma of the Gaussian whose spectrum falls to 1e-5 where h's does */
     double area_s;
 };
 /* For a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a failure. */
