@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/cast/kernels_aim.h"
 #include "core/cast/kernels_moving.h"
 #include "core/cast/kernels_sweep.h"
@@ -24,13 +23,14 @@ static int reading_rotation(const struct cast_setup *s, double to_crs[9])
     return linear;
 }
 
-/* Vectors of socs -> prcs, and the places of the head, each by the pose of its own time. */
+/* Vectors d and r are turned from socs to prcs, each by the pose of its pulse's time. `place` gets the head's place. */
 struct move {
     struct vec3_in d, r; /* r.x NULL: only d */
     struct vec3_out to_d, to_r, place;
 };
 
-/* Finds the leg of pulse i, and returns the first of the n pulses after it; times don't fall. */
+/* Finds the leg that pulse i lies in, which is the way between two poses. Returns the first of the n pulses beyond it;
+ * pulses are in order of time. */
 static uint32_t find_leg(const struct cast_setup *s, const struct chunk *k, const uint32_t *dt_ns, uint32_t i,
                          uint32_t n, struct kernel_leg *leg)
 {
@@ -76,7 +76,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
     const int wobbles = s->disturbance != NULL && s->disturbance->n_wobbles != 0;
     struct kernel_leg leg;
-    /* Where the head does not turn on its way, one rotation holds for the chunk, as for a head that stands. */
+    /* Where the head moves without turning, one rotation holds for the chunk, as for a head that stands. */
     const int straight = moves && find_leg(s, k, k->dt_ns, 0, k->n, &leg) == k->n && leg.turn == 0.0 &&
                          (s->disturbance == NULL || s->disturbance->slip_turn == 0.0);
     const int turns_later = moves && !straight;

@@ -6,7 +6,7 @@
 #include "core/cast/kernels_aim.h"
 #include "core/vecmath.h"
 
-/* A matrix as values of its own, which no store to an array can change. */
+/* A matrix in local values, so that the compiler need not read it again after each store to an array. */
 struct aim_matrix {
     double xx, xy, xz, yx, yy, yz, zx, zy, zz;
 };

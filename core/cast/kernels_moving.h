@@ -10,7 +10,7 @@
 struct kernel_leg {
     double before_ns, span_ns;         /* from the first pose to the run's t0; to the second pose */
     double position_m[3], shift_m[3];  /* at the first pose; from there to the second */
-    double rotation[9], axis[3], turn; /* socs -> prcs at the first; about this axis of socs by `turn` turns */
+    double rotation[9], axis[3], turn; /* socs -> prcs at the first; it turns about `axis` (socs) by `turn` turns */
 };
 void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0_ns, struct kernel_leg *leg);
 /* Directions s (socs) -> d (prcs) of n pulses, dt_ns after the run's t0. */
