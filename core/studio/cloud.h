@@ -34,8 +34,8 @@ struct cloud {
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
-    /* The step to which the file rounds coordinates, on the ground: the scale of LAS; 1e-6 m of a PLY as text, as our
-     * recorder writes it; two units in the last place of single precision; 0: it rounds nothing. */
+    /* The step that the file rounds coordinates to, in metres, also of degrees. It is the scale of LAS, 1e-6 m of a PLY
+     * as text (as our recorder writes it), or two units in the last place of single precision. 0: none is rounded. */
     double count_m;
     int is_single;      /* 1: in single precision */
     int is_text;        /* 1: the file holds coordinates as decimal numbers */
@@ -70,9 +70,9 @@ enum cloud_column {
  * of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err);
-/* Positions alone, of software that is not ours: PLY and LAS as above; PCD (text, binary, compressed); and text, a line
- * a point, with blanks, commas or semicolons between numbers. There a line of names that has x, y and z says where they
- * stand; else they come first. Lines that are no points are left out, with a warning of more than one. */
+/* Reads positions alone, from files of any software: PLY and LAS as above; PCD (text, binary, compressed); and text, a
+ * line a point, with blanks, commas or semicolons between numbers. In text a line of names may say which columns are x,
+ * y and z; else they are the first three. Other lines are left out; more than one of them gives a warning. */
 int cloud_read_positions(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
@@ -83,9 +83,9 @@ struct cloud_site {
         *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
     uint32_t n_stations;
     double max_m; /* reach of the search */
-    /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from
-     * the scene to the body's own frame and gives the body's index; NULL: the point is of the scene. From any
-     * thread. */
+    /* For bodies that move, which are not in the scene's index; NULL: there are none. Turns a point with such a body's
+     * label into the body's own frame, and returns the body's index. Returns NULL for a point of the scene. Called from
+     * any thread. */
     const struct distance *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
     void *body_ctx;
     unsigned threads; /* at least 1; the result does not depend on it */
@@ -105,7 +105,7 @@ struct cloud_compared {
     const uint32_t *triangle; /* [cloud->n] */
 };
 
-/* The station of point i, from 1, and its place in the scene. */
+/* These return the station of point i, from 1, and its place in the scene. */
 static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
 {
     return cloud->station != NULL ? cloud->station[i] : 1;
@@ -123,8 +123,8 @@ struct cloud_coverage {
  * there is no such triangle. */
 uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 
-/* How many of the n_surfaces, the scene's and then those of bodies, and of the scene's triangles have points
- * (far ones have no triangle). SH_EINPUT: a label of n_surfaces or more. */
+/* Counts the surfaces and the triangles that have points. n_surfaces: those of the scene and then those of bodies;
+ * triangles: of the scene, and far points have none. SH_EINPUT: a label of n_surfaces or more. */
 int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
                 struct cloud_coverage *out, struct sh_err *err);
 

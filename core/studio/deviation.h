@@ -3,10 +3,10 @@
  * deviations. In: a cloud (core/studio/cloud.h) with its distances, and each station's head. Out: per point the
  * deviation along the beam, its expected sigma, range and incidence, in metres and as cosines.
  *
- * Along the beam: the line from the station through the point is followed to the scene. measured - exact range
- * is positive where the point lies beyond the surface. Exact is the range of the BVH's first hit. Where the point
- * belongs to another surface (a later echo, what lies beyond glass), it is that of the nearest triangle, if the
- * line crosses that one.
+ * Along the beam: the line from the station through the point is followed to the scene. The deviation is the measured
+ * minus the exact range, so it is positive where the point lies beyond the surface. The exact range is that of the
+ * BVH's first hit. Where the point belongs to another surface (a later echo, a point beyond glass), it is that of the
+ * nearest triangle, if the line crosses that one.
  *
  * On a smooth face: the point's distance from the nearest triangle is the deviation times the cosine of the
  * incidence, to 1 % and 2 um. So the surface that the beam meets is also the nearest one, and no edge or corner is
@@ -21,7 +21,7 @@
  * Expected sigma of that deviation, to first order. u: the beam, n: the face's normal, i: the incidence, R: the
  * range; with cos i = |n u| a move of the point by m changes the deviation by (n m) / (n u):
  *     range noise      sigma0 + sigma1 R, or by the signal (core/detect.h)
- *     angle noise      R sigma |n e| / cos i, e: where the angle moves the beam, at right angles to it
+ *     angle noise      R sigma |n e| / cos i, e: the direction in which the angle moves the beam
  *     ball             f_k |n_k| radius / sqrt(5) / cos i over its axes: a ball's uniform points have r^2/5 an axis
  * The steps of counts add to that. They are summed separately, since they are no noise:
  *     of encoders      as angle noise of sigma = step / sqrt(12)
@@ -31,9 +31,9 @@
  * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
  * instrument.
  *
- * The bound of the distance, where the only random effect is a ball. It adds: errors of cast and georeferencing
- * from the plan, half a count an axis (sqrt(3)/2 counts of a position; a polar point's range and angles, at right
- * angles to each other), half an encoder count an axis times R, the ball's radius. */
+ * The distance has a bound where the only random effect is a ball. The bound is the sum of the plan's errors of cast
+ * and georeferencing, half a count an axis (sqrt(3)/2 counts of a position, or a polar point's range and angles at
+ * right angles to each other), half an encoder count an axis times R, and the ball's radius. */
 #ifndef CORE_STUDIO_DEVIATION_H
 #define CORE_STUDIO_DEVIATION_H
 
@@ -75,7 +75,7 @@ struct deviation_hit {
     double range_m, beam[3], normal[3]; /* unit vectors, prcs */
     int32_t label;                      /* of the surface; -1: what comes back of it is not known */
 };
-/* The expected sigma there, by noise; and what counts add, as if every place within a count were as likely. */
+/* Returns the expected sigma there, by noise. *counts_m: the part of counts, if all places within one are as likely. */
 double deviation_sigma_m(const struct deviation_head *head, const struct deviation_hit *hit, double *counts_m);
 
 /* These figures give a client the same sigma. Amplitudes count in units of the threshold. */
@@ -90,7 +90,7 @@ struct deviation_terms {
 /* Returns 0 where no error is expected, since the instrument has errors of its own. */
 int deviation_terms_of(const struct deviation_head *head, struct deviation_terms *out);
 
-/* INFINITY: there is no bound, as for Gaussian noise. */
+/* Returns the bound of the distance at a range. INFINITY: there is none, as for Gaussian noise. */
 double deviation_bound_m(const struct deviation_head *head, double range_m);
 
 #endif

@@ -4,8 +4,8 @@
  *
  * Units and frames: metres, z up, right-handed. In the formats:
  *   .ply   binary, little-endian: coordinates as double. As text: to the nanometre.
- *   .obj   coordinates to the nanometre; z up (the format has neither unit nor axes). With a material (a texture, or
- *          parts): NAME.mtl beside it.
+ *   .obj   coordinates to the nanometre; z up (the format has neither unit nor axes). Where the mesh or a part of it
+ *          has a texture, NAME.mtl is written, too.
  *   .gltf, .glb  float; metres and y up, as the format demands: (x, y, z) is written as (x, z, -y). Colours are linear
  *          there, and left out where a texture is. .gltf has its numbers in NAME.bin beside it, .glb all it
  *          needs within.

@@ -34,7 +34,7 @@ struct scan_grid {
     const struct scan_column *column; /* [n_columns] lines rising */
     double head_m[3];                 /* where the head stood */
     const float (*to_head_m)[3];      /* [n_points] head minus point; NULL: head_m */
-    uint32_t rows_per_turn;           /* from 3 on: the row before that borders on row 0 */
+    uint32_t rows_per_turn;           /* from 3 on: the last row of a turn borders on row 0; less: none does */
     int closes;                       /* the last column borders on the first; needs three columns */
     double long_edge;                 /* 0: no filter */
 };

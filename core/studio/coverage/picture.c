@@ -16,7 +16,7 @@ static const uint8_t BY_NONE[3] = {206, 52, 44}, BY_ONE[3] = {236, 200, 58}, BY_
 
 /* ---- the pieces in their order */
 
-/* As many rows from `first` on as are one cell. */
+/* Returns the end of the rows from `first` on that belong to one cell. */
 static uint32_t rows_alike(const uint32_t *piece, uint32_t first, uint32_t rows)
 {
     uint32_t end = first + 1;

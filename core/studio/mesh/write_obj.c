@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* .obj, and .mtl beside it where there is a texture or a part with one. A colour of a vertex follows its coordinates,
- * as fractions: many readers take that, though the format does not name it. */
+/* .obj, and .mtl where the mesh or a part has a texture. A colour of a vertex follows its coordinates, as fractions:
+ * many readers take that, though the format does not name it. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -99,7 +99,7 @@ static char *put_point(char *p, const struct mesh *m, uint32_t i)
     return p;
 }
 
-/* work: counts the rows; NULL: they don't count. */
+/* Writes n rows. work: counts them; NULL: they don't count. */
 static int put_rows(const struct obj *o, char *(*put)(char *p, const struct mesh *m, uint32_t i), uint32_t first,
                     uint32_t n, struct mesh_work *work, struct sh_err *err)
 {
@@ -157,7 +157,7 @@ int mesh_write_obj(const struct mesh_format *format, struct mesh_output *out, co
     const char *name = mesh_stem(out->path, &len);
     snprintf(o.whole_name, sizeof o.whole_name, "%.*s", (int)len, name);
     o.whole = (struct mesh_part){o.whole_name, mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
-    if (has_textures(&o) && (materials = mesh_beside(out->path, ".mtl")) == NULL)
+    if (has_textures(&o) && (materials = mesh_with_ending(out->path, ".mtl")) == NULL)
         return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", out->path);
     int rc = write_main(&o, out, materials, err);
     free(materials);

@@ -6,10 +6,8 @@
 #include "core/decimal.h"
 #include "core/studio/mesh/inside.h"
 
-enum {
-    MAX_SCALARS = 8,
-    ROW = (3 + 3 + 3 + 2 + MAX_SCALARS) * (DECIMAL_GENERAL_ROOM + 1)
-}; /* a vertex; a face has less */
+enum { MAX_SCALARS = 8 };
+enum { ROW = (3 + 3 + 3 + 2 + MAX_SCALARS) * (DECIMAL_GENERAL_ROOM + 1) }; /* bytes of a vertex; a face has less */
 
 static const char *const type_name[] = {"double", "float", "ushort"};
 

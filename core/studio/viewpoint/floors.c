@@ -27,7 +27,7 @@ struct floors {
     uint32_t covered; /* columns that hold anything */
 };
 
-/* All columns are followed at a time: each ray begins just below the surface that the last one hit. */
+/* All columns are followed together: each ray begins just below the surface that the one before hit. */
 struct column {
     double top_m, last_m; /* where the next ray begins; the last surface, INFINITY: none yet */
 };
@@ -68,7 +68,7 @@ static int take_layer(struct survey *s, struct column *column, struct floors *fl
     return n_hits;
 }
 
-/* 0: no memory. */
+/* Finds all floors. Returns 0 where there is no memory. */
 static int drop(struct survey *s, const struct sh_report *report, struct floors *floors)
 {
     struct column column[N_COLUMNS];
@@ -102,7 +102,7 @@ static int stands(const struct survey *s, uint32_t first, double height)
     return n >= LEGS - 2;
 }
 
-/* Directions as a scan's: even in azimuth and in line angle. Each line begins a little further. */
+/* Casts rays as a scan does, evenly in azimuth and in line angle. Each line begins a little further round. */
 static struct survey_sight floors_look(struct survey *s, const struct floor *f, double height, int *level)
 {
     const double p[3] = {f->at_m[0], f->at_m[1], f->at_m[2] + height};
@@ -124,7 +124,8 @@ static struct survey_sight floors_look(struct survey *s, const struct floor *f, 
     return survey_look(s, LEGS, LOOKS);
 }
 
-/* More is better: what is seen, how far away it is, how near to the middle and how low the place is. */
+/* Returns a score that grows with the share seen and with its distance. It falls with the place's distance from the
+ * middle and with its height. */
 static double score(const struct survey *s, const struct floor *f, const struct survey_sight *sight)
 {
     double aside = hypot(f->at_m[0] - s->centre_m[0], f->at_m[1] - s->centre_m[1]) / s->radius_m;

@@ -42,7 +42,7 @@ static double to_mm(double m)
     return round(1e3 * m) * 1e-3;
 }
 
-/* 0: no memory. */
+/* Takes a ray's hit as a floor, if it is one. Returns 0 where there is no memory. */
 static int take_surface(struct search *s, struct drop *d, uint32_t ray)
 {
     const double z_m = d->top_m - s->survey.rays.range_m[ray];
@@ -55,7 +55,7 @@ static int take_surface(struct search *s, struct drop *d, uint32_t ray)
     return places_keep(&s->floor, &s->n_floors, &s->floor_room, &floor);
 }
 
-/* Floors of up to BVH_CHUNK columns, layer by layer. */
+/* Finds the floors of up to BVH_CHUNK columns, layer by layer. */
 static int find_floors(struct search *s, struct drop *drop, uint32_t n)
 {
     int has_room = 1, open = 1;
@@ -83,7 +83,7 @@ static int places_compare(const void *a, const void *b)
     return (p->position_m[2] < q->position_m[2]) - (p->position_m[2] > q->position_m[2]);
 }
 
-/* Rays of one place: down beside it, and outward from the head. */
+/* Adds the rays of one place: down around it, and outward from the head. */
 static void add_looks(struct search *s, const struct viewpoint_place *p)
 {
     const double *at = p->position_m;
@@ -140,7 +140,7 @@ static int places_find(struct search *s, struct sh_err *err)
     return choose(s) ? sh_check_stop(s->report, err) : sh_fail(err, SH_ENOMEM, "no memory for places to stand");
 }
 
-/* The step with which the grid has as many places as are allowed. A side that is shorter than a step still has one. */
+/* Returns the step with which the grid has as many places as are allowed. A side shorter than a step has one. */
 static double least_step_m(const struct viewpoint_grid *g)
 {
     const double x_m = g->max_m[0] - g->min_m[0], y_m = g->max_m[1] - g->min_m[1];

@@ -22,8 +22,6 @@ int survey_open(struct survey *s, const struct scene *scene, const struct viewpo
                 const struct sh_report *report, struct sh_err *err)
 {
     rays_set_up(s, scene, view);
-    /* Places outside are farther away: from there a ray may take one surface for another at their border, which a
-     * survey can bear. If the BVH reached so far for places inside, too, most of their hits would be in doubt. */
     int rc = bvh_create(scene, 0, report, &s->own, err);
     s->bvh = s->own;
     return rc == SH_OK ? bvh_work_create(&s->work, err) : rc;
