@@ -87,14 +87,14 @@ struct waveform_record {
     uint32_t n_left_out; /* samples that found no room here, or windows too many: they count as lost */
 };
 
-/* Samples of one pulse. scan_key: rng_scan; pulse: its number in the scan. */
+/* Makes the samples of one pulse. scan_key: rng_scan; pulse: its number in the scan. */
 void waveform_sample(const struct waveform *waveform, uint64_t scan_key, uint64_t pulse,
                      const struct waveform_return *returns, uint32_t n, struct waveform_record *record);
-/* P at range r_m without noise and digits, for tests and closed forms. */
+/* Returns P at range r_m without noise and digits, for tests and closed forms. */
 double waveform_signal(const struct waveform *waveform, const struct waveform_return *returns, uint32_t n, double r_m);
-/* The integral of h over time, s. */
+/* Returns the integral of h over time, s. */
 double waveform_pulse_area_s(const struct waveform *waveform);
-/* The spec, and what follows from it. */
+/* Returns the spec. */
 const struct waveform_spec *waveform_spec_of(const struct waveform *waveform);
 
 /* ---- detection: echoes from the samples of one pulse, as the head's firmware finds them */
@@ -117,7 +117,7 @@ struct waveform_echo {
 /* SH_EINPUT, without the file's name: echoes are not found with this pulse, since a long and weak part of it keeps its
  * centroid away from its peak. Samples of such a pulse are as good as others. */
 int waveform_check_detection(const struct waveform *waveform, struct sh_err *err);
-/* The largest value of h, of a pulse with which echoes are found. */
+/* Returns the largest value of h, of a pulse with which echoes are found. */
 double waveform_pulse_peak(const struct waveform *waveform);
 
 /* Finds at most `most` echoes in the order of range. level: the amplitude, in thresholds, below which nothing is an

@@ -100,8 +100,8 @@ double finder_top(const struct finder_run *run, uint32_t top, double *place)
     return y * exp(-0.125 * slope * slope / bend);
 }
 
-/* The crossing of a level between sample a, which is below it, and its neighbour b, which is not. Near half of the peak
- * a Gaussian bends by 0.193 of its peak over sigma^2 (v^2 - 1 at v^2 = 2 ln 2, times a half). */
+/* Returns the crossing of a level between sample a, which is below it, and its neighbour b, which is not. Near half
+ * of the peak a Gaussian bends by 0.193 of its peak over sigma^2 (v^2 - 1 at v^2 = 2 ln 2, times a half). */
 static double detect_crossing(const double *y, uint32_t a, uint32_t b, double level, double bend)
 {
     double step = y[b] - y[a], u = (level - y[a]) / step;
@@ -229,7 +229,7 @@ void finder_add_term(const struct finder_run *run, const struct finder_mix *mix,
 {
     const struct finder_term *g = &mix->g[self];
     struct finder_spread spread;
-    finder_by_sigma(run->finder, g->sigma, &spread);
+    finder_find(run->finder, FINDER_SIGMA, g->sigma, &spread);
     const struct finder_found found = {g->at - spread.lag, g->peak * spread.gain, spread.width,
                                        (int)(mix->limited >> self & 1)};
     if (found.peak >= level * run->finder->peak) finder_add(run, &found, mix, self, list);

@@ -116,7 +116,7 @@ static double decompose_shapes(const struct finder_task *task, const struct find
     double sum = 0.0;
     for (uint32_t j = 0; j < mix->n; j++) {
         struct finder_spread spread;
-        finder_by_sigma(task->run->finder, mix->g[j].sigma, &spread);
+        finder_find(task->run->finder, FINDER_SIGMA, mix->g[j].sigma, &spread);
         double left = (1.2 * spread.misfit + FINDER_ROUGH) * mix->g[j].peak;
         sum += left * left * 2.0 * FINDER_NEAR * mix->g[j].sigma;
     }
@@ -178,7 +178,7 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
             struct finder_spread spread;
             double apart = fabs(a->at - b->at);
             if (apart < 0.35 * task->run->finder->spread[0].sigma) return 0;
-            finder_by_sigma(task->run->finder, b->sigma, &spread);
+            finder_find(task->run->finder, FINDER_SIGMA, b->sigma, &spread);
             if (apart < 5.0 * b->sigma && a->peak < (2.0 * spread.tail + FINDER_ROUGH) * b->peak) return 0;
         }
     return 1;

@@ -66,7 +66,7 @@ void finder_fraction(const struct finder_run *run, double level, struct finder_l
         if (height < at || edges_hidden(run, &peak[i], list)) continue;
         (void)finder_half(run, &peak[i], height, side);
         struct finder_spread spread;
-        finder_by_width(run->finder, side[1] - side[0], &spread);
+        finder_find(run->finder, FINDER_WIDTH, side[1] - side[0], &spread);
         const struct finder_found found = {side[0] + spread.half_lead, height, side[1] - side[0], 0};
         finder_add(run, &found, NULL, 0, list);
     }

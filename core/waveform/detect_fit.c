@@ -157,6 +157,6 @@ int finder_fit(const struct finder_run *run, const struct finder_peak *peak, str
     struct finder_spread spread;
     double rms = finder_fit_near(run, peak, g);
     if (rms < 0.0 || g->sigma < FINDER_LEAST * finder->spread[0].sigma) return 0;
-    finder_by_sigma(finder, g->sigma, &spread);
+    finder_find(finder, FINDER_SIGMA, g->sigma, &spread);
     return rms <= fit_explained(run, g, spread.misfit) && fit_alone(run, peak, g, 1.2 * spread.tail + FINDER_ROUGH);
 }

@@ -78,9 +78,9 @@ double finder_lead(const struct finder *finder, double part);
 
 /* Fills `finder` from the signals of a waveform that is otherwise complete. */
 void finder_learn(const struct waveform *waveform, struct finder *finder);
-/* Interpolate the figures of the echo whose term has this sigma, or of the echo of this width. */
-void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread);
-void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread);
+/* Interpolates the figures of the echo whose term has this sigma, or of the echo of this width. */
+enum finder_key { FINDER_SIGMA, FINDER_WIDTH };
+void finder_find(const struct finder *finder, enum finder_key key, double value, struct finder_spread *spread);
 
 enum finder_mark { FINDER_PLAIN, FINDER_LIMITED, FINDER_BLIND };
 
@@ -104,7 +104,7 @@ static inline int finder_limited(const struct finder_run *run, const struct find
 }
 /* Finds maxima of at least `least`, and keeps `most` of them. Returns their number, with those that found no room. */
 uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most);
-/* The largest signal about a top sample, and where it is. */
+/* Returns the largest signal about a top sample. *place: where it is. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place);
 /* Finds where the signal crosses half of the peak on both sides of its top, within the peak's samples. On a side
  * where it doesn't, that of the other side is mirrored. Returns how many sides were seen. */
@@ -118,7 +118,7 @@ struct finder_found {
     double at, peak, width;
     int saturated;
 };
-/* A mean of n squares of noise is larger than this once in 30,000 times. */
+/* Returns a limit that a mean of n squares of noise exceeds once in 30,000 times. */
 double finder_noise2(const struct finder *finder, double n);
 
 /* A sum of terms. `open`: bit j is set where component j is limited, or cut by the window's end. */

@@ -231,30 +231,23 @@ static void learn_stretch(const struct finder_spread *end, double ratio, struct 
     spread->half_lead *= ratio;
 }
 
-void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread)
+static double learn_key(const struct finder_spread *spread, enum finder_key key)
 {
-    const struct finder_spread *s = finder->spread, *end = &s[FINDER_SPREADS - 1];
-    uint32_t k = 0;
-    if (sigma <= s->sigma || sigma >= end->sigma) {
-        const struct finder_spread *near = sigma <= s->sigma ? s : end;
-        learn_stretch(near, sigma / near->sigma, spread);
-        return;
-    }
-    while (sigma > s[k + 1].sigma)
-        k++;
-    learn_between(finder, k, (sigma - s[k].sigma) / (s[k + 1].sigma - s[k].sigma), spread);
+    return key == FINDER_SIGMA ? spread->sigma : spread->width;
 }
 
-void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread)
+void finder_find(const struct finder *finder, enum finder_key key, double value, struct finder_spread *spread)
 {
     const struct finder_spread *s = finder->spread, *end = &s[FINDER_SPREADS - 1];
+    const double least = learn_key(s, key);
     uint32_t k = 0;
-    if (width <= s->width || width >= end->width) {
-        const struct finder_spread *near = width <= s->width ? s : end;
-        learn_stretch(near, width / near->width, spread);
+    if (value <= least || value >= learn_key(end, key)) {
+        const struct finder_spread *near = value <= least ? s : end;
+        learn_stretch(near, value / learn_key(near, key), spread);
         return;
     }
-    while (width > s[k + 1].width)
+    while (value > learn_key(&s[k + 1], key))
         k++;
-    learn_between(finder, k, (width - s[k].width) / (s[k + 1].width - s[k].width), spread);
+    const double before = learn_key(&s[k], key);
+    learn_between(finder, k, (value - before) / (learn_key(&s[k + 1], key) - before), spread);
 }
