@@ -65,7 +65,7 @@ struct coverage_pulses {
 /* Casts a scan. Its result waits until it is kept or dropped. Reports progress after a second. */
 int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, const char *what,
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
-/* Figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
+/* Gives figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
 void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *gain_m2);
 /* Makes the waiting scan that of the next station, counted from 1 in this order. */
 void coverage_keep(struct coverage *coverage);
@@ -163,7 +163,7 @@ struct coverage_places {
     const double (*place_m)[3]; /* [n] */
     _Atomic uint64_t *cells;    /* gets a bit for each cell that a ray hits, seen before or not; NULL: not asked for */
 };
-/* gain: [places->n] */
+/* Sets gain[places->n]. */
 int coverage_gains(const struct coverage *coverage, const struct coverage_directions *directions,
                    const struct coverage_places *places, const struct sh_report *report, struct coverage_gain *gain,
                    struct sh_err *err);

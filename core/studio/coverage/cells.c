@@ -33,12 +33,6 @@ struct build {
     int rc;
 };
 
-void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3])
-{
-    for (int i = 0; i < 3; i++)
-        memcpy(corner[i], c->scene->vertex_m[c->scene->triangle[triangle][i]], sizeof corner[i]);
-}
-
 static float float_of(uint32_t bits)
 {
     float f;
@@ -80,7 +74,7 @@ static double count_pieces(const struct coverage *c, double cell_m)
     for (uint32_t t = 0; t < c->scene->n_triangles; t++) {
         double corner[3][3];
         if (!has_cells(c, t)) continue;
-        coverage_corners(c, t, corner);
+        scene_corners(c->scene, t, corner);
         pieces += cut_count((const double(*)[3])corner, cell_m);
     }
     return pieces;
@@ -148,7 +142,7 @@ static void cut_triangle(struct build *b, uint32_t t)
     struct coverage *c = b->c;
     double corner[3][3], n[3];
     struct cut cut;
-    coverage_corners(c, t, corner);
+    scene_corners(c->scene, t, corner);
     vec3_normal(corner[0], corner[1], corner[2], n);
     const double area_m2 = 0.5 * vec3_length(n);
     if (c->first[t] == NO_CELL) {
@@ -209,7 +203,7 @@ static int number_pieces(struct coverage *c, struct sh_err *err)
         c->first[t] = NO_CELL;
         if (!has_cells(c, t)) continue;
         c->first[t] = (uint32_t)c->n_columns;
-        coverage_corners(c, t, corner);
+        scene_corners(c->scene, t, corner);
         cut_set_up((const double(*)[3])corner, c->spec.cell_m, &cut);
         const uint32_t columns = cut_columns(&cut);
         has_room = grow(&c->column, &room, c->n_columns + columns, sizeof *c->column);
@@ -257,7 +251,7 @@ uint32_t coverage_cell_at(const struct coverage *c, uint32_t triangle, const dou
     double corner[3][3], n[3], weight[3];
     struct cut cut;
     uint32_t column, row;
-    coverage_corners(c, triangle, corner);
+    scene_corners(c->scene, triangle, corner);
     vec3_normal(corner[0], corner[1], corner[2], n);
     for (int i = 0; i < 3; i++) { /* a weight is the area of the triangle that the point and the opposite edge make */
         double across[3];

@@ -36,9 +36,6 @@ struct coverage {
     struct cell_hits *hits; /* of the scan that waits */
 };
 
-/* Corners of a triangle, prcs. */
-void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3]);
-
 uint32_t coverage_bits(double value);
 
 #endif

@@ -57,7 +57,7 @@ static void add_hits(struct worker *w, uint32_t n)
     atomic_fetch_add(&w->look->met, met);
 }
 
-/* Pulses first .. end of one line. */
+/* Casts pulses first .. end of one line. */
 static void cast_line(struct worker *w, const struct schedule_line *line, uint64_t first, uint64_t end)
 {
     const struct coverage_scan *scan = w->look->scan;

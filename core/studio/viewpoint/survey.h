@@ -40,6 +40,18 @@ void survey_add(struct survey *s, const double from_m[3], const double dir[3]);
 void survey_cast(struct survey *s);
 void survey_clear(struct survey *s);
 
+/* A column of the scene that rays go down, from surface to surface. */
+struct survey_column {
+    double x_m, y_m;
+    double top_m;  /* where the next ray begins, just below the last surface */
+    double last_m; /* that surface; INFINITY: none yet */
+};
+static const double survey_down[3] = {0.0, 0.0, -1.0};
+/* Follows n <= BVH_CHUNK columns together, until none has a further surface or report asks to stop. take gets each
+ * surface at z_m, hit by ray i of column i, whose last_m is still the surface above. Returns 0 where take does. */
+int survey_descend(struct survey *s, struct survey_column *column, uint32_t n, const struct sh_report *report,
+                   int (*take)(void *ctx, uint32_t i, double z_m), void *ctx);
+
 /* Returns the cosine between a ray and its triangle's normal, -1..1: negative where it hits the front. */
 double survey_cosine(const struct survey *s, uint32_t ray);
 
