@@ -182,7 +182,7 @@ struct cast_counters {
 
 struct caster;
 
-/* Working memory of one thread. */
+/* Makes the working memory of one thread. */
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 /* Makes memory for waveforms. Without it a caster casts as if its setups had none. */
@@ -213,7 +213,7 @@ struct cast_hit {
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 
-/* Exact hits, with the caster's working memory; bvh.h. */
+/* Finds exact hits (bvh.h) with the caster's working memory. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Makes the outlines of a scene that are steps as seen from the station: beam_outlines_create, with rays into bvh.
@@ -231,7 +231,8 @@ enum cast_stage {
     CAST_POSITIONS,
     CAST_STAGES
 };
-/* NULL: off, which costs nothing that could be measured. The profile stays the caller's. */
+/* Measures the cost of each stage. NULL: off, which costs nothing that could be measured. The profile stays the
+ * caller's. */
 void caster_set_profile(struct caster *caster, struct bvh_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);

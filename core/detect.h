@@ -79,13 +79,13 @@ struct detect_signal {
  * order. */
 int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err);
 
-/* A of a return E rho(i). */
+/* Returns A of a return E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
 
 /* Returns the reflectance that a head reports for an amplitude at range_m, in the data sheet's air. */
 double detect_reflectance(const struct detect_signal *signal, double range_m, double amplitude);
 
-/* Extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's
+/* Returns the extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's
  * exponents (I. Kim et al., Comparison of laser beam propagation at 785 nm and 1550 nm in fog and haze,
  * 2001). */
 double detect_extinction_1_m(double visibility_m, double wavelength_m);
@@ -102,11 +102,11 @@ struct detect_echoes {
 
 /* Fills amplitude and refl_cdb; range_m becomes NaN where nothing is detected. */
 void detect_by_signal(const struct detect_signal *signal, const struct detect_echoes *echoes);
-/* After that: amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo. */
+/* Called after that. Sets amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo. */
 void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *echoes, int16_t *amplitude_cdb);
-/* Range noise by the amplitude. */
+/* Adds range noise by the amplitude. */
 void detect_range_noise(const struct detect_signal *signal, const struct detect_echoes *echoes);
-/* Range noise of sigma0 + sigma1 * range, whatever the signal. */
+/* Adds range noise of sigma0 + sigma1 * range, whatever the signal. */
 void detect_fixed_noise(double sigma0_m, double sigma1, uint64_t range_key, uint32_t n, const uint64_t *key,
                         double *range_m);
 
@@ -135,7 +135,7 @@ struct detect_points {
     double *range_m, *mirror_turn, *pan_turn;
     uint64_t scan_key; /* rng_scan */
 };
-/* rotation: socs -> prcs; NULL with local axes. */
+/* Moves each point within its ball. rotation: socs -> prcs; NULL with local axes. */
 void detect_move_in_ball(const struct detect_ball *ball, const double rotation[9], const struct detect_points *points);
 
 #endif

@@ -84,7 +84,7 @@ struct beam {
     double along[BEAM_HALF_STEPS + 2], across[BEAM_HALF_STEPS + 2];
 };
 
-/* Lengths and angles as above; the pulse width in seconds. */
+/* Sets a beam's figures, with exit diameter and divergence as above. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
 /* Replaces the range at a footprint's centre by the mean of the footprint's ranges. The footprint lies on one plane,
@@ -93,13 +93,13 @@ double beam_radius(const struct beam *beam, double range_m);
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
 /* Sets the widths of the echoes of such footprints, for pulses of beam->resolution_m. */
 void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
-/* Width of an echo whose ranges have this variance. pulse_m is the pulse's own width, c tau / 2. */
+/* Returns the width of an echo whose ranges have this variance. pulse_m is the pulse's own width, c tau / 2. */
 double beam_echo_width(double pulse_m, double variance_m2);
 
-/* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
+/* Gives the part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
  * times the distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
-/* Its second moments, along n and along the line. */
+/* Gives its second moments, along n and along the line. */
 void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
@@ -108,7 +108,7 @@ struct beam_pattern {
     float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* 0 from n on; the room is a multiple of 64 */
     double rest; /* variance of x (and of y) around a place: that of the footprint minus that of the places */
 };
-/* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
+/* Makes a pattern of 0 (the centre alone) to BEAM_MAX_RINGS rings. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
 /* At the end of a plane, the sub-rays that hit it stand for the part of the footprint on it. The error of their
@@ -117,7 +117,7 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern);
  * better, since each has 1/n of the energy or nothing. Outlines cut exactly. */
 double beam_end_error(uint32_t rings);
 
-/* Two axes across a beam's direction. */
+/* Chooses two axes across a beam's direction. */
 void beam_axes(const double dir[3], double e1[3], double e2[3]);
 struct beam_sight {
     double dir[3], e1[3], e2[3];
@@ -149,7 +149,7 @@ struct beam_merging {
     int by_surface;      /* 1: an echo's surface is the one that returns most; 0: that of its strongest return */
     uint32_t most;       /* echoes of a pulse; the weakest are left out */
 };
-/* For a footprint, as defined above. */
+/* Sets how the returns of a footprint are merged, as defined above. */
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);
 /* Sorts returns by range, in place. */
 void beam_sort(struct beam_return *returns, uint32_t n);
@@ -225,7 +225,7 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
+/* Finds the outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
  * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: the range from
  * which there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
@@ -242,12 +242,12 @@ struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     struct beam_part part[BEAM_MAX_PARTS];
 };
-/* fine: the pattern of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of
- * less than 0.05 % of the energy are left out. */
+/* Cuts a footprint by n lines. fine: the pattern of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than
+ * BEAM_MAX_PARTS. Parts of less than 0.05 % of the energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              int spreads, struct beam_parts *parts);
 
-/* Standard deviation of the ranges within a part that lies on the plane with normal n, range_m away in its
+/* Returns the standard deviation of the ranges within a part that lies on the plane with normal n, range_m away in its
  * centre. */
 float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
                       const struct beam_part *part);

@@ -69,7 +69,7 @@ struct plan_georef_need {
 /* Chooses the method and fills row. SH_EINPUT: the forced method has no bound here. The georef is not changed. */
 int plan_georef(const struct georef *georef, const struct plan_georef_need *need, enum georef_method *method,
                 struct plan_row *row, struct sh_err *err);
-/* Georeferencing where points leave as range and angles. */
+/* Fills the row where points are sent as range and angles. */
 void plan_georef_polar(struct plan_row *row);
 
 /* ---- sampling */
@@ -99,14 +99,14 @@ int plan_sample_create(const struct plan_places *places, const struct sh_report 
                        struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
-/* The error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
+/* Finds the error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
  * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures are upper
  * limits: error_m is three standard errors above the mean square. echo_share is the 95 % limit of Poisson's
  * distribution for the pulses that do not meet one smooth surface; the others count as they are found. The
  * first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
-/* The error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
+/* Finds the error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
  * pulse whose way is longer than that counts as wrong, too: the rest of its way is not known. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
@@ -135,7 +135,7 @@ struct plan_sight_found {
 int plan_sight(const struct plan_sight_need *need, const struct plan_places *places, const struct sh_report *report,
                int *map, struct plan_row *row, struct sh_err *err);
 
-/* The steps of plan_sight. 0: so few pulses don't pay for a map, whatever they hit. */
+/* The steps of plan_sight. This returns 0 where so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
 /* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as of struct sight_spec. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
@@ -152,10 +152,10 @@ struct plan_methods {
     int sight;           /* first hits are looked up in the station's map */
 };
 
-/* A beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
+/* Sets a beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
-/* The row of the mesh: the error of its vertices, see struct scene. */
+/* Fills the row of the mesh: the error of its vertices, see struct scene. */
 void plan_mesh(double error_m, struct plan_row *row);
 /* Fills the row of the cast, which leaves no choice. packet: rays per Embree call. */
 void plan_cast(uint32_t packet, struct plan_row *row);
@@ -176,8 +176,8 @@ enum { PLAN_HEAD_ROWS = 6 };
 
 /* Stages that are left out have the method "none" and say why. Returns how many rows. */
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS]);
-/* Processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and the rest of
- * the work for each pulse. Rows have the cost of methods beyond that. */
+/* Returns the processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and
+ * the rest of the work for each pulse. Rows have the cost of methods beyond that. */
 double plan_pulse_ns(double n_triangles, uint32_t packet);
 /* Fills a row with these figures. */
 void plan_say(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,

@@ -88,7 +88,7 @@ struct schedule_line {
     int last_of_frame;
 };
 
-/* First segment of a scan: pulse 0 at time 0, line 0, phase 0. The spec must have been checked. */
+/* Makes the first segment of a scan: pulse 0 at time 0, line 0, phase 0. The spec must have been checked. */
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec);
 
 /* Makes the segment that follows `before` from pulse k on, with a new spec. The pulse keeps its time, the mirror
@@ -97,33 +97,35 @@ void schedule_start(struct schedule_segment *seg, const struct schedule_spec *sp
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
                      const struct schedule_spec *spec, uint64_t k);
 
-/* Time of pulse k since the scan's start; k >= seg->k0. */
+/* Returns the time of pulse k since the scan's start; k >= seg->k0. */
 int64_t schedule_time_ns(const struct schedule_segment *seg, uint64_t k);
-/* num/den: how many nanoseconds a firing sequence lasts, or a pulse where there is no sequence. */
+/* Sets num/den to the nanoseconds of a firing sequence, or of a pulse where there is no sequence. */
 void schedule_sequence_ns(const struct schedule_segment *seg, uint64_t *num, uint64_t *den);
-/* First pulse that fires at or after t_ns; at least seg->k0. */
+/* Returns the first pulse that fires at or after t_ns; at least seg->k0. */
 uint64_t schedule_pulse_at(const struct schedule_segment *seg, int64_t t_ns);
-/* Line of pulse k. */
+/* Returns the line of pulse k. */
 uint64_t schedule_line_of(const struct schedule_segment *seg, uint64_t k);
-/* Everything about line n of the segment (n >= line0). */
+/* Fills `line` for line n of the segment, n >= line0. */
 void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct schedule_line *line);
 
-/* A cut at or before pulse k where packets end: a multiple of SCHEDULE_PACKET from the line's first pulse. */
+/* Returns the last pulse up to k where a packet may begin: a multiple of SCHEDULE_PACKET from the line's first
+ * pulse. */
 uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 
-/* The run of pulses k .. k+n-1, all of `line`. */
+/* Fills the run of pulses k .. k+n-1, all of `line`. */
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
 
-/* The angle at pulse k of the axis that sweeps a line, in turns: a line head's mirror, the rotor of a head of beams. */
+/* Returns the angle at pulse k of the axis that sweeps a line, in turns: a line head's mirror, the rotor of a head
+ * of beams. */
 double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k);
 /* Changes a run of a line head, or of a head of beams: that axis stands still at sweep_turn. Lines go on by time. */
 void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, struct schedule_run *run);
 
-/* The number of pulses that fire within max_ns, at least one. */
+/* Returns the number of pulses that fire within max_ns, at least one. */
 uint64_t schedule_longest_run(const struct schedule_segment *seg, int64_t max_ns);
 
-/* Pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one
+/* These return pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one
  * turn. */
 double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k);
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k);

@@ -101,19 +101,19 @@ void surface_colours_set(struct surface_colours *colours, uint32_t label, const 
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
                             struct sh_err *err);
-/* The colour of a hit. uv is finite, or NULL where it is not known; rgb is the colour between the vertices, or NULL
- * where there is none. Labels beyond the entries are grey. */
+/* Returns the colour of a hit. uv is finite, or NULL where it is not known; rgb is the colour between the vertices,
+ * or NULL where there is none. Labels beyond the entries are grey. */
 uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2],
                         const uint8_t rgb[3]);
 
-/* The surface of a label, entry n for one beyond the table. */
+/* Returns the surface of a label, and entry n for one beyond the table. */
 static inline const struct surface *surface_at(const struct surface_table *table, uint32_t label)
 {
     label = surface_of_label(label);
     return &table->surface[label < table->n ? label : table->n];
 }
 
-/* rho(i) of n hits; label beyond the table: 0. */
+/* Computes rho(i) of n hits; it is 0 for a label beyond the table. */
 void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,
                     double *rho);
 

@@ -12,7 +12,7 @@
 #include "core/cast/disturbance.h"
 #include "core/mat3.h"
 
-/* The rotation from socs to the frame of positions: to the CRS where that is a rotation, else to prcs.
+/* Sets to_crs to the rotation from socs to the frame of positions: the CRS where that is a rotation, else prcs.
  * Returns 1 in the first case. */
 static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
@@ -59,7 +59,7 @@ static void move(const struct cast_setup *s, const struct chunk *k, const uint32
     }
 }
 
-/* The rotation for the true beams where the pan has slipped; the encoders don't see the slip. */
+/* Returns the rotation of the true beams where the pan has slipped; the encoders don't see the slip. */
 static const double *slipped_rotation(const struct cast_setup *s, const double rotation[9], double out[9])
 {
     double slip[9];
@@ -69,7 +69,7 @@ static const double *slipped_rotation(const struct cast_setup *s, const double r
     return out;
 }
 
-/* For an ideal head: its beams go where its encoders say, except for the encoders' steps. */
+/* Aims the beams of an ideal head, which go where its encoders say, except for the encoders' steps. */
 static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_turns *turns)
 {
     const struct cast_setup *s = k->s;
@@ -101,7 +101,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     move(s, k, k->dt_ns, k->n, &m);
 }
 
-/* As slipped_rotation, for directions and origins in socs: turns them by the slip. */
+/* Turns directions and origins in socs by the slip, as slipped_rotation turns a rotation. */
 static void slip_bent(struct caster *c, const struct chunk *k, int offset)
 {
     double slip[9], back[9];
@@ -112,7 +112,7 @@ static void slip_bent(struct caster *c, const struct chunk *k, int offset)
     if (offset) kernel_turn_back(&VEC3_IN(c->read, 0), back, k->n, &VEC3_OUT(c->read, 0));
 }
 
-/* For a head with errors of mechanics and encoders: the turns become the encoders' readings. */
+/* Aims the beams of a head with errors of mechanics and encoders. The turns become the encoders' readings. */
 static void aim_bent(struct caster *c, struct chunk *k, const struct instrument *instrument)
 {
     const struct cast_setup *s = k->s;

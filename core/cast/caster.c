@@ -100,7 +100,7 @@ static void begin_echoes(struct echo_list *l, const struct chunk *k)
         l->width_m[i] = (float)k->s->pulse_m;
 }
 
-/* The rays of the pulses' centres, and the places for their hits. */
+/* Returns the rays of the pulses' centres, and the places for their hits. */
 static struct ray_hits centres(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;

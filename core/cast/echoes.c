@@ -46,7 +46,7 @@ static void list_paths(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Index of a pulse's echo j: its first one is in the pulse's place. */
+/* Returns the index of a pulse's echo j: its first one is in the pulse's place. */
 static uint32_t echoes_place_of(const struct secondary *f, uint32_t j)
 {
     return j == 0 ? f->pulse : f->at + j - 1;

@@ -45,7 +45,7 @@ void caster_echoes(struct caster *c, const struct chunk *k);
 /* The second half of caster_echoes decides which returns are detected, their noise, and which are sent. It is called
  * by itself for a list without returns, since noise in waveforms may still make echoes. */
 void caster_report(struct caster *c, const struct chunk *k);
-/* How many echoes a pulse may send. */
+/* Returns how many echoes a pulse may send. */
 uint32_t caster_max_echoes(const struct cast_setup *s);
 
 #endif

@@ -3,7 +3,7 @@
 
 #include "core/vecmath.h"
 
-/* Times of the pulses of a run with a table: they fire at the ticks of the sequence. */
+/* Computes times in a run with a table, whose pulses fire at ticks of the sequence. */
 static void times_of_table(const struct schedule_run *run, uint32_t *dt_ns)
 {
     const uint64_t begin = run->firing[run->firing_at].tick;

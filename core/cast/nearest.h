@@ -29,7 +29,7 @@ void caster_nearest(struct nearest *w, const struct cast_setup *s, const struct 
 
 /* Number of the tripod's legs among the bodies, as in struct ray_hits. */
 enum { CAST_LEGS = CAST_MAX_MOVERS + 1 };
-/* Body k > 0 of those that a ray may meet. */
+/* Returns body k > 0 of those that a ray may hit. */
 static inline const struct cast_mover *caster_body(const struct cast_setup *s, uint8_t body)
 {
     return body == CAST_LEGS ? &s->tripod->legs : &s->mover[body - 1];

@@ -29,7 +29,7 @@ static void follow_pulse(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Positions as a head computes them, from ranges and what its encoders read: writes the three numbers of
+/* Computes positions as a head does, from ranges and what its encoders read, and writes the three numbers of
  * echoes at .. at + n of the list. Returns 0 where all fit; numbers that don't are LINE_XYZ_NONE. */
 static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const struct kernel_wire *out)
 {

@@ -114,7 +114,7 @@ static void add_centre(struct caster *c, const struct cast_setup *s, const struc
     add_return(c, s, &job->centre, 1.0, rho);
 }
 
-/* Sigma of the ranges within the part that sub-ray i of a job stands for. */
+/* Returns sigma of the ranges within the part that sub-ray i of a job stands for. */
 static float hit_sigma(const struct caster *c, const struct cast_setup *s, const struct job *job, uint32_t i)
 {
     const struct pool *p = &c->sub_rays->pool;
@@ -284,7 +284,7 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
     if (w->n_jobs > 0) run_jobs(c, k);
 }
 
-/* The range up to which outlines may cut a footprint. Its centre hits a surface at range_m, and steep is 1
+/* Returns the range up to which outlines may cut a footprint. Its centre hits a surface at range_m, and steep is 1
  * / cos^2 of the incidence. The limit lies 4 radii of the footprint beyond the hit, and 3 more
  * times 1 / cos, since the surface may bend away: a footprint on a plane reaches tan(incidence) radii beyond. */
 static double limit_m(const struct beam *beam, double range_m, float steep)

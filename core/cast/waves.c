@@ -52,7 +52,7 @@ static void parts_end(struct wave_work *w, uint32_t pulse, uint32_t n)
     w->n_parts += n;
 }
 
-/* One part for returns that lie close together. It keeps their power, mean and variance. */
+/* Returns one part for returns that lie close together. It keeps their power, mean and variance. */
 static struct wave_part join_returns(const struct beam_return *r, uint32_t n)
 {
     double back = 0.0, first = 0.0, second = 0.0;

@@ -39,7 +39,7 @@ struct wave_work {
 struct caster;
 struct chunk;
 
-/* The caller begins with this, before returns are taken. */
+/* Begins a chunk, before its returns are taken. */
 void waves_begin(struct caster *c, const struct chunk *k);
 /* Takes the returns of a pulse with sub-rays, in any order; they may change places. */
 void waves_take_returns(struct caster *c, const struct chunk *k, uint32_t pulse, struct beam_return *returns,

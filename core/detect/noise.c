@@ -60,8 +60,8 @@ void detect_ball_keys(struct detect_ball *ball, uint64_t seed)
     ball->radius_key = rng_key(seed, RNG_BALL_RADIUS);
 }
 
-/* Uniform in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes), the cube
- * root of a uniform number the distance. */
+/* Draws a place uniformly in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes),
+ * the cube root of a uniform number the distance. */
 static void in_unit_ball(const struct detect_ball *ball, uint64_t scan_key, uint64_t key, double u[3])
 {
     uint64_t bits = rng_u64(ball->direction_key ^ scan_key, key);

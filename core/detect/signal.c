@@ -62,7 +62,7 @@ int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_si
     return SH_OK;
 }
 
-/* log rho_min. */
+/* Returns log rho_min. */
 VEC_INLINE double log_least(const struct detect_signal *s, double range_m)
 {
     double g = s->g0 + s->more_1_m[0] * (range_m - s->at_m[0]);

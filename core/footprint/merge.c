@@ -87,7 +87,7 @@ static struct average average(const struct beam_merging *how, const struct beam_
     return a;
 }
 
-/* One echo from returns without a gap between them. Returns 0 where they are too weak for one. */
+/* Makes one echo from returns without a gap between them. Returns 0 where they are too weak for one. */
 static int make_echo(const struct beam_merging *how, const struct beam_return *r, uint32_t n, struct beam_echo *echo)
 {
     double energy = 0.0, back = 0.0;

@@ -10,7 +10,7 @@
 /* Steeper surfaces than this look like a step, and count as one. */
 #define SLOPE 20.0
 
-static void put_pair(struct outline_prober *prober, uint32_t i, const double at[3], const double normal[3],
+static void aim_pair(struct outline_prober *prober, uint32_t i, const double at[3], const double normal[3],
                      double beside_m)
 {
     for (uint32_t side = 0; side < 2; side++) {
@@ -50,7 +50,7 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
     for (uint32_t i = 0; i < n; i++) {
         for (int k = 0; k < 3; k++)
             at[k] = p[k] + e[k] * (i + 0.5) / n;
-        put_pair(prober, i, at, normal, beside_m);
+        aim_pair(prober, i, at, normal, beside_m);
     }
     prober->probe->cast(prober->probe->ctx, 2 * n, &VEC3_IN(prober->dir, 0), prober->range_m, prober->kind);
     for (uint32_t i = 0; i < n; i++) {

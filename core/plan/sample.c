@@ -320,7 +320,7 @@ void plan_sample_optics(struct plan_sample *s, uint32_t depth, struct plan_optio
 
 /* ---- sight */
 
-/* Unit vectors to a pulse's direction, and to the corners of a square around it. */
+/* Makes unit vectors to a pulse's direction, and to the corners of a square around it. */
 static void square_around(const struct plan_place *p, uint64_t pulse, double across_rad, double d[3][SIGHT_RAYS])
 {
     const double pan = 2.0 * M_PI * schedule_pan_turn(&p->segment, pulse), half = 0.5 * across_rad;

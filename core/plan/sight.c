@@ -21,7 +21,7 @@ static const struct plan_ray_cost *ray_cost(uint32_t packet)
     return cost;
 }
 
-/* Cost of reading a triangle's plane, which both ways need. */
+/* Returns the cost of reading a triangle's plane, which both ways need. */
 static double plane_ns(double n_triangles)
 {
     return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * n_triangles));
@@ -32,14 +32,14 @@ double plan_pulse_ns(double n_triangles, uint32_t packet)
     return PLAN_COST_PULSE + ray_cost(packet)->hit + plane_ns(n_triangles);
 }
 
-/* Cells of the whole cube, as sight_cells chooses them for that many pulses. */
+/* Returns the cells of the whole cube, as sight_cells chooses them for that many pulses. */
 static double cells(const struct plan_sight_need *need)
 {
     const double edge = sight_cells(need->pulses / need->share, need->memory_bytes);
     return 6.0 * edge * edge;
 }
 
-/* The least cost of making a map, whatever it shows. */
+/* Returns the least cost of making a map, whatever it shows. */
 static double least_build_ns(const struct plan_sight_need *need)
 {
     return PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * need->n_triangles;
@@ -56,7 +56,7 @@ struct costs {
     double bvh, map, build;
 };
 
-/* The share of the cells with more than one triangle that the memory holds. */
+/* Returns the share of the cells with more than one triangle that the memory holds. */
 static double fitting(const struct plan_sight_need *need, const struct plan_sight_found *f, double mixed)
 {
     const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) +

@@ -6,7 +6,7 @@
 static const uint64_t NS_TIMES_UHZ = 1000000000000000; /* ns per second x micro-hertz per hertz */
 static const uint64_t FINE_DEN = 1ull << 40;
 
-/* How many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. The first of them begins at
+/* Returns how many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. The first of them begins at
  * r0/den. */
 static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
 {
@@ -23,7 +23,7 @@ static int pan_is_still(const struct schedule_spec *spec)
     return spec->emitter != NULL || spec->pan_udeg_s <= 0 || spec->pan_stop_udeg <= spec->pan_start_udeg;
 }
 
-/* num/den: lines a tick. */
+/* Sets num/den, lines a tick. */
 static void set_rates(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     const int table = spec->emitter != NULL && spec->emitter->kind == EMITTER_BEAMS;

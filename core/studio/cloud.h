@@ -50,7 +50,7 @@ struct cloud {
     int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
 
-/* Two units in the last place of v in single precision. */
+/* Returns two units in the last place of v in single precision. */
 static inline double cloud_single_unit(double v)
 {
     return 1.2e-7 * v;
@@ -91,7 +91,7 @@ struct cloud_site {
     unsigned threads; /* at least 1; the result does not depend on it */
 };
 
-/* Per point: its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
+/* Sets for each point its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
  * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a
  * station are of the first one. SH_EINPUT: a point's station is not among n_stations. SH_ESTOPPED. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
@@ -119,7 +119,7 @@ struct cloud_coverage {
     uint32_t surfaces_hit, triangles_hit;
 };
 
-/* The surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
+/* Returns the surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
  * there is no such triangle. */
 uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 

@@ -65,7 +65,7 @@ struct deviation_points {
 int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err);
 void deviation_points_free(struct deviation_points *points);
 
-/* head: [compared->site->n_stations]. Labels from n_surfaces on are of
+/* Fills `out`. head: [compared->site->n_stations]. Labels from n_surfaces on are of
  * bodies that move: they get ranges alone. All threads; the result doesn't depend on them. SH_ESTOPPED. */
 int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
                     const struct sh_report *report, const struct deviation_points *out, struct sh_err *err);

@@ -52,7 +52,7 @@ struct figures_histogram {
  * value: 0 bins. */
 void figures_histogram_of(const double *value, size_t n, double share, struct figures_histogram *out);
 void figures_histogram_of_signed(const float *value, size_t n, double share, struct figures_histogram *out);
-/* The smallest of 1, 2, 5 times a power of ten that is v or more; v > 0. */
+/* Returns the smallest of 1, 2, 5 times a power of ten that is v or more; v > 0. */
 double figures_nice(double v);
 
 /* The density of one station's points on the surfaces. The scene is cut into cells: each triangle's plane is projected
@@ -83,8 +83,8 @@ struct figures_on_scene {
 /* Counts the points in their cells. Points without a triangle take no part. Up to 3 million cells, in 96 MiB. */
 int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
                        struct figures_density *out, struct sh_err *err);
-/* The same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly, and up to
- * 50 m. all: the figures of all its cells. */
+/* Does the same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly,
+ * and up to 50 m. all: the figures of all its cells. */
 int figures_density_fit(const struct figures_on_scene *in, double first_m, const struct sh_report *report,
                         struct figures_density *out, struct figures_density_row *all, struct sh_err *err);
 void figures_density_free(struct figures_density *density);
@@ -100,7 +100,7 @@ struct figures_times {
     size_t gaps;                    /* longer than the station's gap_s, between points that follow each other */
     double longest_s, longest_at_s; /* where it begins */
 };
-/* Needs cloud->time_s. gap_s and out: [n_stations]. */
+/* Fills out[n_stations]. Needs cloud->time_s, and gap_s[n_stations]. */
 void figures_times_of(const struct cloud *cloud, uint32_t n_stations, const double *gap_s, struct figures_times *out);
 
 /* Counts shots by their number of echoes. Needs cloud->echo and echo_count. Shots without echo are counted where the

@@ -48,7 +48,7 @@ struct map;
 int map_create(const struct map_spec *spec, struct map **out, struct sh_err *err);
 void map_free(struct map *map);
 
-/* n points in prcs. A point with a coordinate that is not finite is a shot without echo: it is left out. */
+/* Adds n points in prcs. A point with a coordinate that is not finite is a shot without echo: it is left out. */
 void map_add_points(struct map *map, size_t n, const double *x_m, const double *y_m, const double *z_m);
 
 struct map_station {

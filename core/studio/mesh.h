@@ -71,13 +71,13 @@ struct mesh {
     int ascii;                    /* .ply as text */
 };
 
-/* 1: the ending is that of a format that this module writes. */
+/* Returns 1 where the ending is that of a format that this module writes. */
 int mesh_has_format(const char *path);
 
-/* 1: the ending is that of a format for points without faces: .ply and .obj. */
+/* Returns 1 where the ending is that of a format for points without faces: .ply and .obj. */
 int mesh_takes_points(const char *path);
 
-/* 1: the ending is that of a format whose coordinates are float. */
+/* Returns 1 where the ending is that of a format whose coordinates are float. */
 int mesh_is_float(const char *path);
 
 /* SH_EINPUT where the ending is of a format of floats and they can't hold coordinates between low and high, with the

@@ -54,7 +54,7 @@ static inline int picture_box_overlaps(const struct picture_box *a, const struct
     return a->left < b->right && b->left < a->right && a->top < b->bottom && b->top < a->bottom;
 }
 
-/* CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; colours outside the gamut are moved to its border. */
+/* Converts CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; colours outside the gamut are moved to its border. */
 void picture_lab(double l, double a, double b, uint8_t rgb[3]);
 
 struct picture_part {

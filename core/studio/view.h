@@ -51,8 +51,8 @@ struct view;
 int view_create(const struct view_spec *spec, struct view **out, struct sh_err *err);
 void view_free(struct view *view);
 
-/* n points in prcs. Each has a colour (rgb, may be NULL) or else a figure (value; NaN: not known). Points that are not
- * finite are shots without echo and left out. */
+/* Adds n points in prcs. Each has a colour (rgb, may be NULL) or else a figure (value; NaN: not known). Points that
+ * are not finite are shots without echo and left out. */
 void view_add_points(struct view *view, size_t n, const double (*xyz_m)[3], const float *value,
                      const uint8_t (*rgb)[3]);
 
@@ -67,8 +67,8 @@ void view_get_counts(const struct view *view, struct view_counts *counts);
  * front of the eye. */
 int view_project(const struct view *view, const double p_m[3], double place_px[2], double *depth_m);
 
-/* The smallest and largest visible figure, without the lowest and highest half percent of the places; 0: none is
- * visible. */
+/* Gives the smallest and largest visible figure, without the lowest and highest half percent of the places. Returns
+ * 0 where none is visible. */
 int view_range(const struct view *view, double *low, double *high);
 
 /* Colours of figures. */
@@ -80,12 +80,13 @@ struct view_colours {
     const struct sh_report *report; /* of the work, line by line; NULL: none */
 };
 
-/* The image; the caller frees it with picture_free. SH_ESTOPPED where report asks to stop; there is no image then. */
+/* Makes the image, which the caller frees with picture_free. SH_ESTOPPED where report asks to stop; there is no
+ * image then. */
 int view_draw(const struct view *view, const struct view_colours *colours, struct picture *out, struct sh_err *err);
 
 /* ---- marks and legends */
 
-/* Even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): like the map's heights, but stronger.
+/* Gives even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): like the map's heights, but stronger.
  * NaN: colour_unknown. */
 void view_ramp(double part, uint8_t rgb[3]);
 

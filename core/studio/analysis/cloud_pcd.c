@@ -147,7 +147,7 @@ static int keep_position(const struct pcd *g, size_t i, struct sh_err *err)
     return cloud_check_position(&g->t, 0, g->cloud->xyz_m[i], err);
 }
 
-/* data: `len` bytes, where field f of point i stands at start + i * step. */
+/* Reads points from `len` bytes, where field f of point i stands at start + i * step. */
 static int take_binary(struct pcd *g, const uint8_t *data, size_t len, bool by_field, struct sh_err *err)
 {
     if (g->n > len / g->record_len)

@@ -74,7 +74,7 @@ static void put_float(struct row *r, float v)
         end_text(r, decimal_put_general(begin_text(r), (double)v, 9));
 }
 
-/* size: bytes of its type, 1, 2 or 4. */
+/* Puts a whole number of `size` bytes: 1, 2 or 4. */
 static void put_whole(struct row *r, uint32_t v, size_t size)
 {
     if (r->ascii)
