@@ -78,8 +78,8 @@ struct cast_detect {
  * not known. */
 struct cast_beam {
     struct beam beam;
-    enum beam_mode mode; /* BEAM_RINGS or BEAM_ADAPTIVE. Adaptive needs outlines, a head and a scene that stand
-                          * still, and beams that begin at station_m (no instrument_has_offset). */
+    enum beam_mode mode; /* BEAM_RINGS or BEAM_ADAPTIVE. Adaptive needs outlines, a head and a scene that stand still, a
+                          * tripod without legs, and beams that begin at station_m (no instrument_has_offset). */
     uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
     struct beam_pattern pattern, fine; /* sub-rays of a whole footprint; places for beam_cut */
     const struct beam_outlines *outlines;

@@ -52,7 +52,7 @@
 
 enum beam_mode { BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE, BEAM_AUTO };
 
-/* How a diameter or a divergence is defined. Where the irradiance above has fallen to a share q of its peak,
+/* Definitions of a diameter or a divergence. Where the irradiance above has fallen to a share q of its peak,
  * r = w sqrt(ln(1/q) / 2). So a full width times beam_widening() is the full width at 1/e^2 (q = exp(-2)):
  *   1/e     q = exp(-1)   r = w / sqrt(2)          sqrt(2)         = 1.4142
  *   FWHM    q = 1/2       r = w sqrt(ln(2) / 2)    sqrt(2 / ln(2)) = 1.6986
@@ -141,7 +141,7 @@ struct beam_echo {
     uint8_t number; /* among the pulse's echoes, from 0, left-out ones included; keys random numbers */
 };
 
-/* How returns are merged into echoes. */
+/* This says how returns are merged into echoes. */
 struct beam_merging {
     double gap_m;        /* a larger one begins a new echo */
     double pulse_m;      /* width of the pulse, c tau / 2 */
@@ -182,8 +182,7 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
  * reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
-/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they
- * meet. */
+/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they hit. */
 struct beam_probe {
     void (*cast)(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind);
     void *ctx;

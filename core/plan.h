@@ -92,7 +92,7 @@ struct plan_places {
 
 struct plan_sample;
 
-/* Draws equally many pulses of all places. 61 sub-rays show which pulses meet one smooth surface. These are
+/* Draws equally many pulses of all places. 61 sub-rays show which footprints lie on one smooth surface. These are
  * many and alike: only some of them are cast with the reference. The places must outlive the sample.
  * Where report asks to stop, sampling ends at once, and its figures mean nothing. */
 int plan_sample_create(const struct plan_places *places, const struct sh_report *report, struct plan_sample **out,
@@ -102,7 +102,7 @@ void plan_sample_free(struct plan_sample *sample);
 /* Finds the error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
  * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures are upper
  * limits: error_m is three standard errors above the mean square. echo_share is the 95 % limit of Poisson's
- * distribution for the pulses that do not meet one smooth surface; the others count as they are found. The
+ * distribution for footprints that do not lie on one smooth surface; the others count as they are found. The
  * first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 

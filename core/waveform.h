@@ -58,7 +58,7 @@ struct waveform;
 int waveform_create(const struct waveform_spec *spec, struct waveform **out, struct sh_err *err);
 void waveform_free(struct waveform *waveform);
 
-/* How the energy of a return spreads over range. */
+/* This says how the energy of a return spreads over range. */
 enum waveform_spread {
     WAVEFORM_POINT, /* not at all: a sub-ray */
     WAVEFORM_DISC, /* a whole footprint on one plane: the irradiance's marginal over -extent .. extent (footprint.h: the

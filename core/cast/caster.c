@@ -2,9 +2,9 @@
 /* The way of a pulse, from its place in the schedule to a point. cast_chunk has the stages in their order:
  *
  *     aim        aim.c            angles -> where the beam goes and begins, and what the encoders read of it
- *     nearest    nearest.c        the first surface that the beam's centre meets: what stands still, and
- *                                 bodies that move; exact (core/bvh.h)
- *     tripod     tripod.c         what is hidden below the head
+ *     nearest    nearest.c        the first surface that the beam's centre hits, of the scene and of bodies that
+ *                                 move; exact (core/bvh.h)
+ *     tripod     tripod.c         pulses that the tripod below the head hides
  *     optics     optics.c         where that is glass or a mirror: the surfaces seen in it (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie

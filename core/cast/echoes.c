@@ -158,7 +158,7 @@ static void detect(struct caster *c, const struct chunk *k)
     c->counters.faint += before - kernel_count_echoes(l->range_m, l->n);
 }
 
-/* A user who sets fixed noise beside a signal model wants it fixed: a soiled window does not change it then. */
+/* A user who sets fixed noise together with a signal model wants it fixed: a soiled window does not change it then. */
 static double fixed_sigma_m(const struct cast_setup *s)
 {
     const int is_modelled = s->detect != NULL && s->detect->signal != NULL;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Through glass and off mirrors: only rays that meet such a surface are cast again, together. */
+/* Follows rays through glass and off mirrors: only rays that hit such a surface are cast again, together. */
 #include "core/cast/optics.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How points get into the CRS. */
+/* Chooses how points get into the CRS. */
 #include "core/plan.h"
 
 #include <math.h>

@@ -76,7 +76,7 @@ int cloud_read_columns(const char *path, unsigned columns, const struct sh_repor
 int cloud_read_positions(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
-/* How cloud_compare maps a point to the scene. */
+/* This says how cloud_compare maps a point to the scene. */
 struct cloud_site {
     const struct distance *index;
     const struct georef *const

@@ -9,12 +9,12 @@
  * nearest triangle, if the line crosses that one.
  *
  * On a smooth face: the point's distance from the nearest triangle is the deviation times the cosine of the
- * incidence, to 1 % and 2 um. So the surface that the beam meets is also the nearest one, and no edge or corner is
+ * incidence, to 1 % and 2 um. So the surface that the beam hits is also the nearest one, and no edge or corner is
  * between. With a footprint, twelve rays along its border have to hit the same plane, too. Only such points have a
  * deviation along the beam: at an edge it may be any number, however good the point.
  *
  * A point is judged where noise alone causes its deviation: on a smooth face with no other surface near. Two balls of
- * DEVIATION_CLEAR sigma touch the face where the beam meets it, in front and behind; nothing else reaches into them.
+ * DEVIATION_CLEAR sigma touch the face where the beam hits it, in front and behind; nothing else reaches into them.
  * Otherwise large deviations would be taken for small ones of the other surface. Up to about DEVIATION_SAMPLE points
  * of a cloud are judged, evenly taken.
  *
@@ -57,9 +57,9 @@ struct deviation_points {
     float *along_m;  /* measured minus exact; NaN: not on a smooth face, far, a shot without echo, of a body */
     float *sigma_m;  /* expected; NaN: not known, the point isn't judged, or along_m is NaN */
     float *counts_m; /* the counts' part of it; NaN where sigma_m is */
-    float *cosine;   /* of the incidence on what the beam meets; NaN: nothing, or the station moves */
+    float *cosine;   /* of the incidence where the beam hits; NaN: it hits nothing, or the station moves */
     float *range_m;  /* from the station; NaN: a shot without echo */
-    uint32_t *met;   /* the triangle that the beam meets there, as the BVH has it, or else the nearest one;
+    uint32_t *met;   /* the triangle that the beam hits there, as the BVH has it, or else the nearest one;
                       * CLOUD_TRIANGLE_NONE: neither. NULL: not asked for (deviation_points_create) */
 };
 int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err);
@@ -70,7 +70,7 @@ void deviation_points_free(struct deviation_points *points);
 int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
                     const struct sh_report *report, const struct deviation_points *out, struct sh_err *err);
 
-/* Where a beam meets a face. */
+/* The hit of a beam on a face. */
 struct deviation_hit {
     double range_m, beam[3], normal[3]; /* unit vectors, prcs */
     int32_t label;                      /* of the surface; -1: what comes back of it is not known */

@@ -22,7 +22,8 @@ static double detect_signals(const struct finder *finder, double baseline, const
 }
 
 /* Marks samples that are limited, and those in which the receiver is blind. *until: number on the pulse's grid of the
- * first sample that is not blind any more; it goes on from window to window. */
+ * first sample that is not blind any more; it goes on from window to window. If a receiver has not saturated, it shows
+ * a signal right after the last limited sample: then only the digits were limited, and it is not blind. */
 static void detect_mark(const struct finder *finder, const struct waveform_window *window, double *y, uint8_t *mark,
                         uint32_t *until)
 {
@@ -31,6 +32,8 @@ static void detect_mark(const struct finder *finder, const struct waveform_windo
         if (y[i] >= finder->limit) {
             mark[i] = FINDER_LIMITED;
             *until = window->first + i + 1 + finder->blind;
+        } else if (i > 0 && mark[i - 1] == FINDER_LIMITED && y[i] > 5.0 * finder->noise) {
+            *until = 0;
         } else if (window->first + i < *until) {
             mark[i] = FINDER_BLIND;
             if (i > 0) y[i] = y[i - 1];

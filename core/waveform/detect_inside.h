@@ -29,8 +29,8 @@ struct finder_term {
     double at, sigma, peak;
 };
 
-/* The echo of a plane of one of the tilts, without noise: its true figures beside those of the term that fits it
- * best. A real head is adjusted on such targets. */
+/* The echo of a plane of one of the tilts, without noise: its true figures, and how they differ from those of the term
+ * that fits it best. A real head is adjusted on such targets. */
 struct finder_spread {
     double sigma;     /* of that term */
     double lag;       /* from the echo's centroid to that term's middle */

@@ -9,7 +9,7 @@
 
 enum { NO_CELL = COVERAGE_NO_CELL };
 
-/* How near and how steeply a cell was hit at best, as the bits of a float. The bits of positive floats have the same
+/* The nearest and the steepest hits of a cell, as the bits of floats. The bits of positive floats have the same
  * order as the numbers, so threads can keep the larger one without a lock. */
 struct cell_hits {
     _Atomic uint32_t pulses, cosine, nearness; /* nearness: 1 / range */
