@@ -98,7 +98,7 @@ struct cast_colour {
 struct cast_disturbance {
     int dark;         /* the laser does not fire: shots are empty, except for echoes that noise makes in waveforms */
     double slip_turn; /* the beam's pan is this much more than the encoder reads */
-    /* What a soiled window lets through, both ways together, as a share of the optical power through a clean one. With
+    /* The optical power that a soiled window lets through, both ways together, as a share of that of a clean one. With
      * a signal model each return is weaker by this factor, and detect.h has the rest. Without one the fixed part of the
      * range noise is divided by it. That is the jitter of detect.h: rise time over the ratio of signal and noise as
      * voltages (Skolnik). The voltage is proportional to the optical power, and thermal noise does not depend on it. */

@@ -120,10 +120,10 @@ int waveform_check_detection(const struct waveform *waveform, struct sh_err *err
 /* Returns the largest value of h, of a pulse with which echoes are found. */
 double waveform_pulse_peak(const struct waveform *waveform);
 
-/* Finds at most `most` echoes in the order of range. level: the amplitude, in thresholds, below which nothing is an
- * echo (1: as in detect.h). Returns how many, and adds to *n_crowded those that found no room: the weakest are left
- * out. It finds none where waveform_check_detection fails. Pure. */
-uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
+/* Finds at most `most` echoes of an amplitude of 1 or more, in the order of range. Returns how many, and adds to
+ * *n_crowded those that found no room: the weakest are left out. It finds none where waveform_check_detection fails.
+ * Pure. */
+uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded);
 

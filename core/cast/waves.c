@@ -341,7 +341,7 @@ static void find_echoes(struct caster *c, const struct chunk *k, const struct wa
     struct waveform_echo echo[LINE_MAX_ECHOES];
     uint32_t crowded = 0;
     /* Echoes beyond the head's max_echoes are dropped later: so one out of range does not take another's place. */
-    const uint32_t found = waveform_detect(k->s->waves->waveform, k->s->waves->detector, 1.0, &c->waves->record, echo,
+    const uint32_t found = waveform_detect(k->s->waves->waveform, k->s->waves->detector, &c->waves->record, echo,
                                            LINE_MAX_ECHOES, &crowded);
     const uint32_t n = keep_ranges(k->s, echo, found);
     const uint32_t rest = n > 1 ? echoes_secondary(l, i, n - 1) : 0, all = n + crowded;

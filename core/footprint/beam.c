@@ -21,9 +21,10 @@ static double mean_t2(void)
     return mean_t() - exp(-2.0) / (1.0 - exp(-2.0));
 }
 
-/* Sums over a strip of the disc across x, or densities by x on the chord there. */
+/* A strip of the disc between two distances from the centre, or the chord at one distance, per distance. The irradiance
+ * is a Gaussian that is cut off at the disc's edge. */
 struct strip {
-    double energy, along, across; /* energy; its second moments, by the distance and along the line */
+    double energy, along, across; /* energy; its second moments, by the distance and along the chord */
 };
 
 static struct strip chord_at(double x)

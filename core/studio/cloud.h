@@ -34,8 +34,8 @@ struct cloud {
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
-    /* The step that the file rounds coordinates to, in metres, also of degrees. It is the scale of LAS, 1e-6 m of a PLY
-     * as text (as our recorder writes it), or two units in the last place of single precision. 0: none is rounded. */
+    /* The step that the file rounds coordinates to, in metres, also where they are degrees: the scale of LAS, 1e-6 m of
+     * a PLY as text (as our recorder writes it), or two units in the last place of single precision. 0: none. */
     double count_m;
     int is_single;      /* 1: in single precision */
     int is_text;        /* 1: the file holds coordinates as decimal numbers */

@@ -141,14 +141,13 @@ static int detect_joined(const struct finder_run *run, const struct finder_peak 
     return run->y[after->from] > fmax(3.0 * run->finder->noise, 0.02 * smaller);
 }
 
-static void detect_gaussians(const struct finder_run *run, double level, struct finder_list *list)
+static void detect_gaussians(const struct finder_run *run, struct finder_list *list)
 {
     struct finder_peak peak[FINDER_PEAKS];
     const struct finder *finder = run->finder;
     /* Noise may lower all samples of an echo that just reaches the level, and the largest lies half a sample from its
      * top. */
-    double least = level * finder->peak - 3.0 * finder->noise;
-    least = fmax(least, 0.5 * level * finder->peak);
+    const double least = fmax(finder->peak - 3.0 * finder->noise, 0.5 * finder->peak);
     uint32_t n = finder_peaks(run, least, peak, FINDER_PEAKS), end;
     if (n > FINDER_PEAKS) {
         list->crowded += n - FINDER_PEAKS;
@@ -159,9 +158,9 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
         for (end = i + 1; end < n && end - i < FINDER_MIX && detect_joined(run, &peak[end - 1], &peak[end]);)
             end++;
         if (end > i + 1 || finder_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
-            finder_decompose(run, &peak[i], end - i, level, &mix);
+            finder_decompose(run, &peak[i], end - i, 1, &mix);
         for (uint32_t j = 0; j < mix.n; j++)
-            finder_add_term(run, &mix, j, level, list);
+            finder_add_term(run, &mix, j, finder->peak, list);
     }
 }
 
@@ -227,7 +226,7 @@ void finder_add(const struct finder_run *run, const struct finder_found *found, 
     detect_insert(list, &echo);
 }
 
-void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double least,
                      struct finder_list *list)
 {
     const struct finder_term *g = &mix->g[self];
@@ -235,10 +234,10 @@ void finder_add_term(const struct finder_run *run, const struct finder_mix *mix,
     finder_find(run->finder, FINDER_SIGMA, g->sigma, &spread);
     const struct finder_found found = {g->at - spread.lag, g->peak * spread.gain, spread.width,
                                        (int)(mix->limited >> self & 1)};
-    if (found.peak >= level * run->finder->peak) finder_add(run, &found, mix, self, list);
+    if (found.peak >= least) finder_add(run, &found, mix, self, list);
 }
 
-uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
+uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded)
 {
@@ -256,10 +255,10 @@ uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector
             detect_mark(finder, window, y, mark, &until);
             run.mark = mark;
         }
-        if (top < 0.5 * level * finder->peak) continue;
-        if (detector == WAVEFORM_THRESHOLD) finder_threshold(&run, level, &list);
-        if (detector == WAVEFORM_FRACTION) finder_fraction(&run, level, &list);
-        if (detector == WAVEFORM_GAUSSIANS) detect_gaussians(&run, level, &list);
+        if (top < 0.5 * finder->peak) continue;
+        if (detector == WAVEFORM_THRESHOLD) finder_threshold(&run, &list);
+        if (detector == WAVEFORM_FRACTION) finder_fraction(&run, &list);
+        if (detector == WAVEFORM_GAUSSIANS) detect_gaussians(&run, &list);
     }
     *n_crowded += list.crowded;
     return list.n;

@@ -258,16 +258,16 @@ static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
     return 1;
 }
 
-void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
+void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, int adds,
                       struct finder_mix *mix)
 {
-    const double least = fmax(0.5 * level * run->finder->peak, 4.0 * run->finder->noise);
+    const double least = adds ? fmax(0.5 * run->finder->peak, 4.0 * run->finder->noise) : (double)INFINITY;
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     if (decompose_begin(run, peak, n, mix)) return;
     /* One term was not enough before this. Mostly two are. */
     struct finder_mix two;
-    if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
+    if (n == 1 && mix->open == 0 && run->mark == NULL && adds && decompose_two(&task, &two)) {
         finder_mix_fit(&task, &two);
         if (decompose_sound(&task, &two, least) && decompose_enough(&task, &two)) {
             *mix = two;

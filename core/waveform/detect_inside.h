@@ -131,8 +131,8 @@ struct finder_mix {
 /* Adds an echo. Its deviation is about h, after the other components of its mixture have been taken away. */
 void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
                 uint32_t self, struct finder_list *list);
-/* Adds the echo that term `self` of a mixture stands for, if that reaches the level. */
-void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+/* Adds the echo that term `self` of a mixture stands for, if its peak is `least` or more. */
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double least,
                      struct finder_list *list);
 
 /* Fits one term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its
@@ -151,12 +151,12 @@ struct finder_task {
 void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
 /* Fills rest[hi - lo + 1] with the part of the samples that the components don't explain. */
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
-/* Begins with one component a peak, and adds more while the residual could have another echo of this level;
- * INFINITY: adds none. Where a top is not seen, its flanks decide. */
-void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
+/* Begins with one component a peak. adds: adds more while the residual could have another echo. Where a top is not
+ * seen, its flanks decide. */
+void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, int adds,
                       struct finder_mix *mix);
 
-void finder_threshold(const struct finder_run *run, double level, struct finder_list *list);
-void finder_fraction(const struct finder_run *run, double level, struct finder_list *list);
+void finder_threshold(const struct finder_run *run, struct finder_list *list);
+void finder_fraction(const struct finder_run *run, struct finder_list *list);
 
 #endif

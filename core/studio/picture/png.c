@@ -19,7 +19,7 @@ static void on_warning(png_structp png, png_const_charp text)
     (void)text; /* libpng's warnings concern chunks that we do not write */
 }
 
-/* No local variable changes after setjmp, so longjmp leaves all of them defined. */
+/* Nothing that is used after longjmp changes between setjmp and longjmp. */
 static int encode(const struct picture_part *part, FILE *file, png_structp png, png_infop info)
 {
     if (setjmp(png_jmpbuf(png)) != 0) return SH_EIO;
