@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Which sub-rays a pulse gets, and where in its footprint. */
+/* Chooses the sub-rays that a pulse gets, and where in its footprint they lie. */
 #include "core/cast/sub_rays.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/caster.h"
 #include "core/vecmath.h"
 
 enum { LANES = 8 }; /* the pool has room for that many beyond the last sub-ray */

@@ -4,7 +4,6 @@
 
 #include <math.h>
 
-#include "core/cast/caster.h"
 #include "core/cast/kernels_points.h"
 #include "core/cast/waves.h"
 #include "core/surface.h"

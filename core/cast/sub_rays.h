@@ -3,7 +3,7 @@
 #ifndef CORE_CAST_SUB_RAYS_H
 #define CORE_CAST_SUB_RAYS_H
 
-#include "core/cast/chunk_arrays.h"
+#include "core/cast/caster.h"
 
 enum {
     POOL = 24 * CHUNK,     /* sub-rays worked on at a time */
@@ -70,9 +70,6 @@ struct sub_ray_work {
     uint32_t n_echoes;
     struct beyond beyond;
 };
-
-struct caster;
-struct chunk;
 
 /* ---- sub_rays.c: puts the echoes of a chunk's footprints into the list, with rho where something asks for it. */
 void caster_sub_rays(struct caster *c, const struct chunk *k);

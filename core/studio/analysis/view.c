@@ -47,7 +47,8 @@ int view_create(const struct view_spec *spec, struct view **out, struct sh_err *
 {
     int rc = check_camera(&spec->camera, err);
     if (rc == SH_OK && !(spec->point_m >= 0 && spec->point_m <= 1e9 && spec->point_px > 0 && spec->point_px <= 32))
-        rc = sh_fail(err, SH_EINPUT, "view: points of %g m, at least %g pixels; allowed are 0 or more, 32 or less",
+        rc = sh_fail(err, SH_EINPUT,
+                     "view: points of %g m, at least %g pixels; allowed are 0 to 1e9 m, above 0 to 32 pixels",
                      spec->point_m, spec->point_px);
     if (rc != SH_OK) return rc;
     struct view *view = calloc(1, sizeof *view);
