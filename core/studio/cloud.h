@@ -79,8 +79,8 @@ void cloud_free(struct cloud *cloud);
 /* This says how cloud_compare maps a point to the scene. */
 struct cloud_site {
     const struct distance *index;
-    const struct georef *const
-        *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
+    /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
+    const struct georef *const *georef;
     uint32_t n_stations;
     double max_m; /* reach of the search */
     /* For bodies that move, which are not in the scene's index; NULL: there are none. Turns a point with such a body's

@@ -58,8 +58,8 @@ struct mesh {
     const float (*normal)[3]; /* [n_vertices] unit vectors; NULL: none */
     const uint8_t (*rgb)[3];  /* [n_vertices] sRGB; NULL: none */
     const float (*uv)[2]; /* [n_vertices] 0, 0 is the image's lower left corner; in .ply they are s, t; NULL: none */
-    const uint32_t (
-        *face)[3]; /* [n_faces] indices of vertices, counter-clockwise seen from outside; NULL: points alone */
+    /* [n_faces] indices of vertices, counter-clockwise seen from outside; NULL: points alone */
+    const uint32_t (*face)[3];
     const uint8_t (*face_rgb)[3];     /* [n_faces] of .ply alone; NULL: none */
     const struct mesh_scalar *scalar; /* [n_scalars] */
     uint32_t n_scalars;
@@ -67,7 +67,7 @@ struct mesh {
     uint32_t n_comments;
     const char *texture;          /* name of the image that uv are of, as the file's reader finds it; NULL: none */
     const struct mesh_part *part; /* [n_parts] one after the other, all vertices and all faces; then texture is NULL */
-    uint32_t n_parts;             /* 0: one, named as the file */
+    uint32_t n_parts;             /* 0: one, named as the file, or "mesh" in .gltf, .glb and .fbx */
     int ascii;                    /* .ply as text */
 };
 

@@ -69,7 +69,7 @@ struct mesh_format {
     const char *ending;
     int is_float, takes_points;
     const char *exporter; /* Assimp's name of the format */
-    /* Opens and writes out->path and what belongs to it; the caller closes. */
+    /* Opens and writes out->path and what belongs to it; the caller closes. The mesh has at least one part. */
     int (*write)(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
                  struct mesh_work *work, struct sh_err *err);
 };

@@ -265,12 +265,11 @@ static int fill_part(struct export_scene *s, const struct mesh *m, unsigned i, c
 }
 
 /* Parts without a face are left out. */
-static int make_scene(struct export_scene *s, const struct mesh *m, const struct mesh_part *whole)
+static int make_scene(struct export_scene *s, const struct mesh *m)
 {
-    const uint32_t n_parts = m->n_parts > 0 ? m->n_parts : 1;
-    const struct mesh_part *part = m->n_parts > 0 ? m->part : whole;
+    const struct mesh_part *part = m->part;
     unsigned n = 0;
-    for (uint32_t i = 0; i < n_parts; i++)
+    for (uint32_t i = 0; i < m->n_parts; i++)
         n += part[i].n_faces > 0;
     if (!allocate(s, n)) return 0;
     set_string(&s->root.mName, "scan");
@@ -281,7 +280,7 @@ static int make_scene(struct export_scene *s, const struct mesh *m, const struct
     s->scene.mMaterials = s->materials;
     uint32_t vertex = 0, face = 0;
     unsigned at = 0;
-    for (uint32_t i = 0; i < n_parts; i++) {
+    for (uint32_t i = 0; i < m->n_parts; i++) {
         if (part[i].n_faces > 0 && !fill_part(s, m, at++, &part[i], vertex, face)) return 0;
         vertex += part[i].n_vertices;
         face += part[i].n_faces;
@@ -329,16 +328,13 @@ static int check_size(const struct mesh_format *format, const char *path, const 
 int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
                       struct mesh_work *work, struct sh_err *err)
 {
-    const char *path = out->path;
     struct export_scene s = {.is_fbx = strcmp(format->exporter, "fbx") == 0,
                              .holds_images = strcmp(format->exporter, "glb2") == 0};
-    /* With the file's name the exporter would choose another name for the .bin of a .gltf. */
-    const struct mesh_part whole = {"mesh", mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
-    int rc = check_size(format, path, mesh, s.is_fbx, err);
+    int rc = check_size(format, out->path, mesh, s.is_fbx, err);
     if (rc != SH_OK) return rc;
     if (s.is_fbx) fill_meta(&s);
-    rc = make_scene(&s, mesh, &whole) ? export_scene(format, out, &s, work, err)
-                                      : sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    rc = make_scene(&s, mesh) ? export_scene(format, out, &s, work, err)
+                              : sh_fail(err, SH_ENOMEM, "%s: no memory to write it", out->path);
     free_scene(&s);
     return rc == SH_OK && !s.holds_images ? mesh_output_images(out, mesh, err) : rc;
 }
