@@ -127,7 +127,7 @@ struct beam_sight {
 struct beam_return {
     double range_m;
     double energy; /* of the footprint's */
-    double back;   /* what comes back of that, where surfaces are modelled; else the energy again */
+    double back;   /* the part of it that comes back, where surfaces are modelled; else the energy again */
     float sigma_m; /* of the ranges within it */
     uint32_t label;
     uint32_t colour; /* goes along with the label */
@@ -165,7 +165,7 @@ struct beam_alike {
     double energy;         /* of a return */
     const double *range_m; /* NaN: the sub-ray hits nothing */
     const uint32_t *label;
-    const double *rho; /* what comes back of the energy; NULL: all */
+    const double *rho; /* the share of the energy that comes back; NULL: all */
 };
 enum { BEAM_ALIKE = 16 };
 /* Merges the pulses whose returns all lie on one surface without a gap, as most do, several at a time. The echoes are
@@ -173,7 +173,7 @@ enum { BEAM_ALIKE = 16 };
  * an element for each pulse. */
 uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alike *alike, struct beam_echo *echo);
 
-/* ---- what a footprint may reach besides the surface in its centre */
+/* ---- outlines: other surfaces that a footprint may reach */
 
 /* The outlines of a scene as seen from one place: edges with the surface on one side only. A footprint
  * without an outline lies on the surface that its centre hits: one ray is enough. An edge with a triangle on
@@ -202,8 +202,8 @@ struct beam_outlines_spec {
  * apart. A stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to
  * BEAM_LEAST_STEP_M (a wall that stands on a floor; parts of a wall): it can't make another echo. Like any
  * fold between triangles, an outline that is left out may move a range by a sixth of the footprint's radius
- * times the change of slope. The edge of the exit may see what is hidden from the station: a strip of at
- * most the exit's radius. */
+ * times the change of slope. From the edge of the exit a strip that the station can't see may be visible. It is at
+ * most as wide as the exit's radius. */
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);

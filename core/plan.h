@@ -26,7 +26,7 @@ struct plan_tolerance {
 struct plan_option {
     char method[32];
     double error_m;    /* bound; NaN: not known */
-    double echo_share; /* bound, likewise */
+    double echo_share; /* bound; NaN: not known */
     double cost_ns;    /* per pulse, beyond a single ray, less than 0 where it saves; NaN: depends on the scene */
     char why_not[96];  /* why it is not possible; empty: it is */
 };
@@ -35,7 +35,7 @@ enum { PLAN_MAX_OPTIONS = 12 };
 
 struct plan_row {
     char stage[16], method[32];
-    double error_m, echo_share, cost_ns; /* as above */
+    double error_m, echo_share, cost_ns; /* as in struct plan_option */
     char why[192];
     int forced; /* the configuration says so, not the plan */
     uint32_t n_left;

@@ -17,7 +17,7 @@ struct chunk {
     struct bvh_origins from;
     int linear;     /* the directions that the encoders read are turned into the CRS already */
     int attributes; /* the block has room for them */
-    int colours;    /* likewise */
+    int colours;    /* the setup asks for them, and the block has room */
     int texels;     /* colours are those of textures: hits carry them */
     int waves;      /* waveforms are sent, or searched for echoes */
     int spreads;    /* returns say how their ranges spread: for widths, or for waveforms */

@@ -26,7 +26,7 @@ struct echo_list {
     uint64_t key[CAST_LIST];   /* for random numbers */
     double cosine[CAST_LIST];
     double energy[CAST_LIST]; /* share of the pulse's energy that took this way */
-    double rho[CAST_LIST];    /* what comes back of it; the energy itself where surfaces are not modelled */
+    double rho[CAST_LIST];    /* the part of it that comes back; the energy itself where surfaces are not modelled */
     uint8_t ghost[CAST_LIST];
     double amplitude[CAST_LIST];
     int16_t refl_cdb[CAST_LIST], amplitude_cdb[CAST_LIST];

@@ -343,7 +343,7 @@ static void list_echoes(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Finds what comes back of pulses whose central ray stands for the whole footprint. */
+/* Finds how much comes back of pulses whose central ray stands for the whole footprint. */
 static void weigh_central(struct caster *c, const struct chunk *k)
 {
     struct echo_list *l = &c->list;

@@ -87,7 +87,7 @@ static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apar
     return found;
 }
 
-/* Up to so many returns stay as they are. */
+/* With this many returns or fewer, none are joined. */
 enum { FEW = 16 };
 
 /* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. With d a fifteenth of a

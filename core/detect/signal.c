@@ -152,11 +152,11 @@ void detect_amplitudes(const struct detect_signal *signal, const struct detect_e
     const uint32_t n = e->n;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        double seen = amplitude[i] + per_snr * rng_normal(signal_key, key[i]); /* as above */
+        double seen = amplitude[i] + per_snr * rng_normal(signal_key, key[i]); /* the noise of detect() */
         int detected = range_m[i] == range_m[i];
         double cdb = 1000.0 / 2.302585092994045684 * vec_log(detected && seen > 1.0 ? seen : 1.0);
         uint64_t bits;
-        cdb = cdb > 32767.0 ? 32767.0 : cdb; /* likewise */
+        cdb = cdb > 32767.0 ? 32767.0 : cdb; /* as in detect() */
         vec_round(cdb, &bits);
         out[i] = (int16_t)(detected ? bits : (uint64_t)(uint16_t)LINE_AMPLITUDE_NONE);
     }

@@ -117,7 +117,7 @@ static void drop_weakest(struct beam_echo *e, uint32_t n)
     memmove(e + weakest, e + weakest + 1, (n - weakest - 1) * sizeof *e);
 }
 
-/* From so many returns on it is faster to look for gaps before sorting. */
+/* With this many returns or more it is faster to look for gaps before sorting. */
 enum { MANY = 7 };
 
 /* Most footprints lie on one surface: there is no gap between their returns, whatever their order. The

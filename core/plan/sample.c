@@ -19,14 +19,14 @@ enum {
     MAX_DRAWN = 32768,  /* pulses */
     MIXED_LOOKS = 1024, /* the most pulses with several smooth surfaces that are cast with the reference */
     PLAIN_LOOKS = 1024, /* the most other pulses that are cast with it */
-    PLAIN_EVERY = 8,    /* one in so many of the other pulses is taken */
+    PLAIN_EVERY = 8,    /* one of this many other pulses is taken */
     PROBE_RINGS = 4,
     OPTICS_DRAWN = 8192,
     TRIES = 1 << 23, /* of drawing, a second or two in all: with a narrow field of view most are not cast */
     ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
     SIGHT_DRAWN = 1024,
     SIGHT_RAYS = 5, /* to the middle of a cell, and to its corners */
-    SIGHT_FEW = 3,  /* up to so many triangles among them are a few */
+    SIGHT_FEW = 3,  /* the most triangles of a cell that count as a few */
 };
 
 struct echoes {

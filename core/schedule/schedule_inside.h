@@ -47,7 +47,7 @@ static inline uint64_t firing_ticks(const struct schedule_segment *seg, uint64_t
     return firing_tau(seg->spec.emitter, k) - firing_tau(seg->spec.emitter, seg->k0);
 }
 
-/* Returns the first pulse that fires so many ticks after the segment's first, or later. */
+/* Returns the first pulse that fires at `ticks` after the segment's first, or later. */
 static inline uint64_t firing_after(const struct schedule_segment *seg, uint64_t ticks)
 {
     if (kind_of(seg) != EMITTER_BEAMS) return seg->k0 + ticks;

@@ -58,8 +58,8 @@ struct coverage_scan {
 };
 
 struct coverage_pulses {
-    uint64_t cast, met;   /* with at least one hit that counts, on the scene that stands still */
-    uint64_t hits, front; /* of these hits, on the front of a triangle */
+    uint64_t cast, met;   /* pulses; those with a hit that counts, on the scene that stands still */
+    uint64_t hits, front; /* such hits; those on the front of a triangle */
 };
 
 /* Casts a scan. Its result waits until it is kept or dropped. Reports progress after a second. */
@@ -91,8 +91,8 @@ struct coverage_sums {
     double area_m2, duplicate_m2, silent_m2; /* of all cells; of duplicate faces, and faces without echo: left out */
     double none_m2, one_m2, several_m2;      /* area that no, one, or several stations see */
     struct coverage_spread density_1_m2;     /* pulses per area, of all stations; over the area that is seen */
-    struct coverage_spread incidence_rad;    /* the smallest of each cell, likewise */
-    struct coverage_spread range_m;          /* the smallest of each cell, likewise */
+    struct coverage_spread incidence_rad;    /* the smallest of each cell, over the area that is seen */
+    struct coverage_spread range_m;          /* the smallest of each cell, over the area that is seen */
 };
 int coverage_sum(const struct coverage *coverage, struct coverage_sums *sums, struct sh_err *err);
 

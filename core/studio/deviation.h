@@ -73,7 +73,7 @@ int deviation_along(const struct cloud_compared *compared, const struct deviatio
 /* The hit of a beam on a face. */
 struct deviation_hit {
     double range_m, beam[3], normal[3]; /* unit vectors, prcs */
-    int32_t label;                      /* of the surface; -1: what comes back of it is not known */
+    int32_t label;                      /* of the surface; -1: the power that comes back is not known */
 };
 /* Returns the expected sigma there, by noise. *counts_m: the part of counts, if all places within one are as likely. */
 double deviation_sigma_m(const struct deviation_head *head, const struct deviation_hit *hit, double *counts_m);

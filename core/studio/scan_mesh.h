@@ -11,7 +11,8 @@
  * The long-edge filter leaves out each triangle with an edge that is longer than `long_edge` times the mean edge. The
  * mean is over all edges of the mesh before the filter, each counted once: along columns, along rows, and diagonals.
  *
- * Ownership: what is given stays the caller's and is not changed, unless said. Pure but for progress; any thread. */
+ * Ownership: inputs stay the caller's and are not changed, except where a function says so. Pure but for progress; any
+ * thread. */
 #ifndef CORE_STUDIO_SCAN_MESH_H
 #define CORE_STUDIO_SCAN_MESH_H
 
@@ -73,7 +74,7 @@ struct scan_sampler {
 };
 /* Returns a key that differs for each scan of each station, both counted from 1. */
 uint64_t scan_sampler_key(uint64_t seed, uint32_t station, uint32_t scan);
-/* SH_ENOMEM. scan_sampler_free is due in any case. */
+/* Sums the areas. SH_ENOMEM. scan_sampler_free is due in any case. */
 int scan_sampler_start(struct scan_sampler *sampler, const double (*xyz_m)[3], const uint32_t (*face)[3],
                        uint32_t n_faces, uint64_t key, struct sh_err *err);
 /* Returns the number of points for a density per square metre: area times density, rounded. */

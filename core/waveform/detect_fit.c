@@ -13,7 +13,7 @@ enum { FIT_STEPS = 24 };
 /* The fit has come to its end where another step would lower the sum of squares by this part of a sample's variance. */
 #define FIT_ENOUGH 0.01
 
-/* Sums over the samples of products of derivatives, of these and the rest, and of rest^2. */
+/* Sums over the samples: products of two derivatives (h), of a derivative and the rest (r), and rest^2. */
 struct fit_sums {
     double h[6], r[3], rest2; /* h: 00, 01, 02, 11, 12, 22 */
     uint32_t n;

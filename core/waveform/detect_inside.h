@@ -55,14 +55,14 @@ struct finder {
     double lead[FINDER_LEADS];    /* by v: from h's rise through exp(-v v / 2) of its peak to its centroid */
     int gaussian;                 /* h is one */
     double middle;                /* from the centroid of h to its middle, in widths */
-    double reach[2];              /* so many sigmas before and after its middle a term ends */
+    double reach[2];              /* where a term ends, in sigmas before and after its middle */
     double area, variance, third; /* of h: its sum over the samples, and central moments */
     double shape[FINDER_SHAPE];   /* h over its peak */
     uint32_t top;                 /* entry of shape: its first maximum above a half */
     double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* logarithm of shape, and its derivative by widths */
 };
 
-/* Returns the value of a table of h, so many widths after its centroid. */
+/* Returns the value of a table of h at `widths` after its centroid. */
 static inline double finder_table(const double table[FINDER_SHAPE], double widths)
 {
     double place = (widths + FINDER_SHAPE_LEAD) * (1.0 / FINDER_SHAPE_STEP);

@@ -9,7 +9,7 @@
 
 /* sigma of a Gaussian of width 1, full at half maximum */
 #define SIGMA_1 0.42466090014400953
-/* Beyond so many sigmas a Gaussian is below 1e-9 of its peak. */
+/* Beyond this many sigmas a Gaussian is below 1e-9 of its peak. */
 #define GAUSSIAN_END 6.5
 /* An asymmetric pulse ends where it has fallen to this: its tail is long. */
 #define TAIL_LEAST 1e-6

@@ -27,7 +27,7 @@ struct work {
     const struct deviation_head *head;
     const struct deviation_points *out;
     const struct sh_report *report;
-    size_t every; /* sigma is worked out for one point in so many */
+    size_t every; /* sigma is computed for one of this many points */
     atomic_size_t next;
     atomic_int failed;
 };

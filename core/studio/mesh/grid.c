@@ -234,7 +234,7 @@ int scan_faces_make(const struct scan_grid *grid, struct scan_faces *faces, cons
     if (rc == SH_OK && faces->n_edges > 0) faces->mean_edge_m = b.sum_m / (double)faces->n_edges;
     if (rc == SH_OK && grid->long_edge > 0) filter(grid, faces);
     free(b.mark);
-    if (faces->n_faces > 0) resize(&faces->face, faces->n_faces, sizeof *faces->face); /* gives back what is too much */
+    if (faces->n_faces > 0) resize(&faces->face, faces->n_faces, sizeof *faces->face); /* frees the rest */
     return rc;
 }
 
