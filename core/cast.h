@@ -127,9 +127,9 @@ void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, doubl
 /* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
-    /* NULL: none. Else of the BVH and of station_m: rays that begin there are looked up in it, with the same
-     * hits. All other rays are cast into the BVH: beams that begin beside the station, sub-rays, rays beyond
-     * glass and mirrors, and those to moving bodies. A head that moves has no sight. */
+    /* NULL: none. It is made for `bvh` and `station_m`. Rays that begin at the station are looked up in it, with the
+     * same hits. All other rays are cast into the BVH: beams that begin beside the station, sub-rays, rays beyond
+     * glass and mirrors, and rays to moving bodies. A head that moves has no sight. */
     const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
@@ -188,11 +188,11 @@ void caster_free(struct caster *caster);
 /* Makes memory for waveforms. Without it a caster casts as if its setups had none. */
 int caster_add_waves(struct caster *caster, struct sh_err *err);
 
-/* Fills block from the run, with attributes where it has room for them. The echo of a single ray has the
- * width of the pulse. That of a footprint, or of returns merged from glass and mirrors, has the width of
- * core/footprint.h. An amplitude needs a signal model. Range noise moves echoes, and doesn't widen them. The
- * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes; where they are
- * found in waveforms, max_echoes also with single rays). Returns the number of echoes. Allocates nothing. */
+/* Fills block from the run, with attributes where it has room for them. Returns the number of echoes. Allocates
+ * nothing. The echo of a single ray has the width of the pulse. The echo of a footprint, or of returns merged from
+ * glass and mirrors, has the width that core/footprint.h defines. An amplitude needs a signal model. Range noise moves
+ * echoes, and doesn't widen them. The block has capacity for run->n times the echoes that a pulse may have: 1 + depth
+ * with a single ray, beam->max_echoes with a beam, and max_echoes with either where echoes are found in waveforms. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 
@@ -206,10 +206,10 @@ struct cast_hit {
     uint8_t front;          /* the triangle's corners go counter-clockwise as seen from the head */
 };
 
-/* The hits of a run's pulses that the head can report, each pulse as one ray, without noise. They lie within its
- * ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit, and so is the surface
- * beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit has room for (1 +
- * depth) run->n. Returns the number of hits. They are in order of chunks only. Allocates nothing. */
+/* Casts a run's pulses as single rays without noise, and fills `hit` with the hits that the head can report. They lie
+ * within its ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit, and so is
+ * the surface beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit has room
+ * for (1 + depth) run->n. Returns the number of hits. They are in order of chunks only. Allocates nothing. */
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 

@@ -110,11 +110,11 @@ void detect_range_noise(const struct detect_signal *signal, const struct detect_
 void detect_fixed_noise(double sigma0_m, double sigma1, uint64_t range_key, uint32_t n, const uint64_t *key,
                         double *range_m);
 
-/* Range ambiguity: an echo that comes back after the next pulse has left, beyond R_u = c T / 2 (T: time
- * between pulses). Folded: reported as of the last pulse that had left by then, R mod R_u. (It stays with its
- * own pulse here, so that its direction is that of the pulse it belongs to.) Resolved: reported where it is,
- * within so many zones; what lies beyond is lost. In both an echo is lost that comes back while the head is
- * blind, less than range_min_m after a pulse. */
+/* Range ambiguity: an echo from beyond R_u = c T / 2 (T: time between pulses) comes back after the next pulse has left.
+ * Folded: its range is measured from the last pulse that had left by then: R mod R_u. (It stays with its own pulse
+ * here, and so it has that pulse's direction.) Resolved: its range is right up to a number of zones; echoes beyond
+ * them are lost. In both an echo is lost that comes back while the head is blind, less than range_min_m after a
+ * pulse. */
 enum detect_ambiguity { DETECT_AMBIGUITY_NONE, DETECT_FOLDED, DETECT_RESOLVED };
 void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, double range_min_m, uint32_t n,
                   double *range_m);

@@ -84,7 +84,7 @@ struct beam {
     double along[BEAM_HALF_STEPS + 2], across[BEAM_HALF_STEPS + 2];
 };
 
-/* Sets a beam's figures, with exit diameter and divergence as above. */
+/* Sets a beam's figures. exit_m is D and divergence_rad is theta, both full widths at 1/e^2. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
 /* Replaces the range at a footprint's centre by the mean of the footprint's ranges. The footprint lies on one plane,

@@ -124,7 +124,8 @@ struct plan_sight_need {
 };
 
 /* Shares of the pulses, by the cell of the map that they lie in. The cell shows one triangle, nothing, a few triangles,
- * or so many that the BVH is asked. small: so few rays hit its triangles that the map leaves them to the BVH. */
+ * or more than a few: then the BVH is asked (ask). small: so few rays hit the cell's triangles that the map leaves them
+ * to the BVH. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */

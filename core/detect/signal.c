@@ -14,7 +14,7 @@ static int by_range(const void *a, const void *b)
     return (x->range_m > y->range_m) - (x->range_m < y->range_m);
 }
 
-/* Fits g through the reaches. more_1_m is by how much a slope exceeds the one before. */
+/* Fits g through the reaches. more_1_m is the difference between a slope and the previous one. */
 static int fit_reaches(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err)
 {
     struct detect_reach reach[DETECT_MAX_REACHES];

@@ -64,13 +64,14 @@ enum cloud_column {
     CLOUD_RGB = 16,
     CLOUD_AMPLITUDE = 32
 };
-/* Reads positions, stations, echoes and labels, and these columns. Errors (SH_EINPUT, naming file and line, or byte):
- * missing or unreadable, not a PLY or LAS file, x, y or z missing, a count the file can't hold, truncated, infinite
- * coordinates, or only some of the three NaN, a station, echo or label that is not a whole number in its range. Warns
- * of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
+/* Reads positions, stations, echoes and labels, and these columns. SH_EINPUT names the file, and the line or byte:
+ *   the file is missing, unreadable, truncated, or not PLY or LAS; it lacks x, y or z, or counts more than it can hold;
+ *   a coordinate is infinite, or only some of the three are NaN;
+ *   a station, echo or label is not a whole number in its range.
+ * Warns of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err);
-/* Reads positions alone, from files of any software: PLY and LAS as above; PCD (text, binary, compressed); and text, a
+/* Reads positions alone, from files of any software: PLY and LAS; PCD (text, binary, compressed); and text, a
  * line a point, with blanks, commas or semicolons between numbers. In text a line of names may say which columns are x,
  * y and z; else they are the first three. Other lines are left out; more than one of them gives a warning. */
 int cloud_read_positions(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);

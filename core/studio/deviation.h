@@ -31,9 +31,12 @@
  * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
  * instrument.
  *
- * The distance has a bound where the only random effect is a ball. The bound is the sum of the plan's errors of cast
- * and georeferencing, half a count an axis (sqrt(3)/2 counts of a position, or a polar point's range and angles at
- * right angles to each other), half an encoder count an axis times R, and the ball's radius. */
+ * The distance has a bound where the only random effect is a ball. The bound is the sum of:
+ *   the plan's errors of cast and georeferencing;
+ *   half a count an axis: sqrt(3)/2 counts of a position, or a polar point's range and angles at right angles to each
+ *   other;
+ *   half an encoder count an axis, times R;
+ *   the ball's radius. */
 #ifndef CORE_STUDIO_DEVIATION_H
 #define CORE_STUDIO_DEVIATION_H
 
