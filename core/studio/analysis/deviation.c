@@ -27,7 +27,7 @@ struct work {
     const struct deviation_head *head;
     const struct deviation_points *out;
     const struct sh_report *report;
-    size_t every; /* sigma is worked out for one point in so many */
+    size_t every; /* sigma is computed for one of this many points */
     atomic_size_t next;
     atomic_int failed;
 };
@@ -84,7 +84,7 @@ static int crosses(const struct scene *scene, uint32_t triangle, const double at
     return 1;
 }
 
-/* Sets the normal, and gives the cosine of the incidence. */
+/* Sets the normal, and returns the cosine of the incidence. */
 static double normal_of(const struct bvh *bvh, uint32_t triangle, struct deviation_hit *hit)
 {
     const double *n = bvh_plane(bvh, triangle)->n;
@@ -94,6 +94,7 @@ static double normal_of(const struct bvh *bvh, uint32_t triangle, struct deviati
     return fabs(vec3_dot(hit->normal, hit->beam));
 }
 
+/* Whether the nearest surface is the one that the beam hits: the distance is then the deviation times the cosine. */
 static int deviation_is_same(double distance_m, double along_m, double cosine)
 {
     const double across_m = fabs(along_m) * cosine;
@@ -132,7 +133,7 @@ static void deviation_judge(const struct work *w, const struct deviation_head *h
     w->out->counts_m[i] = (float)counts_m;
 }
 
-/* The nearest surface is the one that the beam meets, along_m before the point. */
+/* Keeps a deviation on a smooth face: the beam hits the nearest surface, along_m before the point. */
 static void deviation_keep(const struct work *w, const struct deviation_head *head, size_t i, double along_m,
                            const struct deviation_hit *hit)
 {
@@ -187,8 +188,8 @@ static int is_on_plane(const struct batch *b, uint32_t k, const struct bvh *bvh)
     return fabs(b->around[3][k] - range_m) <= 1e-6 * range_m + SAME_M;
 }
 
-/* Rays along the border of each footprint: where one of them does not meet the plane of the middle, the footprint is
- * cut. */
+/* Casts rays along the border of each footprint. Where one of them does not hit the plane of the middle, the footprint
+ * is cut. */
 static void look_around(struct batch *b, const struct deviation_head *head, const struct bvh_rays *central)
 {
     struct bvh_rays rays = *central;
