@@ -37,7 +37,7 @@ static int check_device(RTCDevice device, struct sh_err *err)
     enum RTCError code = rtcGetDeviceError(device);
     if (code == RTC_ERROR_NONE) return SH_OK;
     if (code == RTC_ERROR_CANCELLED) return sh_fail_stopped(err);
-    return embree_fail(code, "bvh", err);
+    return embree_fail(code, err);
 }
 
 static void attach(struct bvh *bvh, uint32_t n, RTCBoundsFunction bounds, RTCIntersectFunctionN meet)
@@ -107,7 +107,7 @@ int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, co
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);
-        return embree_fail(rtcGetDeviceError(NULL), "bvh", err);
+        return embree_fail(rtcGetDeviceError(NULL), err);
     }
     rtcSetDeviceMemoryMonitorFunction(bvh->device, embree_counts_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);

@@ -48,6 +48,8 @@ struct bvh_copy {
 
 struct bvh_leaf;
 
+enum { BVH_LEAVES }; /* the leaves' geometry in Embree's scene, before that of copies */
+
 struct bvh {
     RTCDevice device;
     RTCScene rtc;

@@ -18,7 +18,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/distance.h"
+#include "core/bvh.h"
 #include "core/err.h"
 #include "core/georef.h"
 
@@ -78,15 +78,15 @@ void cloud_free(struct cloud *cloud);
 
 /* How cloud_compare maps a point to the scene. */
 struct cloud_site {
-    const struct distance *index;
+    const struct bvh *bvh;
     const struct georef *const
         *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
     uint32_t n_stations;
     double max_m; /* reach of the search */
     /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from
-     * the scene to the body's own frame and gives the body's index; NULL: the point is of the scene. From any
+     * the scene to the body's own frame and gives the body's BVH; NULL: the point is of the scene. From any
      * thread. */
-    const struct distance *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
+    const struct bvh *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
     void *body_ctx;
     unsigned threads; /* at least 1; the result does not depend on it */
 };

@@ -86,7 +86,6 @@ struct watch {
     atomic_int ending;
 
     /* the observer's, but for what is constant */
-    struct distance *index;
     struct deviation_head *head; /* [n_stations] */
     struct deviation_head now;   /* of the scan at hand */
     struct device_held held;     /* what `now` is of */
