@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/anchor_geotiff.h"
+#include "firmware_sim/site/steps.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Beam and optics: tries methods on the head's own pulses, lets core/plan choose, and makes the beams. */
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/beam_choice.h"
-#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/steps.h"
 #include "firmware_sim/site/look.h"
-#include "firmware_sim/site/site.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,9 +2,7 @@
 /* Georeferencing of a site: heights, method, counts. */
 #include "core/digits.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/georeference.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 #include <math.h>
 #include <stdio.h>

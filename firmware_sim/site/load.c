@@ -7,22 +7,9 @@
 #include "core/scene_copies.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/site/beam_choice.h"
-#include "firmware_sim/site/bvhs.h"
-#include "firmware_sim/site/colours.h"
-#include "firmware_sim/site/copies.h"
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/plausibility.h"
-#include "firmware_sim/site/georeference.h"
+#include "firmware_sim/site/steps.h"
 #include "firmware_sim/site/plan_rows.h"
-#include "firmware_sim/site/platform.h"
-#include "firmware_sim/site/warnings.h"
-#include "firmware_sim/site/sights.h"
-#include "firmware_sim/site/site.h"
-#include "firmware_sim/site/target.h"
-#include "firmware_sim/site/tripod.h"
 #include "firmware_sim/site/waves.h"
-#include "firmware_sim/site/world.h"
 
 static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
 {
@@ -47,12 +34,11 @@ static int add_mover(struct site *site, uint32_t number, const struct scene_mesh
         return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many meshes move; allowed are %d", cfg->file,
                        CAST_MAX_MOVERS);
     struct site_mover *m = &site->mover[site->n_movers++];
-    m->mesh = &cfg->scene.mesh[number];
     m->number = number;
     int rc = scene_load(spec, 1, cfg->scene.tolerance_m, report, &m->scene, err);
     if (rc != SH_OK) return rc;
     if (site->n_surfaces + m->scene->n_surfaces > SCENE_MAX_SURFACES)
-        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", m->mesh->file, SCENE_MAX_SURFACES);
+        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", spec->file, SCENE_MAX_SURFACES);
     site->n_surfaces += m->scene->n_surfaces;
     return SH_OK;
 }
@@ -127,11 +113,23 @@ static int load_world(struct site *site, const struct sh_report *report, struct 
     struct site_world *world = site->world;
     if (world->scene != NULL) return SH_OK;
     int rc = load_scene(site, report, err);
-    world->n_loads++;
     world->scene = site->scene; /* the world owns it, also after an error */
     world->n_movers = site->n_movers;
     world->n_surfaces = site->n_surfaces;
-    memcpy(world->mover, site->mover, sizeof world->mover);
+    return rc;
+}
+
+/* The sites of a world share the BVHs: the first site builds them. */
+static int build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const unsigned threads = site->cfg->loop.threads;
+    struct site_world *world = site->world;
+    int rc = world->bvh != NULL ? SH_OK : bvh_create(site->scene, threads, report, &world->bvh, err);
+    for (uint32_t i = 0; i < site->n_movers && rc == SH_OK; i++) {
+        struct site_mover *m = &site->mover[i];
+        if (m->bvh == NULL) rc = bvh_create(m->scene, threads, report, &m->bvh, err);
+    }
+    site->bvh = world->bvh;
     return rc;
 }
 
@@ -178,7 +176,7 @@ static int load_load(struct site *site, const struct sh_report *report, struct s
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = site_set_up_waves(site, report, err);
     if (rc == SH_OK) rc = site_set_up_silent(site, err);
-    if (rc == SH_OK) rc = site_build_bvhs(site, site->cfg->loop.threads, report, err);
+    if (rc == SH_OK) rc = build_bvhs(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);

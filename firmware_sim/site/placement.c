@@ -13,7 +13,7 @@
 #include "core/mat3.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/site/anchor_geotiff.h"
+#include "firmware_sim/site/steps.h"
 
 /* A floor at the place that was given, or this little above it, is still found. */
 #define FLOOR_ABOVE_M 0.01

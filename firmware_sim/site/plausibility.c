@@ -11,8 +11,7 @@
 #include "core/vec3.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/plausibility.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 /* Most scenes for such a head are neither smaller nor larger: then the scale is probably wrong by a thousand. */
 static const double SMALL_M = 0.05, LARGE_M = 10000.0;

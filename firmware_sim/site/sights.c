@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/look.h"
-#include "firmware_sim/site/sights.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 #include "firmware_sim/site/view.h"
 
 #include <stdatomic.h>

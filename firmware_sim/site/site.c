@@ -101,7 +101,7 @@ void site_move(const struct site *site, double t_s, struct cast_setup *setup)
     for (uint32_t k = 0; k < site->n_movers; k++) {
         const struct site_mover *m = &site->mover[k];
         struct cast_mover *out = &setup->mover[k];
-        const struct config_mesh *mesh = m->mesh;
+        const struct config_mesh *mesh = &site->cfg->scene.mesh[m->number];
         double t = t_s;
         if (mesh->cycle_s > 0.0) { /* back and forth */
             t = fmod(t_s, mesh->cycle_s);

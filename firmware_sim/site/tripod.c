@@ -5,9 +5,7 @@
  * The ground is the first surface straight below the head's origin, without movers. The vertical is the plumb line
  * there (placement.c), however the head is tilted. A leg of length L reaches from the top, at height h above that
  * ground, down to its level: cos(opening) = h / L. */
-#include "firmware_sim/site/site.h"
-#include "firmware_sim/site/tripod.h"
-#include "firmware_sim/site/world.h"
+#include "firmware_sim/site/steps.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -4,9 +4,7 @@
 #include <string.h>
 
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/georeference.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 struct site_vary {
     struct site site; /* the first member: site_vary_free gets its address */
