@@ -105,12 +105,6 @@ static void find_seen(struct build_shared *b)
             }
 }
 
-static void bins_count(struct build_shared *b, uint32_t region, uint32_t number)
-{
-    b->bin[region + 1]++;
-    if ((number & BUILD_IS_GROUP) == 0) b->kept[number]++;
-}
-
 /* Counts a triangle or a group in each region of the range. Once all are counted, `write` puts its number into the bins
  * of these regions. */
 static void put_range(struct build_shared *b, uint32_t face, const struct range *r, uint32_t number, int write)
@@ -122,7 +116,7 @@ static void put_range(struct build_shared *b, uint32_t face, const struct range 
             if (write)
                 b->binned[b->bin[at]++] = number;
             else
-                bins_count(b, at, number);
+                b->bin[at + 1]++;
         }
 }
 
@@ -178,8 +172,7 @@ int build_bins(struct build_shared *b, struct sh_err *err)
     const uint32_t regions = SIGHT_FACES * b->regions * b->regions;
     b->seen = malloc(regions);
     b->bin = calloc((size_t)regions + 2, sizeof *b->bin);
-    b->kept = calloc((size_t)bvh_scene(b->sight->bvh)->n_triangles + 1, sizeof *b->kept);
-    if (b->seen == NULL || b->bin == NULL || b->kept == NULL)
+    if (b->seen == NULL || b->bin == NULL)
         return sh_fail(err, SH_ENOMEM, "sight: no memory for %u regions", regions);
     find_seen(b);
     /* Regions were counted one place further: filling a region moves its begin to its end. */
@@ -187,8 +180,7 @@ int build_bins(struct build_shared *b, struct sh_err *err)
     int rc = put_all(b, 0, err);
     for (uint32_t i = 0; i < regions; i++)
         b->bin[i + 1] += b->bin[i];
-    const uint64_t bytes =
-        b->bin[regions] * sizeof *b->binned + bvh_scene(b->sight->bvh)->n_triangles * sizeof *b->kept;
+    const uint64_t bytes = b->bin[regions] * sizeof *b->binned;
     if (b->bytes + bytes > b->spec->memory_bytes) {
         memset(b->seen, 0, regions);
         memset(b->bin, 0, (regions + 1) * sizeof *b->bin);

@@ -18,7 +18,6 @@
 enum {
     BUILD_REGIONS = 16, /* along an edge of a face, at most */
     BUILD_NO_RECORD = 0xffffffff,
-    BUILD_NOT_KEPT = 0xffffffff,
     BUILD_GROUP = 32, /* triangles of a group */
     BUILD_GROUP_BIT = 31,
 };
@@ -63,8 +62,6 @@ struct build_shared {
     const struct sight_spec *spec;
     const struct sh_report *report;
     uint32_t regions, region_cells;  /* along an edge of a face; cells along an edge of a region */
-    struct build_candidate *figures; /* of triangles in many regions, in prcs, without slopes */
-    uint32_t *kept;                  /* [of all triangles] place in figures, or BUILD_NOT_KEPT; NULL: none are kept */
     uint8_t *seen;                   /* [regions of all faces] 0: no ray goes there */
     uint64_t *bin;                   /* [regions of all faces + 1] of binned */
     uint32_t *binned;                /* triangles and groups by region */
@@ -96,10 +93,9 @@ int build_bins(struct build_shared *b, struct sh_err *err);
 /* ---- candidate.c */
 /* Corners relative to the station. */
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3]);
-/* Computes the figures of triangles in many regions in advance. */
-void build_figures(struct build_shared *b);
-/* False where no ray meets the triangle: it has no area, or a corner is at the station. */
-int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triangle, struct build_candidate *c);
+/* The figures of a triangle as seen from the station, in the coordinates of a face. False where no ray meets it: it has no
+ * area, or a corner is at the station. */
+int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c);
 void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r);
 
 /* ---- region.c */

@@ -368,7 +368,7 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
         const uint32_t number = b->binned[i];
         struct build_candidate *c = &w->candidate[w->n];
         if ((number & BUILD_IS_GROUP) == 0) {
-            w->n += (size_t)build_candidate(b, face, number, c);
+            w->n += (size_t)build_candidate(b->sight, face, number, c);
             continue;
         }
         build_group_candidate(&b->group[number & ~BUILD_IS_GROUP], face, c);

@@ -147,13 +147,10 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
     int rc = take_arrays(b, err);
     if (rc == SH_OK) rc = build_groups(b, err);
     if (rc == SH_OK) rc = build_bins(b, err);
-    if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
     if (rc == SH_OK && !is_too_fine(b)) rc = keep_records(b, err);
     if (rc == SH_OK) sight_finish(b);
     free(b->seen);
-    free(b->figures);
-    free(b->kept);
     free(b->bin);
     free(b->binned);
     free(b->group);
