@@ -28,11 +28,11 @@ enum {
 #define BUILD_WIDER  (1.0 + 4.0 * SIGHT_PAD)
 #define BUILD_BESIDE (1e6 * SIGHT_TILT_DOUBT)
 
-/* The box around a group, from the station. */
+/* The box around a group of triangles, or around one, from the station. */
 struct build_group {
     double lo_m[3], hi_m[3];
     double far_m;   /* no coordinate is larger */
-    int8_t whole;   /* it is a candidate itself */
+    int8_t whole;   /* of a group: it is a candidate itself */
     uint8_t beside; /* a bit for each face that shows nothing of it */
 };
 
@@ -61,26 +61,29 @@ struct build_shared {
     struct sight *sight;
     const struct sight_spec *spec;
     const struct sh_report *report;
-    uint32_t regions, region_cells;  /* along an edge of a face; cells along an edge of a region */
-    uint8_t *seen;                   /* [regions of all faces] 0: no ray goes there */
-    uint64_t *bin;                   /* [regions of all faces + 1] of binned */
-    uint32_t *binned;                /* triangles and groups by region */
-    struct build_group *group;       /* [n_groups] */
+    uint32_t regions, region_cells; /* along an edge of a face; cells along an edge of a region */
+    uint8_t *seen;                  /* [regions of all faces] 0: no ray goes there */
+    uint64_t *bin;                  /* [regions of all faces + 1] of binned */
+    uint32_t *binned;               /* triangles and groups by region */
+    struct build_group *group;      /* [n_groups] */
     uint32_t n_groups;
     _Atomic uint32_t next;       /* region to be divided */
     _Atomic uint64_t bytes;      /* taken, of spec->memory_bytes */
     _Atomic uint64_t given_back; /* of these, freed at the end */
     struct build_arena leaf, list, record;
-    _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
-    int may_coarsen;           /* 1: where the memory is full, the build begins again with larger cells */
-    _Atomic int full;          /* bytes would have become more than the memory */
-    _Atomic int failed;        /* SH_ENOMEM, SH_ESTOPPED */
+    int may_coarsen;    /* 1: where the memory is full, the build begins again with larger cells */
+    _Atomic int full;   /* bytes would have become more than the memory */
+    _Atomic int failed; /* SH_ENOMEM, SH_ESTOPPED */
 };
 
 /* Takes n elements of `size` bytes. UINT64_MAX: there is no more room. */
 uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t n, uint64_t size);
 
 /* ---- groups.c */
+/* How many triangles a group has: BUILD_GROUP, but for the last one. */
+uint32_t build_group_size(const struct sight *sight, uint32_t group);
+/* The box around n triangles: all but `whole`. */
+void build_box(const struct sight *sight, uint32_t first, uint32_t n, struct build_group *g);
 int build_groups(struct build_shared *b, struct sh_err *err);
 /* Finds where a group is seen on a face: u from rect[0][0] to rect[0][1], v in rect[1]. Returns 0 where no bounds are
  * known. */

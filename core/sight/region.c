@@ -34,7 +34,6 @@ struct division {
     uint32_t face;
     uint32_t *block; /* leaves of the tile at hand, where squares are smaller than a tile */
     uint32_t block_u, block_v;
-    uint64_t cells[4];
 };
 
 /* Four quarters of a square at a time. */
@@ -226,18 +225,10 @@ static uint32_t make_list(const struct division *d, const struct seen *seen)
     return (uint32_t)SIGHT_FEW << SIGHT_KIND_SHIFT | (uint32_t)at;
 }
 
-enum { ONE, NOTHING, FEW, ASK };
-
-static void region_end(struct division *d, const struct square *q, uint32_t leaf, int what)
-{
-    put_leaf(d, q, leaf);
-    d->cells[what] += (uint64_t)q->size * q->size;
-}
-
-static void end_few(struct division *d, const struct square *q, const struct seen *seen)
+static void put_few(const struct division *d, const struct square *q, const struct seen *seen)
 {
     if (*seen->leaf == NO_LEAF) *seen->leaf = make_list(d, seen);
-    region_end(d, q, *seen->leaf, *seen->leaf == SIGHT_ASK ? ASK : FEW);
+    put_leaf(d, q, *seen->leaf);
 }
 
 static int all_cover(const struct seen *seen)
@@ -309,13 +300,13 @@ static void divide_tile(struct division *d, const struct square *q, const struct
 static void divide(struct division *d, const struct square *q, const struct seen *seen)
 {
     if (seen->n == 0)
-        region_end(d, q, SIGHT_NOTHING, NOTHING);
+        put_leaf(d, q, SIGHT_NOTHING);
     else if (seen->n == 1 && seen->cover != NO_CANDIDATE)
-        region_end(d, q, d->w->candidate[seen->cover].triangle, ONE);
+        put_leaf(d, q, d->w->candidate[seen->cover].triangle);
     else if (seen->groups == seen->n && (seen->filled || q->size <= GROUPS_SIZE))
-        region_end(d, q, SIGHT_ASK, ASK);
+        put_leaf(d, q, SIGHT_ASK);
     else if (q->size == 1 || (seen->n <= SIGHT_MAX_LIST && seen->cover != NO_CANDIDATE && all_cover(seen)))
-        end_few(d, q, seen);
+        put_few(d, q, seen);
     else if (q->size == SIGHT_TILE)
         divide_tile(d, q, seen);
     else
@@ -406,11 +397,6 @@ int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
                         .groups = (uint32_t)w->groups,
                         .own_leaf = NO_LEAF};
     seen.leaf = &seen.own_leaf;
-    if (fits)
-        divide(&d, &all, &seen);
-    else
-        region_end(&d, &all, SIGHT_ASK, ASK);
-    for (int i = 0; i < 4; i++)
-        atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
+    if (fits) divide(&d, &all, &seen); /* else its tiles ask, as they did from the beginning */
     return SH_OK;
 }
