@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Loading a site: `load` at the end of this file has the steps in their order. */
+/* Loading a site: take_steps near its end has the steps in their order. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -167,7 +167,7 @@ static int load_emitter(struct site *site, struct sh_err *err)
 
 /* The anchor comes before the scene. So an error in an IFC file's site is reported, not a later error that it
  * causes. */
-static int load_load(struct site *site, const struct sh_report *report, struct sh_err *err)
+static int take_steps(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = load_emitter(site, err);
     if (rc == SH_OK) rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
@@ -202,7 +202,7 @@ int site_load_for(const struct config *cfg, enum site_purpose purpose, const str
     site->moving = config_head_moves(&cfg->platform);
     int rc = site_enter_world(site, other, err);
     if (rc == SH_OK && purpose == SITE_WRITTEN_OUT) site->world->written_out = 1;
-    if (rc == SH_OK) rc = load_load(site, &heard.report, err);
+    if (rc == SH_OK) rc = take_steps(site, &heard.report, err);
     if (rc == SH_OK && site->measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
     if (rc == SH_OK && site->measures) rc = site_plan_rows(site, err);
     if (rc == SH_OK) return SH_OK;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to this folder: the steps of loading a site, each in the file that is named above it. `load` in load.c has them
- * in their order. Each uses only what earlier steps have filled in. A step returns an error of core/err.h; report gets
+/* Private to this folder: the steps of loading a site, each in the file that is named above it. take_steps in load.c
+ * has them in their order. Each uses only what earlier steps have filled in. A step returns an error of core/err.h; report gets
  * its warnings. */
 #ifndef FIRMWARE_SIM_SITE_STEPS_H
 #define FIRMWARE_SIM_SITE_STEPS_H
