@@ -13,8 +13,8 @@ void bvh_free_copies(struct bvh *bvh);
 void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args);
 void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args);
 
-/* bvh_refine and bvh_cosines where there are copies. */
-void bvh_refine_copies(const struct bvh *bvh, const struct bvh_rays *rays);
+/* Steepness and cosines where there are copies. */
+void bvh_steepness_copies(const struct bvh *bvh, const struct bvh_rays *rays);
 void bvh_cosines_copies(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,
                         double *cosine);
 

@@ -86,7 +86,7 @@ void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const stru
         side[i] = edge_side(a, b, dir);
         near |= fabs(side[i]) <= 4.0 * blur(a, b);
     }
-    query->decided += (uint64_t)near;
+    query->counters.decided += (uint64_t)near;
     const int hits = is_inside(side);
     if (!hits && !near) return;
     if (is_edge_on(v, side) || vec3_is_any_zero(v) || (!hits && !is_near_miss(v, side, dir))) return;

@@ -158,22 +158,14 @@ WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf
         meet_triangle(query, tfar, leaf, 1, second, own);
 }
 
-__attribute__((target("avx512f,avx512vl"))) static void meet_own(struct bvh_query *query, float *tfar,
-                                                                 const struct bvh_leaf *leaf, const int *valid)
+__attribute__((target("avx512f,avx512vl"))) void bvh_meet_wide(struct bvh_query *query, float *tfar,
+                                                               const struct bvh_leaf *leaf, const int *valid)
 {
-    meet(query, tfar, leaf, valid, 1);
-}
-
-__attribute__((target("avx512f,avx512vl"))) static void meet_one(struct bvh_query *query, float *tfar,
-                                                                 const struct bvh_leaf *leaf, const int *valid)
-{
-    meet(query, tfar, leaf, valid, 0);
-}
-
-void bvh_meet_wide(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid)
-{
-    query->leaves++;
-    (query->has_own ? meet_own : meet_one)(query, tfar, leaf, valid);
+    query->counters.leaves++;
+    if (query->has_own)
+        meet(query, tfar, leaf, valid, 1);
+    else
+        meet(query, tfar, leaf, valid, 0);
 }
 
 int bvh_has_wide(void)
