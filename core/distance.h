@@ -4,8 +4,8 @@
  *
  * The query runs in the BVH's float frame. Every radius is widened by that frame's rounding, so no triangle that could
  * be nearest is missed. The distance is point to triangle in double, edges and face apart, since barycentric regions
- * (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles. Its error is at most 16 half-units in the last
- * place of the distance to the triangle's farthest corner, at any coordinates. */
+ * (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles. Its error is at most 16 half-units in the
+ * last place of the distance to the triangle's farthest corner, at any coordinates. */
 #ifndef CORE_DISTANCE_H
 #define CORE_DISTANCE_H
 
@@ -17,10 +17,9 @@ struct distance_hit {
     uint32_t triangle;
 };
 
-/* Finds the nearest point of the mesh within max_m. Returns 1 and fills hit, or 0 when nothing is that near. Triangles of
- * copies are left out (core/scene_copies.h writes them out). Points farther than 1e18 m from the BVH's origin along an
- * axis have nothing near, whatever max_m is.
- * Thread: any number at once. */
+/* Finds the nearest point of the mesh within max_m. Returns 1 and fills hit, or 0 when nothing is that near. Triangles
+ * of copies are left out (core/scene_copies.h writes them out). Points farther than 1e18 m from the BVH's origin along
+ * an axis have nothing near, whatever max_m is. Thread: any number at once. */
 int distance_query(const struct bvh *bvh, const double p_prcs[3], double max_m, struct distance_hit *hit);
 /* Whether a triangle is that near, one of a copy or of the scene's own. */
 int distance_reaches(const struct bvh *bvh, const double p_prcs[3], double max_m);

@@ -64,9 +64,9 @@ struct scene_places {
 };
 
 struct scene_mesh_spec {
-    const char *
-        file; /* ending chooses the reader: .obj .ply .stl .tif in double; .ifc by two readers; .gltf .glb by their own;
-                       * others by Assimp */
+    /* Its ending chooses the reader: .obj .ply .stl .tif in double; .ifc by two readers; .gltf .glb by their own;
+     * others by Assimp. */
+    const char *file;
     enum scene_up up;
     double scale;       /* metres per unit of the file, > 0 */
     double offset_m[3]; /* added after axes and scale */

@@ -47,8 +47,8 @@ struct sight_info {
 int sight_possible(const struct scene *scene);
 /* Cells along an edge of the cube's faces, for rays and memory_bytes as of struct sight_spec. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes);
-/* About how many triangles a sight would examine one by one: those that are not in a group for the BVH. It looks at a few
- * thousand of them. */
+/* About how many triangles a sight would examine one by one: those that are not in a group for the BVH. It looks at a
+ * few thousand of them. */
 double sight_examined(const struct sight_spec *spec);
 /* Made by `threads` threads (0: all). SH_ESTOPPED where report asks to stop, SH_ENOMEM. */
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,

@@ -55,7 +55,7 @@ void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args)
     bvh_pad_box(bvh, lo, hi, vec3_length(far), args->bounds_o);
 }
 
-/* ---- the way in and out */
+/* ---- into a mesh's frame, and back */
 
 /* Turns the directions into the mesh's frame, in double. */
 VEC_CLONES
@@ -212,7 +212,7 @@ void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args)
     leave(query, copy, tfar, nested);
 }
 
-/* ---- what was met */
+/* ---- planes, cosines and steepness of hits */
 
 void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane)
 {

@@ -9,7 +9,7 @@
 /* Makes the BVHs of meshes that have copies. */
 int bvh_make_copies(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err);
 void bvh_free_copies(struct bvh *bvh);
-/* Embree asks for the box of a copy, and meets one. */
+/* Embree calls these: for the box of a copy, and where a packet reaches a copy. */
 void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args);
 void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args);
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Distance to the scene by Embree's point query, among the leaves of its BVH.
+/* Finds the distance to a scene by Embree's point query, among the leaves of its BVH.
  *
- * Rounding. Embree sees q' = float(q - c), c being the BVH's origin. With g the largest |q - c| over the axes, that moves
- * the query by at most sqrt(3) 2^-24 g. The boxes of leaves are rounded outward (leaves.c). So a triangle within r of q
- * is in a box within r + sqrt(3) 2^-24 g of q'. Embree's test of a box works on squares with a few roundings, below
- * 8 * 2^-24 of the distance. Both go onto every radius. */
+ * Rounding. Embree sees q' = float(q - c), c being the BVH's origin. With g the largest |q - c| over the axes, that
+ * moves the query by at most sqrt(3) 2^-24 g. The boxes of leaves are rounded outward (leaves.c). So a triangle within
+ * r of q is in a box within r + sqrt(3) 2^-24 g of q'. Embree's test of a box works on squares with a few roundings,
+ * below 8 * 2^-24 of the distance. Both go onto every radius. */
 #include "core/distance.h"
 
 #include <float.h>

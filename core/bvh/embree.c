@@ -30,7 +30,7 @@ uint32_t embree_packet(RTCDevice device)
     return 1;
 }
 
-/* In the steps in which Embree chooses its kernels. */
+/* These are the steps in which Embree chooses its kernels. */
 static const char *instructions(void)
 {
 #if defined(__x86_64__)

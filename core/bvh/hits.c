@@ -126,7 +126,7 @@ static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct b
     batch->start_m = w->start_m;
 }
 
-/* Where rays begin, as Embree and the leaves get it. */
+/* Sets where rays begin, for Embree and for the leaves. */
 static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     vec3_sub(rays->from.at_m, bvh->origin_m, batch->local.at_m);

@@ -22,7 +22,7 @@ static int odd_corner(const uint32_t a[3], const uint32_t b[3])
     return n == 1 ? odd : 3;
 }
 
-/* fmax would be a call. */
+/* A call of fmax would cost more. */
 static double larger(double x, double y)
 {
     return y > x ? y : x;
@@ -89,7 +89,7 @@ static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, st
     bvh_set_plane(bvh, first + ahead, &leaf->plane[1]);
 }
 
-/* The radius of the scene about the origin. */
+/* Returns the radius of the scene about the BVH's origin. */
 static double radius_of(const struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* One ray at one triangle, in double and without vectors: where a packet was in doubt, where a hit is as near as another
- * one, or where there may be a hole. */
+/* One ray at one triangle, in double and without vectors: where a packet was in doubt, where a hit is as near as
+ * another one, or where there may be a hole. */
 #include <math.h>
 
 #include "core/bvh/bvh_inside.h"

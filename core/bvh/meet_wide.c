@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A packet of 16 at a leaf, with AVX-512. It finds what meet.c finds, with rays as bits of masks: what compilers make of
- * such loops takes 1.4 times as long. */
+/* A packet of 16 at a leaf, with AVX-512. It finds what meet.c finds, with rays as bits of masks. The loops of meet.c
+ * take 1.4 times as long, as compilers translate them. */
 #include "core/bvh/meet.h"
 
 #if defined(__x86_64__) && !defined(VEC_ONE) /* measuring one instruction set: core/vecmath.h */
@@ -66,8 +66,8 @@ struct plane {
     uint32_t triangle;
 };
 
-/* Takes the triangle as the hit of those rays for which it is the nearest so far, among the eight from `at` on; `in` are
- * inside of it for certain. Returns those to which it is as near as another one. */
+/* Takes the triangle as the hit of those rays for which it is the nearest so far, among the eight from `at` on; `in`
+ * are inside of it for certain. Returns those to which it is as near as another one. */
 WIDE __mmask8 take_8(struct bvh_query *query, float *tfar, const struct plane *p, int at, __mmask8 in,
                      double range_m[8], int own)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays into Embree, in packets of 4, 8 or 16, or one by one. */
+/* Hands rays to Embree, in packets of 4, 8 or 16, or one by one. */
 #include "core/bvh/packet.h"
 
 #include <math.h>

@@ -50,7 +50,7 @@ static uint32_t leave_out_inner(double (*point)[2], uint32_t n)
     return left;
 }
 
-/* The chain from the left to the right end, or back, by A. M. Andrew. */
+/* Adds a point to the chain from the left to the right end, or back (A. M. Andrew, 1979). */
 static uint32_t add_chain(double (*hull)[2], uint32_t n, uint32_t least, const double p[2])
 {
     while (n >= least + 2 && turns(hull[n - 2], hull[n - 1], p) <= 0.0)

@@ -36,8 +36,8 @@ struct build_group {
     uint8_t beside; /* a bit for each face that shows nothing of it */
 };
 
-/* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. What they
- * mean and are scaled by: struct sight_record. */
+/* A triangle in a region. Its functions are linear in u and v: f[0] + f[1] u + f[2] v. struct sight_record says what
+ * they mean, and in which units they are. */
 struct build_candidate {
     union {
         double edge[3][3];
@@ -82,7 +82,7 @@ uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t 
 /* ---- groups.c */
 /* How many triangles a group has: BUILD_GROUP, but for the last one. */
 uint32_t build_group_size(const struct sight *sight, uint32_t group);
-/* The box around n triangles: all but `whole`. */
+/* Sets the box around n triangles: all members but `whole`. */
 void build_box(const struct sight *sight, uint32_t first, uint32_t n, struct build_group *g);
 int build_groups(struct build_shared *b, struct sh_err *err);
 /* Finds where a group is seen on a face: u from rect[0][0] to rect[0][1], v in rect[1]. Returns 0 where no bounds are
@@ -94,10 +94,10 @@ void build_group_candidate(const struct build_group *g, uint32_t face, struct bu
 int build_bins(struct build_shared *b, struct sh_err *err);
 
 /* ---- candidate.c */
-/* Corners relative to the station. */
+/* Sets v to a triangle's corners, from the station. */
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3]);
-/* The figures of a triangle as seen from the station, in the coordinates of a face. False where no ray meets it: it has no
- * area, or a corner is at the station. */
+/* The figures of a triangle as seen from the station, in the coordinates of a face. False where no ray meets it: it has
+ * no area, or a corner is at the station. */
 int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c);
 void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r);
 

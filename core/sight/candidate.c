@@ -32,7 +32,7 @@ static void from_face(const double f[3], uint32_t face, double out[3])
     out[(axis + 2) % 3] = f[2];
 }
 
-/* The side of edge a-b, in units of its doubt (sight_inside.h). */
+/* Sets the side of edge a-b, in units of its doubt (sight_inside.h). */
 static void set_edge(const double a[3], const double b[3], double sign, double side[3])
 {
     double e[3];

@@ -15,7 +15,7 @@ struct looks {
     quad_mask met[SIGHT_MAX_LIST], may[SIGHT_MAX_LIST]; /* the ray passes inside for certain; may do so */
     quad first_q;
     quad_mask first, any; /* the record that comes first; something may be hit */
-    quad_mask open, asks; /* not decided; nor to be decided in double */
+    quad_mask open, asks; /* the ray is not decided; nor can decide_tie decide it */
 };
 
 /* Finds for each record on which side of its edges the rays pass, and where they hit its plane. Then it finds the

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays looked up in the map, a chunk at a time. */
+/* Looks rays up in the map, a chunk at a time. */
 #include <stdlib.h>
 #include <string.h>
 

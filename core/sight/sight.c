@@ -72,8 +72,8 @@ static int take_arrays(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* Coarser cells everywhere are better than fine ones in some places, unless they have to be much
- * coarser. */
+/* Where the memory is full, rays of all further regions would ask the BVH. Cells of twice the width everywhere are
+ * better than that. */
 static int is_too_fine(const struct build_shared *b)
 {
     return b->may_coarsen && atomic_load_explicit(&b->full, memory_order_relaxed);

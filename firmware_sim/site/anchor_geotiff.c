@@ -98,7 +98,7 @@ static int find_zone(const double grid_m[3], const struct georef_place *at, int 
     return 0;
 }
 
-/* The largest distance of a corner, at the raster's height 0, from its place in the raster's own system. */
+/* Finds the largest distance of a corner, at the raster's height 0, from its place in the raster's own system. */
 static int measure_corners(const struct terrain *t, const struct geoframe *frame, double height_m, double *worst_m,
                            struct sh_err *err)
 {
@@ -128,7 +128,7 @@ static void anchor_geotiff_say(const struct config *cfg, const struct sh_report 
         sh_warn(report, "%s: coordinates in %s have errors up to %.2g m on WGS 84", t->file, t->crs, at->accuracy_m);
 }
 
-/* *worst_m: how far a corner is from its place. */
+/* Sets *worst_m to the farthest that a corner is from its place. */
 static int set_tangent(const struct terrain *t, const double middle_m[2], const struct crs_place *at,
                        struct geoframe *frame, double *worst_m, struct sh_err *err)
 {

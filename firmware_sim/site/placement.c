@@ -146,7 +146,7 @@ int placement_find_anchor(const struct config *cfg, const struct sh_report *repo
     return SH_OK;
 }
 
-/* The place on the Earth as the configuration gives it. */
+/* Finds the place on the Earth that the configuration gives. */
 static int given_place(const struct config_station *s, struct georef_place *at, struct sh_err *err)
 {
     int rc = SH_OK;

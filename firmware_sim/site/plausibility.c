@@ -13,7 +13,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/steps.h"
 
-/* Most scenes for such a head are neither smaller nor larger: then the scale is probably wrong by a thousand. */
+/* Hardly any scene for such a head is smaller or larger than this. One that is probably has a scale that is wrong by a
+ * thousand. */
 static const double SMALL_M = 0.05, LARGE_M = 10000.0;
 
 /* A scan is called mostly empty where a smaller share of its pulses hits a surface. */
@@ -22,7 +23,7 @@ static const double EMPTY_SHARE = 0.05;
 enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
 _Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
 
-/* The program of the configured pulse rate, which has the smallest and the largest range. */
+/* Returns the program of the configured pulse rate, which has the smallest and the largest range. */
 static const struct config_program *program_of(const struct site *site)
 {
     const struct config *cfg = site->cfg;

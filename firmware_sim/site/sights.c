@@ -28,7 +28,7 @@ static const char *why_not(const struct site *site)
 
 /* ---- the plan */
 
-/* Pulses that a scan casts: those of its frames; without an end, those of an hour. */
+/* Returns how many pulses a scan casts: those of its pan sweeps; without an end, those of an hour. */
 static double pulses_of(const struct plan_place *place, uint32_t frames)
 {
     const struct schedule_segment *seg = &place->segment;
@@ -44,7 +44,7 @@ static double pulses_of(const struct plan_place *place, uint32_t frames)
     return all != 0 ? fired * (double)cast / (double)all : 0.0;
 }
 
-/* The memory of all maps together. */
+/* Returns the memory of all maps together. */
 static uint64_t memory_bytes(const struct site *site)
 {
     return (uint64_t)(site->cfg->cast.sight_mib * 0x1p20);

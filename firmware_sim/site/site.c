@@ -67,7 +67,7 @@ uint32_t site_most_points_per_pulse(const struct site *site)
     return most < cfg->profile.max_echoes ? most : cfg->profile.max_echoes;
 }
 
-/* The mesh that a label of a real surface belongs to; *label becomes its number there. */
+/* Returns the mesh that a label of a real surface belongs to. *label becomes the surface's number there. */
 static const struct scene *find_mesh(const struct site *site, uint32_t *label)
 {
     const struct scene *scene = site->scene;

@@ -163,7 +163,7 @@ struct site {
 /* A path is cut into stretches whose poses are within this distance of a centre. */
 #define SITE_STRETCH_M 1000.0
 
-/* Room left beyond the head's largest range, for noise. */
+/* Extents go this much beyond the head's largest range, for noise. */
 #define SITE_MARGIN 1.01
 
 enum site_purpose {
@@ -242,7 +242,7 @@ uint32_t site_n_served(const struct site *site);
  * The hemisphere of the false northing is that in which the first station is given, if it is given in UTM. */
 void site_grid(const struct site *site, int *zone, int *side);
 
-/* The schedule of its head with some settings. */
+/* Fills the schedule of its head with these settings. */
 void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec);
 
 /* Entries that a pulse may need in a block: its echoes, at most as many as the plan allows. */

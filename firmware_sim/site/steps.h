@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to this folder: the steps of loading a site, each in the file that is named above it. take_steps in load.c
- * has them in their order. Each uses only what earlier steps have filled in. A step returns an error of core/err.h; report gets
- * its warnings. */
+ * has them in their order. Each uses only what earlier steps have filled in. A step returns an error of core/err.h;
+ * report gets its warnings. */
 #ifndef FIRMWARE_SIM_SITE_STEPS_H
 #define FIRMWARE_SIM_SITE_STEPS_H
 
@@ -27,7 +27,7 @@ int site_enter_world(struct site *site, const struct site *other, struct sh_err 
 void site_leave_world(struct site *site);
 /* Returns the radius of a sphere around a mesh, a little more than that of its box; sets the sphere's centre. */
 double site_enclose(const struct scene *mesh, double centre_m[3]);
-/* The largest error of vertices, of the scene and of movers. */
+/* Returns the largest error of vertices, of the scene and of movers. */
 double site_mesh_error_m(const struct site *site);
 
 /* ---- anchor_geotiff.c: the scene's frame from its GeoTIFF meshes (scene.anchor.source geotiff) */
@@ -66,8 +66,8 @@ void site_free_detect(struct site *site);
 int site_vary_detect(struct site *site, struct sh_err *err);
 /* Sets the number of surfaces of glass or mirrors that pulses are followed through. */
 void site_set_depth(struct site *site, uint32_t depth);
-/* site_noise_m: how far noise may take a point, whether noise is on or not. site_ball_m: the part of it that is ball
- * noise. site_range_noise_m: ten sigma of the range noise; 0 while that is off. */
+/* site_noise_m returns how far noise may take a point, whether noise is on or not; site_ball_m, the part of it that is
+ * ball noise; site_range_noise_m, ten sigma of the range noise, or 0 while that is off. */
 double site_noise_m(const struct site *site);
 double site_ball_m(const struct site *site);
 double site_range_noise_m(const struct site *site);

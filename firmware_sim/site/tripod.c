@@ -20,7 +20,8 @@
 /* A prism of SIDES faces a leg, and its two ends. */
 enum { LEGS = 3, SIDES = 6, LEG_VERTICES = 2 * SIDES, LEG_TRIANGLES = 2 * SIDES + 2 * (SIDES - 2) };
 
-/* Stops are the stations of the configuration, one round after the other (platform.c). */
+/* Returns the number of the configured station that a stop is at: stops go through all stations, round after round
+ * (platform.c). */
 static uint32_t number_of(const struct site *site, uint32_t i)
 {
     return i % site->cfg->n_stations;
