@@ -43,21 +43,17 @@ static int add_mover(struct site *site, uint32_t number, const struct scene_mesh
     return SH_OK;
 }
 
-/* Sets the sphere around a body, and its labels, which follow those given before. */
-static void place_mover(struct site_mover *m, uint32_t label)
-{
-    for (uint32_t i = 0; i < m->scene->n_triangles; i++)
-        m->scene->label[i] = (uint16_t)(m->scene->label[i] + label);
-    m->scene->label0 = label;
-    m->radius_m = site_enclose(m->scene, m->centre_m);
-}
-
+/* Sets the sphere around each body, and its labels, which follow those given before. */
 static void place_movers(struct site *site)
 {
     uint32_t label = site->scene->n_surfaces;
-    for (uint32_t i = 0; i < site->n_movers; i++) {
-        place_mover(&site->mover[i], label);
-        label += site->mover[i].scene->n_surfaces;
+    for (uint32_t k = 0; k < site->n_movers; k++) {
+        struct site_mover *m = &site->mover[k];
+        for (uint32_t i = 0; i < m->scene->n_triangles; i++)
+            m->scene->label[i] = (uint16_t)(m->scene->label[i] + label);
+        m->scene->label0 = label;
+        m->radius_m = site_enclose(m->scene, m->centre_m);
+        label += m->scene->n_surfaces;
     }
 }
 
