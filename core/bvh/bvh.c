@@ -1,18 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Makes a BVH: the leaves, Embree's tree of them, the planes. */
-#include "core/bvh/bvh_inside.h"
-
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/monotonic.h"
-
-#include "core/bvh/copies.h"
-#include "core/bvh/leaves.h"
 #include "core/bvh/meet.h"
-#include "core/bvh/planes.h"
+#include "core/monotonic.h"
 
 /* tests/check/tsan.supp has the names of this function and of the two others that Embree's threads
  * call. */

@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Copies of meshes in a BVH: a packet that reaches one is cast in the mesh's own frame. bvh_inside.h says why that is
  * exact. */
-#include "core/bvh/copies.h"
-
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/bvh/bvh_inside.h"
 #include "core/bvh/leaves.h"
 #include "core/bvh/nearest.h"
 #include "core/bvh/packet.h"

@@ -11,7 +11,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/bvh/bvh_inside.h"
 #include "core/bvh/leaves.h"
 #include "core/vec3.h"
 

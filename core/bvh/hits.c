@@ -6,7 +6,6 @@
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/packet.h"
-#include "core/bvh/planes.h"
 #include "core/vecmath.h"
 
 enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would collide in a cache */

@@ -6,8 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/bvh/bvh_inside.h"
-#include "core/bvh/planes.h"
 #include "core/huge_pages.h"
 
 /* The corner of a triangle that is not on its common edge with another one; 3: they share no edge. */

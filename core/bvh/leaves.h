@@ -6,8 +6,7 @@
 
 #include <string.h>
 
-#include "core/bvh.h"
-#include "core/embree.h"
+#include "core/bvh/bvh_inside.h"
 
 /* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. A leaf of one triangle has corner 0 in place
  * of corner 3.

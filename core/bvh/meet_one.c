@@ -3,9 +3,7 @@
  * another one, or where there may be a hole. */
 #include <math.h>
 
-#include "core/bvh/bvh_inside.h"
 #include "core/bvh/edges.h"
-#include "core/bvh/leaves.h"
 #include "core/bvh/meet.h"
 #include "core/bvh/nearest.h"
 #include "core/bvh/packet.h"

@@ -1,12 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Planes of triangles in double: ranges and steepness from them; labels of rays. Loops over arrays that compilers turn
  * into vectors. */
-#include "core/bvh/planes.h"
-
 #include <math.h>
 
-#include "core/bvh/bvh_inside.h"
-#include "core/bvh/copies.h"
 #include "core/bvh/leaves.h"
 #include "core/huge_pages.h"
 #include "core/vec3.h"
