@@ -9,10 +9,9 @@
 
 enum { NO_CANDIDATE = 0xffffffff };
 
-/* A square of cells on the face, `size` cells wide, and its middle. */
+/* A square of cells on the face, `size` cells wide. */
 struct square {
     uint32_t u, v, size;
-    double mid_u, mid_v, half;
 };
 
 /* Candidates that may be seen in a square. */
@@ -33,15 +32,14 @@ struct division {
     struct build_work *w;
     uint32_t face;
     uint32_t *block; /* leaves of the tile at hand, where squares are smaller than a tile */
-    uint32_t block_u, block_v;
 };
 
 /* Four quarters of a square at a time. */
 struct quarters {
     struct square square[4];
     struct seen seen[4];
-    quad u, v;   /* their middles */
-    double half; /* of each, with the pad */
+    quad u, v;   /* their middles, in the coordinates of the face */
+    double half; /* of each one's width, with the pad */
     /* The plane of the candidate that covers each quarter; cover is NO_CANDIDATE, and first 0, where none
      * does. */
     quad_mask cover;
@@ -190,7 +188,7 @@ static void put_leaf(const struct division *d, const struct square *q, uint32_t 
 {
     struct sight *s = d->b->sight;
     if (q->size < SIGHT_TILE) {
-        uint32_t *to = &d->block[(q->v - d->block_v) * SIGHT_TILE + q->u - d->block_u];
+        uint32_t *to = &d->block[q->v % SIGHT_TILE * SIGHT_TILE + q->u % SIGHT_TILE];
         for (uint32_t v = 0; v < q->size; v++)
             for (uint32_t u = 0; u < q->size; u++)
                 to[v * SIGHT_TILE + u] = leaf;
@@ -241,18 +239,18 @@ static int all_cover(const struct seen *seen)
 
 static void divide(struct division *d, const struct square *q, const struct seen *seen);
 
-static void make_quarters(const struct square *q, const struct seen *seen, struct quarters *four)
+/* All numbers here are multiples of powers of two: they are exact. */
+static void make_quarters(const struct division *d, const struct square *q, const struct seen *seen,
+                          struct quarters *four)
 {
-    const double half = 0.5 * q->half;
+    const double cell = 2.0 / d->b->sight->cells;
+    const uint32_t size = q->size / 2;
+    four->half = 0.5 * size * cell + SIGHT_PAD;
     for (uint32_t k = 0; k < 4; k++) {
-        four->square[k] = (struct square){.u = q->u + (k & 1) * (q->size / 2),
-                                          .v = q->v + (k >> 1) * (q->size / 2),
-                                          .size = q->size / 2,
-                                          .mid_u = q->mid_u + (k & 1 ? half : -half),
-                                          .mid_v = q->mid_v + (k & 2 ? half : -half),
-                                          .half = half};
-        four->u[k] = four->square[k].mid_u;
-        four->v[k] = four->square[k].mid_v;
+        const struct square own = {q->u + (k & 1) * size, q->v + (k >> 1) * size, size};
+        four->square[k] = own;
+        four->u[k] = (own.u + 0.5 * size) * cell - 1.0;
+        four->v[k] = (own.v + 0.5 * size) * cell - 1.0;
         four->seen[k].list = seen->above + k * (size_t)seen->n;
         four->seen[k].above = seen->above + 4 * (size_t)seen->n;
     }
@@ -261,8 +259,7 @@ static void make_quarters(const struct square *q, const struct seen *seen, struc
 static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
 {
     struct quarters four;
-    four.half = 0.5 * q->half + SIGHT_PAD;
-    make_quarters(q, seen, &four);
+    make_quarters(d, q, seen, &four);
     region_look(d->w, seen, &four);
     for (uint32_t k = 0; k < 4; k++) {
         struct seen *mine = &four.seen[k];
@@ -277,8 +274,6 @@ static void divide_tile(struct division *d, const struct square *q, const struct
 {
     uint32_t block[SIGHT_BLOCK], same = 1;
     d->block = block;
-    d->block_u = q->u;
-    d->block_v = q->v;
     divide_quarters(d, q, seen);
     while (same < SIGHT_BLOCK && block[same] == block[0])
         same++;
@@ -371,21 +366,11 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     return SH_OK;
 }
 
-static struct square square_of(const struct build_shared *b, uint32_t region)
-{
-    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
-    const double cell = 2.0 / b->sight->cells;
-    struct square q = {
-        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
-    q.mid_u = (q.u + 0.5 * size) * cell - 1.0;
-    q.mid_v = (q.v + 0.5 * size) * cell - 1.0;
-    return q;
-}
-
 int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
 {
     struct division d = {.b = b, .w = w, .face = region / (b->regions * b->regions)};
-    const struct square all = square_of(b, region);
+    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
+    const struct square all = {at % b->regions * size, at / b->regions * size, size};
     int fits;
     if (!b->seen[region]) return SH_OK;
     int rc = gather(b, w, region, d.face, &fits);
