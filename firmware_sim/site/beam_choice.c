@@ -133,7 +133,7 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
     }
 }
 
-/* What beams there are to choose from: all, or the one that the configuration forces. */
+/* The beams to choose from: all, or the one that the configuration forces. */
 struct beam_choices {
     struct beam_choice beam[FOOTPRINT_OPTIONS];
     struct plan_option option[FOOTPRINT_OPTIONS];
