@@ -118,7 +118,6 @@ int build_bins(struct build_shared *b, struct sh_err *err)
         memset(b->bin, 0, (regions + 1) * sizeof *b->bin);
     } else {
         b->bytes += bytes;
-        b->given_back += bytes;
     }
     b->binned = malloc((b->bin[regions] + 1) * sizeof *b->binned);
     if (rc == SH_OK && b->binned == NULL)

@@ -67,9 +67,8 @@ struct build_shared {
     uint32_t *binned;               /* triangles and groups by region */
     struct build_group *group;      /* [n_groups] */
     uint32_t n_groups;
-    _Atomic uint32_t next;       /* region to be divided */
-    _Atomic uint64_t bytes;      /* taken, of spec->memory_bytes */
-    _Atomic uint64_t given_back; /* of these, freed at the end */
+    _Atomic uint32_t next;  /* region to be divided */
+    _Atomic uint64_t bytes; /* taken, of spec->memory_bytes */
     struct build_arena leaf, list, record;
     int may_coarsen;    /* 1: where the memory is full, the build begins again with larger cells */
     _Atomic int full;   /* bytes would have become more than the memory */

@@ -130,7 +130,6 @@ int build_groups(struct build_shared *b, struct sh_err *err)
     if (b->group == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory for %u groups", n);
     b->n_groups = n;
     b->bytes += bytes;
-    b->given_back += bytes;
     for (uint32_t i = 0; i < n; i++) {
         if ((i & 0xfff) == 0 && sh_check_stop(b->report, err) != SH_OK) return SH_ESTOPPED;
         set_group(b, i, &b->group[i]);

@@ -91,7 +91,6 @@ static void build_some(void *shared, int reports)
         const int rc = sh_stopped(b->report) ? SH_ESTOPPED : build_region(b, &w, region);
         if (rc != SH_OK) atomic_store(&b->failed, rc);
     }
-    atomic_fetch_add(&b->given_back, w.taken);
     build_work_free(&w);
 }
 
@@ -131,7 +130,10 @@ static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
     if (rc == SH_OK) { /* where an array can't shrink, it stays */
         resize(&s->leaf, b->leaf.used, sizeof *s->leaf);
         resize(&s->list, b->list.used, sizeof *s->list);
-        s->info = (struct sight_info){.cells = s->cells, .bytes = b->bytes - b->given_back, .peak_bytes = b->bytes};
+        s->info = (struct sight_info){.cells = s->cells,
+                                      .bytes = tiles_of(s->cells) * sizeof *s->tile + b->leaf.used * sizeof *s->leaf +
+                                               b->list.used * sizeof *s->list + b->record.used * sizeof *s->record,
+                                      .peak_bytes = b->bytes};
     }
     free(b->seen);
     free(b->bin);

@@ -4,18 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/steps.h"
 
 double site_enclose(const struct scene *mesh, double centre_m[3])
 {
-    double half2 = 0.0;
-    for (int i = 0; i < 3; i++) {
-        const double half = 0.5 * (mesh->max_m[i] - mesh->min_m[i]);
-        centre_m[i] = mesh->min_m[i] + half;
-        half2 += half * half;
-    }
-    return sqrt(half2) * (1.0 + 1e-9) + 1e-6;
+    double size[3];
+    vec3_sub(mesh->max_m, mesh->min_m, size);
+    for (int i = 0; i < 3; i++)
+        centre_m[i] = mesh->min_m[i] + 0.5 * size[i];
+    return 0.5 * vec3_length(size) * (1.0 + 1e-9) + 1e-6;
 }
 
 double site_mesh_error_m(const struct site *site)
