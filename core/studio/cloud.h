@@ -18,7 +18,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/distance.h"
+#include "core/bvh.h"
 #include "core/err.h"
 #include "core/georef.h"
 
@@ -79,15 +79,15 @@ void cloud_free(struct cloud *cloud);
 
 /* This says how cloud_compare maps a point to the scene. */
 struct cloud_site {
-    const struct distance *index;
+    const struct bvh *bvh;
     /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
     const struct georef *const *georef;
     uint32_t n_stations;
     double max_m; /* reach of the search */
-    /* For bodies that move, which are not in the scene's index; NULL: there are none. Turns a point with such a body's
-     * label into the body's own frame, and returns the body's index. Returns NULL for a point of the scene. Called from
+    /* For bodies that move, which are not in the scene's BVH; NULL: there are none. Turns a point with such a body's
+     * label into the body's own frame, and returns the body's BVH. Returns NULL for a point of the scene. Called from
      * any thread. */
-    const struct distance *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
+    const struct bvh *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
     void *body_ctx;
     unsigned threads; /* at least 1; the result does not depend on it */
 };

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/distance.h"
 #include "core/together.h"
 #include "core/vec3.h"
 
@@ -103,14 +104,14 @@ static int deviation_is_same(double distance_m, double along_m, double cosine)
 
 /* Whether nothing else lies around the place where the beam meets a face: within the balls of radius_m that touch it
  * there, in front and behind. */
-static int is_alone(const struct distance *index, const double at_m[3], const double normal[3], double radius_m)
+static int is_alone(const struct bvh *bvh, const double at_m[3], const double normal[3], double radius_m)
 {
     struct distance_hit hit;
     for (int side = -1; side <= 1; side += 2) {
         double middle[3];
         for (int k = 0; k < 3; k++)
             middle[k] = at_m[k] + side * radius_m * normal[k];
-        if (distance_query(index, middle, 0.999 * radius_m, &hit)) return 0;
+        if (distance_query(bvh, middle, 0.999 * radius_m, &hit)) return 0;
     }
     return 1;
 }
@@ -128,7 +129,7 @@ static void deviation_judge(const struct work *w, const struct deviation_head *h
     double counts_m;
     const double sigma_m = deviation_sigma_m(head, hit, &counts_m),
                  radius_m = DEVIATION_CLEAR * hypot(sigma_m, counts_m);
-    if (radius_m > LEAST_CLEAR_M && !is_alone(w->of->site->index, at_m, hit->normal, radius_m)) return;
+    if (radius_m > LEAST_CLEAR_M && !is_alone(w->of->site->bvh, at_m, hit->normal, radius_m)) return;
     w->out->sigma_m[i] = (float)sigma_m;
     w->out->counts_m[i] = (float)counts_m;
 }
