@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A recorded point cloud, and its distance from the scene. In: a PLY or LAS file, the scene's index of
- * distances, the stations' georeferences. Out: points; per point a distance in metres and a triangle;
- * statistics and coverage of them.
+/* A recorded point cloud, and its distance from the scene. In: a PLY or LAS file, the scene's BVH, the
+ * stations' georeferences. Out: points; per point a distance in metres and a triangle; statistics and coverage of
+ * them.
  *
  * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
  * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
