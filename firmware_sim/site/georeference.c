@@ -207,10 +207,12 @@ static int add_georef(struct site *site, struct site_station *s, const struct sh
     const struct config *cfg = site->cfg;
     struct georef_spec spec = {.crs = cfg->output.crs, .geoid = site->geoid};
     site_grid(site, &spec.utm_zone, &spec.side);
+    struct sh_err why = {0};
     int rc = sh_check_stop(report, err);
     if (rc == SH_OK) rc = placement_georef(&s->at, &site->anchor, &spec, err);
-    if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
+    rc = georef_create(&spec, &s->georef, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: station %s: %.300s", cfg->file, s->station->name, why.text);
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
     if (epsg != first)
         sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points have no common system", cfg->file,
