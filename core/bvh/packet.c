@@ -56,7 +56,7 @@ void bvh_call_embree(const struct bvh *bvh, struct bvh_query *query, const int *
 }
 #endif
 
-/* Fields that stay the same from packet to packet. Embree changes tfar alone. */
+/* Sets the fields that stay the same from packet to packet. Embree changes only tfar. */
 static void begin_packet(struct packet *packet, const struct bvh_batch *batch, uint32_t width)
 {
     float *org = bvh_field(&packet->at, width, org_x);
@@ -66,7 +66,8 @@ static void begin_packet(struct packet *packet, const struct bvh_batch *batch, u
         org[i] = (float)batch->local.at_m[i / width];
 }
 
-/* Rays `first` to first + n; lanes without a ray have that of the first, and no hit. */
+/* Sets the rays from `first` to first + n - 1. A lane without a ray gets the origin and direction of lane 0. It is not
+ * valid, so it gets no hit. */
 VEC_INLINE void set_floats(struct packet *packet, const struct bvh_batch *batch, uint32_t first, uint32_t n,
                            uint32_t width)
 {
@@ -88,7 +89,8 @@ VEC_INLINE void set_floats(struct packet *packet, const struct bvh_batch *batch,
         packet->valid[i] = i < n ? -1 : 0;
 }
 
-/* Returns n numbers of a packet's rays where those of a whole packet may be read. */
+/* Returns the numbers of a packet's n rays as an array of which BVH_PACKET elements may be read: `from`, or a copy in
+ * `room`. */
 VEC_INLINE const double *whole_packet(const double *from, uint32_t n, double room[BVH_PACKET])
 {
     if (n == BVH_PACKET) return from;

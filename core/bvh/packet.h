@@ -10,8 +10,8 @@
 #include "core/embree.h"
 #include "core/vecmath.h"
 
-/* A surface no further than this from a ray's origin is no hit: the ray begins on it, and goes on. This is
- * half of the wire's finest count, and far more than rounding makes of zero. */
+/* A surface no further than this from a ray's origin is no hit: the ray begins on it, and goes on. This is half of the
+ * finest step of ranges and coordinates in the stream (1 um), and far more than the rounding error of a range of 0. */
 #define BVH_AT_ORIGIN_M 5e-7
 /* Ranges that differ by no more than this share of them are the same. */
 #define BVH_SAME 1e-12
@@ -24,7 +24,8 @@ typedef struct RTCRayQueryContext bvh_context;
 typedef struct RTCIntersectContext bvh_context;
 #endif
 
-/* A packet in double, as leaves see it. Embree passes its context on, which is the first member. */
+/* The state of a packet in double, for the leaves. Embree gives the functions of the leaves a pointer to `context`. As
+ * that is the first member, it is also a pointer to the whole struct. */
 struct bvh_nested;
 struct bvh_query {
     bvh_context context;
@@ -60,8 +61,8 @@ struct bvh_nested {
     int valid[BVH_PACKET];
 } __attribute__((aligned(64)));
 
-/* A field of `width` rays, which has as many elements, from the names of struct RTCRayHit. Embree has accessors for C++
- * alone. */
+/* Finds the array of a field in a packet of `width` rays. A packet has an array of `width` elements for each member of
+ * struct RTCRay, in the same order; `name` is that member. Embree has such accessors for C++ alone. */
 #define bvh_field(rays, width, name) \
     ((float *)(void *)(rays) + offsetof(struct RTCRay, name) / sizeof(float) * (size_t)(width))
 _Static_assert(offsetof(struct RTCRay16, tfar) == 16 * offsetof(struct RTCRay, tfar), "field by field");

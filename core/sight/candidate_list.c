@@ -16,8 +16,8 @@ struct looks {
 };
 
 /* Finds for each record on which side of its edges the rays pass, and where they hit its plane. Then it finds the
- * first of the triangles that are certainly hit. Another one may come before that, where it is or may be hit and its
- * plane is not certainly behind. Such rays are left to the BVH, also those of planes that coincide: to compare their
+ * nearest of the triangles that are certainly hit. If a ray hits or may hit another triangle, and the plane of that is
+ * not certainly behind, the ray is left to the BVH. Rays at planes that coincide are left to it, too: to compare their
  * ranges here takes longer. */
 VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct looks *w)
 {

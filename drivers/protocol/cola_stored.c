@@ -16,7 +16,9 @@ static void put_lines(const struct cola *self, char *text, size_t cap)
         n += (size_t)snprintf(text + n, cap - n, " %u", *bytes[i]);
     n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\n", s.every, s.filter,
                           s.scale);
-    if (cola_framing(self) != cola_configured_framing(self)) /* other links may be configured for another dialect */
+    /* The lines are for the sessions of all links. Where the dialect is the configured one, it is not stored, so that
+     * links with another one keep theirs. */
+    if (cola_framing(self) != cola_configured_framing(self))
         n += (size_t)snprintf(text + n, cap - n, "EIHstCola %u\n", cola_framing(self));
     if (s.narrowed) n += (size_t)snprintf(text + n, cap - n, "LMPoutputRange %d %d\n", s.start_e4, s.stop_e4);
     snprintf(text + n, cap - n, "LocationName %s\n", s.location);
@@ -54,7 +56,7 @@ static int take_cfg(struct cola_settings *s, const char *at)
     return *at == '\0';
 }
 
-/* A whole number up to `most` that ends the line. */
+/* Reads a whole number up to `most` that ends the line. Returns 1, or 0 where there is none. */
 static int cola_stored_take_number(const char *at, unsigned most, unsigned *v)
 {
     int n;

@@ -164,7 +164,7 @@ static uint8_t format_of(const struct las_facts *f)
     return (uint8_t)((f->has_waves ? 9 : 6) + (f->has_colour != 0));
 }
 
-/* The places of the counts differ by version; formats 6 and 7 leave the counts of 32 bits 0. */
+/* The places of the counts differ by version; LAS 1.4 leaves the counts of 32 bits 0. */
 static void put_numbers(uint8_t *to, const struct las_facts *f)
 {
     if (f->minor != 2) le_put64(to + LAS_POINTS_AT, f->n_points);

@@ -50,14 +50,14 @@ void outfile_yield(struct outfile *file);
  * not renamed. OUTFILE_DROP: PATH.part is removed. Everything is freed in any case. */
 enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
-/* For a file that a repair can complete. SH_EINPUT: an earlier recording left `part`, that of path; both names are in
- * the text. */
+/* Checks that no earlier recording has left data in `part`, which is PATH.part of `path`. It is for files that a repair
+ * can complete. SH_EINPUT: there are data; the text has both names. */
 int outfile_check_left(const char *part, const char *path, struct sh_err *err);
 /* Warns that PATH.part keeps what reached the disk, where it does. */
 void outfile_say_left(const char *path, const struct sh_report *report);
 /* Reserves len bytes on the disk for the end of the file, so that the end, or a repair, can be written when the disk is
  * full. The reserved room lies far beyond the end, and does not count as length. Nothing is reserved where the file
- * system can't do that, or files have a limit. SH_EIO: the disk is full. */
+ * system can't do that, or where the length of files is limited (RLIMIT_FSIZE). SH_EIO: the disk is full. */
 int outfile_reserve(struct outfile *file, uint64_t len, struct sh_err *err);
 /* Frees the reserved room, for what is written next. */
 void outfile_release(struct outfile *file);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/record/scan_count.h"
 
-/* A repetition alone begins no scan: between scans it is that of the last one. If it has another number than the
- * descriptor before, that of a new scan was lost. A head that was started again counts from 1 again, and so does its
- * time. */
+/* Between scans the head repeats the descriptor of the last scan, which begins no scan. If a repeated descriptor has
+ * another scan number than the one before, the first descriptor of a new scan was lost. A head that was started again
+ * counts scans from 1 again, and its time begins anew. */
 static int scan_count_begins(const struct scan_count *count, const struct native_descriptor *d,
                              const struct native_header *header)
 {

@@ -31,7 +31,7 @@ struct device_time_server {
     struct command_time_server set;
     uint16_t port;
     int asks;           /* 1: it is to be asked now */
-    int refused;        /* 1: it would be, but is not on this machine (ntp.anywhere) */
+    int refused;        /* 1: it is not asked: neither on this machine nor as configured (ntp.anywhere) */
     uint32_t power_ons; /* how often power has come */
     int64_t max_offset_ns;
 };

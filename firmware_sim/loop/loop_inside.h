@@ -68,7 +68,8 @@ int casters_start(struct loop *loop, struct sh_err *err);
 void casters_join(struct loop *loop);
 void casters_free(struct loop *loop);
 
-/* Device time begins. Real-time priority where it is permitted; a warning where it is not. */
+/* Starts device time, and the thread. In real time the thread has real-time priority; where that is not permitted,
+ * there is a warning. */
 int pacer_start(struct loop *loop, struct sh_err *err);
 void pacer_join(struct loop *loop);
 

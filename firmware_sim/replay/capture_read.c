@@ -56,7 +56,7 @@ static int read_file(struct replay_capture *c, const char *path, struct sh_err *
     int rc = SH_OK;
     while (n != 0 && rc == SH_OK) {
         if (c->file_len > MAX_FILE)
-            rc = sh_fail(err, SH_EINPUT, "%s: longer than 2 GiB, which is allowed", path);
+            rc = sh_fail(err, SH_EINPUT, "%s: the file is too long; allowed are up to 2 GiB", path);
         else if (!grow(&c->file, &room, c->file_len + (1 << 20), 1))
             rc = sh_fail(err, SH_ENOMEM, "%s: no memory for it", path);
         else
@@ -74,8 +74,8 @@ static int same_end(const struct ethernet_end *a, const struct ethernet_end *b)
     return a->is_v6 == b->is_v6 && a->port == b->port && memcmp(a->address, b->address, sizeof a->address) == 0;
 }
 
-/* The flow of a packet and the side that sent it; NULL: it begins one. A connection may have the ends of an older
- * one. */
+/* Finds the flow of a packet, and the side that sent it. NULL: the packet begins a flow. A new connection may have the
+ * addresses and ports of an older one. */
 static struct capture_flow *find_flow(struct replay_capture *c, const struct ip_packet *p, uint8_t *side)
 {
     const int begins = p->is_tcp && (p->flags & (TCP_SYN | TCP_ACK)) == TCP_SYN;
@@ -107,7 +107,7 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
     if (f == NULL && c->n_flows == MAX_FLOWS)
         return sh_fail(
             err, SH_EINPUT,
-            "more than %d connections, which are allowed; a filter of tcpdump or Wireshark makes a smaller file",
+            "too many connections; allowed are up to %d; a filter of tcpdump or Wireshark makes a smaller file",
             (int)MAX_FLOWS);
     if (f == NULL) f = add_flow(c, p, t_ns);
     if (f == NULL) return sh_fail(err, SH_ENOMEM, "no memory");

@@ -303,10 +303,10 @@ int capture_build(struct replay_capture *c, struct sh_err *err)
         const struct capture_flow *f = &c->flow[i];
         if (!is_first(c, f)) continue;
         if (c->n_places == CAPTURE_MAX_TALKS)
-            return sh_fail(err, SH_EINPUT, "more than %d ports of devices, which are allowed", (int)CAPTURE_MAX_TALKS);
+            return sh_fail(err, SH_EINPUT, "too many ports of devices; allowed are up to %d", (int)CAPTURE_MAX_TALKS);
         const int rc = build_place(c, f, udp_t0_ns);
         if (rc == SH_EINPUT)
-            return sh_fail(err, rc, "more than %d different requests to a port, which are allowed", (int)MAX_REQUESTS);
+            return sh_fail(err, rc, "too many different requests to a port; allowed are up to %d", (int)MAX_REQUESTS);
         if (rc == SH_ESTOPPED) return rc;
         if (rc != SH_OK) return sh_fail(err, rc, "no memory for its messages");
         if (c->place[c->n_places - 1].n_messages == 0) capture_forget(c, --c->n_places);

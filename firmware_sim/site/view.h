@@ -20,7 +20,7 @@ struct site_view {
     } band[SITE_VIEW_BANDS];
 };
 
-/* For the settings at power-up. */
+/* Sets the view of a station, by the settings at power-up. */
 void site_view_of(const struct site *site, uint32_t station, struct site_view *view);
 /* This is the function `sees` of struct sight_spec; ctx is the view. */
 int site_view_sees(const void *ctx, const double dir[3], double radius_rad);

@@ -125,7 +125,7 @@ static int put_node(struct nodes *n, const struct node *node, int is_time, int d
     return rc == SH_OK ? put_zeros(n, NODE_LEN, err) : rc;
 }
 
-/* Puts a mark, zeros up to a multiple of 16, the version, zeros, and another mark. */
+/* Puts a mark, 4 zeros, 1 to 16 zeros up to a multiple of 16, the version, zeros, and another mark. */
 static int put_tail(struct nodes *n, uint64_t at, struct sh_err *err)
 {
     if (n->n_raw < at || n->n_raw - at < MARK_LEN + TAIL_LEN) return fbx_nodes_fail(n, at, err);

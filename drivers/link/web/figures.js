@@ -151,7 +151,7 @@ export class Figures {
 
 const mark = (key, bad) => byId(`figure-${key}`)?.classList.toggle('bad', bad);
 
-// Says what came from before, by a head's figures.
+// Says how many points from before the page was opened have come, and what the head no longer had, by Head.figures().
 function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}) {
   if (!points && !gone && !lost) return NONE;
   return [short(number(points)), gone > 0 && `${short(gone)} older ones are gone`,

@@ -84,7 +84,7 @@ async function fetchScene() {
   }
 }
 
-// Returns the time of a frame by its descriptor; 0 if no pan turns through it.
+// Returns how many seconds a pan sweep takes, from a descriptor; 0 if the pan does not turn.
 const frameSeconds = ({pan_start_udeg: from, pan_stop_udeg: to, pan_udeg_s: rate}) =>
   (Number(rate) > 0 ? Math.abs(Number(to) - Number(from)) / Number(rate) : 0);
 

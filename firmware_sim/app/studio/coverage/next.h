@@ -28,11 +28,12 @@ struct coverage_next_place {
     enum coverage_place state;
 };
 
-/* A round of choosing: places that were scanned as a whole, by gain. The first one is the best, and is chosen. */
+/* A place that a round has tried with a whole scan, not with an estimate. */
 struct coverage_next_tried {
     uint32_t place;
     double seen_m2, gain_m2;
 };
+/* A round of choosing one place. The tried places are in order of gain, so the first one is the best, and is chosen. */
 struct coverage_next_round {
     uint32_t n_tried;
     struct coverage_next_tried tried[COVERAGE_MOST_SCANS];
