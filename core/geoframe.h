@@ -8,8 +8,9 @@
  *            centre, about 0.009 deg per km.
  *   grid     prcs is easting, northing (with false origin) and ellipsoidal height of one UTM or UPS grid, as
  *            a mesh in such coordinates is. y is grid north, z the plumb line everywhere. Lengths are grid
- *            lengths: a horizontal metre of the scene is `scale` (0.9996 to 1.0010 in UTM) of a true one, so
- *            ranges carry that factor. Points in that grid are the mesh's own coordinates to the last bit.
+ *            lengths: a true horizontal metre has the length k in the scene, the grid's scale there (0.9996 to
+ *            1.0010 in UTM). Ranges have that factor, too. Points in that grid are the mesh's own coordinates to
+ *            the last bit.
  *   ecef     prcs is ECEF, as a mesh in geocentric coordinates is. The axes of a head are those of its place:
  *            y true north, z the plumb line.
  * Constant after it is set up; any thread. */

@@ -69,7 +69,7 @@ static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const st
 }
 
 /* Returns of a pulse that are nearer to each other than the range resolution make one echo. A return without power
- * stays apart, and is counted in the echoes' numbers. */
+ * is not merged, but it gets a number among the echoes. */
 static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct secondary *f, int texels)
 {
     const uint32_t n = f->n + 1;

@@ -7,7 +7,7 @@
 #include "core/cast/kernels_aim.h"
 
 enum { KERNEL_BLOCK = 64 };
-/* Sine, and cosine less 1, of -32 .. 31 steps. */
+/* A table of sines, and of cosines less 1, of the angles that an axis turns in -32 to 31 steps from pulse to pulse. */
 struct kernel_steps {
     int ready;
     double mirror_turn, pan_turn; /* a step */
@@ -16,8 +16,8 @@ struct kernel_steps {
 /* Computes the steps of a run, unless they are those of the run before. 0 where the run has a table, or its steps
  * are too large. */
 int kernel_sweep_steps(struct kernel_steps *steps, const struct schedule_run *run);
-/* Up to BVH_CHUNK pulses of a run, from its pulse `first` on. (Clang 19 crashes on a function with clones for several
- * instruction sets when a struct has the same name.) */
+/* Up to BVH_CHUNK pulses of a run, from its pulse `first` on. The struct is not called kernel_sweep: clang 19 crashes
+ * where a struct has the name of a function that is compiled for several instruction sets (VEC_CLONES). */
 struct kernel_pulses {
     const struct schedule_run *run;
     uint32_t first;

@@ -7,7 +7,7 @@
 #include "core/angle.h"
 #include "core/georef/proj_lib.h"
 
-/* A system of the registry, as far as it is used here. */
+/* A coordinate reference system that PROJ knows: the part of it that is used here. */
 struct grid {
     const char *name;
     struct proj_lib lib;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files as Assimp opens them while it imports: the mesh, and what it names (buffers of a glTF, ...). Only regular
- * files, as in core/infile.h: opening a FIFO would wait. */
+/* Assimp opens files through these functions while it imports: the mesh, and the files that the mesh names (buffers of
+ * a glTF, ...). Only regular files are opened, as in core/infile.h: opening a FIFO would wait. */
 #ifndef CORE_IMPORT_IMPORT_OPEN_H
 #define CORE_IMPORT_IMPORT_OPEN_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Wavefront OBJ in double: v with its colour, f, o, g, usemtl, mtllib. Points and lines are counted; statements without
- * shape are ignored. */
+/* Wavefront OBJ in double: v with its colour, f, o, g, usemtl, mtllib. Points and lines are counted; statements that
+ * have no part in a shape are ignored. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -94,8 +94,8 @@ static int keep_rgb(struct obj *o, const double rgb[3], struct sh_err *err)
     return SH_OK;
 }
 
-/* Reads x y z, then at most w, or a colour of three numbers and anything after it. The weight w is for
- * curves only. */
+/* Reads x y z and up to five further numbers. Three or more of these begin with a colour. All others are ignored, also
+ * the weight w, which only curves use. */
 static int read_vertex(struct obj *o, struct sh_err *err)
 {
     double v[8] = {[5] = NAN};
@@ -264,7 +264,7 @@ static int read_other(struct obj *o, struct text_span word)
             memcpy(o->unknown, word.p, word.n < sizeof o->unknown ? word.n : sizeof o->unknown - 1);
         }
     }
-    return SH_OK; /* text statements: a backslash there may be a path's */
+    return SH_OK; /* the words of other statements are not read: a backslash at the line's end may belong to a path */
 }
 
 static int read_statement(struct obj *o, struct sh_err *err)

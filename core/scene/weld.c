@@ -30,7 +30,7 @@ static uint32_t *weld_recent(struct build_weld *w, uint64_t key)
     return &w->recent[key >> 32 & (BUILD_RECENT - 1)];
 }
 
-/* A table of so many slots, with what the old one holds. */
+/* Makes a table of `size` slots, and puts the vertices of the old one into it. */
 static int make_table(struct scene_build *b, struct build_weld *w, size_t size, struct sh_err *err)
 {
     uint32_t *old = w->slot, *slot = huge_pages_alloc(size * sizeof *slot);
@@ -48,7 +48,8 @@ static int make_table(struct scene_build *b, struct build_weld *w, size_t size, 
     return SH_OK;
 }
 
-/* A vertex is a corner of six triangles, as a rule: a third of the table is in use then. */
+/* `vertices` has one for each corner of a triangle. As a rule six triangles have a corner at the same place: then at
+ * most a third of the table is in use. */
 int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err)
 {
     size_t size = 64;

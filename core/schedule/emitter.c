@@ -144,7 +144,7 @@ static void describe_sphere(const struct emitter *e, char *buf, size_t len)
                           360.0 * emitter_ring_turn(e, e->rings - 1));
     }
     if (!emitter_sphere_is_exact(e) && n > 0 && (size_t)n < len)
-        snprintf(buf + n, len - (size_t)n, "; %.6g deg, as asked for, does not divide a turn",
+        snprintf(buf + n, len - (size_t)n, "; %.6g deg, as asked, does not divide 180 deg",
                  1e-6 * (double)e->asked_udeg);
 }
 

@@ -29,8 +29,9 @@ static void to_face(const struct build_group *g, uint32_t face, struct reach at[
 }
 
 /* Returns whether the whole box lies beyond one side of the face's pyramid, or behind the station. Boxes that touch a
- * side count as within: a triangle seen edge-on may be hit a little beside its end. That is SIGHT_TILT_DOUBT over 1e-6,
- * the sine below which core/bvh limits ranges to those between the edges. */
+ * side count as within: a triangle seen edge-on may be hit a little beside its end. BUILD_BESIDE bounds that distance:
+ * it is SIGHT_TILT_DOUBT over 1e-6. Where the sine of the angle to the plane is below 1e-6, core/bvh limits ranges to
+ * those between the edges. */
 static int is_beside(const struct build_group *g, uint32_t face)
 {
     struct reach at[3];
@@ -137,7 +138,8 @@ int build_groups(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* near_m is that of the box's nearest point. The rounding of its squares loses less than 1e-12. */
+/* near_m becomes the distance of the box's nearest point. The factor 1 - 1e-12 makes up for the rounding of the
+ * squares, so that no point is nearer. */
 void build_group_candidate(const struct build_group *g, uint32_t face, struct build_candidate *c)
 {
     double rect[2][2], near2 = 0.0;

@@ -46,8 +46,8 @@ uint32_t sight_cells(double rays, uint64_t memory_bytes)
     return cells;
 }
 
-/* Arrays have their largest size: pages that are never touched take no memory. They are in huge pages, since they are
- * filled at once and read at random. */
+/* Arrays have their largest size: pages that are never touched take no memory. Large ones are in huge pages, since they
+ * are filled at once and read at random. */
 static void *take_array(struct build_shared *b, struct build_arena *arena, uint64_t most, uint64_t size)
 {
     const uint64_t within = b->spec->memory_bytes / size + 1;
@@ -152,8 +152,8 @@ static void free_arrays(struct sight *s)
     s->record = NULL;
 }
 
-/* Builds with the current number of cells. TOO_FINE where the memory does not hold them, and
- * may_coarsen. */
+/* Builds with the current number of cells. Returns TOO_FINE where the memory does not hold them and may_coarsen is
+ * set. */
 static int try_cells(struct sight *s, const struct sight_spec *spec, unsigned threads, const struct sh_report *report,
                      int may_coarsen, struct sh_err *err)
 {

@@ -7,9 +7,9 @@
  *     column = width / 2 + f r / d,  row = height / 2 - f u / d,  f = width / 2 / tan(fov / 2)
  * in pixels, d > 0. fov is the angle across the width.
  *
- * Each point is a disc: point_m wide, and at least point_px. Where discs overlap, that of the nearer point counts;
- * discs bulge, so that on a surface each place takes the nearest centre. Memory depends on the image alone: 12
- * bytes for each of SUB x SUB places of a pixel.
+ * Each point is a disc: point_m wide, and at least point_px. Where discs overlap, that of the nearer point counts. A
+ * disc is deeper at its rim than at its centre, so that on a surface each place shows the disc whose centre is nearest.
+ * Memory depends on the image alone: 12 bytes for each place; a pixel has 2 x 2 places (VIEW_SUB).
  *
  * Shading: surfaces that face the light from the upper left of the eye are bright; places whose neighbours are
  * nearer are dark (eye-dome lighting, C. Boucheny: Visualisation scientifique de grands volumes de donnees: pour
@@ -108,15 +108,15 @@ struct view_entry {
     char name[64];
 };
 enum { VIEW_MAX_NAMES = 12 };
-/* Draws a legend there of n things with names; entry has the first VIEW_MAX_NAMES of them. Where there is no room for
- * all, it ends with the number of the others. */
+/* Draws a legend below on the left, of n things with names; entry has the first VIEW_MAX_NAMES of them. Where there is
+ * no room for all, it ends with the number of the others. */
 void view_draw_names(struct picture *picture, const char *title, const struct view_entry *entry, uint32_t n);
 
 /* ---- where to look from */
 
-/* Chooses an eye from which a box fills the image: in the direction azimuth (clockwise from y, seen from above, where
- * the eye stands) and elevation above the horizon, below 90 degrees. fov, width and height are given; eye and look_at
- * are set. */
+/* Chooses an eye from which a box fills the image. azimuth and elevation say in which direction from the box the eye
+ * stands: azimuth clockwise from y, seen from above; elevation above the horizon, below 90 degrees. fov, width and
+ * height are given; eye and look_at are set. */
 void view_frame(const double min_m[3], const double max_m[3], double azimuth_rad, double elevation_rad,
                 struct view_camera *camera);
 

@@ -236,7 +236,8 @@ void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix)
         const double gain = mix->chi2 - next.chi2;
         *mix = next;
         now = 1 - now;
-        /* Steps that are hardly damped gain a tenth of the one before, or less. */
+        /* A step with little damping gains at most a tenth of the one before. So once a step gains no more than half of
+         * the noise's variance, further ones gain too little. */
         if (gain <= 0.5 * task->variance && damping < 1.0) return;
         damping *= 0.15;
     }

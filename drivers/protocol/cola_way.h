@@ -20,8 +20,8 @@ struct cola_encoder {
     int16_t speed_mm_s;
 };
 
-/* A payload of poses. The path begins at 0 again where the scan has another number, or where its last pose is
- * from before: a replayed recording goes back within a scan. */
+/* Takes a payload of poses. The path begins at 0 again where the scan has another number, or where the payload's last
+ * pose is earlier than the last one that was taken: a replayed recording goes back within a scan. */
 void cola_way_add(struct cola_way *w, uint32_t scan, const uint8_t *payload, size_t len);
 struct cola_encoder cola_way_at(const struct cola_way *w, uint32_t scan, int64_t t_ns);
 

@@ -109,7 +109,7 @@ struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams o
     uint64_t sequence_ns_num, sequence_ns_den; /* num / den ns is the time of a firing sequence (beams) or a pulse */
     int64_t first_ring_udeg; /* sphere: elevation of ring 0, rounded; the others follow by 180 deg / gaps */
     uint32_t echoes;         /* enum native_echoes: which echoes of a pulse are sent */
-    uint32_t gaps;           /* sphere without all its rings: gaps between rings from pole to pole; else 0: rings - 1 */
+    uint32_t gaps;           /* sphere: gaps between rings from pole to pole, where not all are scanned. 0: rings - 1 */
 };
 enum native_echoes {
     NATIVE_ECHOES_ALL = 0,

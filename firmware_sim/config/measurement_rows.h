@@ -104,7 +104,8 @@
              "the finer sample_ns must be: up to 0.37 of the pulse's width with 1.5, 0.2 with 2, 0.09 with 3."},
     {KEY(waveform.bandwidth_mhz), CFG_REAL, "MHz", "0", 0, 100000,
      .help = "Bandwidth of the receiver, at -3 dB, from 1 on; 0: no limit. It lowers the pulse's peak, and with it the "
-             "level of waveform.echoes, but not the noise: below 5 times the noise many echoes are of noise alone."},
+             "level of waveform.echoes, but not the noise. If that level is below 5 times the noise, many echoes are "
+             "of noise alone."},
     {KEY(waveform.sample_ns), CFG_REAL, "ns", "1", 0.05, 100,
      .help = "Time from sample to sample, in whole picoseconds."},
     {KEY(waveform.bits), CFG_COUNT, NULL, "12", 8, 14, .help = "Bits of a sample."},
@@ -115,7 +116,7 @@
     {KEY(waveform.saturation_db), CFG_REAL, "dB", "0", 0, 90,
      .help = "The receiver gives no more than this signal, above the threshold; 0: no limit."},
     {KEY(waveform.dead_ns), CFG_REAL, "ns", "0", 0, 100000,
-     .help = "The receiver gives nothing for this time after a sample at saturation_db, which it needs."},
+     .help = "The receiver gives nothing for this time after a sample at saturation_db, which must be given, too."},
     {KEY(waveform.keep_db), CFG_REAL, "dB", "-6", -60, 60,
      .help = "Samples are kept in windows where the signal reaches this, relative to the threshold."},
     {KEY(waveform.before_ns), CFG_REAL, "ns", "5", 0, 4000,

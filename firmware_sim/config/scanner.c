@@ -56,7 +56,8 @@ static void copy_text_of(char *text, size_t len, const char *diagnostic)
         snprintf(text, len, "%.*s%s", (int)(at - diagnostic), diagnostic, end);
 }
 
-/* Returns whether a diagnostic was reported before, as those of the file's own sections were. */
+/* Returns whether a diagnostic was reported before. The file is read once for each scanner, so diagnostics of the
+ * sections that scanners share come again. */
 static int was_reported(const struct config_diagnostics *diagnostics, const char *diagnostic)
 {
     char text[sizeof diagnostics->err[0].text], reported[sizeof text];
@@ -75,8 +76,8 @@ static void add_diagnostics(struct config_diagnostics *diagnostics, const struct
             cfg_add_diagnostic(diagnostics, more->place[i], more->err[i].code, more->err[i].text);
 }
 
-/* Returns the station whose configuration station i uses. A station with a section `scanner` uses its own; the others
- * share the file's, which is that of the first of them. */
+/* Returns the station whose configuration station i uses. A station with a section `scanner` has one of its own. The
+ * others share one, which is loaded for the first of them. */
 static uint32_t loaded_as(const struct config *cfg, uint32_t i)
 {
     uint32_t k = 0;

@@ -27,7 +27,7 @@ void device_say_overrun(struct device_overrun *overrun, uint64_t pulse_next, uin
     overrun->first = UINT64_MAX;
 }
 
-/* Adds the event once a second, and the error once per episode. */
+/* Adds the event once a second, and the error once per episode: here two seconds without a loss end an episode. */
 void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick)
 {
     const uint64_t journal = atomic_load(&overrun->counters->lost_journal_lines);

@@ -183,7 +183,7 @@ static int is_merging(const struct wire *wire)
            wire->count[FAULT_OF_NOTICES] < wire->merge_until[FAULT_OF_NOTICES];
 }
 
-/* Finishes an item: later ones keep its delay, and pieces that were held for it go on. */
+/* Finishes an item. Later ones do not go out before it, even if it is delayed. Pieces that were held for it go on. */
 static int wire_finish(struct wire *wire, const struct wire_making *making)
 {
     const int of = making->item->of;

@@ -21,7 +21,7 @@ struct wire {
     uint64_t merge_until[FAULT_N_OF]; /* frames up to this number go into a write that a merge began */
     struct wire_queue queue;
     int64_t last_due_ns;               /* due time of the last piece: delays keep the order */
-    int64_t reply_due_ns;              /* due time of the last reply: late replies keep theirs */
+    int64_t reply_due_ns;              /* due time of the last reply: late replies keep their order */
     int is_over;                       /* an act that ends the session waits: later items are discarded */
     uint64_t void_frames, void_pulses; /* discarded for that */
     uint8_t *unit;                     /* the copy of the item at hand, which faults change */

@@ -25,8 +25,8 @@ void unit_queue_clear(struct unit_queue *queue);
 /* Returns the bytes that are left for further units. Each unit takes a few bytes more than its length. */
 uint32_t unit_queue_room(const struct unit_queue *queue);
 struct unit_kind {
-    uint64_t tick;      /* when it was made */
-    uint64_t made_tick; /* the stream's tick up to which it was made: the same at any pace */
+    uint64_t tick;      /* the last released tick when it was made: its age counts from there */
+    uint64_t made_tick; /* the tick that the session had reached in the stream: the same at any pace */
     int is_reply;       /* it answers the client */
 };
 

@@ -26,7 +26,8 @@ struct replay_options {
     int start;           /* play at once; and end the run at the end, unless loop */
     uint32_t clients;    /* with start: once so many clients are there; 0: at once */
     double duration_s;   /* > 0: end the run after that time; with start: after that time of playing */
-    /* In place of a recording: what each link says, as many as cfg has links, and how. NULL: a recording. */
+    /* In place of a recording: a talk for each link of cfg, which says what the link sends (drivers/protocol/talk.h).
+     * talk_options holds for all of them. NULL: a recording. */
     const struct talk *const *talk;
     struct talk_options talk_options;
     const char *truth;              /* file for the faults that are injected; NULL: none */

@@ -152,7 +152,7 @@ static void odd_steps_are_rounded(void **state)
     assert_int_equal(e.steps, 103);
     assert_int_equal(e.rings, 52);
     emitter_describe(&e, text, sizeof text);
-    assert_non_null(strstr(text, "3.5 deg, as asked for, does not divide a turn"));
+    assert_non_null(strstr(text, "3.5 deg, as asked, does not divide 180 deg"));
     emitter_set_sphere(&e, 2000000);
     emitter_describe(&e, text, sizeof text);
     assert_null(strstr(text, "does not divide"));

@@ -8,7 +8,7 @@ double figures_nice(double v)
     static const double step[] = {1.0, 2.0, 5.0, 10.0};
     const double power = floor(log10(v));
     for (int i = 0; i < 4; i++) {
-        /* pow is good to a unit in the last place or two; 10^-k itself is not a double */
+        /* No double is exactly 10^-k, so this divides by 10^k. pow is good to a unit or two in the last place. */
         const double nice = power < 0.0 ? step[i] / pow(10.0, -power) : step[i] * pow(10.0, power);
         if (nice >= v * (1.0 - 1e-12)) return nice;
     }

@@ -35,7 +35,8 @@ static struct picture_box box_at(const double at[2], const double size[2], int r
     return (struct picture_box){x - 0.5 * size[0], y - 0.5 * size[1], x + 0.5 * size[0], y + 0.5 * size[1]};
 }
 
-/* Marks of stations are boxes, too; their ticks are not. */
+/* Returns whether the box overlaps no label that is placed and no station's mark. Ticks of headings may be covered:
+ * cost_of counts that of the label's own station. */
 static int is_free(const struct map *map, const struct map_label *label, uint32_t n, const struct picture_box *box)
 {
     for (uint32_t i = 0; i < n; i++) {
@@ -80,7 +81,7 @@ static void place_label(const struct map *map, const struct map_layout *at, uint
     measure(&map->station[i], size);
     for (int ring = 0; ring < RINGS; ring++)
         for (int k = 0; k < PLACES; k++) {
-            const double rank = 0.02 * k + 0.5 * ring; /* the ring counts as half a box of wall */
+            const double rank = 0.02 * k + 0.5 * ring; /* the next ring costs as much as walls under half of the box */
             if (rank >= least) continue;
             const struct picture_box box = box_at(place, size, ring, k);
             if (box.left < 2 || box.top < 2 || box.right > at->width - 2 || box.bottom > at->top + at->map_height)

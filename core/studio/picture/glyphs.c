@@ -126,7 +126,7 @@ const char *glyph_strokes(uint32_t code)
 
 uint32_t glyph_base(uint32_t code, const char **accent)
 {
-    /* From 0xc0 on. A dot stands for no letter with an accent. */
+    /* The characters from 0xc0 on: base letters, and kinds of accents. A dot: the character has no accent. */
     static const char base[] = "AAAAAA.CEEEEIIII.NOOOOO.OUUUUY..aaaaaa.ceeeeiiii.nooooo.ouuuuy.y";
     static const char kind[] = "`'^~:o.,`'^:`'^:.~`'^~:./`'^:'..`'^~:o.,`'^:`'^:.~`'^~:./`'^:'.:";
     if (code < 0xc0 || code >= 0xc0 + sizeof base - 1 || base[code - 0xc0] == '.') return 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* An image as a PNG, and files that appear whole. */
+/* Writes an image as a PNG. Files of pictures appear under their names only when they are complete. */
 #include <errno.h>
 #include <png.h>
 #include <string.h>

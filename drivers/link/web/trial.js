@@ -5,13 +5,13 @@
 
 import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from './previews.js';
 
-// Cells are looked for by pulses that are nearer to each other than those that are shown. At rest finer pulses follow,
-// which grazing surfaces need.
+// Points are shown with the angular step of the station. The cells that it sees are found with these finer steps: the
+// first at once, the second once the station rests. Surfaces at grazing incidence need the second.
 const COVER_STEPS_DEG = [0.5, 0.25];
-const REST_MS = 300; // a station rests so long before the finer ones
+const REST_MS = 300; // a station must rest for this time before the second step
 const COVER_MS = 500; // while a station is dragged, its cells are asked for no more often
 const MOST_STATIONS = 16; // so many stations may be in a request for a suggestion
-const MOST_RENEWED = 3; // so often in a row stations are asked for again if the head no longer has their answers
+const MOST_RENEWED = 3; // how often in a row all stations are asked for again, where the head has dropped their answers
 
 // These are settings of a station that a preview takes; null: as at power-up.
 export const SETTINGS = ['step_deg', 'far_m', 'line0_deg', 'line1_deg', 'pan0_deg', 'pan1_deg'];
