@@ -102,7 +102,7 @@ static inline __attribute__((always_inline)) char *put_short(char *to, uint64_t 
 
 char *decimal_put_short(char *to, uint64_t v, unsigned decimals)
 {
-    return decimals == 9 ? put_short(to, v, 9) : put_short(to, v, decimals); /* a known number divides fast */
+    return decimals == 9 ? put_short(to, v, 9) : put_short(to, v, decimals); /* dividing by a constant is fast */
 }
 
 /* ---- doubles */
@@ -160,7 +160,7 @@ static inline __attribute__((always_inline)) char *put_fixed(char *to, double v,
 
 char *decimal_put_fixed(char *to, double v, unsigned decimals)
 {
-    if (decimals == 6) return put_fixed(to, v, 6); /* a known number divides fast */
+    if (decimals == 6) return put_fixed(to, v, 6); /* dividing by a constant is fast */
     if (decimals == 9) return put_fixed(to, v, 9);
     return put_fixed(to, v, decimals);
 }
@@ -182,8 +182,9 @@ static int scale_any(double v, int decimals, uint64_t *whole)
     return scale(take_apart(v), low * high, whole);
 }
 
-/* The number of decimals depends on the power of ten of the first digit. It is estimated from the power of two below
- * |v|, and may be one too low. Then there is a digit too many, and one decimal less is taken. */
+/* The number of decimals depends on the power of ten of the first digit. That power is estimated from the power of two
+ * below |v|, and may be one too low. Then the number has one digit too many, and it is scaled again with one decimal
+ * less. */
 char *decimal_put_general(char *to, double v, unsigned digits)
 {
     const int exponent = MANTISSA_BITS - take_apart(v).s; /* of two: 2^exponent <= |v| < 2^(exponent + 1) */

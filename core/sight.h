@@ -20,8 +20,9 @@
 
 struct sight;
 
-/* A map leaves a triangle to the BVH where fewer rays than this hit it, unless larger triangles are in its group.
- * Examining a triangle costs as much as it saves for this many rays. */
+/* Triangles that follow each other in the scene's list make a group of up to 32. A map leaves a whole group to the BVH
+ * where fewer rays than this, for each of its triangles, hit the box around the group. Examining a triangle costs as
+ * much as it saves for this many rays. */
 #define SIGHT_GROUP_RAYS 64.0
 
 struct sight_spec {
@@ -47,8 +48,8 @@ struct sight_info {
 int sight_possible(const struct scene *scene);
 /* Cells along an edge of the cube's faces, for rays and memory_bytes as of struct sight_spec. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes);
-/* About how many triangles a sight would examine one by one: those that are not in a group for the BVH. It looks at a
- * few thousand of them. */
+/* Estimates how many triangles a sight would examine one by one: those whose group is not left to the BVH. At most
+ * 1,024 of the groups are looked at. */
 double sight_examined(const struct sight_spec *spec);
 /* Made by `threads` threads (0: all). SH_ESTOPPED where report asks to stop, SH_ENOMEM. */
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,

@@ -113,7 +113,9 @@ static void mean_corner(const struct scene *scene, double mean_m[3])
         mean_m[i] = fmin(fmax(sum[i] / (3.0 * scene->n_triangles), scene->min_m[i]), scene->max_m[i]);
 }
 
-/* The origin is the middle of the scene. Where rays go in stretches, it is where most triangles are. */
+/* The origin is the middle of the scene. Where a long ray is cast piece by piece, none longer than stretch_m
+ * (bvh_inside.h), and the scene has no copies, it is the mean of the triangles' corners. So it lies where most
+ * triangles are. */
 static void measure(struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;

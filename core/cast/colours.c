@@ -8,7 +8,8 @@
 #include "core/cast/echoes.h"
 #include "core/colour.h"
 
-/* Returns the frame scalar when a pulse of the chunk fires. Between two knots it changes evenly. */
+/* Returns the frame scalar at the time when a pulse of the chunk fires: a number that a trajectory has at each time
+ * (cast.h). Between two knots it changes evenly. */
 static double frame_at(const struct chunk *k, uint32_t pulse)
 {
     const struct cast_setup *s = k->s;

@@ -22,10 +22,11 @@
 
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 
-/* Costs of the BVH, by how many rays Embree takes at once: for a hit, for a miss, and extra near a border, since rays
- * of a packet then go to more leaves. They come from the bench's column `without` (no map) of house, garden and
- * terrain, 1 to 22.5 million pulses. Hit and miss are costs where borders are rare; border is how much the cost grows
- * with their share. For packets of 8 and 4 they follow the ratios of Embree's packets in the chart. */
+/* Costs of the BVH, by how many rays Embree takes at once: for a hit, for a miss, and extra for a ray near a border,
+ * beyond which rays hit another triangle, since the rays of a packet then go to more leaves. They come from the bench's
+ * column `without` (no map) of house, garden and terrain, 1 to 22.5 million pulses. `hit` and `miss` are costs where
+ * such rays are rare; `border` times the share of such rays is added. For packets of 8 and 4 all three follow the
+ * ratios of Embree's packets in the chart. */
 struct plan_ray_cost {
     uint32_t packet;
     double hit, miss, border;
@@ -47,6 +48,6 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 #define PLAN_COST_SIGHT_EXAMINED 440.0
 #define PLAN_COST_SIGHT_CELL     60.0
 #define PLAN_SIGHT_CELL_BYTES    25.0
-#define PLAN_SIGHT_RECORD_BYTES  128.0 /* of a triangle in such cells, per region, and of a hidden one for each */
+#define PLAN_SIGHT_RECORD_BYTES  128.0 /* one struct sight_record, for a triangle in such cells */
 
 #endif

@@ -26,7 +26,7 @@ struct learn_echo {
 /* Returns the signal of an echo of amplitude 1, x samples after its centroid. */
 static double learn_signal(const struct waveform *waveform, double metre, double extent_m, double x)
 {
-    const double far_m = 1e6 * metre; /* no bend of a near plane */
+    const double far_m = 1e6 * metre; /* so far that ranges across the disc are evenly spaced (README, Spread) */
     const struct waveform_return part = {far_m, 1.0, extent_m, extent_m > 0.0 ? WAVEFORM_DISC : WAVEFORM_POINT};
     return waveform_signal(waveform, &part, 1, far_m + x * metre);
 }
@@ -51,8 +51,8 @@ static double learn_half(const struct finder *finder, const struct learn_echo *e
     return side[1] - side[0];
 }
 
-/* Measures peak and width of h, from a first guess: its area over its largest value. (At its centroid a pulse of
- * two humps may be nothing.) */
+/* Measures peak and width of h, from a first guess of the width: its area over its largest value. (Its value at the
+ * centroid would not do: between two humps it may be 0.) */
 static void learn_pulse(const struct waveform *waveform, struct finder *finder, struct learn_echo *echo)
 {
     const struct waveform_pulse *pulse = &waveform->pulse;
@@ -74,8 +74,8 @@ static void learn_pulse(const struct waveform *waveform, struct finder *finder, 
     finder->seen = finder->peak > 0.9 * most && at > 1.0 - FINDER_SHAPE_LEAD && at < FINDER_SHAPE_LAG - 1.0;
 }
 
-/* Finds the crossings of falling levels, from the top outward. At each of them h is last below the level before its
- * peak. */
+/* Finds where h crosses falling levels on its rising side. The search for each level goes from the peak back in time,
+ * to the first place where h is below the level. */
 static void learn_leads(struct finder *finder, const struct learn_echo *echo)
 {
     uint32_t i = echo->top;

@@ -232,7 +232,7 @@ static void tcp_end(void *link, int session)
     const struct tcp_link *tcp = link;
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return;
-    self->state = TCP_ENDED; /* with a pulled cable the end goes out after it, when poll closes the socket */
+    self->state = TCP_ENDED; /* a pulled cable holds back the end: poll closes the socket once it is in again */
     if (tcp->is_silent) return;
     shutdown(self->fd, SHUT_WR);
     socket_drain(self->fd);
@@ -280,7 +280,7 @@ static void tcp_speak(struct tcp_link *tcp, int resets)
 static int tcp_unplug(struct tcp_link *tcp)
 {
     if (tcp->listener.fd < 0) return SH_ESTATE;
-    tcp->is_silent = 0;      /* what is left of its sockets ends here */
+    tcp->is_silent = 0;      /* need not be undone: the silent sockets end here */
     close(tcp->listener.fd); /* the system turns clients away that wait there */
     tcp->listener.fd = -1;
     for (int s = 0; s < tcp->n_sessions; s++)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The telegram LMDscandata; COLA.md draws it. Both forms are this one sequence of values. */
+/* The telegram LMDscandata; COLA.md draws it. CoLa-A and CoLa-B write the same values in the same order. */
 
 #include "drivers/protocol/cola.h"
 

@@ -2,7 +2,7 @@
 /* Payloads of fixed length as tables: a row for each struct member, in wire order without gaps.
  *
  * The same table encodes and decodes, so the two can't differ. The protocol's pages give the offsets, and
- * tests/unit/test_native.c holds them. Pure; any thread; real-time safe. */
+ * tests/unit/test_native.c checks them. Pure; any thread; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_FIELDS_H
 #define DRIVERS_PROTOCOL_FIELDS_H
 
@@ -30,8 +30,9 @@ struct field_table {
     uint8_t type; /* enum native_type of the frame whose payload is such a struct, or begins with one */
 };
 
-/* The descriptor has two lengths: its last two fields are sent only where content is not 0. Telemetry has three: the
- * count of lines that files lack, and the state of a PTP follower, are sent only where there are such. */
+/* The descriptor has two lengths: its last two fields are sent only where content is not 0. Telemetry has three:
+ * the state of a PTP follower comes last, and is sent only where the head has one. The number of lines that journal and
+ * truth have lost is before it, and is sent where it is not 0 or a state follows. */
 extern const struct field_table fields_descriptor, fields_descriptor_content, fields_anchor, fields_emitter,
     fields_points, fields_attributes, fields_waves, fields_line_end, fields_telemetry, fields_telemetry_lines,
     fields_telemetry_ptp, fields_event, fields_pose;

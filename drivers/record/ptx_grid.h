@@ -51,7 +51,7 @@ int ptx_grid_begin(struct ptx_grid *grid, uint64_t text_at, const struct station
 int ptx_grid_shot(struct ptx_grid *grid, uint32_t column, uint32_t row);
 /* Takes n cells; intensity -1: a shot without echo. */
 int ptx_grid_cells(struct ptx_grid *grid, struct ptx_cell *cell, int n, struct sh_err *err);
-/* Writes what was given to the file. */
+/* Flushes: the file then has all cells that were given so far. */
 int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err);
 /* Calls fn for each column with its cells from row_min to row_max; a cell without echo has intensity -1. Then
  * the grid is without shots; its file stays until ptx_grid_clear. */

@@ -8,7 +8,7 @@
 
 #include "drivers/host/scanhead.h"
 
-/* The pace of the work at hand; pieces of work follow each other. Zeroed at first. */
+/* The pace of the work at hand; pieces of work follow each other. The caller sets all to 0 before the first one. */
 struct progress_pace {
     char what[64];
     int64_t since_ns;

@@ -15,7 +15,8 @@ const struct command_unit command_unit_replay = {"s", 0, "no unit", {{NULL, 0}}}
 static const double SLOWEST = 0.01, FASTEST = 1000.0;
 static const double LONGEST_S = 1e9; /* of a recording whose length is not known */
 
-/* Cuts a time of whole ns to the digits of a reply. Rounded up, the length would be refused as a time. */
+/* Cuts a time of whole ns to the digits of a reply. If the length were rounded up, a client that sends it back as the
+ * time of a seek would be refused: it would be beyond the end. */
 static double whole_us(double s)
 {
     return 1e-6 * (double)(llround(1e9 * s) / 1000);

@@ -129,8 +129,8 @@ enum head_state device_visible_state(const struct device *device, uint64_t relea
 uint64_t device_ticks_of(const struct device *device, double s);
 
 /* scan.c */
-/* With options.start, options.duration_s counts from the first scan's tick; before that, from the first tick at which a
- * self-test failed. */
+/* With options.start: options.duration_s counts from this tick. Called where a scan begins, of which only the first one
+ * has an effect, and where a self-test fails before any scan, of which only the first one has an effect, too. */
 void device_count_duration(struct device *device, uint64_t tick);
 void device_begin_scan(struct device *device, uint64_t tick);
 /* Claims the tick's part of the scan that is on: descriptor, names, pulses; and the scan's end. */

@@ -16,7 +16,7 @@
  *     INITIALIZING --boot over--> LISTENING --2nd Announce--> UNCALIBRATED <--servo--> SLAVE
  *     UNCALIBRATED, SLAVE --no Announce for 3 intervals--> LISTENING      any state --fault--> FAULTY --> LISTENING
  *
- * The servo is a PI controller: of the offset o, ns, over the Sync interval T it corrects the rate by 0.7 o / T, and
+ * The servo is a PI controller. From the offset o, ns, and the Sync interval T it corrects the rate by 0.7 o / T, and
  * its estimate of the oscillator by 0.3 o / T. Those are linuxptp's gains for T = 1 s. Its states:
  *     s0 unlocked   an offset is measured
  *     s1 jump       with the second one the rate is known; the clock is stepped where the offset is too large
@@ -25,7 +25,7 @@
  * In holdover the rate stays as it was last corrected, and a fault's drift is added (clock_faults.c). Offset, delay and
  * grandmaster stay those of the last master, as ptp4l reports them.
  *
- * All figures are integers of ns and 1e-12; each correction is exact and nothing is summed up. A jitter's number is
+ * All figures are integers of ns and 1e-12, and the clock takes each correction exactly. A jitter's number is
  * keyed by noise.seed and the number of the Sync. The last PTP_KEPT changes are kept, since sessions ask for past
  * times.
  *

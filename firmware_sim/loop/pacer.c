@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing,
- * and calls the system only for the clock, for wake-ups, and to wait for a tick that is late. */
+/* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing. In real
+ * time it calls the system only for the clock, for wake-ups, and to wait for a tick that is late. In the paces `fast`
+ * and `step` it also waits for casters, files and readers. */
 #include <errno.h>
 #include <sched.h>
 #include <string.h>

@@ -48,7 +48,7 @@ static const char *const entered[] = {"EXT_mesh_gpu_instancing",
 struct search {
     const json_t *root;
     uint64_t n;
-    struct gltf_at first; /* place of the first one; number and list are its, too */
+    struct gltf_at first; /* place of the first such index; `number` is its value, `list` the list it is for */
     double number;
     const char *list;
 };

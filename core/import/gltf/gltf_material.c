@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Materials: the base colour, its texture, how that lies, and what its alpha cuts out. */
+/* Materials: the base colour, its texture, how texture coordinates are transformed, and the holes that the texture's
+ * alpha cuts out. */
 #include "core/import/gltf/gltf_material.h"
 
 #include <math.h>

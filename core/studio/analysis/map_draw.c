@@ -8,7 +8,7 @@
 
 enum {
     WALL_LEVELS = 14, /* height levels hit that make a pixel as dark as it gets */
-    FREE_LEVELS = 4,  /* floor and ceiling, each across the border of two levels: not structure */
+    FREE_LEVELS = 4,  /* floor and ceiling fill up to two levels each; only more levels than these are structure */
     HISTOGRAM_BINS = 1024,
     BAR_PX = 240, /* longest scale bar */
 };

@@ -2,7 +2,8 @@
 /* Triangles of a scan's grid. First come all triangles; then the mean of their edges; then the filter.
  *
  * Each edge counts once. Diagonals belong to one cell. An edge along a column, or across two columns, borders on two
- * cells. Each cell that uses it sets the same mark at the same one of its points. Marks are counted afterwards. */
+ * cells. Its mark is stored at one of the edge's two points. Both cells set this same mark, and marks are counted
+ * afterwards. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

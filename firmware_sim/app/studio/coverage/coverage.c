@@ -293,8 +293,8 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "candidates", "FILE.csv", .at = AT(o.candidates), .file = APP_READS,
      .help = "compare the places in a file with the columns x_m,y_m,z_m of the head's origin, and perhaps heading_deg"},
     {APP_NUMBER, "step-deg", "D", .min = 0.2, .max = 30.0, .at = AT(o.step_deg),
-     .help = "angle between the rays by which places are compared (default 1). Rays of heads that scan a plane or have "
-             "several beams are their pulses"},
+     .help = "angle between the rays by which places are compared (default 1). Not for heads that scan a plane or "
+             "have several beams: the rays are then the head's own pulses"},
     {APP_WHOLE, "scans", "K", .min = 1, .max = COVERAGE_MOST_SCANS, .at = AT(o.scans),
      .help = "scan the K best places of each round as a whole, and take the best one (default 3)"},
     OPTION_SET,

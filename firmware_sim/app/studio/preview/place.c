@@ -22,7 +22,7 @@ static int64_t udeg_or(double deg, int64_t otherwise_udeg)
     return isinf(deg) ? otherwise_udeg : llround(1e6 * deg);
 }
 
-/* Sets windows of the lines and of the pan. Only a line head can have them without another plan. */
+/* Sets windows of the lines and of the pan. Heads that don't scan lines are refused. */
 static int set_windows(const struct preview_request *r, const struct config_profile *p, struct head_settings *s,
                        struct sh_err *err)
 {

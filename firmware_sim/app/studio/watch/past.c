@@ -35,7 +35,7 @@ struct past {
     uint64_t run; /* another one in each run of a head */
     /* the taker's */
     struct placing placing[KINDS];
-    int is_new;     /* they are not in the last piece yet */
+    int is_new;     /* one of `placing` is not in the last piece yet */
     int after_pose; /* the last frame had poses: the points that need them follow */
 
     pthread_mutex_t lock; /* of all below */
