@@ -3,7 +3,7 @@
  * sampled before. Sampling has a row of its own. Figures are medians of the rounds, in processor time of the thread.
  *
  *   build/tests/bench/waveform_detect            a table
- *   build/tests/bench/waveform_detect --chart    rows of the chart's table (tests/bench/README.md)
+ *   build/tests/bench/waveform_detect --chart    rows of the chart's table (tests/bench/CHART.md)
  *
  * `single` is one return on a plane that is hit head on, `tilted` at 80 degrees, `pair` are two a pulse's width
  * apart, `foliage` is 40 returns over 3 m, `limited` is one 30 dB above the full scale, and `nothing` is noise.
