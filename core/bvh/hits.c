@@ -89,7 +89,8 @@ VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const do
 }
 
 /* Takes the rays' own origins into the local frame, also as Embree gets them. Returns a bound of their distances from
- * its origin, and bounds those from each other: both by how far they are from the first one. */
+ * that frame's origin, and sets batch->apart_m, a bound of the distances between any two of them. Both bounds follow
+ * from the largest distance from the first ray. */
 VEC_CLONES
 static double take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {

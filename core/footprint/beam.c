@@ -21,8 +21,8 @@ static double mean_t2(void)
     return mean_t() - exp(-2.0) / (1.0 - exp(-2.0));
 }
 
-/* A strip of the disc between two distances from the centre, or the chord at one distance, per distance. The irradiance
- * is a Gaussian that is cut off at the disc's edge. */
+/* A strip of the disc between two distances from the centre. For a chord at one distance the members are per unit of
+ * distance. The irradiance is a Gaussian that is cut off at the disc's edge. */
 struct strip {
     double energy, along, across; /* energy; its second moments, by the distance and along the chord */
 };
@@ -116,7 +116,7 @@ static void plane_means(const double *restrict term, float most, const float *re
 }
 
 /* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i:
- * s^2 + b^2 = s^2 x, and what is left out is s^2 of these terms. */
+ * s^2 + b^2 = s^2 x. Terms that are smaller than these by a factor of s^2 are left out. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m)
 {
     double s2 = beam->slope * beam->slope;
@@ -125,8 +125,8 @@ void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, d
     plane_means(term, (float)(0.25 / s2), steep, n, range_m);
 }
 
-/* Variance of the ranges, to first order in s tan i: that of rho cos phi (half the mean t) times w(R)^2 tan^2
- * i. Beyond `most` the plane counts as along the beam. */
+/* To first order in s tan i, the variance of the ranges is the variance of rho cos phi times w(R)^2 tan^2 i. The
+ * variance of rho cos phi is half the mean t. `steep` counts up to `most`: there the plane is along the beam. */
 VEC_CLONES
 void beam_plane_widths(const struct beam *beam, const float *restrict steep, const double *restrict range_m, uint32_t n,
                        float *restrict width_m)
@@ -200,7 +200,8 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
         /* energy inside of the middle of this ring's annulus */
         double inside = (1.0 + 3.0 * k * (k - 1) + 3.0 * k) / pattern->n;
         double radius = sqrt(-0.5 * log(1.0 - inside * all));
-        pattern->rest -= 3.0 * k * radius * radius / pattern->n; /* half of it each way */
+        /* the ring has 6 k places; x^2 and y^2 each have a mean of half of radius^2 */
+        pattern->rest -= 3.0 * k * radius * radius / pattern->n;
         for (uint32_t i = 0; i < 6 * k; i++, at++) {
             double phi = 2.0 * M_PI * (i + 0.5 * (k % 2)) / (6 * k);
             pattern->x[at] = (float)(radius * cos(phi));
@@ -209,8 +210,8 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
     }
 }
 
-/* An upper bound of the errors of all cuts that leave 1 % of the energy, with 1 to 18 rings (test_beam.c). The
- * centre alone may stand for a sliver at the footprint's rim. */
+/* With 1 to 18 rings this is an upper bound of the errors of all cuts that leave 1 % of the energy (test_beam.c).
+ * Without rings the centre is the only sub-ray. It may stand for a sliver at the rim, one radius away. */
 double beam_end_error(uint32_t rings)
 {
     return rings == 0 ? 1.0 : 0.35 * pow(rings, -0.75);

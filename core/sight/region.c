@@ -84,7 +84,8 @@ VEC_INLINE uint16_t place_group(const struct build_candidate *c, const struct qu
 }
 
 /* Finds which candidates lie outside of each quarter, which cover it, and which of those comes first in its
- * middle. Rays here are 1 to sqrt(3) long, since a direction's largest component is 1. So doubts count twice. */
+ * middle. A doubt bounds a rounding error per unit length of a ray (sight_inside.h). Rays here are 1 to sqrt(3) long,
+ * since a direction's largest component is 1. So twice each doubt is a bound. */
 VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
 {
     quad first = {0.0, 0.0, 0.0, 0.0};
@@ -183,7 +184,7 @@ static void region_look(const struct build_work *w, const struct seen *in, struc
     }
 }
 
-/* Sets a square's leaf: of whole tiles, or in the current block. */
+/* Sets a square's leaf: in each tile of the square or, where it is smaller than a tile, in the current block. */
 static void put_leaf(const struct division *d, const struct square *q, uint32_t leaf)
 {
     struct sight *s = d->b->sight;

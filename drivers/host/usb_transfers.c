@@ -73,7 +73,7 @@ static void LIBUSB_CALL out_done(struct libusb_transfer *transfer)
     if (usb->out_error == 0) usb->out_failing.n = 0;
 }
 
-/* The errno for the result of a request: EPROTO may be over in a moment. */
+/* Returns the errno for the result of a request. EPROTO: another try may succeed. */
 static int errno_of_rc(int rc)
 {
     return rc == 0 ? 0 : rc == LIBUSB_ERROR_NO_DEVICE ? ENODEV : EPROTO;

@@ -91,7 +91,7 @@ static void describe_empty(const struct cola *self, struct cola_record *r)
     if (self->model->named) snprintf(r->name, sizeof r->name, "Field%03u", (unsigned)self->field + 1);
 }
 
-/* In a TiM the corner of a rectangle is counted from the first beam, in an LMS1xx from 0. */
+/* The angle of a rectangle's corner counts from the first beam in a TiM, from angle 0 in an LMS1xx. */
 enum cola_error cola_read_field(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const struct cola_field *f = &self->fields.field[self->field];
@@ -236,7 +236,7 @@ enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, stru
     return cola_args_end(args);
 }
 
-/* u16 version, u32 time, outputs of u8 state, u32 count, u16 time of day: 0, or 1 and that */
+/* u16 version, u32 time, for each output u8 state and u32 count, then u16 0, or u16 1 and the time of day */
 static void put_outputs(const struct cola *self, struct cola_out *out)
 {
     const int lms = cola_ports_is_lms(self);

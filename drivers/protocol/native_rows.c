@@ -25,7 +25,7 @@ uint32_t native_put_rows_plain(uint8_t *restrict dst, const struct line_block *b
     return bits >> 24;
 }
 
-#if defined(__x86_64__) && !defined(VEC_ONE) /* measuring one instruction set: core/vecmath.h */
+#if defined(__x86_64__) && !defined(VEC_ONE) /* VEC_ONE: for measuring one instruction set (core/vecmath.h) */
 #include <immintrin.h>
 
 enum { LANES = 16 };

@@ -158,7 +158,7 @@ static int end_text(struct repair *r, struct place *p, struct sh_err *err)
         const int rc = check_ours(r, p, err);
         if (rc != SH_OK) return rc;
     }
-    if (p->header < HEADER_LINES || p->n_lines == 0) { /* no place of this grid is there */
+    if (p->header < HEADER_LINES || p->n_lines == 0) { /* no point of this grid is there */
         const uint64_t end = p->header > 0 ? p->grid_at : p->at;
         r->was_whole = end == r->len;
         return repair_cut(r, end, err);

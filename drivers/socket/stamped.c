@@ -30,8 +30,8 @@ void stamped_enable(int fd)
     setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
 }
 
-/* Returns the time in a note: when the kernel received the bytes or, if it stamped nothing then (stamped_begin), when
- * they were read. */
+/* Returns the time in a control message: when the kernel received the bytes or, if it stamped nothing then
+ * (stamped_begin), when they were read. */
 static int64_t time_of(const struct cmsghdr *c)
 {
     struct timespec t;
@@ -197,7 +197,7 @@ void stamped_begin(struct stamped_socket *keeper)
     for (int i = 0; i < TRIES; i++) {
         if (sendto(keeper->fd, &byte, 1, 0, (struct sockaddr *)&keeper->own, keeper->own_len) != 1) return;
         const int64_t sent_ns = stamped_now_ns();
-        poll(NULL, 0, 1); /* a stamp of its reading is later than this */
+        poll(NULL, 0, 1); /* so if the byte is stamped only when it is read, its time is after sent_ns */
         if (stamped_take(keeper, &byte, 1, &got, &err) != 1 || got.t_ns <= sent_ns) return;
     }
 }

@@ -50,7 +50,7 @@ static int claim_name(const char *name, unsigned number, int *claim)
     return error;
 }
 
-/* The lowest number from 1 on that is free under that name. 0, or an errno: EADDRINUSE when there is none. */
+/* Claims the lowest number that is free under that name, from 1 on. Returns 0 or an errno; EADDRINUSE: none is free. */
 static int claim_lowest(const char *name, unsigned *number, int *claim)
 {
     int error = EADDRINUSE;

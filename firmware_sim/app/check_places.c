@@ -16,7 +16,7 @@ static double turn_deg(double deg)
 {
     double turned = fmod(deg, 360.0) + 0.0;
     if (turned < 0.0) turned += 360.0;
-    return turned < 360.0 - 5e-7 ? turned : 0.0; /* what would print as 360 */
+    return turned < 360.0 - 5e-7 ? turned : 0.0; /* 359.9999995 and more would print as 360 */
 }
 
 void check_print_anchor(const struct site *site, FILE *out)

@@ -8,7 +8,7 @@
 #include "firmware_sim/device/events.h"
 #include "firmware_sim/device/head_clock.h"
 
-static const double MOST_LATE_MS = 10000.0; /* of a sentence; RECEIVER_KEPT has room for so many */
+static const double MOST_LATE_MS = 10000.0; /* of a sentence; RECEIVER_KEPT sentences are enough for that */
 static const uint64_t GAINS = HEAD_FAULT(FAULT_CLOCK_DRIFT) | HEAD_FAULTS_HOLDOVER;
 
 static void add_leap(struct head_clock *clock, struct device_events *events, const struct head_fault *f)

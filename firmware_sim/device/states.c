@@ -51,7 +51,7 @@ void device_transition(struct device *device, enum head_event event, uint64_t ti
         device->power.boot_begins = 1;
         device->machine.due_tick = tick + device_ticks_of(device, profile->boot_s);
         break;
-    case HEAD_SPIN_UP: /* its time counts from the command, but it never ends before the first open tick */
+    case HEAD_SPIN_UP: /* it counts from the command, but never ends before the first tick that is not claimed */
         device->machine.due_tick = tick + device_ticks_of(device, profile->spin_up_s);
         if (device->machine.due_tick < device->next_tick) device->machine.due_tick = device->next_tick;
         break;

@@ -40,8 +40,8 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     const int native = pump->protocol->passes_native;
     clear(s);
     s->moved_ns = clock_now_ns();
-    /* In the paces that wait, no more than the queue is released from here on. So the tick at the cursor, which is read
-     * after that, stays in the ring. */
+    /* In the paces that wait, the pacing thread is from here on ahead of this reader by the queue's length at most. The
+     * cursor is set after that, so its tick stays in the ring. */
     stream_set_reader(pump->stream, s->reader, stream_released(pump->stream), pump->holds);
     s->cursor = stream_released(pump->stream);
     s->power_from = s->came_at = 0;
@@ -287,8 +287,8 @@ int session_pass(struct pump *pump, struct session *s, int is_last)
     return faulty_pass(pump->link, session_index(pump, s), t_ns);
 }
 
-/* Takes more once the link has taken all. Returns as session_pass does. When there is nothing, buffer and cursor stay
- * as they are. */
+/* Fills the buffer, all of which is written, if the link takes more now. Returns as session_pass does. Where nothing is
+ * left to send, the buffer stays empty, and the cursor stays where it is. */
 static int fill_if_link_takes(struct pump *pump, struct session *s)
 {
     const int is_over = atomic_load(&pump->stream->over);
@@ -306,7 +306,7 @@ int session_write(struct pump *pump, struct session *s, int index)
         const uint64_t from = s->cursor;
         ssize_t n = s->out_pos == s->out_len ? fill_if_link_takes(pump, s) : 1;
         if (n > 0 && s->out_pos == s->out_len && s->cursor != from) {
-            if (lends(pump)) return 1; /* the link is full until they are taken */
+            if (lends(pump)) return 1; /* the link is full until the client has read the lent ticks */
             continue;
         }
         if (n > 0 && s->out_pos == s->out_len) {

@@ -65,7 +65,7 @@ static int read_clock(struct replay *r, struct sh_err *err)
     return got < 0 ? got : recording_rewind(&r->recording, err);
 }
 
-/* A recording may have any bytes there. A reply is one line of ASCII, without the byte that begins a frame. */
+/* A recorded text may have any bytes. A reply is one line of ASCII, without the byte that begins a frame. */
 static void keep_ascii(char *text)
 {
     for (; *text != '\0'; text++)
@@ -92,7 +92,7 @@ static void take_identity(struct config *cfg, const char *idn)
             snprintf(cfg->link[i].serial, sizeof cfg->link[i].serial, "%.31s", field[2]);
 }
 
-static const double MOST_UHZ = 1e15; /* 1 GHz, since a recording may have any number there */
+static const double MOST_UHZ = 1e15; /* 1 GHz, since a recording may give any rate */
 
 /* Fills in the rates, since a link that can't carry the stream is refused. */
 static void fill_config(struct replay *r, const struct native_descriptor *d)
@@ -136,7 +136,8 @@ static int is_device(const struct config *cfg)
     return 0;
 }
 
-/* Sets the figures that SCAN:REPLay reports and allows. Its end is the end of the part that is played. */
+/* Sets the figures that SCAN:REPLay reports and allows. length_s is from the recording's first frame to the end of the
+ * part that is played. */
 static void describe_replay(struct replay *r)
 {
     int64_t last_ns;

@@ -36,7 +36,7 @@ static int replay_look(struct replay *r)
         if (got < 0) return replay_fail(r, &err), -1;
         if (got == 0) return 0;
         const double since_ns = (double)r->frame.t_ns - (double)r->first_ns;
-        /* A device that is asked for scans has booted, so that part of a recording is left out. */
+        /* A device that is asked for scans has booted. So frames before the first points are left out. */
         const int is_early = since_ns < r->begin_s * 1e9 || (r->is_device && r->frame.bytes[1] != NATIVE_POINTS);
         if (!r->in_range && is_early) {
             replay_keep_front(&r->front, r->frame.bytes);
@@ -135,7 +135,7 @@ void replay_stop(struct replay *r, uint64_t tick, int wants_again)
     pthread_mutex_unlock(&r->lock);
 }
 
-/* Whether readers need a front before the first frame, which then is in r->front. */
+/* Returns whether readers need descriptor, emitter and anchor before the first frame. If so, r->front has them. */
 static int needs_front(struct replay *r)
 {
     const uint8_t *frame = r->frame.bytes;

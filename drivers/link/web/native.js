@@ -172,7 +172,7 @@ export class Decoder {
     this.last = null;
     if (view.byteLength < HEAD) refuse('points shorter than their header');
     const n = view.getUint32(36, true), shots = view.getUint32(32, true);
-    if (n > (view.byteLength - HEAD) / RECORD) refuse('points fewer than their number');
+    if (n > (view.byteLength - HEAD) / RECORD) refuse('fewer points than the header says');
     const low = view.getUint32(8, true), high = view.getUint32(12, true), pulse0 = high * 2 ** 32 + low;
     const t0_ns = view.getInt32(20, true) * 2 ** 32 + view.getUint32(16, true);
     if (pulse0 < this.lastPulse0) this.#forget();

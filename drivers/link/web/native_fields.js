@@ -126,7 +126,7 @@ export function readTelemetry(view) {
   return t;
 }
 
-// Names of an event's a, b and c, in this order; _ns is BigInt, the others are Numbers.
+// Names of an event's a, b and c, in this order. Those in _ns are BigInt, the others as `exact` returns them.
 const EVENTS = {
   1: ['STATE', 'state', 'before'],
   2: ['SCAN_START', 'scan', 'at_ns', 'gps_ns'],
@@ -212,7 +212,7 @@ export function readNames(view) {
 export function readBeside(view, bytes, what) {
   if (view.byteLength < 16) refuse(`${what} shorter than their header`);
   const n_points = view.getUint32(12, true);
-  if (n_points > (view.byteLength - 16) / bytes) refuse(`${what} fewer than their number`);
+  if (n_points > (view.byteLength - 16) / bytes) refuse(`fewer ${what} than the header says`);
   const [pulse0_low, pulse0_high, line] = [0, 4, 8].map((at) => view.getUint32(at, true));
   return {pulse0_low, pulse0_high, line, n_points};
 }

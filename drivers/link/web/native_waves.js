@@ -10,7 +10,7 @@ const KEPT_BYTES = 64 * 2 ** 20; // at 300,000 pulses per second of 64 samples e
 function walk(view, n_windows, each) {
   let at = HEAD;
   for (let i = 0; i < n_windows; i++) {
-    if (view.byteLength - at < RECORD) refuse('waveforms fewer than their number');
+    if (view.byteLength - at < RECORD) refuse('fewer waveforms than the header says');
     const n = view.getUint16(at + 12, true), end = at + RECORD + 2 * (n + (n & 1));
     if (n === 0 || n > MAX_SAMPLES || end > view.byteLength) refuse('a window without samples, or longer than its frame');
     each(at, n);

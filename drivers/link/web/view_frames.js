@@ -9,10 +9,10 @@ import {readTheme} from './view_theme.js';
 import {copyOf} from './picture.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
-const SHOW_MS = 160; // updates of a growing picture are so far apart, and twice the time of one
+const SHOW_MS = 160; // least time between updates of a growing picture; it is also at least twice the time of an update
 const PLAIN = 150_000; // with fewer points per frame, a frame is drawn plain
 const COARSE = 0.5; // this is the scale of such a frame
-const SHADING = 260; // eye-dome lighting counts per unit of logarithmic depth
+const SHADING = 260; // the strength of eye-dome lighting: a factor of differences in logarithmic depth (view_gl.js)
 
 export class Frames {
   goneDrawn = 0; // points that are drawn, and are gone from the cloud
@@ -194,7 +194,7 @@ export class Frames {
     this.#made = {target, camera: Object.assign(new Camera(), view.camera), moving: this.#moving};
   }
 
-  // Puts it onto the page, now that the GPU has it.
+  // Puts the frame in #made onto the page, now that the GPU has drawn it.
   #showMade(now) {
     const {target, camera, moving} = this.#made;
     this.#made = null;

@@ -71,7 +71,7 @@ static int notify_ready(const struct loop *loop, struct sh_err *err)
     return notify_send(text, err);
 }
 
-/* The end has begun: links bring out what their readers still take. */
+/* Reports that the run is ending. Until it is over, links still write what their readers take. */
 static void notify_stopping(void)
 {
     struct sh_err err;

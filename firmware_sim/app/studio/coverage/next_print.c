@@ -73,7 +73,7 @@ void coverage_next_print(const struct coverage_next *next, const struct coverage
     for (uint32_t i = 0; i < next->n_rounds; i++)
         print_round(next, result, i);
     if (next->n_rounds < next->n_asked)
-        printf("\nno %sstation: from these places nothing is seen that no station sees\n",
+        printf("\nno %sstation: all that can be seen from these places is seen by a station already\n",
                next->n_rounds > 0 ? "further " : "");
 }
 

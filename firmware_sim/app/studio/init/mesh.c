@@ -12,7 +12,8 @@
 #include "core/geotiff.h"
 #include "firmware_sim/app/app.h"
 
-/* A mesh without a unit that would be larger than LARGEST_M is taken to be in millimetres, unless it is a survey. */
+/* A mesh without a unit that would be larger than LARGEST_M is taken to be in millimetres, unless it is a survey, or
+ * its coordinates are those of a projected system. */
 static const double LARGEST_M = 2000.0, LARGEST_SURVEY_M = 50000.0;
 /* In millimetres, a mesh less high than this would be a plate thinner than half a metre. */
 static const double LEAST_HEIGHT_MM = 500.0;
@@ -68,8 +69,8 @@ static void choose_up(const struct init_wish *wish, const char *name, const stru
             name);
 }
 
-/* Eastings and northings of projected systems are large compared with the size of the mesh. In millimetres they would
- * be some 100 m, where nobody puts an origin on purpose. */
+/* Eastings and northings of projected systems are large compared with the size of the mesh. If they were millimetres,
+ * the mesh would lie some 100 m from its origin, and nobody places a small mesh like that on purpose. */
 static int is_projected(const struct scene *scene, const double middle[3])
 {
     const double least = 50000.0, large = 200000.0, times = 20.0;

@@ -86,8 +86,8 @@ enum { JUDGED_LEAST = 100 };
 
 /* z^2 of a normal deviation has a variance of 2; six standard errors of its mean are exceeded once in 5e8. A
  * fiftieth is added, since sigma is exact only to first order, and the noisy points themselves decide where faces are
- * smooth. For the mean a hundredth of sigma is added. Counts add between nothing and three times their variance
- * (core/studio/deviation.h). */
+ * smooth. For the mean a hundredth of sigma is added. Positions and encoder angles are rounded to counts. That rounding
+ * adds between nothing and three times its expected variance (core/studio/deviation.h). */
 static void judge_noise(struct report_verdict *v, const struct figures *f)
 {
     const double n = (double)f->noisy, tolerance = 6.0 * sqrt(2.0 / n) + 0.02, z2 = f->z_rms * f->z_rms;

@@ -74,7 +74,8 @@ static void to_enu(const struct geoframe *frame, int is_geodetic, double p[3])
     mat3_apply_transposed(frame->rotation, d, p);
 }
 
-/* Turns the angles of a head in ECEF to its new frame. For points in degrees they refer to its place already. */
+/* Turns the angles of a head in ECEF to the new frame. Where points are in degrees, the angles of a head are relative
+ * to east, north and up at its own place already. */
 static void turn_station(const struct geoframe *frame, struct viewed_station *s)
 {
     double quat[4], in_ecef[9], back[9], turned[9];
