@@ -12,14 +12,15 @@
  *   ecef      WGS 84 geocentric X, Y, Z: a rotation and a shift
  *   utm       easting, northing (with false origin), height. Zone automatic or forced; UPS beyond 84 N and 80
  *             S when it is automatic. Grid convergence and scale are part of the map. Where the scene is
- *             in the same grid (which utm_zone 0 then means), they are the scene's own coordinates.
+ *             itself in a grid, utm_zone 0 means that grid; positions in it are the scene's own coordinates.
  *   geodetic  latitude and longitude in degrees, height; longitude differences the short way round, in
  *             -180..180
  *
  * Methods. Exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm; `make
  * chart`). Order 1, 2, 3 evaluate its Taylor polynomial about the centre in a few ns, within georef_bound_m.
  * Order 5 exists where heights stay what they are (a grid to another one or to geodetic). In geodetic output
- * longitude has a closed form, which holds up to some radii of the scene from a pole (georef/polynomial.h).
+ * longitude has a closed form (georef/polynomial.h). It may be used near a pole, down to a distance of a few radii
+ * of the scene.
  * Only a map that is not linear has polynomials. Local, ecef from a metric frame, and the scene's own grid are
  * linear, and exact with every method.
  *

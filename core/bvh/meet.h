@@ -19,15 +19,16 @@ void bvh_meet_wide(struct bvh_query *query, float *tfar, const struct bvh_leaf *
 
 /* ---- meet_one.c: one ray and one triangle */
 
-/* Decides where single precision is in doubt whether they meet, or the plane's range is of no use. which: the
- * triangle of the leaf. */
+/* Decides in double whether the ray meets the triangle, and at what range. Packets call it where single precision
+ * leaves doubt, or where the plane's range is of no use. which: 0 or 1, the triangle of the leaf. */
 void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which);
 /* Notes a hit whose range is no further than the nearest, or counts as the same, unless there is a hole. */
 void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m);
 
-/* Where a plane is seen at a smaller sine, the range comes from the edges. Rays that are inside for certain never see it
- * so: each side is then at least 9 units of 2^-24 of F L (see below), so the three of them, which add up to n . d, are
- * at least 1.6e-6 L L, and |n| is at most L L. */
+/* The least sine of the angle between ray and plane with which the range comes from the plane. At smaller ones it comes
+ * from the edges. A ray that is inside for certain in single precision has a larger sine: each of its sides is at least
+ * 9 units of 2^-24 of F L (see below). So the three of them, which add up to n . d, are at least 1.6e-6 L L, and |n| is
+ * at most L L. */
 #define BVH_FLAT 1e-6
 
 /* ---- edges */
@@ -35,15 +36,18 @@ void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t 
 /* A leaf's edges, from one corner to another: three of triangle 0, then two of triangle 1. The third edge of triangle 1
  * is the second of triangle 0 in the other direction.
  *
- * An edge's side is (p x (q - p)) . d. L is the leaf's size: no edge is longer, and no corner is further from the
- * leaf's base. F is the distance of that base from the ray's origin, plus L. In single precision the side's error is at
- * most 15 units of 2^-24 of F L: the base from the ray's origin, rounded, 1; the corner, rounded and added to it, 2;
- * the edge 3; the cross product 3; the direction 1; the dot product 5. |p| itself is no measure, since it may be far
- * smaller than its summands. Where rays begin at points o of their own, p counts from one of these, c. Then the side is
- * (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with A = |o - c| for F. It is
- * computed for three edges. For the other two it is a sum or difference of those, since the edges of a triangle add up
- * to zero: that is at most 2 * 15 + 1 units of A L, and adding it is 1 more of each. So F has 2 A in it. The doubt of
- * double precision (edges.h) is far less than the rest of the bound. */
+ * The side of the edge from corner p to corner q, both relative to the ray's origin, is (p x (q - p)) . d. L is the
+ * leaf's size: no edge is longer, and no corner is further from the leaf's base. F is the distance of that base from
+ * the ray's origin, plus L. In single precision the side's error is at most 15 units of 2^-24 of F L: the base from the
+ * ray's origin, rounded, 1; the corner, rounded and added to it, 2; the edge 3; the cross product 3; the direction 1;
+ * the dot product 5. |p| itself is no measure, since it may be far smaller than its summands.
+ *
+ * Rays of a packet may begin at different points o. Then p and q are relative to c, the origin of one of them, and the
+ * side is (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with A = |o - c| in place
+ * of F. It is computed for three edges. For the other two it is a sum or difference of those, since the edges of a
+ * triangle add up to zero. Its error is therefore at most 2 * 15 + 1 units of A L. Adding it to the first term rounds
+ * by 1 unit of A L and 1 of F L. So F has 2 A in it. The doubt of double precision (edges.h) is far less than the rest
+ * of the bound. */
 #define BVH_SIDE_DOUBT (24.0F * 0x1p-24F)
 
 /* The figures of a leaf by which rays are judged: edges e, and their moments m = p x (q - p). All rays from one point

@@ -29,7 +29,7 @@ VEC_INLINE void aim_direction(struct aim_matrix m, struct aim_axes a, struct vec
     d.z[i] = m.zx * x + m.zy * y + m.zz * a.sm;
 }
 
-/* An encoder: counts per turn, and a count in radians; 0 where both encoders of a head are ideal. */
+/* An encoder: counts per turn, and a count in radians. count_rad is 0 where both encoders of a head are ideal. */
 struct aim_encoder {
     double counts, count_rad;
 };

@@ -31,9 +31,11 @@ void kernel_polar(const struct cast_setup *setup, const double *range_m, const s
 /* Sets coordinates in counts of scale[], LINE_XYZ_NONE for NaN and for what doesn't fit. Returns how many
  * coordinates did not fit. */
 uint32_t kernel_geo(const struct vec3_in *p, const double scale[3], uint32_t n, const struct kernel_wire *out);
-/* The same for direction * range, where that is the position already. Returns 0 where all fit. */
+/* Sets coordinates of direction * range in counts, for linear maps: directions are already those of the CRS. Returns 0
+ * where all fit, else 1. */
 uint32_t kernel_place(const struct vec3_in *direction, const double *range_m, const double scale[3], uint32_t n,
                       const struct kernel_wire *out);
+/* Multiplies directions e by their ranges. */
 void kernel_scale(const double *range_m, uint32_t n, const struct vec3_out *e);
 
 #endif

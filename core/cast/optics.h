@@ -35,7 +35,7 @@ struct path_rays {
 struct nearest;
 struct ray_hits;
 
-/* Returns 1 for glass and mirrors. Detection must have a depth. */
+/* Returns 1 for glass and mirrors. To be called only with s->detect->depth above 0. */
 int caster_goes_on(const struct cast_setup *s, uint32_t label);
 /* Sets n to the unit normal of a triangle of the scene (body 0) or of a body, prcs. */
 void caster_normal(const struct cast_setup *s, uint8_t body, uint32_t triangle, double n[3]);

@@ -27,7 +27,7 @@ struct polynomial_kernels {
     polynomial_meridian *meridian[6];
 };
 
-/* As polynomial_apply. */
+/* Does what polynomial_apply does, with the given kernels. */
 void polynomial_apply_with(const struct polynomial_kernels *kernels, const struct polynomial *p, int order, size_t n,
                            struct vec3_in d, struct vec3_out out);
 
@@ -74,7 +74,8 @@ VEC_INLINE double plane5(const double *c, double p, double q)
     return q0 + q * (q1 + q * (q2 + q * (q3 + q * q4)));
 }
 
-/* 2 atan t in degrees, without its terms from t^9 on: POLYNOMIAL_ATAN_LEFT t^9 at most. */
+/* Returns 2 atan t in degrees. The terms of the series from t^9 on are left out. Together they are at most
+ * POLYNOMIAL_ATAN_LEFT t^9, in radians. */
 #define POLYNOMIAL_ATAN_LEFT (2.0 / 9.0)
 VEC_INLINE double twice_atan_deg(double t)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* This finds unit and axes of a file as Assimp gives it back: some formats define them, some files state them. */
+/* Finds the unit and the axes that a file's vertices have after Assimp has read it. Some formats define them; an FBX
+ * file states them. */
 #ifndef CORE_IMPORT_IMPORT_SAYS_H
 #define CORE_IMPORT_IMPORT_SAYS_H
 

@@ -40,10 +40,10 @@ struct scene_build {
     int64_t start_ns, file_ns, reported_ns; /* of the load, of this file, of the last report */
 };
 
-/* Room for that many more, so that a reader that knows its counts allocates once. */
+/* Makes room for that many more, so that a reader that knows its counts allocates once. */
 int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, struct sh_err *err);
 
-/* v in the file's units and axes. Its index in the scene is scene->n_vertices before the call. */
+/* Adds a vertex. v: in the file's units and axes. Its index in the scene is scene->n_vertices before the call. */
 int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
 
 /* Makes room for n corners in corner, corner_uv and corner_rgb; their contents stay. */
@@ -51,7 +51,7 @@ int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
 
-#define BUILD_SINGLE_ROUNDING 6e-8 /* 2^-24: of the nearest float */
+#define BUILD_SINGLE_ROUNDING 6e-8 /* 2^-24: largest relative error of rounding to the nearest float */
 
 /* The file's coordinates, up to `largest`, were rounded to single precision, with an error of up to
  * `error`; both in its units. Records the error, and warns of more than a micrometre. With `refuse` it
@@ -64,7 +64,7 @@ static inline bool build_wants_textures(const struct scene_build *b)
     return b->spec->textures || b->spec->cutouts;
 }
 
-/* Whether colours of vertices are. */
+/* Whether colours of vertices are to be read. */
 static inline bool build_wants_colours(const struct scene_build *b)
 {
     return b->spec->textures;

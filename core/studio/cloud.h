@@ -92,9 +92,10 @@ struct cloud_site {
     unsigned threads; /* at least 1; the result does not depend on it */
 };
 
-/* Sets for each point its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
- * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a
- * station are of the first one. SH_EINPUT: a point's station is not among n_stations. SH_ESTOPPED. */
+/* Sets for each point its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing within max_m)
+ * and that triangle's number. The number is CLOUD_TRIANGLE_NONE where there is no triangle, and where it is one of a
+ * moving body. Points without a station are of the first one. SH_EINPUT: a point's station is not among n_stations.
+ * SH_ESTOPPED. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
 
@@ -144,7 +145,8 @@ struct cloud_stats {
 
 /* distance_m as cloud_compare gives it; not negative. */
 void cloud_stats(const double *distance_m, size_t n, double tolerance_m, struct cloud_stats *out);
-/* Returns that percentile of the n_finite finite ones of n values from 0 up; NaN: there are none. */
+/* Returns a percentile, for example 950 for the 95th, of the finite values in v: n_finite of all n. No value is
+ * negative. NaN: none is finite. */
 double cloud_percentile(const double *v, size_t n, size_t n_finite, unsigned permille);
 
 #endif

@@ -87,7 +87,7 @@ int mesh_check_box(const char *path, const double low[3], const double high[3], 
 /* Writes the mesh and the files that it names, all or none (core/newfile.h): all are written as NAME.part, and once all
  * are complete they are renamed, the mesh last. Where one can't be written, none is left. SH_EINPUT: an unknown ending,
  * with the known ones; a number that is not finite; a mesh that the format can't hold. SH_ESTOPPED where report asks to
- * stop; progress of what lasts over a second. */
+ * stop. report also gets the progress of a write that takes more than a second. */
 int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report *report, struct sh_err *err);
 
 #endif

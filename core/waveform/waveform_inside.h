@@ -9,8 +9,8 @@
 #include "core/waveform.h"
 #include "core/waveform/detect_inside.h"
 
-/* h in steps. Step i is h[i % phases * pitch + i / phases], so that all samples of a pulse, which lie whole samples
- * apart, read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
+/* h in steps. Step i is h[i % phases * pitch + i / phases]: steps that are a whole sample apart lie side by side. So
+ * successive samples of a pulse read neighbours. The first 4 steps are 0, and so is the last entry of each row. */
 struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */

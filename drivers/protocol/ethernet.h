@@ -6,7 +6,8 @@
  * checksums. Addresses and ports are true. The rest of the headers is made up:
  *
  *   hardware addresses   zeros where an end is this machine's own (127.0.0.0/8, ::1), as Linux' loopback has them;
- *                        those of groups and broadcasts; else 02:00 and the last four bytes of the IP address
+ *                        for a multicast group the group's; for 255.255.255.255 ff:ff:ff:ff:ff:ff; else 02:00 and the
+ *                        last four bytes of the IP address
  *   time to live         64
  *   fragments            none: a datagram is one frame, whatever its length
  *

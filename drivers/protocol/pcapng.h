@@ -37,11 +37,12 @@ size_t pcapng_put_interface(uint8_t *to, enum pcapng_link link, uint32_t snap_le
                             const char *comment);
 /* The length of a packet's block. */
 size_t pcapng_packet_len(size_t data_len);
-/* t_ns from 0 on. lost: packets of this interface since the one before; from 1 on, the block is PCAPNG_LOST bytes
- * longer than pcapng_packet_len. */
+/* Puts a packet. t_ns: 0 or later. lost: how many packets were lost at this interface since its packet before. Where
+ * that is above 0, the block is PCAPNG_LOST bytes longer than pcapng_packet_len. */
 size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const void *data, size_t data_len,
                          uint64_t lost);
-/* Frames that came at an interface until t_ns, and those that the system dropped; within PCAPNG_FRONT_ROOM. */
+/* Puts statistics of an interface: how many frames came until t_ns, and how many the system dropped. PCAPNG_FRONT_ROOM
+ * bytes are enough. */
 size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped);
 
 /* ---- reading */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Stream sockets, for links and USB back ends: opening, settings, bytes in and out. Only socket_open and socket_open_at
- * wait (for a connection), and socket_open and socket_resolve (for names).
+/* Stream sockets, for links and USB back ends: opening, settings, bytes in and out. Nothing here waits, with three
+ * exceptions: socket_resolve waits for names, socket_open_at for a connection, and socket_open for both.
  *
  * Errors: SH_E; where there is an err, its text names the socket by socket_place.what. Any thread. */
 #ifndef DRIVERS_SOCKET_SOCKET_H

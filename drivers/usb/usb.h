@@ -15,13 +15,12 @@
  * read holds the host back. A transfer belongs to the core from submit until the back end's complete() is
  * called with it. That happens exactly once, maybe within submit.
  *
- * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end
- * with a short packet, or with a zero-length packet where they are a whole number of packets. Where they
- * filled the transfer exactly, the zero-length packet ends the next transfer, unless more is written first. On an
- * endpoint of units that packet always comes before further data: at once if another transfer waits, else with the
- * next one that is submitted.
- * A transfer whose rest is smaller than the next packet fails with USB_OVERFLOW, as on a real bus. That packet stays
- * with the function: nothing is lost.
+ * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end with a
+ * short packet, or with a zero-length packet where they are a whole number of packets. Where they filled the transfer
+ * exactly, the zero-length packet ends the next transfer, unless more is written first. On an endpoint that has `units`
+ * (model.h: the data of one write are a unit) that packet always comes before further data: at once if another transfer
+ * waits, else with the next one that is submitted. A transfer whose rest is smaller than the next packet fails with
+ * USB_OVERFLOW, as on a real bus. That packet stays with the function: nothing is lost.
  *
  * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN
  * 1.2; Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.

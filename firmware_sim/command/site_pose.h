@@ -6,7 +6,7 @@
 struct command_call;
 struct command_unit;
 
-/* Takes call->pose as six numbers into call->out. Returns -1 when it failed. */
+/* Reads the six numbers of the text call->pose into call->out. Returns -1 when it failed. */
 int command_take_pose(struct command_call *call);
 
 extern const struct command_unit command_unit_place;

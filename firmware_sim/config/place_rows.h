@@ -94,8 +94,8 @@
     {STATION(position_m), CFG_VEC3, "m", "", -1e9, 1e9, .example = "[0, 0, 1.7]", .flags = CFG_NEEDED,
      .help = "The head's origin in the scene frame. Required, unless scene.anchor gives it from a place on Earth."},
     {STATION(instrument_height_m), CFG_REAL, "m", "", 0, 1000, .example = "1.7",
-     .help = "Height of the head's origin above the first surface below its place. The search downward begins at z "
-             "(or height_m), with 1 cm to spare."},
+     .help = "Height of the head's origin above the first surface below its place. The search downward begins 1 cm "
+             "above z (or height_m)."},
     {STATION(heading_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "Direction of the head's y axis, clockwise from the scene's y axis. That is north without scene.anchor, "
              "grid north with utm, true north with ecef."},

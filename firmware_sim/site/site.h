@@ -22,7 +22,8 @@
 struct config;
 struct site_waves;
 
-/* Points of the geo layout along one stretch of a head's path: about its centre. */
+/* Georeference and scale of the points of one stretch of a head's path, geo layout. Points are relative to the
+ * stretch's centre. */
 struct site_leg {
     struct georef *georef;
     double scale[3]; /* as below */
@@ -175,8 +176,8 @@ enum site_purpose {
 #define SITE_MOST_WRITTEN_OUT 10000000 /* triangles; SH_EINPUT: there would be more */
 /* cfg must outlive the site. */
 int site_load(const struct config *cfg, const struct sh_report *report, struct site **out, struct sh_err *err);
-/* The same for a purpose, and beside the site of another scanner of the same file, or NULL. Where both have the same
- * scene, scene and BVHs are shared, not loaded again. `other` may be freed before or after. */
+/* Does the same for a purpose. other: the site of another scanner of the same file; NULL: none is loaded. Where both
+ * have the same scene, scene and BVHs are shared, not loaded again. `other` may be freed before or after. */
 int site_load_for(const struct config *cfg, enum site_purpose purpose, const struct site *other,
                   const struct sh_report *report, struct site **out, struct sh_err *err);
 void site_free(struct site *site);
@@ -237,9 +238,10 @@ const struct head_settings *site_settings(const struct site *site);
 int site_serves(const struct site *site, uint32_t i);
 uint32_t site_n_served(const struct site *site);
 
-/* The grid of output.crs utm, as georef_spec has it: one for all stations of an anchored scene, that of the
- * anchor or of the first station, unless output.utm_zone or the scene's own grid says it; else by position.
- * The hemisphere of the false northing is that in which the first station is given, if it is given in UTM. */
+/* Sets zone and side of the grid of output.crs utm, as georef_spec has them. output.utm_zone decides where it is given.
+ * Else an anchored scene has one grid for all its stations: the scene's own, or that of the anchor, or that of the
+ * first station. Without an anchor zone is 0: each station has the grid of its position. The hemisphere of the false
+ * northing is that in which the first station is given, if it is given in UTM; but the scene's own grid has its own. */
 void site_grid(const struct site *site, int *zone, int *side);
 
 /* Fills the schedule of its head with these settings. */
@@ -283,7 +285,8 @@ void site_free_tripod(struct site_tripod *tripod);
 /* "top 1.6 m above the ground, opening 27.3 deg, ...", for a station with a tripod. */
 void site_describe_tripod(const struct site_station *station, char *text, size_t len);
 
-/* Poses of all movers at a time of the scan; at a stop they stand as at the stop's own (site_mover_time). */
+/* Sets the poses of all movers at t_s, a time of the scan. site_mover_time returns the t_s to give: at a stop movers
+ * stand still, so it is the time of that stop; else scan_s. */
 void site_move(const struct site *site, double t_s, struct cast_setup *setup);
 double site_mover_time(const struct site *site, uint32_t station, double scan_s);
 

@@ -8,7 +8,7 @@
 
 struct scene_build;
 
-/* The extension says this of a buffer view. */
+/* The fields of EXT_meshopt_compression or KHR_meshopt_compression of a buffer view. */
 struct gltf_packed {
     struct gltf_bytes from;
     uint64_t stride, count;

@@ -2,8 +2,8 @@
 /* scanhead help: what the program says of itself, for people, for man and for a shell.
  *
  * In: the list of commands (app.h) and their tables, the table of configuration keys. Out: the help's text, manual
- * pages as roff, a completion for bash. What --help has, pages and completion have: only man.c names a command, where
- * one has a second help. */
+ * pages as roff, a completion for bash. Pages and completion are made from the tables that --help prints, so
+ * nothing here names a command. One exception is in man.c: `record --raw --help` has a help of its own. */
 #ifndef FIRMWARE_SIM_APP_HELP_HELP_H
 #define FIRMWARE_SIM_APP_HELP_HELP_H
 

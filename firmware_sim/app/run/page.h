@@ -30,7 +30,7 @@ enum { WATCH_SCENE_TRIANGLES = 100000 };
 #define WATCH_CPU_SHARE 0.05
 
 struct run_page {
-    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report gets the
+    /* Builds what the observer needs: room for points, cells of coverage, the coarse scene. report gets the
      * progress, and a warning where there is no room for a part. cfg and site outlive the watch. On failure *out is
      * NULL. */
     int (*open)(const struct config *cfg, const struct site *site, const struct watch_options *options,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Texts to values, by their rows, and what rows allow. */
+/* Converts texts to values and stores them, by the rows of their keys; and says which values a row allows. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_VALUE_H
 #define FIRMWARE_SIM_CONFIG_TABLE_VALUE_H
 

@@ -2,7 +2,7 @@
 /* Judges whether deviations of points are those that follow from configuration and plan: at a station of a recording
  * (expect.c), and in a scan that still goes on (firmware_sim/app/studio/watch). In: the setup of the station's head,
  * and the figures of its points (core/studio/figures.h). Out: a judgement, its limits, and one sentence or two. Pure.
- * Also the JSON of both, which `report --json` and /quality share (json.c). */
+ * json.c writes figures and judgements as JSON, for `report --json` and for /quality. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 #define FIRMWARE_SIM_APP_STUDIO_REPORT_VERDICT_H
 
@@ -11,7 +11,8 @@
 #include "firmware_sim/base/json.h"
 #include "firmware_sim/site/site.h"
 
-/* The first side of density cells, and the share of the points that lies within a histogram's bins. */
+/* REPORT_CELL_M: the side of density cells with which the search for a fitting side begins. REPORT_SHOWN: the share of
+ * the points that lies within a histogram's bins. */
 #define REPORT_CELL_M 0.1
 #define REPORT_SHOWN  0.995
 
