@@ -101,7 +101,7 @@ int help_run(const struct app_command *const *commands, int argc, char **argv)
     const int status = app_parse(&help_command, argc, argv, &in, &wish);
     if (status != APP_GO_ON) return status;
     if (in.n_options > 1) return app_usage(&help_command, "--man and --completion: allowed is one of them");
-    if (in.n_options == 0) return help_print(commands, stdout), APP_OK; /* as of: scanhead help -- */
+    if (in.n_options == 0) return help_print(commands, stdout), APP_OK; /* as in `scanhead help --` */
     if (wish.man != NULL) return man_print(commands, strcmp(wish.man, "list") == 0 ? NULL : wish.man);
     if (strcmp(wish.completion, shells[0]) != 0)
         return app_usage(&help_command, "--completion %s: allowed is %s", wish.completion, shells[0]);

@@ -202,7 +202,8 @@ static int run_serve(struct run *r, struct sh_err *err)
 
 /* ---- points */
 
-/* Whether the client has written the file since it was started. */
+/* Returns 0 if the file is as it was before the client was started. A missing file counts as new: reading it fails,
+ * with the reason. */
 static int is_new(const struct run *r)
 {
     struct stat now;
