@@ -17,7 +17,7 @@ static const char *const shells[] = {"bash"};
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_TEXT, "man", "PAGE", .at = AT(man),
-     .help = "print a manual page as roff, by its name; list: the names of all"},
+     .help = "print the manual page of that name as roff; --man list prints the names of all pages"},
     {APP_TEXT, "completion", "SHELL", .at = AT(completion), OPTION_CHOICES(shells),
      .help = "print a completion for bash, to be sourced"},
     OPTION_END

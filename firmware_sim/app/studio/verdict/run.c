@@ -64,8 +64,8 @@ static void run_prepare(struct run *r)
     }
     if (n != 0)
         sh_warn(&app_report_stderr,
-                "soak: faults flip with reseal do not strike, since no client can notice them and its points would be "
-                "unknown: %u",
+                "soak: %u faults flip with reseal do not strike: no client can notice them, and the points that they "
+                "change would count as unknown",
                 n);
 }
 
