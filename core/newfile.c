@@ -58,7 +58,7 @@ static int fail_hard_link(const char *path, const struct stat *st, struct sh_err
                    path, (unsigned long)st->st_nlink);
 }
 
-/* The number of the open descriptor that a name of the system stands for; -1: it is no such name. */
+/* Returns the open descriptor that a name like /dev/stdout or /dev/fd/3 stands for; -1: it is no such name. */
 static int number_of(const char *path)
 {
     int n = -1;
@@ -187,7 +187,8 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
         struct stat st;
         const int n = number_of(path);
         if (n < 0) return fail_link(path, err);
-        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode); /* a shell writes on at the same offset */
+        /* A regular file, as of `>FILE`: a duplicate has the same offset as the other writers of that descriptor. */
+        is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode);
         fd = is_shared ? fcntl(n, F_DUPFD_CLOEXEC, 0) : open(path, flags, 0666);
     }
     if (fd < 0 && errno == ENXIO)

@@ -30,7 +30,7 @@ void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *restrict dt_n
     const double before = leg->before_ns, span = leg->span_ns;
     const struct vec3_in s = *from;
     const struct vec3_out d = *to;
-    if (turn == 0.0) { /* a straight way: the formula would add zeros */
+    if (turn == 0.0) { /* no rotation between the two poses: the formula would add zeros */
         double back[9];
         mat3_transpose(m, back);
         kernel_turn_back(from, back, n, to);

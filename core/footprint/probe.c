@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Finds the stretches of an outline that are visible steps, or the end of a kind of surface. */
+/* Finds the stretches of an outline that count: those at a visible step, and those where one kind of surface ends and
+ * another begins (beam_outlines_spec.kind in core/footprint.h). */
 #include <math.h>
 
 #include "core/footprint/outlines.h"

@@ -6,11 +6,12 @@
 #include "core/digits.h"
 #include "core/georef/state.h"
 
-/* Half a count less than 2^31, for rounding; -2^31 says that there is no point. */
+/* Half a count less than the largest count, 2^31 - 1, so that rounding does not exceed it. -2^31 says that there is no
+ * point. */
 static const double MOST_COUNTS = 2147483646.5;
 
-/* Finds the largest difference of each coordinate from the anchor, in units of the CRS, and the size of a
- * count of one metre. */
+/* Finds for each coordinate its largest difference from the anchor (span) and the length of a metre (unit), both in
+ * units of the CRS. */
 static void spans(const struct georef *georef, double reach_m, double span[3], double unit[3])
 {
     for (int i = 0; i < 3; i++) {

@@ -231,7 +231,7 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
     struct aiPropertyStore *options = lib->aiCreatePropertyStore();
     lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1); /* not the ids */
     lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS,
-                                    1); /* air is no surface */
+                                    1); /* a space is the air of a room */
     const struct aiScene *in = lib->aiImportFileExWithProperties(b->spec->file, 0, &open.io, options);
     lib->aiReleasePropertyStore(options);
     lib->aiDetachLogStream(&stream);

@@ -21,7 +21,7 @@ static const struct plan_ray_cost *ray_cost(uint32_t packet)
     return cost;
 }
 
-/* Returns the cost of reading a triangle's plane, which both ways need. */
+/* Returns the cost of reading a triangle's plane. A pulse needs it with a map and without one. */
 static double plane_ns(double n_triangles)
 {
     return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * n_triangles));
@@ -32,7 +32,8 @@ double plan_pulse_ns(double n_triangles, uint32_t packet)
     return PLAN_COST_PULSE + ray_cost(packet)->hit + plane_ns(n_triangles);
 }
 
-/* Returns the cells of the whole cube, as sight_cells chooses them for that many pulses. */
+/* Returns the number of cells of a map for that many pulses. They divide the six faces of a cube around the station
+ * (core/sight.h); sight_cells chooses how many lie along an edge. */
 static double cells(const struct plan_sight_need *need)
 {
     const double edge = sight_cells(need->pulses / need->share, need->memory_bytes);
@@ -64,8 +65,9 @@ static double fitting(const struct plan_sight_need *need, const struct plan_sigh
     return fmin(1.0, (double)need->memory_bytes / bytes);
 }
 
-/* Where the memory does not hold the cells, the map's maker takes some twice as wide (core/sight/sight.c). An outline
- * crosses half as many of these, so their share is twice as large. */
+/* If the memory does not hold the cells, the map is made again with cells of twice the width (core/sight/sight.c). An
+ * outline crosses half as many of these, but there are only a quarter as many in all. So the share of crossed cells is
+ * twice as large. */
 static void coarsen(const struct plan_sight_found *f, struct plan_sight_found *coarse)
 {
     const double mixed = f->few + f->ask, all = f->one + f->nothing, wider = fmin(mixed + all, 2.0 * mixed);
@@ -145,7 +147,7 @@ int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sigh
     else
         snprintf(option[MAP].why_not, sizeof option[MAP].why_not, "%s", need->why_not);
     if (!can) option[MAP].cost_ns = (double)NAN;
-    if (!it_pays && option[MAP].cost_ns < 0.0) option[MAP].cost_ns = 0.0; /* LEAST_LEFT: too little to be sure of */
+    if (!it_pays && option[MAP].cost_ns < 0.0) option[MAP].cost_ns = 0.0; /* below LEAST_LEFT: not a sure saving */
     const struct plan_choice ask = {"sight", option, OPTIONS, need->forced, "cast.sight", any};
     const int map = plan_choose(&ask, row) == MAP;
     say_why(need, found, &c, it_pays, row);

@@ -9,7 +9,7 @@
 
 enum { ASYMMETRIC = 1 << WAVEFORM_ASYMMETRIC, TABLE = 1 << WAVEFORM_TABLE, ALL = 7, FORMULA = ALL & ~TABLE };
 
-/* The limits low .. high are in SI. Texts show them in `unit`, which is SI times `scale`. */
+/* The limits low .. high are in SI. Texts show them in `unit`: the SI figure times `scale`. */
 struct limit {
     const char *what, *unit;
     size_t at;

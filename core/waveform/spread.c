@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A return's energy spreads over time as pulses at nodes, by quadrature. */
+/* A return's energy spreads over time as pulses at nodes, by quadrature. h is the outgoing pulse after the receiver
+ * (core/waveform.h). */
 #include <math.h>
 #include <stdlib.h>
 
@@ -48,9 +49,9 @@ static void gauss_nodes(struct waveform_node three[3], struct waveform_node five
     five[4] = (struct waveform_node){sqrt(far2), far};
 }
 
-/* Returns the extent, in scales of the pulse, up to which n nodes have an error below 1e-5 of the amplitude
- * (tests/unit/test_waveform.c). With Gauss's nodes the error is the next moment times the next derivative of h. With
- * the others it is the part of h's spectrum that the nodes no longer follow. */
+/* Returns the extent up to which n nodes have an error below 1e-5 of the amplitude (tests/unit/test_waveform.c). Its
+ * unit is the scale of the pulse (waveform_inside.h). With Gauss's nodes the error is the next moment times the next
+ * derivative of h. With the others it is the part of h's spectrum that the nodes no longer follow. */
 static double reach_of(enum waveform_spread spread, uint32_t n)
 {
     if (n == 3) return spread == WAVEFORM_DISC ? 0.5 : 0.2;

@@ -89,7 +89,8 @@ static const struct scip_model models[] = {
 };
 /* clang-format on */
 
-/* Firmware 4.1 and later 4.x of a UST, and 1.1 and later 1.x of the older series. */
+/* Returns whether a firmware has times in microseconds: a UST has them from 4.1 on in 4.x, the older series from 1.1 on
+ * in 1.x. */
 static int has_time_us(const char *firmware)
 {
     int major, minor;

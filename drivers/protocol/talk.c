@@ -2,7 +2,8 @@
 /* The protocol `capture`: a device says again what it said in a capture (talk.h).
  *
  * A request that comes again gets the next run that the capture has for it, and the last one once there is no further
- * one. A run begins with its request: its messages have the delays that they had. */
+ * one. A run is what followed one request in the capture. Its messages come after the request with the same delays as
+ * there. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -71,8 +72,8 @@ static void talk_begin(struct capture_session *s, int run, int request)
     }
 }
 
-/* A request waits while no place is free. If the device speaks in turns, it also waits until the answer to the request
- * before has begun: it would end that answer. */
+/* A request waits while no place is free. If the device speaks in turns, a request ends the answer to the one before.
+ * So it also waits until that answer has begun. */
 static int must_wait(const struct capture_session *s)
 {
     const int takes_turns = s->talk->kind->stops == NULL;
@@ -175,8 +176,9 @@ static void take_unknown(struct capture_session *s, const uint8_t *bytes, size_t
         s->host.send(s->host.ctx, error, kind->error(bytes, len, error));
 }
 
-/* Protocols without messages of their own: finds the longest request that the bytes begin with. Returns its length; 0
- * where they may be the beginning of one. Bytes that begin none are one unknown request. */
+/* Finds a request where the bytes don't show where one ends (no request_len). Returns the length of the longest request
+ * of the capture that the bytes begin with, or 0 if they are only the beginning of one. All other bytes are one unknown
+ * request. */
 static size_t match_beginning(const struct capture_session *s)
 {
     const struct talk *t = s->talk;
@@ -297,7 +299,7 @@ static int owes(const void *protocol)
 
 const struct protocol_ops protocol_capture = {
     .name = "capture",
-    .emitters = 1u << 31, /* no head's */
+    .emitters = 1u << 31, /* no kind of emitter has this bit: it speaks for no head */
     .max_unit = TALK_MAX_MESSAGE,
     .create = talk_create,
     .destroy = free,

@@ -40,7 +40,7 @@ static void ask(const struct protocol_spec *spec, const char *line, char *reply,
     snprintf(reply, cap, "%.*s", (int)cap - 1, whole);
 }
 
-/* A whole number of at most nine digits: 1, or 0. */
+/* Reads a whole number of at most nine digits. Returns 1, or 0 if it is none. */
 static int read_number(const char *s, long *out)
 {
     const size_t len = strlen(s);
@@ -154,7 +154,7 @@ static int set_phase_lock(const struct posted *p, const char *value)
     return command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF");
 }
 
-/* A decimal from 0 to below a limit: 1, or 0. */
+/* Reads a decimal number from 0 to below the limit. Returns 1, or 0 if it is none. */
 static int read_decimal(const char *s, double limit, double *out)
 {
     char *end;

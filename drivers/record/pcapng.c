@@ -50,7 +50,8 @@ static void count_packet(struct packets *p, const struct pcapng_packet *packet)
         scan_count_frame(&p->scans, packet->data);
 }
 
-/* The note is a block of statistics of the first interface, which holds a comment and no figure. */
+/* A repair ends the file with a note that data may be missing. The note is a block of statistics of the first
+ * interface, with a comment and without figures. */
 enum { BLOCK_STATISTICS = 5, OPTION_COMMENT = 1, NOTE_HEAD = 20 };
 static const char NOTE[] = REPAIR_INCOMPLETE;
 enum { NOTE_TEXT = sizeof NOTE - 1, NOTE_LEN = NOTE_HEAD + 4 + (NOTE_TEXT + 3) / 4 * 4 + 4 + 4 };

@@ -44,7 +44,8 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
     if (t->ops->points == NULL) return 0;
-    if (!t->has_waves) { /* where the recorder wants them, no scan has begun yet */
+    /* has_waves is set as a scan begins. So with a recorder that wants waveforms, no scan has begun here. */
+    if (!t->has_waves) {
         *(t->ops->wants_waves ? &t->missing.n_waves_unplaced : &t->missing.n_waves_unheld) += frame->n_points;
         return 0;
     }
@@ -88,8 +89,9 @@ static int find_head(const struct track *t, const struct scanhead_point *p, doub
 }
 
 /* In the geo layout a point has no range, but its window says how coordinates change along a metre of it. The range
- * is the share of the way from the head to the point that lies along the beam. A beam that the CRS bends leaves the
- * tangent sideways, so its range is right to the second order. NaN: the head's place is not known. */
+ * is the length of the way from the head to the point, projected onto the beam's direction. In some CRS a beam is
+ * slightly curved. It then leaves that direction sideways, so the error of the range is of second order. NaN: the
+ * head's place is not known. */
 static double range_along(const struct track *t, const struct scanhead_point *p, const struct scanhead_wave *wave)
 {
     const double xyz[3] = {p->x, p->y, p->z};

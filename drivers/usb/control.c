@@ -63,7 +63,7 @@ static int set_address(struct usb_device *device, const struct setup *s, uint8_t
     return 0;
 }
 
-/* wTotalLength, as it was asked for (usb_device_lengthen). */
+/* Makes wTotalLength wrong if an injected fault has asked for that (usb_device_lengthen). Returns len. */
 static size_t lengthen(const struct usb_device *device, uint8_t *out, size_t room, size_t len)
 {
     if (device->lengthen != 0 && len != 0 && room >= 4) le_put16(out + 2, (uint16_t)(len + device->lengthen));
@@ -138,7 +138,8 @@ static int get_interface_status(struct usb_device *device, const struct setup *s
     return put_status(data, 0);
 }
 
-/* Super speed: suspending a function, asked of its first interface. */
+/* Accepts FUNCTION_SUSPEND, which a host sends at super speed to the first interface of a function. It has no effect
+ * here. */
 static int set_interface_feature(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     (void)data;

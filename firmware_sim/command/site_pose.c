@@ -110,7 +110,8 @@ int command_place_query(struct command_call *call)
     if (!fits)
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes a station, and MIN, MAX or DEF", call->row->header);
     if (take_station(call, field, len, &station) != 0) return -1;
-    if (call->dev->place == NULL) return command_fail(call, CMD_E_SETTINGS, "%s?: it is not known", call->row->header);
+    if (call->dev->place == NULL)
+        return command_fail(call, CMD_E_SETTINGS, "%s?: the place is not known", call->row->header);
     if (kind == COMMAND_VALUE_NUMBER) return reply_place(call, call->dev->place[station - 1].v);
     if (kind == COMMAND_VALUE_DEF) return reply_place(call, call->dev->first_place[station - 1].v);
     for (int i = 0; i < PARTS; i++)

@@ -36,7 +36,7 @@ void device_push_error(struct device_events *events, uint32_t session, int numbe
     }
 }
 
-/* At the end of the run the events do not wait until the second is over. */
+/* Errors that were held back are reported once their second of device time is over, or at the end of the run. */
 void device_say_held(struct device_events *events, uint64_t tick, int is_over)
 {
     for (uint32_t i = 0; i <= DEVICE_MAX_SESSIONS && events->held != 0; i++) {

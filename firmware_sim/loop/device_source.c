@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The head that computes, as a source of the loop: functions of device.h. */
+/* The source of the loop that is a simulated head, by functions of device.h. The other source is a recording
+ * (firmware_sim/replay). */
 #include "firmware_sim/loop/source.h"
 
 #include "firmware_sim/device/scanner_clock.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Keeps the warnings given while loading, so that a site beside this one only gives new ones. */
+/* Keeps the warnings that loading a site gave. A site that is loaded later beside it, for another scanner or for a
+ * station that was moved, then gives only those that are new. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

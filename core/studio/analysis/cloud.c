@@ -72,7 +72,7 @@ int cloud_read_columns(const char *path, unsigned columns, const struct sh_repor
                        struct sh_err *err)
 {
     *out = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
-    if (infile_begins(path, "ply") == 0 && infile_begins(path, "LASF") == 0) /* else the reader says why */
+    if (infile_begins(path, "ply") == 0 && infile_begins(path, "LASF") == 0) /* -1: the reader says why */
         return sh_fail(err, SH_EINPUT,
                        "%s: not a PLY file and not a LAS file; allowed are point clouds of these two formats", path);
     int rc = infile_begins(path, "LASF") == 1 ? cloud_read_las(path, columns, report, out, err)

@@ -18,7 +18,7 @@ function closeWords(code, reason, wasOpen) {
 
 const unquoted = (text) => text.replace(/^"|"$/g, '');
 
-/** Returns the client that took control, as a CONTROL event names it: kind of link and address. '': it doesn't. */
+/** Returns kind of link and address of the client that took control, from a CONTROL event; '' if it names none. */
 export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ? text : '');
 
 /**

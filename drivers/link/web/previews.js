@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This module asks a head what stations would see from other places, and reads its answers. The head's folder preview
-// (README.md) has their formats. Reading is pure.
+// This module asks a head what stations would see from other places, and reads its answers. Their formats stand in
+// firmware_sim/app/studio/preview/README.md. Reading is pure.
 
 import {isWithin} from './section.js';
 
@@ -95,7 +95,8 @@ export function countSeen(cells, seen, reach = null) {
   return {counts, none_m2: area[0], one_m2: area[1], several_m2: area[2], hidden_m2};
 }
 
-// Returns the middle of each cell, x, y, z, x, y, z ..., relative to the cells' origin: that of its pieces.
+// Returns the middle of each cell, which is the mean of its pieces' middles: x, y, z, x, y, z ..., relative to the
+// cells' origin.
 function middlesOf({n, pieces, cell, corners}) {
   const middles = new Float32Array(3 * n), parts = new Uint32Array(n);
   for (let i = 0; i < pieces; i++) {

@@ -6,7 +6,7 @@ import {degrees, roundBelow} from './view_camera.js';
 import {inScene} from './view_stations.js';
 
 const FONT = '12px system-ui, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
-const FIELD = '#1f77b4'; // as in a map
+const FIELD = '#1f77b4'; // monitored fields, as in a map
 const AXES = [['x', [1, 0, 0], '#e0524d'], ['N', [0, 1, 0], '#4aa651'], ['z', [0, 0, 1], '#4a83e0']];
 
 // "20 mm", "5 m", "2 km"
@@ -121,7 +121,7 @@ export class Overlay {
     }
   }
 
-  // Draws the part of a field that lies before the eye.
+  // Draws the outline of a monitored field, as far as it lies before the eye.
   #field(camera, stations, station, {outline_m}) {
     const ends = inScene(stations.placeOf(station), station, outline_m).map((at) => camera.project(at));
     let run = [];

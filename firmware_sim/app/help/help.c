@@ -17,7 +17,7 @@ static const char *const shells[] = {"bash"};
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_TEXT, "man", "PAGE", .at = AT(man),
-     .help = "print a manual page as roff, by its name; list: the names of all"},
+     .help = "print the manual page of that name as roff; --man list prints the names of all pages"},
     {APP_TEXT, "completion", "SHELL", .at = AT(completion), OPTION_CHOICES(shells),
      .help = "print a completion for bash, to be sourced"},
     OPTION_END
@@ -101,7 +101,7 @@ int help_run(const struct app_command *const *commands, int argc, char **argv)
     const int status = app_parse(&help_command, argc, argv, &in, &wish);
     if (status != APP_GO_ON) return status;
     if (in.n_options > 1) return app_usage(&help_command, "--man and --completion: allowed is one of them");
-    if (in.n_options == 0) return help_print(commands, stdout), APP_OK; /* as of: scanhead help -- */
+    if (in.n_options == 0) return help_print(commands, stdout), APP_OK; /* as in `scanhead help --` */
     if (wish.man != NULL) return man_print(commands, strcmp(wish.man, "list") == 0 ? NULL : wish.man);
     if (strcmp(wish.completion, shells[0]) != 0)
         return app_usage(&help_command, "--completion %s: allowed is %s", wish.completion, shells[0]);

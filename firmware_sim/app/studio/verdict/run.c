@@ -64,8 +64,8 @@ static void run_prepare(struct run *r)
     }
     if (n != 0)
         sh_warn(&app_report_stderr,
-                "soak: faults flip with reseal do not strike, since no client can notice them and its points would be "
-                "unknown: %u",
+                "soak: %u faults flip with reseal do not strike: no client can notice them, and the points that they "
+                "change would count as unknown",
                 n);
 }
 
@@ -202,7 +202,8 @@ static int run_serve(struct run *r, struct sh_err *err)
 
 /* ---- points */
 
-/* Whether the client has written the file since it was started. */
+/* Returns 0 if the file is as it was before the client was started. A missing file counts as new: reading it fails,
+ * with the reason. */
 static int is_new(const struct run *r)
 {
     struct stat now;
