@@ -52,7 +52,7 @@ struct cast_tripod {
 enum { CAST_MAX_DEPTH = 4 };
 
 /* The steps between a hit and a point that a configuration asks for. A part that is NULL or 0 is left out.
- * Where all are, cast_setup.detect is NULL.
+ * Where all parts are left out, cast_setup.detect is NULL.
  *
  * A pulse has an echo of each pane that it passes, and of the surface beyond. A mirror has one only where
  * its reflectance says so. A surface seen in a mirror gives a ghost: its range is the length of the folded
@@ -127,9 +127,9 @@ void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, doubl
 /* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
-    /* NULL: none. It is made for `bvh` and `station_m`. Rays that begin at the station are looked up in it, with the
-     * same hits. All other rays are cast into the BVH: beams that begin beside the station, sub-rays, rays beyond
-     * glass and mirrors, and rays to moving bodies. A head that moves has no sight. */
+    /* The station's visibility map; NULL: none. It is made for `bvh` and `station_m`. Rays that begin at the station
+     * are looked up in it, with the same hits. All other rays are cast into the BVH: beams that begin beside the
+     * station, sub-rays, rays beyond glass and mirrors, and rays to moving bodies. A head that moves has no sight. */
     const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
@@ -216,8 +216,9 @@ uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, cons
 /* Finds exact hits (bvh.h) with the caster's working memory. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* Makes the outlines of a scene that are steps as seen from the station: beam_outlines_create, with rays into bvh.
- * spec->kind is that of surface_kinds where detection models surfaces. For setting up. */
+/* Calls beam_outlines_create with a probe that casts its rays into bvh. So outlines that are hidden from the station,
+ * or are no step as seen from there, are left out. spec->kind is that of surface_kinds where detection models surfaces.
+ * It allocates: call it before the scan. */
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
                   struct sh_err *err);
 

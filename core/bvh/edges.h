@@ -60,15 +60,15 @@ static inline int is_inside(const double side[3])
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
 }
 
-/* Returns the resolution of an edge's side in double precision. */
+/* Returns a bound of the rounding error of edge_side. */
 static inline double blur(const double a[3], const double b[3])
 {
     return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * vec3_distance(a, b);
 }
 
-/* Whether a ray that is as near to the line of an edge as rounding passes between the edge's ends, or past one of them
- * by no more than rounding. The nearest points of ray and line are not used: where the ray goes almost along the
- * edge, their error is far larger. */
+/* For a ray whose distance from the line of an edge is within rounding: whether it passes between the edge's ends, or
+ * misses one of them by no more than rounding. The nearest points of ray and line are not used: where the ray goes
+ * almost along the edge, their error is far larger. */
 static inline int is_beside(const double a[3], const double b[3], const double dir[3])
 {
     double e[3], across[3];
@@ -94,8 +94,8 @@ static inline int is_near_miss(double v[3][3], const double side[3], const doubl
     return touches;
 }
 
-/* A ray within the plane, as far as double precision shows, does not hit the triangle. It hits other
- * triangles at the edges. */
+/* Whether a ray lies in the triangle's plane, as far as double precision shows. Such a ray counts as no hit of this
+ * triangle: it hits the neighbours at the edges. */
 static inline int is_edge_on(double v[3][3], const double side[3])
 {
     return fabs(side[0] + side[1] + side[2]) <= blur(v[0], v[1]) + blur(v[1], v[2]) + blur(v[2], v[0]);

@@ -11,7 +11,7 @@
 
 enum { OUTLINE_CELLS = 512 }; /* along a face: 3.9 mrad in its middle, about half of that in its corners */
 
-/* Pulses that are within this angle of one of them are looked up together. */
+/* A group of pulses is looked up by its middle one, where all others are within this angle of it. */
 #define OUTLINE_AROUND_RAD 4e-3
 
 /* An edge's ends, relative to the station. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A builder gives the surfaces of its scene their labels, by name, and their textures. It keeps colours between
+/* A builder gives the surfaces of its scene their labels, by name, and their textures. It stores the colours of
  * vertices. */
 #ifndef CORE_SCENE_BUILD_SURFACES_H
 #define CORE_SCENE_BUILD_SURFACES_H
@@ -26,7 +26,7 @@ struct build_image {
 /* Sets the texture's number, from 1. After an error *number is as it was. */
 int build_texture(struct scene_build *b, const struct build_image *image, uint16_t *number, struct sh_err *err);
 
-/* The names are not searched any more: the scene is done, or given up. */
+/* Frees the index of names by which build_label finds surfaces. To be called when the scene is done, or given up. */
 void build_forget_surfaces(struct scene_build *b);
 
 /* A colour that a file says, times scale, as scene->rgb has it. Values beyond 0..255, and NaN, are limited and

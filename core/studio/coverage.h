@@ -130,8 +130,8 @@ void coverage_pieces(const struct coverage *coverage, coverage_piece *piece, voi
  * Where a figure is not there it is -1. The ending says the format (core/studio/mesh.h); scalars are of .ply alone. */
 
 /* SEEN: seen by none red, by one yellow, by several green. COUNT: how many stations, blue none to red all. DENSITY:
- * points per area, decades, blue the 5 % to red the 95 % of the area. INCIDENCE: blue head on to red at 90 degrees.
- * Where nothing is seen the last two are grey. */
+ * pulses per area, on a logarithmic scale: blue at its 5 % percentile of the area that is seen, red at 95 %. INCIDENCE:
+ * blue head on to red at 90 degrees. Where nothing is seen the last two are grey. */
 enum coverage_colour { COVERAGE_SEEN, COVERAGE_COUNT, COVERAGE_DENSITY, COVERAGE_INCIDENCE };
 int coverage_write_mesh(const struct coverage *coverage, const char *path, enum coverage_colour colour,
                         const struct sh_report *report, struct sh_err *err);
@@ -150,9 +150,9 @@ struct coverage_directions {
  * such a cell stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where that is less than the
  * cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where it is more, the ray stands
  * for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is hit count as a whole.
- * The estimate misses cells that lie between rays, if only a corner of them is seen. It counts cells too many that a
- * scan's points miss, and the parts of ray areas beyond outlines: on average half a ray's area along all outlines.
- * Glass counts as a wall, and moving bodies as nothing. */
+ * The estimate misses cells that lie between rays, if only a corner of them is seen. It is too large by cells that a
+ * scan's points miss, and by the parts of rays' areas that reach beyond a surface's outline: on average half a ray's
+ * area along all outlines. Glass counts as a wall, and moving bodies as nothing. */
 struct coverage_gain {
     double gain_m2;
     double front; /* share of the rays' hits that are on the front of a triangle; NaN: no ray hits */

@@ -83,8 +83,8 @@ struct figures_on_scene {
 /* Counts the points in their cells. Points without a triangle take no part. Up to 3 million cells, in 96 MiB. */
 int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
                        struct figures_density *out, struct sh_err *err);
-/* Does the same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly,
- * and up to 50 m. all: the figures of all its cells. */
+/* Does the same with a cell that it chooses: first_m is doubled until a square of that side has 16 points at the median
+ * density (p50), or is wider than 50 m. all: the figures of all its cells. */
 int figures_density_fit(const struct figures_on_scene *in, double first_m, const struct sh_report *report,
                         struct figures_density *out, struct figures_density_row *all, struct sh_err *err);
 void figures_density_free(struct figures_density *density);

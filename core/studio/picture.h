@@ -2,9 +2,9 @@
 /* Pictures: marks, lines and text on an image, as a PNG file or as SVG. In: places in pixels from the upper left
  * corner, x to the right, y down; colours as sRGB, 8 bits a channel. Out: an image, a PNG (libpng), an SVG.
  *
- * A pen draws on either: on an image, where edges are even by coverage, or into an SVG, as elements of vectors. So
- * drawings are described once. The font is one of strokes and our own: ASCII, the letters of Latin-1 with their
- * accents, and the degree sign. Other characters are boxes on an image; an SVG has them as they are.
+ * A pen draws on either: on an image, where edges are anti-aliased, or into an SVG, as vector elements. So drawings are
+ * described once. The font is one of strokes and our own: ASCII, the letters of Latin-1 with their accents, and the
+ * degree sign. Other characters are boxes on an image; an SVG has them as they are.
  *
  * Ownership: picture_make allocates, picture_free releases; so do svg_begin and svg_end. Thread: a picture
  * belongs to one at a time. Not real-time safe. */
@@ -70,8 +70,9 @@ int picture_write_png(const struct picture *picture, const char *what, const cha
 /* Writes its PNG to a stream, which is flushed. Errors give only the reason. */
 int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err);
 
-/* For pages that hold pictures: the image as the URI of a PNG's data, with one colour transparent (NULL: none); and a
- * text in XML or HTML, in an attribute, too. Bytes that are no character of XML become U+FFFD. */
+/* These two are for pages that hold pictures. picture_put_uri writes the image as a data URI of a PNG, with one colour
+ * transparent (NULL: none). picture_put_escaped writes a text for XML or HTML, also for an attribute. Bytes that are no
+ * character of XML become U+FFFD. */
 int picture_put_uri(FILE *out, const struct picture *picture, const uint8_t *clear, struct sh_err *err);
 void picture_put_escaped(FILE *out, const char *text);
 

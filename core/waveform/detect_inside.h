@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The detectors share this: a window as signals, the learned look of the pulse's echoes, and the echoes found.
+/* The detectors share this: a window as signals, the shapes that echoes of the pulse have, and the echoes found.
+ * h is the outgoing pulse after the receiver's bandwidth (waveform.h).
  *
  * Places and widths count in samples, from the first sample of the window; signals in thresholds. An echo's place is
  * its centroid, since that is its range (waveform.h).
@@ -23,8 +24,8 @@ enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
 #define FINDER_SHAPE_LAG  8.0          /* widths of the pulse after it */
 
-/* Fits add up terms. A term is a Gaussian, or h stretched, where h is no Gaussian. Its middle is between its half
- * maxima, and its sigma is that of a Gaussian of the same width. */
+/* A fit is a sum of terms. A term is a Gaussian; where h is no Gaussian, it is h, stretched in time. Its middle is
+ * between its half maxima, and its sigma is that of a Gaussian of the same width. */
 struct finder_term {
     double at, sigma, peak;
 };
@@ -128,7 +129,8 @@ struct finder_mix {
     double chi2;
 };
 
-/* Adds an echo. Its deviation is about h, after the other components of its mixture have been taken away. */
+/* Adds an echo. Its deviation is the RMS of the samples minus h at the echo, over the echo's peak. The other components
+ * of its mixture are subtracted first. */
 void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
                 uint32_t self, struct finder_list *list);
 /* Adds the echo that term `self` of a mixture stands for, if its peak is `least` or more. */

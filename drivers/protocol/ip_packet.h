@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Finds the TCP or UDP payload in a captured packet: the way back from ethernet.h.
+/* Finds the TCP or UDP payload in a captured packet. ethernet.h does the reverse: it makes such packets.
  *
  * In: a packet and its link type. Out: both ends, and where the payload lies in it. Ethernet with VLAN tags, raw IP,
  * the loopback of BSD, and Linux's "cooked" captures (SLL, SLL2); IPv4 and IPv6. Checksums are not looked at: captures

@@ -2,9 +2,9 @@
 /* A head's own USB identity, where none is configured. It has a serial number, which is the same whenever the head
  * starts again. It also has a number among the USB heads that run on this machine, for the bus id of USB/IP.
  *
- * The serial number follows from the machine and from whose head it is (its configuration). So it does not depend on
- * which other heads run. Where several of the same configuration run at a time, the second and later ones have serial
- * numbers of their own, in the order in which they start. The number is the lowest that no other head has. */
+ * The serial number is computed from the machine's id and from a text that names the head (`whose`). So it does not
+ * depend on which other heads run. Where several of the same configuration run at a time, the second and later ones
+ * have serial numbers of their own, in the order in which they start. The number is the lowest that is free. */
 #ifndef DRIVERS_USB_OWN_IDENTITY_H
 #define DRIVERS_USB_OWN_IDENTITY_H
 

@@ -31,8 +31,8 @@ struct device_overrun {
 void device_say_overrun(struct device_overrun *overrun, uint64_t pulse_next, uint64_t tick);
 /* Adds an event for lines that files lack, once a second at most. */
 void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick);
-/* Counts a lost tick, and keeps its events for later ones. off_tick: power has gone with it; events from before are
- * gone, too. */
+/* Counts a lost tick, and keeps its events for later ticks. Events of ticks before off_tick, at which the head last
+ * lost power, are dropped. */
 void device_count_lost(struct device_overrun *overrun, const struct device_work *work, uint64_t off_tick);
 
 #endif

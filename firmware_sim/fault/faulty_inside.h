@@ -49,14 +49,15 @@ struct faulty_link {
 void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piece *act);
 /* Whether the cable of the link is pulled now. */
 int faulty_is_pulled(const struct faulty_link *f);
-/* The act is another session's of the fault that has pulled the cable, and came due before the cable was in again. A
- * link has one cable, which is pulled once. */
+/* Whether the act belongs to the pull of the cable that another session has begun: it is of the same fault, and was due
+ * before the cable was in again. A link has one cable, so it is pulled once for all sessions. */
 int faulty_is_same_pull(const struct faulty_link *f, const struct wire_piece *act);
 /* Takes out the act that is first in the session's wire. It has not struck. */
 void faulty_drop_act(struct faulty_link *f, int session, const struct wire_piece *act);
 /* Brings an unplugged link back when its time is over. */
 void faulty_plug(struct faulty_link *f);
-/* The link's fault(), called by its owner: this ends what earlier faults began. */
+/* The link's fault(), called by its owner. PLUG brings an unplugged link back. Any other fault first ends the effects
+ * of earlier ones, and is then passed to the inner link. */
 int faulty_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms);
 /* A client has come. 1: it is turned away, by an injected fault. */
 int faulty_turns_away(struct faulty_link *f, int session);

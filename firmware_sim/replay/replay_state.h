@@ -108,7 +108,8 @@ void replay_stop(struct replay *replay, uint64_t tick, int wants_again);
 void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tick);
 
 /* replay_device.c: a recording as a device of another protocol than the native one. */
-/* Whether the protocols of all links can be the recorded head. e NULL: it has no emitter frame. beams: its payload. */
+/* Checks that the protocol of each link can speak for the recorded head; else SH_EINPUT. e NULL: the recording has no
+ * emitter frame. beams: the payload of that frame. */
 int replay_check_links(struct replay *replay, const struct native_descriptor *d, const struct native_emitter *e,
                        const uint8_t *beams, struct sh_err *err);
 /* As struct loop_source_ops has them. */

@@ -9,12 +9,12 @@
  *       A /___|___\ B
  *             F
  *
- * Columns are at most size / sqrt(5) wide, and so are rows at a column's wide end. A row rises by no more than its
- * width again, since it leaves the longer leg at 45 degrees at most: no two points of a piece are farther apart than
- * size. A triangle whose longest edge is no longer than size is one piece. The number of pieces grows with the area
- * and the longest edge: needles cost no more than their length. In a part with n columns, column k (from 0) has the
- * share (2 k + 1) / n^2, and all of its pieces are equal: shares are ratios of whole numbers and sum to 1. Pure; any
- * thread. */
+ * Columns are at most size / sqrt(5) wide, and so are rows at a column's wide end. A row leaves the longer leg at 45
+ * degrees at most, so within a column it rises by no more than the column's width: no two points of a piece are farther
+ * apart than size. A triangle whose longest edge is no longer than size is one piece. The number of pieces grows with
+ * the area and the longest edge: needles cost no more than their length. In a part with n columns, column k (from 0)
+ * has the share (2 k + 1) / n^2, and all of its pieces are equal: shares are ratios of whole numbers and sum to 1.
+ * Pure; any thread. */
 #ifndef CORE_STUDIO_COVERAGE_CUT_H
 #define CORE_STUDIO_COVERAGE_CUT_H
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that runs gives a page more than its stream, by these functions. `run` only opens, starts and closes the
- * watch. The main of scanhead has one (firmware_sim/app/studio/watch); that of scanheadd has none, and its page shows
- * the stream alone.
+/* A head that runs gives a page more than its stream, by these functions. Behind them is a watch: an observer that
+ * reads the stream. `run` only opens, starts and closes it. The program scanhead has a watch
+ * (firmware_sim/app/studio/watch); scanheadd has none, and its page shows the stream alone.
  *
  *     open(cfg, site, &options, &watch, err)            before the loop is made
  *     loop_options.extra = link(watch), loop_options.web = source(watch)
@@ -35,7 +35,7 @@ struct run_page {
      * NULL. */
     int (*open)(const struct config *cfg, const struct site *site, const struct watch_options *options,
                 struct watch **out, struct sh_err *err);
-    /* The loop takes its descriptor over. */
+    /* Gives the link whose other end the watch reads. Its descriptor is the loop's from then on. */
     const struct link_spec *(*link)(struct watch *watch);
     /* Its get may be called by any thread from open until close. */
     const struct web_source *(*source)(const struct watch *watch);

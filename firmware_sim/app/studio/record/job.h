@@ -45,7 +45,7 @@ int record_job_check(struct record_job *job, struct config *cfg, struct sh_err *
  * changed; the settings of --set that it was loaded with must still be there. SH_EINPUT: an option that such a
  * recording can't have. SH_ELOST and others as of recording_check_complete: the files keep the points that came. */
 int record_job_off_line(struct record_job *job, struct config *cfg, struct sh_err *err);
-/* A head on a wire, or a raw stream in a file. */
+/* Records a head on a wire, or a raw stream in a file. */
 int record_job_stream(struct record_job *job, struct sh_err *err);
 
 #endif

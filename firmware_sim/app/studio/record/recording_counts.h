@@ -39,7 +39,7 @@ enum recording_news {
 /* Takes a frame. frames_lost: some were lost in this recording. */
 enum recording_news recording_count(struct recording_counts *counts, const struct scanhead_frame *frame,
                                     int frames_lost);
-/* Something else says that the scan at hand is over. */
+/* Ends the scan at hand without a frame that says so, as when the head answers that it is idle. */
 void recording_count_end(struct recording_counts *counts);
 
 #endif

@@ -39,7 +39,7 @@ int soak_saw_power_go(struct soak_link *link, int64_t before_ns);
 /* Looks for faults of the head in a frame that the client got. */
 void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame);
 void soak_saw_state(struct soak_link *link, const char *state);
-/* Whether no fault waits to be noticed, of those that must be. */
+/* Whether the client has noticed all faults of the head that it must notice. */
 int soak_is_head_seen(struct soak_link *link);
 /* To be called at the end: faults that were not noticed are missed, or hidden with a reason. */
 void soak_judge_head(struct soak_link *link);

@@ -37,7 +37,8 @@ struct view_part {
 /* Positions are relative to origin_m, times to t0_s. SH_ENOMEM. */
 int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s,
                        const struct view_part *part, struct web_body *body, struct sh_err *err);
-/* Triangles of a mesh by rising ratio, from `first` on. SH_ENOMEM. */
+/* Encodes up to `most` triangles of a mesh from number `first` on, in the order of their edge ratio (viewed.h), the
+ * smallest first. SH_ENOMEM. */
 int view_encode_mesh(const struct viewed_mesh *mesh, uint32_t first, uint32_t most, struct web_body *body,
                      struct sh_err *err);
 /* Writes the JSON of /head, for page_json; viewed is the struct viewed. */
