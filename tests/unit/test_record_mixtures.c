@@ -101,6 +101,30 @@ static void test_other_kinds(void **state)
     expect_refused(&b, &a, "a head that stands still");
     b.moving = NATIVE_STOP;
     expect_refused(&a, &b, "stops on a trajectory");
+    expect_refused(&b, &a, "a head that stands still");
+    b = a;
+    b.heights = NATIVE_HEIGHTS_GEOID;
+    expect_refused(&b, &a, "the stream changed to other heights (ellipsoid)");
+    b = a;
+    b.epsg = 32633;
+    expect_refused(&a, &b, "the stream changed from EPSG 32632 to 32633; a file holds one CRS");
+    b = a;
+    b.station = 65536;
+    expect_refused(&a, &b, "station 65536; a file holds stations up to 65535");
+}
+
+/* These are the last stations, and stops, that a file takes. */
+static void test_same_kinds(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 65535);
+    a.moving = NATIVE_STOP;
+    rig_begin();
+    put_scan("a,b,c,d", "model", 1, &a);
+    put_scan("a,b,c,d", "model", 2, &a);
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL);
+    assert_int_equal(rig_count(text, " 7 65535"), 2);
+    free(text);
 }
 
 /* PLY describes its coordinates. As float, degrees would be wrong by metres. */
@@ -238,6 +262,23 @@ static void test_sparse_labels(void **state)
     mesh_points_free(&to);
 }
 
+/* The limit is that of the file, of all parts together. */
+static void test_sparse_limit(void **state)
+{
+    (void)state;
+    static double corner[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    static const uint32_t face[1][3] = {{0, 1, 2}};
+    const struct mesh_points from = {.xyz_m = corner, .n = 3};
+    struct mesh_points to = {.n = INT32_MAX - 99};
+    const struct mesh_sparse sparse = {.per_m2 = 200};
+    const struct mesh_sparse_part part = {face, 1, 1, 1};
+    struct sh_err err = {0};
+    double area_m2 = 7;
+    assert_int_equal(mesh_sparse_add(&sparse, &from, &part, &to, &area_m2, &err), SH_EINPUT);
+    assert_non_null(
+        strstr(err.text, "--sparse 200: 7.5 m2 of mesh would get 2.147e+09 points; a file holds 2147483647: give"));
+}
+
 static int tear_down(void **state)
 {
     e57rig_free();
@@ -247,10 +288,10 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_many_heads),
-        cmocka_unit_test(test_other_kinds),   cmocka_unit_test(test_ply_says),
-        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings),
-        cmocka_unit_test(test_poles),         cmocka_unit_test(test_sparse_labels),
+        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_many_heads),     cmocka_unit_test(test_other_kinds),
+        cmocka_unit_test(test_same_kinds),    cmocka_unit_test(test_sparse_limit),   cmocka_unit_test(test_ply_says),
+        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_poles),
+        cmocka_unit_test(test_sparse_labels),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

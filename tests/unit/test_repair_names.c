@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair, in process: it finds the meant file, replaces none, and changes nothing when given up. And the moments at
  * which a recorder writes its bytes. */
+#include <fcntl.h>
 #include <sys/stat.h>
 
 #include "core/newfile.h"
@@ -130,6 +131,45 @@ static void test_full_for_a_while(void **state)
     }
 }
 
+static void take_row(void *ctx, const uint8_t *row)
+{
+    (void)row;
+    ++*(int *)ctx;
+}
+
+/* A folder stands for a disk that cannot be read, and /dev/full for one that is full. */
+static void test_broken_disk(void **state)
+{
+    (void)state;
+    struct repair r = {.path = "a.las", .fd = open("/", O_RDONLY | O_CLOEXEC), .len = 100};
+    char text[16];
+    int n = 0;
+    assert_int_equal(repair_read(&r, 0, text, sizeof text, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be read: Is a directory");
+    assert_int_equal(repair_rows(&r, &(struct repair_rows){0, 2, 50}, take_row, &n, &repair_err), SH_EIO);
+    assert_int_equal(n, 0);
+    assert_int_equal(repair_write(&r, 0, "x", 1, &repair_err), SH_EPERM);
+    assert_int_equal(repair_cut(&r, 99, &repair_err), SH_EPERM);
+    assert_int_equal(repair_cut(&r, 100, &repair_err), SH_OK);
+    close(r.fd);
+    r.fd = open("/dev/full", O_RDWR | O_CLOEXEC);
+    assert_int_equal(repair_write(&r, 0, "x", 1, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be repaired: No space left on device");
+    assert_int_equal(repair_cut(&r, 99, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be cut: Invalid argument");
+    assert_int_equal(r.cut_bytes, 0);
+    close(r.fd);
+    repair_name("a.las");
+    repair_write_file(repair_path, "abc", 3);
+    r.fd = open(repair_path, O_RDWR | O_CLOEXEC);
+    assert_int_equal(repair_read(&r, 0, text, 4, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be read: it got shorter while it was read");
+    assert_int_equal(repair_read(&r, 1, text, 2, &repair_err), SH_OK);
+    assert_memory_equal(text, "bc", 2);
+    close(r.fd);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
 static int stop(void *ctx)
 {
     (void)ctx;
@@ -237,9 +277,14 @@ static void test_save(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names),        cmocka_unit_test(test_not_ours),
-                                       cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_full_for_a_while),
-                                       cmocka_unit_test(test_stopped),      cmocka_unit_test(test_save),
-                                       cmocka_unit_test(test_zeros),        cmocka_unit_test(test_scans_of_a_stream)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names),
+                                       cmocka_unit_test(test_not_ours),
+                                       cmocka_unit_test(test_moving_poses),
+                                       cmocka_unit_test(test_full_for_a_while),
+                                       cmocka_unit_test(test_broken_disk),
+                                       cmocka_unit_test(test_stopped),
+                                       cmocka_unit_test(test_save),
+                                       cmocka_unit_test(test_zeros),
+                                       cmocka_unit_test(test_scans_of_a_stream)};
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }
