@@ -124,6 +124,8 @@ static void test_same_kinds(void **state)
     put_scan("a,b,c,d", "model", 2, &a);
     char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL);
     assert_int_equal(rig_count(text, " 7 65535"), 2);
+    assert_int_equal(rig_count(text, "comment the stations are stops on a trajectory; frame: its frame scalar there"),
+                     1);
     free(text);
 }
 

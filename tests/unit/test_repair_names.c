@@ -99,6 +99,8 @@ static void test_moving_poses(void **state)
 /* The disk was full for a while, and points were lost. Later writes do not make the file whole. */
 static void test_full_for_a_while(void **state)
 {
+    static const char *const unit[REPAIR_FORMATS] = {"frames", "packets", "points", "points", "points",
+                                                     "points", "points",  "points", "poses"};
     (void)state;
     for (int i = 0; i < REPAIR_FORMATS; i++) {
         struct scanhead *sh;
@@ -126,7 +128,12 @@ static void test_full_for_a_while(void **state)
         assert_int_equal(access(repair_path, F_OK), -1);
         assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
         assert_true(file.was_left && file.n_kept > 0);
+        assert_string_equal(file.unit, unit[i]);
         repair_free(&file);
+        struct bytes got = repair_slurp(repair_path);
+        if (unit[i][1] == 'o' && strstr(repair_path, ".ply") != NULL) /* it says so once */
+            assert_int_equal(rig_count((char *)got.data, "comment incomplete:"), 1);
+        free(got.data);
         assert_int_equal(unlink(repair_path), 0);
     }
 }
