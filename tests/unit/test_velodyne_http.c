@@ -242,6 +242,10 @@ static void test_documents(void **state)
     http_rig.fix.lon_deg = 11.999999;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "{\"pps_state\":\"Locked\",\"position\":\"48 06.00S 12 00.00E\"}"));
+    http_rig.fix.lat_deg = 89.9999; /* the last 0.01 minutes before 90 degrees: 59.994 */
+    http_rig.fix.lon_deg = -179.9999;
+    http_get("/cgi/status.json");
+    assert_non_null(strstr(http_body(), "\"position\":\"89 59.99N 179 59.99W\"}"));
     http_rig.pps = PROTOCOL_PPS_ERROR;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "{\"pps_state\":\"Error\","));
@@ -259,6 +263,9 @@ static void test_documents(void **state)
     assert_non_null(strstr(http_body(), "\"phaselock\":{\"enabled\":\"On\",\"offset\":9001,\"offsetInput\":90.01},"));
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "\"rpm\":600,\"lock\":\"On\",\"phase\":9000}"));
+    http_replies[2].reply = "FIRSt"; /* the device has no such mode */
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "{\"laser\":\"On\",\"returns\":\"\",\"rpm\":600,"));
     http_replies[2].reply = "ALL";
     http_replies[1].reply = "10.166667";
     http_get("/cgi/settings.json");
