@@ -174,27 +174,29 @@ static void test_rows_of_beams(void **state)
     int16_t refl = 0;
     uint16_t label = 0;
     uint8_t echo = 0x11;
-    const struct line_block block = {.line = 1,
-                                     .pulse0 = 8,
-                                     .n_pulses = 1,
-                                     .t0_ns = 20000,
-                                     .line_t0_ns = 12000,
-                                     .n_points = 1,
-                                     .dt_ns = &zero,
-                                     .a = &x,
-                                     .b = &x,
-                                     .c = &x,
-                                     .refl_cdb = &refl,
-                                     .echo = &echo,
-                                     .label = &label};
-    rig_begin();
-    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
-    put_emitter(&e, beam);
-    rig_anchor(&a);
-    rig_put(out, native_encode_points(out, sizeof out, &block, 0));
-    e57rig_record_one((struct recorder_options){0});
-    e57rig_scan(0, 0, 0);
-    assert_int_equal(e57rig_record[0].row, 2);
+    struct line_block block = {.line = 1,
+                               .pulse0 = 8,
+                               .n_pulses = 1,
+                               .t0_ns = 20000,
+                               .n_points = 1,
+                               .dt_ns = &zero,
+                               .a = &x,
+                               .b = &x,
+                               .c = &x,
+                               .refl_cdb = &refl,
+                               .echo = &echo,
+                               .label = &label};
+    for (int first = 4; first <= 6; first += 2) { /* at 10 us it is the first beam of that sequence */
+        block.line_t0_ns = first == 4 ? 10000 : 12000;
+        rig_begin();
+        rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+        put_emitter(&e, beam);
+        rig_anchor(&a);
+        rig_put(out, native_encode_points(out, sizeof out, &block, 0));
+        e57rig_record_one((struct recorder_options){0});
+        e57rig_scan(0, 0, 0);
+        assert_int_equal(e57rig_record[0].row, 8 - first);
+    }
 }
 
 /* A sphere of ten rings has ten lines, and the first and the last one are in one grid. */
@@ -219,6 +221,28 @@ static void test_lines_of_rings(void **state)
     assert_memory_equal(text, "10\n1\n", 5);
     assert_null(strstr(rig_notes, "grids begun"));
     free(text);
+}
+
+/* A head of several rings, and one that pans, have sweeps. Others have lines of one grid. */
+static void test_sweeps(void **state)
+{
+    (void)state;
+    static const struct {
+        int kind;
+        uint32_t rings;
+        double pan_deg_s;
+        int is_apart;
+    } cases[] = {{SCANHEAD_EMIT_SPHERE, 1, 0, 0}, {SCANHEAD_EMIT_SPHERE, 2, 0, 1}, {SCANHEAD_EMIT_SPHERE, 1, 10, 0},
+                 {SCANHEAD_EMIT_LINE, 0, 0, 0},   {SCANHEAD_EMIT_LINE, 0, 10, 1},  {SCANHEAD_EMIT_PLANAR, 2, 10, 0}};
+    static struct track t;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct mesh_grid g = {.kind = cases[i].kind, .rings = cases[i].rings, .sweep = 3};
+        t.info.pan_deg_s = cases[i].pan_deg_s;
+        t.sweep = 3;
+        assert_int_equal(mesh_grid_takes(&g, &t, 0), 1);
+        t.sweep = 4;
+        assert_int_equal(mesh_grid_takes(&g, &t, 0), !cases[i].is_apart);
+    }
 }
 
 /* Elevations are rounded to 1e-6 degrees. An elevation a degree from the pole is a ring. */
@@ -292,8 +316,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_several_heads), cmocka_unit_test(test_many_heads),     cmocka_unit_test(test_other_kinds),
         cmocka_unit_test(test_same_kinds),    cmocka_unit_test(test_sparse_limit),   cmocka_unit_test(test_ply_says),
-        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_poles),
-        cmocka_unit_test(test_sparse_labels),
+        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_sweeps),
+        cmocka_unit_test(test_poles),         cmocka_unit_test(test_sparse_labels),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
