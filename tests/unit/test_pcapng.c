@@ -145,6 +145,63 @@ static void test_damaged(void **state)
 }
 
 /* The layout is that of capinfos: 64-bit options after interface and time. */
+/* Reads blocks until one fails. Returns why; NULL: none did. */
+static const char *why_not(const uint8_t *file, size_t len)
+{
+    static struct sh_err err;
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    size_t used;
+    int rc;
+    for (size_t at = 0; (rc = pcapng_read(&reader, file + at, len - at, &packet, &used, &err)) > 0; at += used)
+        continue;
+    return rc < 0 ? err.text : NULL;
+}
+
+/* The blocks of a good file with one number changed. Numbers at a limit are good. */
+static void test_limits(void **state)
+{
+    (void)state;
+    enum { SECTION, INTERFACE, PACKET };
+    static const struct {
+        int block, at;
+        uint32_t value;
+        const char *why; /* NULL: none */
+    } cases[] = {
+        {SECTION, 0, 7, "not a pcapng file: it does not begin with a section"},
+        {SECTION, 8, 0x4d3c2b1a, "its numbers are big-endian"},
+        {SECTION, 8, 0x1a2b3c4e, "its byte-order mark is wrong"},
+        {SECTION, 12, 2, "its version of pcapng is not 1"},
+        {SECTION, 12, 0x10001, NULL}, /* version 1.1 */
+        {SECTION, 4, 8, "at byte 0: a block of 8 bytes; allowed are multiples of 4 from 12 to "},
+        {SECTION, 4, 30, "a block of 30 bytes"},
+        {SECTION, 4, 12, "the two lengths of a block differ"},
+        {PACKET, 8, 1, "a packet of an interface that is not described"},
+        {PACKET, 20, 8, NULL}, /* with what fills it up */
+        {PACKET, 20, 9, "a packet is longer than its block"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        uint8_t file[512];
+        size_t at[3];
+        at[SECTION] = 0;
+        at[INTERFACE] = pcapng_put_section(file, NULL);
+        at[PACKET] = at[INTERFACE] + pcapng_put_interface(file + at[INTERFACE], PCAPNG_USER0, 0, NULL, NULL);
+        const size_t len = at[PACKET] + pcapng_put_packet(file + at[PACKET], 0, 1, "abcde", 5, 0);
+        assert_null(why_not(file, len));
+        le_put32(file + at[cases[i].block] + cases[i].at, cases[i].value);
+        const char *why = why_not(file, len);
+        if ((why == NULL) != (cases[i].why == NULL) || (why != NULL && strstr(why, cases[i].why) == NULL))
+            fail_msg("case %zu: %s", i, why != NULL ? why : "none");
+    }
+    static uint8_t many[66 * 64];
+    size_t len = pcapng_put_section(many, NULL);
+    for (int i = 0; i < 64; i++)
+        len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
+    assert_null(why_not(many, len));
+    len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
+    assert_non_null(strstr(why_not(many, len), "more than 64 interfaces"));
+}
+
 static void test_statistics(void **state)
 {
     (void)state;
@@ -171,11 +228,12 @@ static void test_loss(void **state)
     struct pcapng_packet packet;
     struct sh_err err = {0};
     size_t used;
-    const size_t plain = pcapng_put_packet(file, 0, 7, "abcde", 5, 0);
-    const size_t len = pcapng_put_packet(with, 0, 7, "abcde", 5, 300);
+    const int64_t t_ns = INT64_C(0x123456789abcdef); /* all bytes differ */
+    const size_t plain = pcapng_put_packet(file, 0, t_ns, "abcde", 5, 0);
+    const size_t len = pcapng_put_packet(with, 0, t_ns, "abcde", 5, 300);
     assert_true(plain == pcapng_packet_len(5) && len == plain + PCAPNG_LOST);
     assert_int_equal(pcapng_read(&reader, with, len, &packet, &used, &err), PCAPNG_PACKET);
-    assert_true(used == len && packet.t_ns == 7 && packet.len == 5 && memcmp(packet.data, "abcde", 5) == 0);
+    assert_true(used == len && packet.t_ns == t_ns && packet.len == 5 && memcmp(packet.data, "abcde", 5) == 0);
     assert_memory_equal(with + 8, file + 8, plain - 12);
     assert_true(rig_uint(with + 36, 4) == (4 | 8 << 16) && rig_uint(with + 40, 8) == 300);
     assert_int_equal(rig_uint(with + 48, 4), 0);
@@ -252,9 +310,9 @@ static void test_of_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets),   cmocka_unit_test(test_disk_full),
-                                       cmocka_unit_test(test_read),      cmocka_unit_test(test_damaged),
-                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_statistics),
-                                       cmocka_unit_test(test_loss),      cmocka_unit_test(test_time_offset)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_packets),    cmocka_unit_test(test_disk_full), cmocka_unit_test(test_read),
+        cmocka_unit_test(test_damaged),    cmocka_unit_test(test_of_others), cmocka_unit_test(test_limits),
+        cmocka_unit_test(test_statistics), cmocka_unit_test(test_loss),      cmocka_unit_test(test_time_offset)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -302,6 +302,18 @@ static void two_stations_are_two_objects(void **state)
     rig_begin();
     begin_scan(1, 1);
     put_step(0);
+    struct native_descriptor d = descriptor(2);
+    const struct native_anchor a = anchor_of(2);
+    strcpy(d.profile, "other");
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(3);
+    text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .n_heads = 2}, NULL);
+    has(text, "comment station 1 scan 1 profile model\ncomment station 2 scan 2 profile other\n");
+    free(text);
+    rig_begin();
+    begin_scan(1, 1);
+    put_step(0);
     text = rig_record_bytes("c.obj", (struct recorder_options){.colour = {.given = 1}}, NULL); /* --colour none */
     assert_null(strstr(text, "mtl"));
     assert_null(strstr(text, "vt "));

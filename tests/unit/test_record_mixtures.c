@@ -57,6 +57,40 @@ static void test_several_heads(void **state)
     }
 }
 
+/* Names of a stream can't end their line. As long as more may come, a header with another head still says so. */
+static void test_header_of_part(void **state)
+{
+    (void)state;
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1), b = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    const char *path = rig_path("a.ply");
+    char part[160];
+    struct scanhead *sh;
+    struct scanhead_frame frame;
+    struct recorder *rec;
+    struct sh_err err = {0};
+    rig_begin();
+    put_scan("Maker,Model\nend_header,SN1,1", "mo\ndel", 1, &a);
+    put_scan("Maker,Model,SN2,1", "model", 1, &b);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    snprintf(part, sizeof part, "%s.part", path);
+    assert_int_equal(
+        recorder_open(recorder_find(path, &err), path, &(struct recorder_options){.n_heads = 2}, &rec, &err), 0);
+    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+    while (scanhead_next(sh, &frame, -1) == 0)
+        assert_int_equal(recorder_frame(rec, sh, &frame, &err), 0);
+    assert_int_equal(recorder_save(rec, &err), 0);
+    char *text = (char *)rig_read(part, NULL);
+    assert_non_null(strstr(text, "comment incomplete: its end is missing, and losses were not counted\n"));
+    assert_non_null(strstr(text, "comment station 1 idn Maker,Model?end_header,SN1,1\n"));
+    assert_non_null(strstr(text, "comment station 1 profile mo?del\n"));
+    assert_non_null(strstr(text, "comment station 2 idn Maker,Model,SN2,1\n"));
+    free(text);
+    assert_int_equal(recorder_close(rec, 0, &err), 0);
+    scanhead_close(sh);
+    unlink(part);
+}
+
 /* Two heads take turns at 130 stations. The header names 128 of these turns, and a note counts the others. */
 static void test_many_heads(void **state)
 {
@@ -270,7 +304,7 @@ static void test_sparse_labels(void **state)
     double area_m2 = 0;
     int seen[3] = {0};
     for (int k = 0; k < 3; k++) {
-        struct mesh_point p = {.label = (uint16_t)(10 * k), .station = 1};
+        struct mesh_point p = {.label = (uint16_t)(10 * k), .station = 1, .rgb = {255, 0, 128}};
         memcpy(p.xyz_m, corner[k], sizeof p.xyz_m);
         assert_int_equal(mesh_points_add(&from, &p, &err), 0);
     }
@@ -281,6 +315,7 @@ static void test_sparse_labels(void **state)
         const double x = to.xyz_m[i][0], y = to.xyz_m[i][1], rest = 1 - x - y;
         const int nearest = x > y && x > rest ? 1 : y > rest ? 2 : 0;
         assert_int_equal(to.label[i], 10 * nearest);
+        assert_memory_equal(to.rgb[i], from.rgb[0], 3);
         seen[nearest]++;
     }
     assert_true(seen[0] > 0 && seen[1] > 0 && seen[2] > 0);
@@ -314,10 +349,12 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_many_heads),     cmocka_unit_test(test_other_kinds),
-        cmocka_unit_test(test_same_kinds),    cmocka_unit_test(test_sparse_limit),   cmocka_unit_test(test_ply_says),
-        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_sweeps),
-        cmocka_unit_test(test_poles),         cmocka_unit_test(test_sparse_labels),
+        cmocka_unit_test(test_several_heads),  cmocka_unit_test(test_many_heads),
+        cmocka_unit_test(test_header_of_part), cmocka_unit_test(test_other_kinds),
+        cmocka_unit_test(test_same_kinds),     cmocka_unit_test(test_sparse_limit),
+        cmocka_unit_test(test_ply_says),       cmocka_unit_test(test_rows_of_beams),
+        cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_sweeps),
+        cmocka_unit_test(test_poles),          cmocka_unit_test(test_sparse_labels),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
