@@ -57,7 +57,7 @@ void e57rig_record_one(struct recorder_options options)
 }
 
 struct e57rig_record e57rig_record[8192];
-size_t e57rig_n_records;
+size_t e57rig_n_records, e57rig_n_packets;
 
 /* The streams of all packets joined, then cut into bits. */
 static uint8_t stream[MAX_STREAMS][1 << 17];
@@ -78,6 +78,7 @@ static void read_packets(const uint8_t *section, unsigned n_streams)
 {
     size_t len = rig_uint(section + 8, 8);
     memset(stream_len, 0, sizeof stream_len);
+    e57rig_n_packets = 0;
     assert_int_equal(rig_uint(section, 8), 1); /* a compressed vector, and reserved bytes */
     for (const uint8_t *p = section + 32; p < section + len;) {
         const uint8_t *from = p + 6 + 2 * n_streams;
@@ -93,6 +94,7 @@ static void read_packets(const uint8_t *section, unsigned n_streams)
         }
         assert_true(from <= p + packet_len && from + 4 > p + packet_len);
         p += packet_len;
+        e57rig_n_packets++;
     }
 }
 

@@ -166,6 +166,27 @@ static void a_rectangle_begins_at_zero_or_at_the_first_beam(void **state)
     }
 }
 
+/* Two corners at one beam, 0.1 degrees apart, are one point: the nearest and the farthest of both, whichever comes first.
+ * 90 degrees are beam 405, and 100 degrees beam 435. */
+static void corners_at_one_beam_are_one_point(void **state)
+{
+    (void)state;
+    static const double corner[3][2] = {{90, 1e6}, {90.1, 3e6}, {100, 2e6}}; /* degrees, um */
+    for (int first = 0; first < 3; first++) {
+        static struct cola_fields f;
+        memset(&f, 0, sizeof f);
+        f.field[0].shape.kind = COLA_SHAPE_POLYGON;
+        for (int k = 0; k < 3; k++) {
+            const double *c = corner[(first + k) % 3], rad = c[0] / 180 * M_PI;
+            assert_int_equal(cola_shape_add(&f.field[0].shape, c[1] * cos(rad), c[1] * sin(rad)), 0);
+        }
+        open_tim();
+        fields_open(&f);
+        cola_expect("sRN field000",
+                    "sRA field000 3F800000 00000000 D05 FFF92230 2 1 1 2 195 3E8 BB8 1B3 7D0 7D0 0 0 0 1 0 0");
+    }
+}
+
 /* 500 m are 62500 counts of 8 mm; with 7 mm they would be more than 65534. */
 static void far_fields_have_a_scale_for_it(void **state)
 {
@@ -385,6 +406,7 @@ int main(void)
         CASE(directions_are_taken_modulo_a_turn),
         CASE(a_record_reaches_to_the_ends_of_the_view),
         CASE(far_fields_have_a_scale_for_it),
+        CASE(corners_at_one_beam_are_one_point),
         CASE(a_record_of_a_sector_spreads_its_points),
         CASE(a_rectangle_begins_at_zero_or_at_the_first_beam),
         CASE(results_follow_the_scan),

@@ -7,6 +7,7 @@
 
 #include "core/bytes.h"
 #include "core/newfile.h"
+#include "drivers/protocol/pcapng.h"
 #include "drivers/record/repair.h"
 #include "tests/unit/repair_rig.h"
 
@@ -65,6 +66,10 @@ static void test_whole_elsewhere(void **state)
     assert_int_equal(repair_untouched("f.pcapng", capture, sizeof capture - 1), SH_OK);
     assert_int_equal(repair_untouched("f.pcapng", more, sizeof more - 1), SH_EFORMAT);
     assert_non_null(strstr(repair_err.text, "was written by another program"));
+    uint8_t other[128]; /* its name is as long as ours */
+    size_t len = pcapng_put_section(other, "Scanhead");
+    memcpy(other + len, PCAPNG_INTERFACE "\x06\0\0\0", 24);
+    assert_int_equal(repair_untouched("f.pcapng", other, len + 24), SH_EFORMAT);
 }
 
 /* A grid of absurd size is not filled up. */

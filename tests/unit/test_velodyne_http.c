@@ -274,6 +274,12 @@ static void test_documents(void **state)
     assert_non_null(strstr(http_body(), "\"lm20_temp\":1126"));
     http_get("/cgi/snapshot.hdl");
     assert_non_null(strstr(http_body(), "\"config\":{\"laser\":\"On\""));
+    int depth = 0; /* its brackets are in pairs, and the last one ends it */
+    for (const char *at = http_body(); *at != '\0'; at++) {
+        depth += (*at == '{') - (*at == '}');
+        assert_true(depth > 0 || at[1] == '\0');
+    }
+    assert_int_equal(depth, 0);
     for (uint32_t i = 0; i < http_rig.n_lines; i++)
         assert_non_null(strchr(http_rig.line[i], '?')); /* reading changes nothing */
 }
