@@ -253,10 +253,29 @@ static void test_far(void **state)
         }
 }
 
+/* The figures of a scan go on from one packet to the next, also after one of a single record. */
+static void test_figures_go_on(void **state)
+{
+    (void)state;
+    size_t len;
+    for (int round = 0; round < 20; round++) {
+        begin(round & 1, 0, 0, 1e-3);
+        fill(1, 9);
+        const uint8_t *p = e57_packet_make(&packet, &facts, 1, &len);
+        assert_int_equal(e57_packet_count(p, len, &facts, &scan), 0);
+        check_figures(&scan, 1);
+        fill(8, 9);
+        p = e57_packet_make(&packet, &facts, 8, &len);
+        assert_int_equal(e57_packet_count(p, len, &facts, &scan), 0);
+        check_figures(&scan, 9);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_plain),
+        cmocka_unit_test(test_figures_go_on),
         cmocka_unit_test(test_far),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

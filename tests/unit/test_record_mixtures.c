@@ -220,8 +220,11 @@ static void test_rows_of_beams(void **state)
                                .refl_cdb = &refl,
                                .echo = &echo,
                                .label = &label};
-    for (int first = 4; first <= 6; first += 2) { /* at 10 us it is the first beam of that sequence */
-        block.line_t0_ns = first == 4 ? 10000 : 12000;
+    static const struct {
+        int first, t0_ns;
+    } lines[] = {{3, 9999}, {4, 10000}, {4, 10999}, {6, 12000}};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        block.line_t0_ns = lines[i].t0_ns;
         rig_begin();
         rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
         put_emitter(&e, beam);
@@ -229,7 +232,7 @@ static void test_rows_of_beams(void **state)
         rig_put(out, native_encode_points(out, sizeof out, &block, 0));
         e57rig_record_one((struct recorder_options){0});
         e57rig_scan(0, 0, 0);
-        assert_int_equal(e57rig_record[0].row, 8 - first);
+        assert_int_equal(e57rig_record[0].row, 8 - lines[i].first);
     }
 }
 
