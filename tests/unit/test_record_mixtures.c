@@ -189,6 +189,25 @@ static void test_ply_says(void **state)
     unlink(rig_path("a.ply.part"));
 }
 
+/* As float, coordinates of a kilometre have steps of 0.06 mm. A station farther away on any axis is refused. */
+static void test_floats(void **state)
+{
+    (void)state;
+    for (int axis = 0; axis < 3; axis++)
+        for (int sign = -1; sign <= 1; sign += 2)
+            for (int beyond = 0; beyond < 2; beyond++) {
+                struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+                struct sh_err err = {0};
+                memset(a.anchor, 0, sizeof a.anchor);
+                a.anchor[axis] = sign * (beyond ? 1000.5 : 1000.0);
+                rig_begin();
+                put_scan("a,b,c,d", "model", 1, &a);
+                assert_int_equal(record("a.ply", (struct recorder_options){.columns = PLY_XYZ | PLY_FLOAT}, &err),
+                                 beyond ? SH_EINPUT : SH_OK);
+                unlink(rig_path(beyond ? "a.ply.part" : "a.ply"));
+            }
+}
+
 static void put_emitter(const struct native_emitter *e, const struct native_beam *beam)
 {
     rig_put(out, native_encode_emitter(out, sizeof out, e, beam, 0, 0));
@@ -352,12 +371,11 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads),  cmocka_unit_test(test_many_heads),
-        cmocka_unit_test(test_header_of_part), cmocka_unit_test(test_other_kinds),
-        cmocka_unit_test(test_same_kinds),     cmocka_unit_test(test_sparse_limit),
-        cmocka_unit_test(test_ply_says),       cmocka_unit_test(test_rows_of_beams),
-        cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_sweeps),
-        cmocka_unit_test(test_poles),          cmocka_unit_test(test_sparse_labels),
+        cmocka_unit_test(test_several_heads),  cmocka_unit_test(test_many_heads), cmocka_unit_test(test_header_of_part),
+        cmocka_unit_test(test_other_kinds),    cmocka_unit_test(test_same_kinds), cmocka_unit_test(test_sparse_limit),
+        cmocka_unit_test(test_ply_says),       cmocka_unit_test(test_floats),     cmocka_unit_test(test_rows_of_beams),
+        cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_sweeps),     cmocka_unit_test(test_poles),
+        cmocka_unit_test(test_sparse_labels),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }
