@@ -3,6 +3,7 @@
  * and damaged. */
 #include "core/bytes.h"
 #include "core/rng.h"
+#include "drivers/protocol/pcap.h"
 #include "drivers/protocol/pcapng.h"
 #include "tests/unit/recorder_rig.h"
 
@@ -202,6 +203,51 @@ static void test_limits(void **state)
     assert_non_null(strstr(why_not(many, len), "more than 64 interfaces"));
 }
 
+/* The older format, in both orders of bytes and with parts of a second in both units (libpcap's savefile.5). */
+static void test_pcap(void **state)
+{
+    (void)state;
+    enum { SECONDS = 1700000000, PART = 123456, HEAD = 24, RECORD = 16, LEN = 5 };
+    for (int i = 0; i < 4; i++) {
+        const int is_big = i & 1, is_ns = i >> 1;
+        const uint32_t words[] = {is_ns ? 0xa1b23c4d : 0xa1b2c3d4, 0, 0, 0, 65535, 0x20093, SECONDS, PART, LEN, 60};
+        uint8_t file[HEAD + RECORD + LEN] = {0};
+        struct pcap_reader reader = {0};
+        struct pcapng_packet packet;
+        struct sh_err err = {0};
+        size_t used;
+        for (int k = 0; k < 10; k++)
+            (is_big ? be_put32 : le_put32)(file + 4 * k, words[k]);
+        file[is_big ? 5 : 4] = 2; /* the version is two numbers of 16 bits: 2.0 */
+        memcpy(file + HEAD + RECORD, "abcde", LEN);
+        assert_true(pcap_is(file));
+        assert_int_equal(pcap_read(&reader, file, HEAD - 1, &packet, &used, &err), PCAPNG_MORE);
+        assert_int_equal(pcap_read(&reader, file, HEAD, &packet, &used, &err), PCAPNG_OTHER);
+        assert_int_equal(used, HEAD);
+        for (size_t n = 0; n < RECORD + LEN; n++)
+            assert_int_equal(pcap_read(&reader, file + HEAD, n, &packet, &used, &err), PCAPNG_MORE);
+        assert_int_equal(pcap_read(&reader, file + HEAD, RECORD + LEN, &packet, &used, &err), PCAPNG_PACKET);
+        assert_int_equal(used, RECORD + LEN);
+        assert_int_equal(reader.at_byte, sizeof file);
+        assert_int_equal(packet.link, 0x93);
+        assert_true(packet.has_time && packet.t_ns == SECONDS * INT64_C(1000000000) + PART * (is_ns ? 1 : 1000));
+        assert_int_equal(packet.len, LEN);
+        assert_int_equal(packet.original_len, 60);
+        assert_memory_equal(packet.data, "abcde", LEN);
+        (is_big ? be_put32 : le_put32)(file + HEAD + 8, (uint32_t)PCAPNG_MAX_BLOCK + 1);
+        assert_int_equal(pcap_read(&reader, file + HEAD, RECORD + LEN, &packet, &used, &err), SH_EFORMAT);
+        assert_memory_equal(err.text, "at byte 45: a packet of ", 24);
+        file[is_big ? 5 : 4] = 3;
+        reader = (struct pcap_reader){0};
+        assert_int_equal(pcap_read(&reader, file, sizeof file, &packet, &used, &err), SH_EFORMAT);
+        assert_string_equal(err.text, "at byte 4: its version of pcap is 3; allowed is 2");
+        file[0] ^= 1;
+        assert_false(pcap_is(file));
+        assert_int_equal(pcap_read(&reader, file, sizeof file, &packet, &used, &err), SH_EFORMAT);
+        assert_string_equal(err.text, "at byte 0: not a pcap file: its first number is wrong");
+    }
+}
+
 static void test_statistics(void **state)
 {
     (void)state;
@@ -310,9 +356,10 @@ static void test_of_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_packets),    cmocka_unit_test(test_disk_full), cmocka_unit_test(test_read),
-        cmocka_unit_test(test_damaged),    cmocka_unit_test(test_of_others), cmocka_unit_test(test_limits),
-        cmocka_unit_test(test_statistics), cmocka_unit_test(test_loss),      cmocka_unit_test(test_time_offset)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets),   cmocka_unit_test(test_disk_full),
+                                       cmocka_unit_test(test_read),      cmocka_unit_test(test_damaged),
+                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_limits),
+                                       cmocka_unit_test(test_pcap),      cmocka_unit_test(test_statistics),
+                                       cmocka_unit_test(test_loss),      cmocka_unit_test(test_time_offset)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

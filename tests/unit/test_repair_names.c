@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include "core/newfile.h"
+#include "drivers/protocol/pcapng.h"
 #include "drivers/record/outfile.h"
 #include "tests/unit/repair_rig.h"
 
@@ -177,6 +178,67 @@ static void test_broken_disk(void **state)
     assert_int_equal(unlink(repair_path), 0);
 }
 
+static int take_long_line(void *ctx, const char *line, size_t len)
+{
+    ++*(int *)ctx;
+    return len == 99 && line[0] == 'a' && line[98] == 'z';
+}
+
+/* Files are read in blocks of 1 MiB. Lines and rows lie across their edges. */
+static void test_several_blocks(void **state)
+{
+    enum { LINES = 30000, LINE = 100 };
+    (void)state;
+    char *text = malloc(LINES * LINE);
+    struct repair r = {.path = "a.csv", .len = LINES * LINE};
+    uint64_t end;
+    int n = 0;
+    memset(text, 'b', LINES * LINE);
+    for (int i = 0; i < LINES; i++) {
+        text[i * LINE] = 'a';
+        text[i * LINE + 98] = 'z';
+        text[i * LINE + 99] = '\n';
+    }
+    repair_name("a.las");
+    repair_write_file(repair_path, text, LINES * LINE);
+    free(text);
+    r.fd = open(repair_path, O_RDONLY | O_CLOEXEC);
+    assert_int_equal(repair_lines(&r, 0, take_long_line, &n, &end, &repair_err), SH_OK);
+    assert_int_equal(n, LINES);
+    assert_int_equal(end, LINES * LINE);
+    n = 0;
+    assert_int_equal(repair_rows(&r, &(struct repair_rows){0, LINES * LINE / 24, 24}, take_row, &n, &repair_err), 0);
+    assert_int_equal(n, LINES * LINE / 24);
+    close(r.fd);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
+static void test_large_capture(void **state)
+{
+    enum { PACKETS = 40000 };
+    (void)state;
+    struct repaired file;
+    const struct bytes *whole = &repair_whole[1];
+    uint8_t *all = malloc(whole->len + PACKETS * pcapng_packet_len(50));
+    size_t len = whole->len;
+    memcpy(all, whole->data, len);
+    for (int i = 0; i < PACKETS; i++)
+        len += pcapng_put_packet(all + len, 0, i, "0123456789012345678901234567890123456789012345678",
+                                 1 + (size_t)i % 50, 0);
+    repair_name("a.pcapng");
+    repair_write_file(repair_path, whole->data, whole->len);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_OK);
+    const uint64_t n = file.n_kept;
+    repair_free(&file);
+    repair_write_file(repair_path, all, len);
+    free(all);
+    if (repair_file(repair_path, NULL, &file, &repair_err) != SH_OK) fail_msg("%s", repair_err.text);
+    assert_int_equal(file.n_kept, n + PACKETS);
+    assert_int_equal(file.was_whole, 1);
+    repair_free(&file);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
 static int stop(void *ctx)
 {
     (void)ctx;
@@ -290,6 +352,8 @@ int main(void)
                                        cmocka_unit_test(test_full_for_a_while),
                                        cmocka_unit_test(test_broken_disk),
                                        cmocka_unit_test(test_stopped),
+                                       cmocka_unit_test(test_several_blocks),
+                                       cmocka_unit_test(test_large_capture),
                                        cmocka_unit_test(test_save),
                                        cmocka_unit_test(test_zeros),
                                        cmocka_unit_test(test_scans_of_a_stream)};
