@@ -203,6 +203,24 @@ static void test_limits(void **state)
     assert_non_null(strstr(why_not(many, len), "more than 64 interfaces"));
 }
 
+/* Blocks and options by the numbers of draft-ietf-opsawg-pcapng: if_name 2, if_tsresol 9, opt_comment 1, and
+ * shb_userappl 4. */
+static void test_bytes(void **state)
+{
+    (void)state;
+    static const uint8_t section[] = {0x0a, 0x0d, 0x0d, 0x0a, 40,   0,    0,    0,    0x4d, 0x3c, 0x2b, 0x1a, 1, 0,
+                                      0,    0,    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 4,    0,    3, 0,
+                                      'a',  'p',  'p',  0,    0,    0,    0,    0,    40,   0,    0,    0};
+    static const uint8_t interface[] = {1,   0,   0,   0,   52,  0,   0, 0, 147, 0, 0, 0, 0,  1, 0, 0, 2, 0,
+                                        4,   0,   'n', 'a', 'm', 'e', 9, 0, 1,   0, 9, 0, 0,  0, 1, 0, 5, 0,
+                                        'w', 'o', 'r', 'd', 's', 0,   0, 0, 0,   0, 0, 0, 52, 0, 0, 0};
+    uint8_t got[128];
+    assert_int_equal(pcapng_put_section(got, "app"), sizeof section);
+    assert_memory_equal(got, section, sizeof section);
+    assert_int_equal(pcapng_put_interface(got, PCAPNG_USER0, 256, "name", "words"), sizeof interface);
+    assert_memory_equal(got, interface, sizeof interface);
+}
+
 /* The older format, in both orders of bytes and with parts of a second in both units (libpcap's savefile.5). */
 static void test_pcap(void **state)
 {
@@ -356,10 +374,10 @@ static void test_of_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets),   cmocka_unit_test(test_disk_full),
-                                       cmocka_unit_test(test_read),      cmocka_unit_test(test_damaged),
-                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_limits),
-                                       cmocka_unit_test(test_pcap),      cmocka_unit_test(test_statistics),
-                                       cmocka_unit_test(test_loss),      cmocka_unit_test(test_time_offset)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_packets), cmocka_unit_test(test_disk_full),  cmocka_unit_test(test_read),
+        cmocka_unit_test(test_damaged), cmocka_unit_test(test_of_others),  cmocka_unit_test(test_limits),
+        cmocka_unit_test(test_bytes),   cmocka_unit_test(test_pcap),       cmocka_unit_test(test_statistics),
+        cmocka_unit_test(test_loss),    cmocka_unit_test(test_time_offset)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }
