@@ -42,6 +42,8 @@ void e57rig_read(const char *path)
     size_t xml_at = rig_uint(content + 24, 8), xml_len = rig_uint(content + 32, 8);
     xml_at = xml_at / PAGE * CONTENT + xml_at % PAGE;
     assert_true(xml_at + xml_len <= content_len && content_len - xml_at - xml_len < CONTENT);
+    for (size_t at = xml_at + xml_len; at < content_len; at++) /* the last page is filled up */
+        assert_int_equal(content[at], 0);
     e57rig_xml = (char *)content + xml_at;
     e57rig_xml[xml_len] = 0;
     assert_memory_equal(e57rig_xml, "<?xml version=\"1.0\"", 19);

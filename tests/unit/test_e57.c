@@ -259,6 +259,7 @@ static void test_no_points(void **state)
     record_e57(0);
     e57rig_scan(0, 0, coloured);
     assert_int_equal(e57rig_n_records, 0);
+    assert_int_equal(e57rig_n_packets, 1); /* an empty one: the standard wants a packet */
     assert_null(strstr(e57rig_xml, "cartesianBounds"));
 }
 

@@ -342,6 +342,26 @@ static void test_refused(void **state)
     remove_state();
 }
 
+/* Cells of a killed recorder never go back. One at the end that does is no cell of this grid, and is cut. */
+static void test_cell_that_goes_back(void **state)
+{
+    (void)state;
+    struct repair r;
+    struct sh_err err;
+    record_scans();
+    const struct state *s = &state_at[n_states - 1];
+    const int scan = grids_in(s->text);
+    uint8_t *grid = malloc(s->grid_len);
+    memcpy(grid, s->grid, s->grid_len);
+    memcpy(grid + s->grid_len - CELL_LEN, grid + HEAD_LEN, CELL_LEN);
+    write_state(s->text, s->text_len, grid, s->grid_len);
+    free(grid);
+    if (killed_rig_repair(rig_path(part), &r, &err) != 0) fail_msg("%s", err.text);
+    assert_int_equal(r.cut_bytes, CELL_LEN);
+    assert_int_equal(r.n_kept, echoes_before(scan) + echoes_in(scan, (s->grid_len - HEAD_LEN) / CELL_LEN - 1));
+    remove_state();
+}
+
 /* Lines of other programs may end with blanks, or with a carriage return. */
 static void test_line_ends(void **state)
 {
@@ -366,7 +386,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_killed),  cmocka_unit_test(test_completing), cmocka_unit_test(test_text_alone),
-        cmocka_unit_test(test_refused), cmocka_unit_test(test_line_ends),
+        cmocka_unit_test(test_refused), cmocka_unit_test(test_line_ends),  cmocka_unit_test(test_cell_that_goes_back),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -138,6 +138,17 @@ static void a_step_as_ply(void **state)
     has(rig_notes, "it has no triangles");
     has(rig_notes, "12 points left out that belong to no triangle");
     free(text);
+    rig_begin();
+    begin_scan(1, 3);
+    const struct rig_point alone = hit(-5, 10, 0, 9);
+    put_line(2, 20, &alone, 1); /* no line is beside it: the points after it take its place */
+    put_step(5);
+    text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1}, NULL);
+    has(text, "comment points_without_triangle 1\n");
+    has(text, "element vertex 12\n");
+    has(text, "end_header\n10 30 30 0 -1 0 10 -5 0 3\n");
+    has(text, "\n13 31 32 0 -1 0 ");
+    free(text);
 }
 
 /* Each sweep of the pan is a mesh by itself: 12 triangles each, and none between the two. */

@@ -134,6 +134,10 @@ static void test_full_for_a_while(void **state)
         struct bytes got = repair_slurp(repair_path);
         if (unit[i][1] == 'o' && strstr(repair_path, ".ply") != NULL) /* it says so once */
             assert_int_equal(rig_count((char *)got.data, "comment incomplete:"), 1);
+        if (strcmp(unit[i], "packets") == 0)
+            assert_non_null(memmem(got.data, got.len, REPAIR_INCOMPLETE, sizeof REPAIR_INCOMPLETE - 1));
+        if (strcmp(unit[i], "poses") == 0)
+            assert_int_equal(rig_count((char *)got.data, "\n# " REPAIR_INCOMPLETE "\n"), 1);
         free(got.data);
         assert_int_equal(unlink(repair_path), 0);
     }
