@@ -192,7 +192,6 @@ int ptx_grid_find(struct ptx_grid *grid, struct ptx_head *head, uint64_t *cut, s
     struct ptx_cell cell;
     uint64_t n = 0;
     uint32_t last = 0;
-    rewind(grid->spool);
     *cut = 0;
     if (fread(head, sizeof *head, 1, grid->spool) != 1 || memcmp(head->magic, MAGIC, sizeof MAGIC) != 0 ||
         head->check != check_of_head(head))

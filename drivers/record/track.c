@@ -122,13 +122,11 @@ static void set_limits(struct track *t, const struct native_descriptor *d)
     t->max_lines = d->frames > 0 ? whole_u32(d->frames * (ceil(fabs(sweep_s) * lines_hz) + 1)) : UINT32_MAX;
 }
 
-/* Adds what the emitter frame says, and the descriptor does not. A line of beams may begin anywhere in a firing
- * sequence, so it may have n_beams pulses more. */
+/* Adds what the emitter frame says, and the descriptor does not. */
 static void set_emitter_limits(struct track *t)
 {
     if (scanhead_get_emitter(t->sh, &t->emitter) != 0) return;
     const struct scanhead_emitter *e = &t->emitter;
-    if (e->kind == SCANHEAD_EMIT_BEAMS && t->max_pulses < UINT32_MAX - SCANHEAD_MAX_BEAMS) t->max_pulses += e->n_beams;
     if (e->kind == SCANHEAD_EMIT_SPHERE && t->max_lines != UINT32_MAX)
         t->max_lines = whole_u32((double)t->max_lines * e->rings);
 }

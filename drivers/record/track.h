@@ -101,7 +101,8 @@ struct track {
     int geoid_heights, moving, stops;
     uint32_t n_scans; /* with points */
     struct track_missing missing;
-    /* The most lines of a scan, and pulses of a line, that the descriptor allows; UINT32_MAX: no limit. */
+    /* The most lines of a scan, and pulses of a line, that the descriptor allows, for files of rows and columns;
+     * UINT32_MAX: no limit. */
     uint32_t max_lines, max_pulses;
     double cast_share;               /* of a line's pulses, 0..1: those in the blind part are not cast */
     struct scanhead_emitter emitter; /* of the last descriptor */

@@ -42,6 +42,8 @@ void e57rig_read(const char *path)
     size_t xml_at = rig_uint(content + 24, 8), xml_len = rig_uint(content + 32, 8);
     xml_at = xml_at / PAGE * CONTENT + xml_at % PAGE;
     assert_true(xml_at + xml_len <= content_len && content_len - xml_at - xml_len < CONTENT);
+    for (size_t at = xml_at + xml_len; at < content_len; at++) /* the last page is filled up */
+        assert_int_equal(content[at], 0);
     e57rig_xml = (char *)content + xml_at;
     e57rig_xml[xml_len] = 0;
     assert_memory_equal(e57rig_xml, "<?xml version=\"1.0\"", 19);
@@ -57,7 +59,7 @@ void e57rig_record_one(struct recorder_options options)
 }
 
 struct e57rig_record e57rig_record[8192];
-size_t e57rig_n_records;
+size_t e57rig_n_records, e57rig_n_packets;
 
 /* The streams of all packets joined, then cut into bits. */
 static uint8_t stream[MAX_STREAMS][1 << 17];
@@ -78,6 +80,7 @@ static void read_packets(const uint8_t *section, unsigned n_streams)
 {
     size_t len = rig_uint(section + 8, 8);
     memset(stream_len, 0, sizeof stream_len);
+    e57rig_n_packets = 0;
     assert_int_equal(rig_uint(section, 8), 1); /* a compressed vector, and reserved bytes */
     for (const uint8_t *p = section + 32; p < section + len;) {
         const uint8_t *from = p + 6 + 2 * n_streams;
@@ -93,6 +96,7 @@ static void read_packets(const uint8_t *section, unsigned n_streams)
         }
         assert_true(from <= p + packet_len && from + 4 > p + packet_len);
         p += packet_len;
+        e57rig_n_packets++;
     }
 }
 

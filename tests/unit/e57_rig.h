@@ -14,8 +14,8 @@ struct e57rig_record {
     uint8_t rgb[3]; /* where there are colours */
 };
 extern struct e57rig_record e57rig_record[8192];
-extern size_t e57rig_n_records;
-extern char *e57rig_xml; /* the XML section, as a string */
+extern size_t e57rig_n_records, e57rig_n_packets; /* of the scan that was read last */
+extern char *e57rig_xml;                          /* the XML section, as a string */
 
 /* Checks the CRCs and the file's header, and finds the XML. */
 void e57rig_read(const char *path);

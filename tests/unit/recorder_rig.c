@@ -13,6 +13,7 @@ int (*rig_stop)(void *ctx);
 static uint32_t rig_seq;
 
 int64_t rig_scan_t0_ns;
+uint32_t rig_sweep;
 
 /* A frame without a number gets the next one. */
 void rig_put(const uint8_t *frame, size_t len)
@@ -29,6 +30,7 @@ void rig_begin(void)
 {
     rig_seq = 0;
     rig_scan_t0_ns = 0;
+    rig_sweep = 0;
     rig_stream = fopen(rig_shs, "wb");
     assert_non_null(rig_stream);
 }
@@ -88,7 +90,8 @@ void rig_points(uint32_t line, uint64_t line_pulse0, uint64_t pulse0, const stru
         label[i] = p[i].label;
         echo[i] = (uint8_t)(p[i].count << 4 | p[i].echo);
     }
-    struct line_block block = {.line = line,
+    struct line_block block = {.frame = rig_sweep,
+                               .line = line,
                                .pulse0 = pulse0,
                                .n_pulses = pulses,
                                .t0_ns = (int64_t)pulse0 * 1000000,

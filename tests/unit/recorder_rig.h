@@ -29,6 +29,7 @@ extern int (*rig_stop)(void *ctx); /* asked while files are completed; NULL: nev
 void rig_put(const uint8_t *frame, size_t len);
 
 extern int64_t rig_scan_t0_ns; /* device time at which the scan of rig_points began; rig_begin makes it 0 */
+extern uint32_t rig_sweep;     /* pan sweep of rig_points; rig_begin makes it 0 */
 
 void rig_begin(void);
 

@@ -101,6 +101,10 @@ static void sick_scan_xd_starts_in_b(void **state)
     EXPECT_B("sRN ODoprh", "sRA ODoprh \0\0\0\0");
     EXPECT_B("sRN ODpwrc", "sRA ODpwrc \0\0\0\1");
     EXPECT_B("sRN LocationName", "sRA LocationName \0\3rig");
+    EXPECT_B("sRN LCMstate", "sRA LCMstate \0");
+    EXPECT_B("sRN STlms", "sRA STlms \0\7\0\0\x8"
+                          "00:00:00\0\xa"
+                          "01.01.1970\0\0\0\0\0\0");
 #define RANGE "\0\1\0\0\x0d\x05\xff\xf9\x22\x30\x00\x22\x55\x10"
     EXPECT_B("sRN LMPoutputRange", "sRA LMPoutputRange " RANGE);
     EXPECT_B("sWN LMPoutputRange " RANGE, "sWA LMPoutputRange ");

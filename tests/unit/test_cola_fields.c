@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* CoLa: monitored fields by telegram, their evaluation, and the events of results and outputs. Records of fields are
  * those of real scanners, as the test server and the files of sick_scan_xd quote them. */
+#include <math.h>
+
 #include "tests/unit/cola_fields_rig.h"
 
 static void open_tim(void)
@@ -37,6 +39,9 @@ static void a_record_is_read_back_as_it_was_written(void **state)
                 "sWA field004");
     cola_expect("sRN field004",
                 "sRA field004 40000000 00000000 683 FFFF3CB0 1 3 0 1 F756B 7F 6DDD0 C8 C8 0 0 1 10 rectfield_45_deg 0");
+#define WIDE " 40000000 00000000 683 FFFF3CB0 1 3 0 1 F756B 1F4 6DDD0 12C 1F40 0 0 1 1 A 0" /* all more than a byte */
+    cola_expect("sWN field004" WIDE, "sWA field004");
+    cola_expect("sRN field004", "sRA field004" WIDE);
 }
 
 static void records_that_say_nothing_are_refused(void **state)
@@ -120,6 +125,66 @@ static void a_record_reaches_to_the_ends_of_the_view(void **state)
     assert_non_null(strstr(record, "sRA field000 3F800000 00000000 D05 FFF92230 2 1 1 "));
     assert_non_null(strstr(record, " 0 FFFF 5DC "));
     assert_non_null(strstr(record, " 32A FFFF 5DC 0 0 0 1 "));
+}
+
+/* 62 directions from 0 to 90 degrees, evenly: each at the beam next to it. Beam 135 is at 0, and three are a degree. */
+static void a_record_of_a_sector_spreads_its_points(void **state)
+{
+    (void)state;
+    char want[1024];
+    int n = snprintf(want, sizeof want, "sRA field000 3F800000 00000000 D05 FFF92230 2 1 1 3E");
+    for (int i = 0; i < 62; i++)
+        n += snprintf(want + n, sizeof want - (size_t)n, " %lX FFFF 5DC", 135 + lround(270 * i / 61.0));
+    snprintf(want + n, sizeof want - (size_t)n, " 0 0 0 1 0 0");
+    open_tim();
+    fields_open(a_sector(0, 900000, 1500000));
+    cola_expect("sRN field000", want);
+}
+
+/* The corner of a rectangle is 500 m away, at 0 degrees or at the first beam. A ten-thousandth of a degree is 0.9 mm. */
+static void a_rectangle_begins_at_zero_or_at_the_first_beam(void **state)
+{
+    (void)state;
+    const struct planar_head head = {.known = 1, .steps = 1080, .n = 811, .last = 810, .front = 405};
+    const struct cola_record r = {.scale = 8.0f,
+                                  .step_e4 = 3333,
+                                  .first_e4 = 900000,
+                                  .type = COLA_FIELD_RECTANGLE,
+                                  .is_rectangle = 1,
+                                  .distance = 62500,
+                                  .width_mm = 1000,
+                                  .length_mm = 2000};
+    struct cola_shape shape;
+    for (int from_first = 0; from_first < 2; from_first++) {
+        assert_int_equal(cola_record_shape(&r, &head, from_first, &shape), COLA_OK);
+        assert_int_equal(shape.kind, COLA_SHAPE_POLYGON);
+        assert_int_equal(shape.n, 4);
+        assert_int_equal(shape.corner[0].x_um, from_first ? 0 : 500000000);
+        assert_int_equal(shape.corner[0].y_um, from_first ? 500000000 : 0);
+        assert_int_equal(shape.corner[2].x_um - shape.corner[0].x_um, 1000000);
+        assert_int_equal(shape.corner[2].y_um - shape.corner[0].y_um, 2000000);
+    }
+}
+
+/* Two corners at one beam, 0.1 degrees apart, are one point: the nearest and the farthest of both, whichever comes first.
+ * 90 degrees are beam 405, and 100 degrees beam 435. */
+static void corners_at_one_beam_are_one_point(void **state)
+{
+    (void)state;
+    static const double corner[3][2] = {{90, 1e6}, {90.1, 3e6}, {100, 2e6}}; /* degrees, um */
+    for (int first = 0; first < 3; first++) {
+        static struct cola_fields f;
+        memset(&f, 0, sizeof f);
+        f.field[0].shape.kind = COLA_SHAPE_POLYGON;
+        for (int k = 0; k < 3; k++) {
+            const double *c = corner[(first + k) % 3], rad = c[0] / 180 * M_PI;
+            assert_int_equal(cola_shape_add(&f.field[0].shape, c[1] * cos(rad), c[1] * sin(rad)), 0);
+        }
+        open_tim();
+        fields_open(&f);
+        cola_expect("sRN field000",
+                    "sRA field000 3F800000 00000000 D05 FFF92230 2 1 1 2 195 3E8 BB8 1B3 7D0 7D0 0 0 0 1 0 0");
+    }
 }
 
 /* 500 m are 62500 counts of 8 mm; with 7 mm they would be more than 65534. */
@@ -341,6 +406,9 @@ int main(void)
         CASE(directions_are_taken_modulo_a_turn),
         CASE(a_record_reaches_to_the_ends_of_the_view),
         CASE(far_fields_have_a_scale_for_it),
+        CASE(corners_at_one_beam_are_one_point),
+        CASE(a_record_of_a_sector_spreads_its_points),
+        CASE(a_rectangle_begins_at_zero_or_at_the_first_beam),
         CASE(results_follow_the_scan),
         CASE(chords),
         CASE(changes_are_sent),

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* CoLa's frames: both forms on one connection, bytes that are no telegram, and telegrams that are broken at random. */
+#include "drivers/protocol/cola_telegram.h"
 #include "tests/unit/cola_rig.h"
 
 /* ---- frames */
@@ -153,13 +154,31 @@ static void broken_telegrams_do_no_harm(void **state)
     cola_expect("sRN LCMstate", "sRA LCMstate 0");
 }
 
+/* A telegram that fills its room to the byte is whole. With a byte less there is none. */
+static void telegrams_without_room_are_none(void **state)
+{
+    (void)state;
+    for (int form = COLA_A; form <= COLA_B; form++) {
+        uint8_t bytes[64];
+        const size_t len = form == COLA_A ? 1 + 10 + 2 + 1 : 8 + 11 + 4 + 1; /* marks, "sRA ODpwrc", value, end */
+        for (size_t room = len + 1; room >= len - 2; room--) {
+            struct cola_out out = {.buf = bytes, .cap = room};
+            memset(bytes, 0xa5, sizeof bytes);
+            cola_begin(&out, (enum cola_form)form, "sRA ODpwrc");
+            cola_put_u(&out, 4, 7);
+            assert_int_equal(cola_end(&out), room >= len ? len : 0);
+            assert_int_equal(bytes[room], 0xa5);
+        }
+    }
+}
+
 int main(void)
 {
 #define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
         CASE(answers_have_the_form_of_the_request), CASE(garbage_is_skipped_and_counted),
         CASE(an_overlong_telegram_is_refused_once), CASE(long_requests_are_answered),
-        CASE(broken_telegrams_do_no_harm),
+        CASE(broken_telegrams_do_no_harm),          CASE(telegrams_without_room_are_none),
     };
     return cmocka_run_group_tests_name("cola frames", tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* CoLa: fields, inputs and outputs, in the forms of real scanners (an LMS111 V1.80.2 and a TiM781S V3.13). */
+#include "drivers/protocol/cola_model.h"
 #include "tests/unit/cola_rig.h"
 
 /* "sRN field012" is answered by "sRA field012 " and these bytes. */
@@ -108,12 +109,38 @@ static void an_lms_says_what_is_not_used(void **state)
     cola_expect("sEN LIDoutputstate 2", "sFA 5");
 }
 
+/* The table of COLA.md, and the outputs of the telegrams above. RSSI has 8 bits at power-up in all models. */
+static void models_are_those_of_the_document(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *model, *version, *firmware;
+        int echoes, rssi, n_fields, n_outputs;
+    } rows[] = {{"TiM561", "V2.62-16.02.16", "V2.62-16", 1, 1, 0, 5},
+                {"TiM571", "V2.62-16.02.16", "V2.62-16", 1, 1, 0, 5},
+                {"TiM781", "V4.1.0", "V4.1.0", 1, 1, 48, 5},
+                {"LMS111", "V1.50", "V1.50", 2, 0, 48, 11},
+                {"LMS11", "V1.00", "V1.00", 1, 1, 48, 5}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct cola_model *m = cola_model_find(rows[i].model);
+        assert_string_equal(m->version, rows[i].version);
+        assert_string_equal(m->firmware, rows[i].firmware);
+        assert_int_equal(m->echoes, rows[i].echoes);
+        assert_int_equal(m->rssi, rows[i].rssi);
+        assert_int_equal(m->rssi_16bit, 0);
+        assert_int_equal(m->n_fields, rows[i].n_fields);
+        assert_int_equal(m->n_outputs, rows[i].n_outputs);
+        assert_int_equal(m->ports, i == 3 ? COLA_PORTS_LMS : COLA_PORTS_TIM);
+    }
+}
+
 int main(void)
 {
 #define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
-        CASE(an_lms_has_ten_empty_fields), CASE(a_tim7_has_48_named_fields), CASE(fields_wait_for_the_head),
-        CASE(a_tim7_has_three_results),    CASE(a_tim7_has_five_outputs),    CASE(an_lms_says_what_is_not_used),
+        CASE(an_lms_has_ten_empty_fields),      CASE(a_tim7_has_48_named_fields), CASE(fields_wait_for_the_head),
+        CASE(a_tim7_has_three_results),         CASE(a_tim7_has_five_outputs),    CASE(an_lms_says_what_is_not_used),
+        CASE(models_are_those_of_the_document),
     };
     return cmocka_run_group_tests_name("cola ports", tests, NULL, NULL);
 }

@@ -207,6 +207,32 @@ static void chains_join_their_links(void **state)
     assert_false(in_sector(&s, 181, 1080, 990000));
 }
 
+/* The outer arc comes first, from the start on, then the inner one back: 64 corners each. Without an inner arc the head
+ * is the last corner. */
+static void an_outline_of_a_sector_has_two_arcs(void **state)
+{
+    (void)state;
+    struct cola_shape s = {.kind = COLA_SHAPE_SECTOR,
+                           .sector = {.start_e4 = 900000, .span_e4 = 900000, .inner_um = 1000000, .outer_um = 2000000}};
+    double at[COLA_SHAPE_CORNERS][2];
+    assert_int_equal(cola_shape_outline(&s, at), 128);
+    for (int i = 0; i < 128; i++) {
+        const double deg = 90 + 90.0 * (i < 64 ? i : 127 - i) / 63, radius_m = i < 64 ? 2 : 1;
+        assert_true(fabs(at[i][0] - radius_m * cos(deg / 180 * M_PI)) < 1e-12); /* some roundings of 2 m */
+        assert_true(fabs(at[i][1] - radius_m * sin(deg / 180 * M_PI)) < 1e-12);
+    }
+    s.sector.inner_um = 0;
+    assert_int_equal(cola_shape_outline(&s, at), 65);
+    assert_true(fabs(at[63][0] + 2) < 1e-12 && at[64][0] == 0 && at[64][1] == 0);
+    static const int32_t corner[3][2] = {{1000000, 0}, {0, 2000000}, {-3000000, 0}};
+    s = polygon(corner, 3);
+    assert_int_equal(cola_shape_outline(&s, at), 3);
+    for (int i = 0; i < 3; i++)
+        assert_true(fabs(at[i][0] - 1e-6 * corner[i][0]) < 1e-12 && fabs(at[i][1] - 1e-6 * corner[i][1]) < 1e-12);
+    s.kind = COLA_SHAPE_CHAIN;
+    assert_int_equal(cola_shape_outline(&s, at), 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -217,6 +243,7 @@ int main(void)
         cmocka_unit_test(rectangles_turn_about_their_corner),
         cmocka_unit_test(points_are_rounded_to_a_micrometre),
         cmocka_unit_test(chains_join_their_links),
+        cmocka_unit_test(an_outline_of_a_sector_has_two_arcs),
     };
     return cmocka_run_group_tests_name("cola shape", tests, NULL, NULL);
 }

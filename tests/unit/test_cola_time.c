@@ -99,6 +99,10 @@ static void the_servers_clock_is_not_set_by_hand(void **state)
     cola_authorise();
     cola_expect("sMN LSPsetdatetime 7E8 1 1 0 0 0 0", "sAN LSPsetdatetime 0");
     assert_int_equal(cola.shift_ns, 0);
+    replies[1].reply = "NONE,192.168.0.11,600,-3,CAN"; /* the head asks no server */
+    cola_expect("sMN LSPsetdatetime 7E8 1 1 0 0 0 0", "sAN LSPsetdatetime 1");
+    replies[1].reply = "CLIENT,192.168.0.11,600,-3,CAN";
+    assert_int_not_equal(cola.shift_ns, 0);
 }
 
 int main(void)

@@ -168,6 +168,28 @@ static void test_packets(void **state)
     }
 }
 
+/* A packet spans 0.1 s, or 8 records where these take longer. So little is missing at any moment. */
+static void test_span_of_packets(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    static const struct {
+        uint32_t ms;
+        size_t n; /* of 100 records: 12 packets of 8 and one of 4; or all within 0.1 s */
+    } cases[] = {{20, 13}, {50, 13}, {1, 1}};
+    for (size_t c = 0; c < sizeof cases / sizeof cases[0]; c++) {
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        for (uint32_t line = 0; line < 100; line++)
+            rig_points(line, line * cases[c].ms, line * cases[c].ms, &points[0], 1);
+        record_e57(0);
+        e57rig_scan(0, 0, coloured);
+        assert_int_equal(e57rig_n_records, 100);
+        assert_int_equal(e57rig_n_packets, cases[c].n);
+    }
+}
+
 /* Times of a broken stream may be any: the time from the first record of a packet wraps. Sanitizers see where it overflows. */
 static void test_far_times(void **state)
 {
@@ -237,6 +259,7 @@ static void test_no_points(void **state)
     record_e57(0);
     e57rig_scan(0, 0, coloured);
     assert_int_equal(e57rig_n_records, 0);
+    assert_int_equal(e57rig_n_packets, 1); /* an empty one: the standard wants a packet */
     assert_null(strstr(e57rig_xml, "cartesianBounds"));
 }
 
@@ -283,6 +306,7 @@ int main(void)
         cmocka_unit_test(test_xml),
         cmocka_unit_test(test_packets),
         cmocka_unit_test(test_far_times),
+        cmocka_unit_test(test_span_of_packets),
         cmocka_unit_test(test_no_points),
         cmocka_unit_test(test_same_bytes),
         cmocka_unit_test(test_disk_full),

@@ -237,25 +237,45 @@ static void test_far(void **state)
             for (int i = 0; i < 40; i++)
                 set_point(i, 0);
             double *column = k == 0 ? track.points.x : k == 1 ? track.points.y : track.points.z;
-            column[17] = far[c / 2] * 0.5;
+            const int at = c % 4 < 2 ? 17 : 0;
+            column[at] = far[c / 2] * 0.5;
             if (c % 2 != 0) column[30] = (double)NAN;
             column[3] = 2147483647.0 * 0.5;
             column[4] = -2147483647.0 * 0.5;
             assert_int_equal(e57_records_put(&packet, &facts, &track, 0, 40, far_m), -1);
-            assert_int_equal(packet.n, 17);
-            assert_true(far_m[0] == track.points.x[17] && far_m[1] == track.points.y[17] &&
-                        far_m[2] == track.points.z[17]);
-            for (int i = 0; i < 17; i++)
+            assert_int_equal(packet.n, at);
+            assert_true(far_m[0] == track.points.x[at] && far_m[1] == track.points.y[at] &&
+                        far_m[2] == track.points.z[at]);
+            for (int i = 0; i < at; i++)
                 take_plain(i);
-            const uint8_t *p = e57_packet_make(&packet, &facts, 17, &len);
-            check_packet(p, len, 17);
+            const uint8_t *p = e57_packet_make(&packet, &facts, (unsigned)at, &len);
+            check_packet(p, len, (unsigned)at);
         }
+}
+
+/* The figures of a scan go on from one packet to the next, also after one of a single record. */
+static void test_figures_go_on(void **state)
+{
+    (void)state;
+    size_t len;
+    for (int round = 0; round < 20; round++) {
+        begin(round & 1, 0, 0, 1e-3);
+        fill(1, 9);
+        const uint8_t *p = e57_packet_make(&packet, &facts, 1, &len);
+        assert_int_equal(e57_packet_count(p, len, &facts, &scan), 0);
+        check_figures(&scan, 1);
+        fill(8, 9);
+        p = e57_packet_make(&packet, &facts, 8, &len);
+        assert_int_equal(e57_packet_count(p, len, &facts, &scan), 0);
+        check_figures(&scan, 9);
+    }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_plain),
+        cmocka_unit_test(test_figures_go_on),
         cmocka_unit_test(test_far),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

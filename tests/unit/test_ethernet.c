@@ -51,6 +51,7 @@ static const uint8_t *check_front(size_t len, const struct ethernet_end *from, c
     assert_int_equal(be16(frame + 12), from->is_v6 ? 0x86dd : 0x0800);
     assert_int_equal(ip[0] >> 4, from->is_v6 ? 6 : 4);
     if (from->is_v6) {
+        assert_memory_equal(ip, "\x60\0\0\0", 4); /* no class, no label */
         assert_int_equal(be16(ip + 4), transport_len);
         assert_int_equal(ip[6], protocol);
     } else {

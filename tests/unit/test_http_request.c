@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "core/rng.h"
+#include "drivers/protocol/http_head.h"
 #include "tests/unit/velodyne_http_rig.h"
 
 static const char done[] = DONE("keep-alive");
@@ -46,6 +47,9 @@ static void test_broken_requests(void **state)
         {"GET / HTTP/1.1\r\nHost: x\r\nnonsense\r\n", 400, 1},
         {"GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400, 1},
         {"GET\r\n\r\n", 400, 1},
+        {"G@T / HTTP/1.1\r\nHost: x\r\n\r\n", 400, 1},
+        {"@ / HTTP/1.1\r\nHost: x\r\n\r\n", 400, 1},
+        {"GET@ / HTTP/1.1\r\nHost: x\r\n\r\n", 400, 1},
         {"GET  HTTP/1.1\r\n\r\n", 400, 1},
         {"GET / HTTP/1.1 \r\n\r\n", 400, 1},
         {"GET / FTP/1.1\r\n\r\n", 400, 1},
@@ -120,6 +124,22 @@ static void test_longest(void **state)
 }
 
 /* HEAD answers as GET, without the body. */
+/* RFC 9110, section 5.6.1: elements may be empty, and have blanks around them. */
+static void test_lists(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *list;
+        int has;
+    } cases[] = {{"close", 1},   {"Close", 1},  {",close", 1}, {"close,", 1}, {"a,,close", 1}, {"a, close\t,b", 1},
+                 {"a,b", 0},     {"closed", 0}, {"clos", 0},   {"", 0},       {",", 0},        {"a close", 0},
+                 {"close b", 0}, {"xclose", 0}, {"a,close", 1}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct http_text list = {cases[i].list, strlen(cases[i].list)};
+        if (http_list_has(list, "close") != cases[i].has) fail_msg("%s", cases[i].list);
+    }
+}
+
 static void test_head_method(void **state)
 {
     (void)state;
@@ -237,6 +257,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(test_pieces),
         TEST(test_broken_requests),
+        cmocka_unit_test(test_lists),
         TEST(test_head_method),
         TEST(test_longest),
         TEST(test_expect_continue),

@@ -192,6 +192,10 @@ static void test_no_points(void **state)
     record_las();
     check_header("OTHER");
     assert_int_equal(rig_uint(las + 247, 8), 0);
+    for (int i = 0; i < 3; i++) {
+        assert_true(rig_double(las + 131 + 8 * i) == 1); /* a scale of 0 is none */
+        assert_true(rig_double(las + 155 + 8 * i) == 0);
+    }
     assert_non_null(strstr(rig_notes, "5 points left out"));
 }
 

@@ -231,6 +231,27 @@ static int opens_stamped(const char *host, int port, struct sh_err *err)
     return rc == SH_OK;
 }
 
+/* One program at a time reads a port of an address. */
+static void a_port_has_one_reader(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    struct stamped_socket first, second;
+    assert_int_equal(stamped_open("127.0.0.1", 0, &first, &err), SH_OK);
+    const int port = ntohs(((const struct sockaddr_in *)&first.own)->sin_port);
+    assert_int_not_equal(port, 0);
+    assert_int_equal(stamped_open("127.0.0.1", port, &second, &err), SH_EINPUT);
+    char want[128];
+    snprintf(want, sizeof want, "udp:127.0.0.1:%d: Address already in use; another program reads it", port);
+    assert_string_equal(err.text, want);
+    stamped_close(&first);
+    assert_int_equal(stamped_open("127.0.0.1", port, &second, &err), SH_OK);
+    stamped_close(&second);
+    assert_int_equal(stamped_open("192.0.2.1", 0, &second, &err), SH_EINPUT); /* of TEST-NET-1 (RFC 5737) */
+    assert_string_equal(err.text, "udp:192.0.2.1:0: Cannot assign requested address; allowed are this machine's "
+                                  "addresses, 0.0.0.0, broadcasts and groups");
+}
+
 static int opens_host(const char *host, int port, struct sh_err *err)
 {
     char source[64];
@@ -312,6 +333,7 @@ int main(void)
         cmocka_unit_test(packets_come_from_the_receivers_network),
         cmocka_unit_test(nobody_is_connected_to_itself),
         cmocka_unit_test(a_client_learns_that_its_head_has_vanished),
+        cmocka_unit_test(a_port_has_one_reader),
         cmocka_unit_test(a_signal_ends_all_attempts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

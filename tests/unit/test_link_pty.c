@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <termios.h>
 
+#include "drivers/link/pty_device.h"
 #include "tests/unit/pty_rig.h"
 
 enum { OUTSIDER_UID = 65534 };
@@ -291,6 +292,34 @@ static void exclusive_child(const char *path)
     bench_close(&bench);
 }
 
+/* Something has the name that a new symlink first gets. The device stays as it was, and no descriptor is left open. */
+static void test_no_new_symlink(void **state)
+{
+    (void)state;
+    char *dir = test_dir(), path[128], beside[160], before[64];
+    struct pty_device device;
+    struct sh_err err = {0};
+    snprintf(path, sizeof path, "%s/scanner", dir);
+    snprintf(beside, sizeof beside, "%s.%ld.tmp", path, (long)getpid());
+    assert_int_equal(pty_device_open(&device, path, &err), SH_OK);
+    const int master = device.master;
+    snprintf(before, sizeof before, "%s", device.slave);
+    assert_int_equal(mkdir(beside, 0700), 0);
+    const int next = dup(STDERR_FILENO);
+    close(next);
+    assert_int_equal(pty_device_renew(&device), SH_EIO);
+    const int same = dup(STDERR_FILENO);
+    close(same);
+    assert_int_equal(same, next);
+    assert_int_equal(device.master, master);
+    assert_string_equal(device.slave, before);
+    assert_int_equal(rmdir(beside), 0);
+    assert_int_equal(pty_device_renew(&device), SH_OK);
+    assert_string_not_equal(device.slave, before);
+    pty_device_close(&device);
+    assert_int_equal(rmdir(dir), 0);
+}
+
 static void test_exclusive(void **state)
 {
     (void)state;
@@ -317,6 +346,7 @@ int main(void)
         cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_nothing_of_the_one_before),
         cmocka_unit_test(test_no_descriptors), cmocka_unit_test(test_symlink),
         cmocka_unit_test(test_left_symlink),   cmocka_unit_test(test_exclusive),
+        cmocka_unit_test(test_no_new_symlink),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -47,6 +47,7 @@ static void test_requests(void **state)
     snprintf(host, sizeof host, "Host: %s\r\n", place);
     assert_int_equal(web_ask(&bench, place, "GET /", host, &body, &len), 200);
     assert_non_null(strstr(body, "<title>"));
+    web_n_released = 0;
     assert_int_equal(web_ask(&bench, place, "GET /scene", host, &body, &len), 200);
     assert_int_equal(len, 5);
     assert_memory_equal(body, "bbbbb", 5);
@@ -72,6 +73,7 @@ static void test_requests(void **state)
     assert_string_equal(body, "a request must have at most 8192 bytes\n");
     assert_int_equal(web_status_of(&bench, place, "GET /", "Upgrade: h2c\r\nConnection: Upgrade\r\n"), 200);
     bench_close(&bench);
+    assert_int_equal(web_n_released, 2); /* one each; errors and the page's own files are not the owner's */
 }
 
 /* A connection ends with its first answer. */

@@ -88,6 +88,17 @@ static void test_parser_text_limits(void **state)
     feed((const uint8_t *)line, 513, 100);
     assert_int_equal(n_texts, 0);
     assert_int_equal(parser.stats.bad_bytes, 513);
+    /* Printable characters are 0x20 to 0x7e. */
+    begin();
+    feed((const uint8_t *)" ~\r\n", 4, 4);
+    assert_int_equal(n_texts, 1);
+    assert_string_equal(parser.text, " ~");
+    for (int i = 0; i < 2; i++) {
+        begin();
+        feed((const uint8_t *)(i == 0 ? "\x1f\r\n" : "\x7f\r\n"), 3, 3);
+        assert_int_equal(n_texts, 0);
+        assert_int_equal(parser.stats.bad_bytes, 3);
+    }
     /* Out of step, a line does not count as a reply. */
     feed((const uint8_t *)"OK\r\n", 4, 4);
     assert_int_equal(n_texts, 0);

@@ -105,6 +105,12 @@ static void wrong_answers(void **state)
         assert_int_equal(ntp_read_answer(packet, len, 10 * SECOND_NS, 14 * SECOND_NS, &a), NTP_FOREIGN);
     memset(packet + 40, 0, 8); /* it has never had a time */
     assert_int_equal(ntp_read_answer(packet, NTP_LEN, 10 * SECOND_NS, 14 * SECOND_NS, &a), NTP_UNSYNCHRONISED);
+    memset(packet + 32, 0, 8); /* both times would be in 2036 */
+    assert_int_equal(ntp_read_answer(packet, NTP_LEN, 10 * SECOND_NS, 14 * SECOND_NS, &a), NTP_UNSYNCHRONISED);
+    answer(packet, 10 * SECOND_NS, 100, 100);
+    assert_int_equal(ntp_read_answer(packet, NTP_LEN, 10 * SECOND_NS, 14 * SECOND_NS, &a), NTP_GOOD);
+    packet[39] = 5; /* T2 is 1.2 ns after T3 */
+    assert_int_equal(ntp_read_answer(packet, NTP_LEN, 10 * SECOND_NS, 14 * SECOND_NS, &a), NTP_UNSYNCHRONISED);
 }
 
 static void kisses_are_read(void **state)

@@ -170,6 +170,17 @@ static int can_have_room(void)
 
 /* Without a limit on files their ends have room on the disk, where the file system can do that. With a limit there is
  * none, as it would lie beyond the limit. */
+/* A file system that keeps no room is no reason to fail: only a full one is. */
+static void test_no_reserve(void **state)
+{
+    (void)state;
+    int ends[2];
+    assert_int_equal(pipe(ends), 0);
+    assert_int_equal(outfile_reserve(&(struct outfile){.fd = ends[1]}, 1, &err), SH_OK);
+    close(ends[0]);
+    close(ends[1]);
+}
+
 static void test_room_and_limits(void **state)
 {
     enum { ROOM = 1 << 20, LIMIT = 1 << 26 };
@@ -215,8 +226,8 @@ static int teardown(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pieces), cmocka_unit_test(test_whole_buffer),    cmocka_unit_test(test_border),
-        cmocka_unit_test(test_full),   cmocka_unit_test(test_room_and_limits),
+        cmocka_unit_test(test_pieces), cmocka_unit_test(test_whole_buffer), cmocka_unit_test(test_border),
+        cmocka_unit_test(test_full),   cmocka_unit_test(test_no_reserve),   cmocka_unit_test(test_room_and_limits),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

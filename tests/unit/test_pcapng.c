@@ -3,6 +3,7 @@
  * and damaged. */
 #include "core/bytes.h"
 #include "core/rng.h"
+#include "drivers/protocol/pcap.h"
 #include "drivers/protocol/pcapng.h"
 #include "tests/unit/recorder_rig.h"
 
@@ -145,6 +146,126 @@ static void test_damaged(void **state)
 }
 
 /* The layout is that of capinfos: 64-bit options after interface and time. */
+/* Reads blocks until one fails. Returns why; NULL: none did. */
+static const char *why_not(const uint8_t *file, size_t len)
+{
+    static struct sh_err err;
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    size_t used;
+    int rc;
+    for (size_t at = 0; (rc = pcapng_read(&reader, file + at, len - at, &packet, &used, &err)) > 0; at += used)
+        continue;
+    return rc < 0 ? err.text : NULL;
+}
+
+/* The blocks of a good file with one number changed. Numbers at a limit are good. */
+static void test_limits(void **state)
+{
+    (void)state;
+    enum { SECTION, INTERFACE, PACKET };
+    static const struct {
+        int block, at;
+        uint32_t value;
+        const char *why; /* NULL: none */
+    } cases[] = {
+        {SECTION, 0, 7, "not a pcapng file: it does not begin with a section"},
+        {SECTION, 8, 0x4d3c2b1a, "its numbers are big-endian"},
+        {SECTION, 8, 0x1a2b3c4e, "its byte-order mark is wrong"},
+        {SECTION, 12, 2, "its version of pcapng is not 1"},
+        {SECTION, 12, 0x10001, NULL}, /* version 1.1 */
+        {SECTION, 4, 8, "at byte 0: a block of 8 bytes; allowed are multiples of 4 from 12 to "},
+        {SECTION, 4, 30, "a block of 30 bytes"},
+        {SECTION, 4, 12, "the two lengths of a block differ"},
+        {PACKET, 8, 1, "a packet of an interface that is not described"},
+        {PACKET, 20, 8, NULL}, /* with what fills it up */
+        {PACKET, 20, 9, "a packet is longer than its block"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        uint8_t file[512];
+        size_t at[3];
+        at[SECTION] = 0;
+        at[INTERFACE] = pcapng_put_section(file, NULL);
+        at[PACKET] = at[INTERFACE] + pcapng_put_interface(file + at[INTERFACE], PCAPNG_USER0, 0, NULL, NULL);
+        const size_t len = at[PACKET] + pcapng_put_packet(file + at[PACKET], 0, 1, "abcde", 5, 0);
+        assert_null(why_not(file, len));
+        le_put32(file + at[cases[i].block] + cases[i].at, cases[i].value);
+        const char *why = why_not(file, len);
+        if ((why == NULL) != (cases[i].why == NULL) || (why != NULL && strstr(why, cases[i].why) == NULL))
+            fail_msg("case %zu: %s", i, why != NULL ? why : "none");
+    }
+    static uint8_t many[66 * 64];
+    size_t len = pcapng_put_section(many, NULL);
+    for (int i = 0; i < 64; i++)
+        len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
+    assert_null(why_not(many, len));
+    len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
+    assert_non_null(strstr(why_not(many, len), "more than 64 interfaces"));
+}
+
+/* Blocks and options by the numbers of draft-ietf-opsawg-pcapng: if_name 2, if_tsresol 9, opt_comment 1, and
+ * shb_userappl 4. */
+static void test_bytes(void **state)
+{
+    (void)state;
+    static const uint8_t section[] = {0x0a, 0x0d, 0x0d, 0x0a, 40,   0,    0,    0,    0x4d, 0x3c, 0x2b, 0x1a, 1, 0,
+                                      0,    0,    0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 4,    0,    3, 0,
+                                      'a',  'p',  'p',  0,    0,    0,    0,    0,    40,   0,    0,    0};
+    static const uint8_t interface[] = {1,   0,   0,   0,   52,  0,   0, 0, 147, 0, 0, 0, 0,  1, 0, 0, 2, 0,
+                                        4,   0,   'n', 'a', 'm', 'e', 9, 0, 1,   0, 9, 0, 0,  0, 1, 0, 5, 0,
+                                        'w', 'o', 'r', 'd', 's', 0,   0, 0, 0,   0, 0, 0, 52, 0, 0, 0};
+    uint8_t got[128];
+    assert_int_equal(pcapng_put_section(got, "app"), sizeof section);
+    assert_memory_equal(got, section, sizeof section);
+    assert_int_equal(pcapng_put_interface(got, PCAPNG_USER0, 256, "name", "words"), sizeof interface);
+    assert_memory_equal(got, interface, sizeof interface);
+}
+
+/* The older format, in both orders of bytes and with parts of a second in both units (libpcap's savefile.5). */
+static void test_pcap(void **state)
+{
+    (void)state;
+    enum { SECONDS = 1700000000, PART = 123456, HEAD = 24, RECORD = 16, LEN = 5 };
+    for (int i = 0; i < 4; i++) {
+        const int is_big = i & 1, is_ns = i >> 1;
+        const uint32_t words[] = {is_ns ? 0xa1b23c4d : 0xa1b2c3d4, 0, 0, 0, 65535, 0x20093, SECONDS, PART, LEN, 60};
+        uint8_t file[HEAD + RECORD + LEN] = {0};
+        struct pcap_reader reader = {0};
+        struct pcapng_packet packet;
+        struct sh_err err = {0};
+        size_t used;
+        for (int k = 0; k < 10; k++)
+            (is_big ? be_put32 : le_put32)(file + 4 * k, words[k]);
+        file[is_big ? 5 : 4] = 2; /* the version is two numbers of 16 bits: 2.0 */
+        memcpy(file + HEAD + RECORD, "abcde", LEN);
+        assert_true(pcap_is(file));
+        assert_int_equal(pcap_read(&reader, file, HEAD - 1, &packet, &used, &err), PCAPNG_MORE);
+        assert_int_equal(pcap_read(&reader, file, HEAD, &packet, &used, &err), PCAPNG_OTHER);
+        assert_int_equal(used, HEAD);
+        for (size_t n = 0; n < RECORD + LEN; n++)
+            assert_int_equal(pcap_read(&reader, file + HEAD, n, &packet, &used, &err), PCAPNG_MORE);
+        assert_int_equal(pcap_read(&reader, file + HEAD, RECORD + LEN, &packet, &used, &err), PCAPNG_PACKET);
+        assert_int_equal(used, RECORD + LEN);
+        assert_int_equal(reader.at_byte, sizeof file);
+        assert_int_equal(packet.link, 0x93);
+        assert_true(packet.has_time && packet.t_ns == SECONDS * INT64_C(1000000000) + PART * (is_ns ? 1 : 1000));
+        assert_int_equal(packet.len, LEN);
+        assert_int_equal(packet.original_len, 60);
+        assert_memory_equal(packet.data, "abcde", LEN);
+        (is_big ? be_put32 : le_put32)(file + HEAD + 8, (uint32_t)PCAPNG_MAX_BLOCK + 1);
+        assert_int_equal(pcap_read(&reader, file + HEAD, RECORD + LEN, &packet, &used, &err), SH_EFORMAT);
+        assert_memory_equal(err.text, "at byte 45: a packet of ", 24);
+        file[is_big ? 5 : 4] = 3;
+        reader = (struct pcap_reader){0};
+        assert_int_equal(pcap_read(&reader, file, sizeof file, &packet, &used, &err), SH_EFORMAT);
+        assert_string_equal(err.text, "at byte 4: its version of pcap is 3; allowed is 2");
+        file[0] ^= 1;
+        assert_false(pcap_is(file));
+        assert_int_equal(pcap_read(&reader, file, sizeof file, &packet, &used, &err), SH_EFORMAT);
+        assert_string_equal(err.text, "at byte 0: not a pcap file: its first number is wrong");
+    }
+}
+
 static void test_statistics(void **state)
 {
     (void)state;
@@ -171,11 +292,12 @@ static void test_loss(void **state)
     struct pcapng_packet packet;
     struct sh_err err = {0};
     size_t used;
-    const size_t plain = pcapng_put_packet(file, 0, 7, "abcde", 5, 0);
-    const size_t len = pcapng_put_packet(with, 0, 7, "abcde", 5, 300);
+    const int64_t t_ns = INT64_C(0x123456789abcdef); /* all bytes differ */
+    const size_t plain = pcapng_put_packet(file, 0, t_ns, "abcde", 5, 0);
+    const size_t len = pcapng_put_packet(with, 0, t_ns, "abcde", 5, 300);
     assert_true(plain == pcapng_packet_len(5) && len == plain + PCAPNG_LOST);
     assert_int_equal(pcapng_read(&reader, with, len, &packet, &used, &err), PCAPNG_PACKET);
-    assert_true(used == len && packet.t_ns == 7 && packet.len == 5 && memcmp(packet.data, "abcde", 5) == 0);
+    assert_true(used == len && packet.t_ns == t_ns && packet.len == 5 && memcmp(packet.data, "abcde", 5) == 0);
     assert_memory_equal(with + 8, file + 8, plain - 12);
     assert_true(rig_uint(with + 36, 4) == (4 | 8 << 16) && rig_uint(with + 40, 8) == 300);
     assert_int_equal(rig_uint(with + 48, 4), 0);
@@ -252,9 +374,10 @@ static void test_of_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_packets),   cmocka_unit_test(test_disk_full),
-                                       cmocka_unit_test(test_read),      cmocka_unit_test(test_damaged),
-                                       cmocka_unit_test(test_of_others), cmocka_unit_test(test_statistics),
-                                       cmocka_unit_test(test_loss),      cmocka_unit_test(test_time_offset)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_packets), cmocka_unit_test(test_disk_full),  cmocka_unit_test(test_read),
+        cmocka_unit_test(test_damaged), cmocka_unit_test(test_of_others),  cmocka_unit_test(test_limits),
+        cmocka_unit_test(test_bytes),   cmocka_unit_test(test_pcap),       cmocka_unit_test(test_statistics),
+        cmocka_unit_test(test_loss),    cmocka_unit_test(test_time_offset)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -101,9 +101,10 @@ static void coarse_encoders(void **state)
 {
     (void)state;
     open_head(-1, 0);
-    for (uint32_t steps = 3000; steps >= 2999; steps--) {
+    for (int k = 0; k < 3; k++) { /* first the steps change alone, then the counts */
+        const uint32_t steps = k == 0 ? 3000 : 2999, counts = k < 2 ? 4096 : 8192;
         protocol_rig_planar(&rig, steps, 0, (int)steps - 1, 7, -1, 10);
-        rig.descriptor.pan_counts_per_turn = 4096;
+        rig.descriptor.pan_counts_per_turn = counts;
         protocol_rig_describe(&rig, 0);
         uint8_t bytes[512];
         struct line_block b;
@@ -111,17 +112,18 @@ static void coarse_encoders(void **state)
         news = (struct planar_news){0, 0, 0};
         assert_int_equal(line_block_alloc(&b, 1, &err), SH_OK);
         b.n_points = b.n_pulses = 1;
+        b.line = (uint32_t)k;
         b.echo[0] = 0x11;
         for (uint32_t i = 0; i < steps; i++) {
             const uint32_t right = (steps + 7 - i) % steps; /* in steps; in counts: to the nearest */
-            b.c[0] = (right * 4096 + steps / 2) / steps % 4096;
-            b.a[0] = i;
+            b.c[0] = (right * counts + steps / 2) / steps % counts;
+            b.a[0] = i + 5000 * (uint32_t)k;
             planar_scan_frame(&scan, (native_encode_points(bytes, sizeof bytes, &b, 0), bytes));
         }
         line_block_free(&b);
         assert_non_null(scan.whole);
         for (uint32_t i = 0; i < steps; i++)
-            assert_int_equal(scan.whole->echo[i][0].range, i);
+            assert_int_equal(scan.whole->echo[i][0].range, i + 5000 * (uint32_t)k);
     }
 }
 

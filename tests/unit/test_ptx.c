@@ -234,6 +234,51 @@ static void test_shared_padding(void **state)
     assert_int_equal(padding.n_places, 1 << 24);
 }
 
+/* Each shot of a line comes to its own place, also in a line that the recorder writes in several pieces. */
+static void test_long_line(void **state)
+{
+    enum { ROWS = 200 };
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    struct rig_point p[ROWS];
+    for (int i = 0; i < ROWS; i++)
+        p[i] = (struct rig_point){0, i + 1, 0, INT16_MIN, 0, 1, 1};
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    rig_points(0, 0, 0, p, ROWS);
+    record_text("a.ptx");
+    expect_head(1, ROWS, "500000.250000000 5000000.000000000 400.125000000");
+    for (int i = 0; i < ROWS; i++) {
+        char line[64];
+        snprintf(line, sizeof line, "%s0.%03d000 0.000000 0.000000 0.500000", "-", i + 1);
+        expect_line(line);
+    }
+    assert_int_equal(*at, 0);
+}
+
+/* A line of text has room for 511 bytes. Coordinates that need more are refused, and no cell is left out. */
+static void test_huge(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+        struct sh_err err = {0};
+        for (int k = 0; k < 3; k++)
+            *(i == 0 ? &a.scale[k] : &a.anchor[k]) = 1e200;
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        rig_points(0, 0, 0, &wall, 1);
+        assert_int_equal(rig_record(rig_path("a.ptx"), (struct recorder_options){0}, RIG_KEEP, &err), SH_EFORMAT);
+        assert_non_null(strstr(err.text, i == 0 ? "more digits than this format allows: 2e+203 1e+203 3e+203"
+                                                : "more digits than this format allows: 1e+200 1e+200 1e+200"));
+        assert_int_equal(access(rig_path("a.ptx"), F_OK), -1);
+        unlink(rig_path("a.ptx.part"));
+        unlink(rig_path("a.ptx.grid"));
+    }
+}
+
 static int asked, stop_at;
 
 static int stop(void *ctx)
@@ -283,7 +328,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_grid),           cmocka_unit_test(test_scans),     cmocka_unit_test(test_polar),
         cmocka_unit_test(test_poses),          cmocka_unit_test(test_far),       cmocka_unit_test(test_stop),
-        cmocka_unit_test(test_shared_padding), cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_shared_padding), cmocka_unit_test(test_disk_full), cmocka_unit_test(test_long_line),
+        cmocka_unit_test(test_huge),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

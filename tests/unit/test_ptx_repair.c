@@ -184,6 +184,7 @@ static uint8_t *repair_well(uint64_t want, size_t *len)
     assert_int_equal(check_text(text, &n_grids), want);
     assert_int_equal(r.n_kept, want);
     assert_int_equal(r.n_scans, n_grids);
+    assert_string_equal(r.unit, "points");
     assert_int_equal(access(rig_path("cut.ptx.grid"), F_OK), -1);
     assert_int_equal(killed_rig_repair(rig_path(part), &r, &err), 0);
     assert_int_equal(r.was_whole, 1);
@@ -327,14 +328,51 @@ static void test_refused(void **state)
     check_refused("18446744073709551615\n1\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");
     check_refused("1\n0\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");
     check_refused("-1\n2\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");
+    check_refused("1x\n1\n" POSE "1 2 3 1\n", NULL, 0, ".part: is ");
     record_scans();
     const struct state *s = &state_at[n_states - 1];
     uint8_t *grid = malloc(s->grid_len);
     memcpy(grid, s->grid, s->grid_len);
     grid[HEAD_LEN + 3 * CELL_LEN + 5] ^= 1;
-    check_refused((char *)s->text, grid, s->grid_len, "damaged");
+    char why[80]; /* the last good cells are those before the fourth */
+    snprintf(why, sizeof why, ".grid: is damaged at byte %d, before its end", HEAD_LEN + 3 * CELL_LEN);
+    check_refused((char *)s->text, grid, s->grid_len, why);
     check_refused("1\n1\n" POSE "1 2 3 1\n", s->grid, s->grid_len, "no grid ends there"); /* of another recording */
     free(grid);
+    remove_state();
+}
+
+/* Cells of a killed recorder never go back. One at the end that does is no cell of this grid, and is cut. */
+static void test_cell_that_goes_back(void **state)
+{
+    (void)state;
+    struct repair r;
+    struct sh_err err;
+    record_scans();
+    const struct state *s = &state_at[n_states - 1];
+    const int scan = grids_in(s->text);
+    uint8_t *grid = malloc(s->grid_len);
+    memcpy(grid, s->grid, s->grid_len);
+    memcpy(grid + s->grid_len - CELL_LEN, grid + HEAD_LEN, CELL_LEN);
+    write_state(s->text, s->text_len, grid, s->grid_len);
+    free(grid);
+    if (killed_rig_repair(rig_path(part), &r, &err) != 0) fail_msg("%s", err.text);
+    assert_int_equal(r.cut_bytes, CELL_LEN);
+    assert_int_equal(r.n_kept, echoes_before(scan) + echoes_in(scan, (s->grid_len - HEAD_LEN) / CELL_LEN - 1));
+    remove_state();
+}
+
+/* Lines of other programs may end with blanks, or with a carriage return. */
+static void test_line_ends(void **state)
+{
+    static const char text[] = "1\r\n2  \r\n0 0 0\r\n1 0 0\r\n0 1 0\r\n0 0 1\r\n1 0 0 0\r\n0 1 0 0\r\n0 0 1 0\r\n"
+                               "0 0 0 1\r\n1 2 3 1 \n0 0 0 0.5\r\n";
+    (void)state;
+    struct repair r;
+    struct sh_err err;
+    write_state(text, sizeof text - 1, NULL, 0);
+    if (killed_rig_repair(rig_path(part), &r, &err) != 0) fail_msg("%s", err.text);
+    assert_true(r.was_whole && r.n_kept == 1 && r.n_scans == 1);
     remove_state();
 }
 
@@ -347,10 +385,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_killed),
-        cmocka_unit_test(test_completing),
-        cmocka_unit_test(test_text_alone),
-        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_killed),  cmocka_unit_test(test_completing), cmocka_unit_test(test_text_alone),
+        cmocka_unit_test(test_refused), cmocka_unit_test(test_line_ends),  cmocka_unit_test(test_cell_that_goes_back),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -138,6 +138,58 @@ static void a_step_as_ply(void **state)
     has(rig_notes, "it has no triangles");
     has(rig_notes, "12 points left out that belong to no triangle");
     free(text);
+    rig_begin();
+    begin_scan(1, 3);
+    put_line(2, 20, (struct rig_point[]){hit(-5, 10, 0, 9)},
+             1); /* no line is beside it: the points after it take its place */
+    put_step(5);
+    text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1}, NULL);
+    has(text, "comment points_without_triangle 1\n");
+    has(text, "end_header\n10 30 30 0 -1 0 10 -5 0 3\n");
+    free(text);
+}
+
+/* Each sweep of the pan is a mesh by itself: 12 triangles each, and none between the two. */
+static void sweeps_are_apart(void **state)
+{
+    (void)state;
+    rig_begin();
+    begin_scan(1, 3);
+    put_step(0);
+    rig_sweep = 1;
+    put_step(4);
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1}, NULL);
+    has(text, "element face 24\n");
+    assert_string_equal(rig_notes, "");
+    free(text);
+}
+
+/* A moving head passes a wall at 5 m: triangles face the head. The line without a pose is left out. */
+static void a_wall_beside_the_way(void **state)
+{
+    (void)state;
+    static uint8_t out[1024];
+    const struct native_descriptor d = descriptor(1);
+    struct native_anchor a = anchor_of(1);
+    struct native_pose pose[2];
+    a.moving = NATIVE_MOVING;
+    for (int i = 0; i < 2; i++)
+        pose[i] = (struct native_pose){
+            .t_ns = 4000000000 * i, .position_m = {HEAD[0], HEAD[1] + 4 * i, HEAD[2]}, .quat = {1, 0, 0, 0}};
+    rig_begin();
+    put_descriptor(&d);
+    rig_anchor(&a);
+    rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
+    for (uint32_t line = 0; line < 5; line++) {
+        const struct rig_point p[3] = {hit(5, line, 0, 0), hit(5, line, 1, 0), hit(5, line, 2, 0)};
+        put_line(line, 20, p, 3);
+    }
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1}, NULL);
+    has(text, "element face 12\n");
+    has(text, "end_header\n15 20 30 -1 0 0 ");
+    has(text, "\n15 23 32 -1 0 0 ");
+    has(rig_notes, "3 points left out whose pose was lost");
+    free(text);
 }
 
 /* 4 m2 have 400 points at 100 a square metre. They lie on the walls, with their labels. */
@@ -250,6 +302,18 @@ static void two_stations_are_two_objects(void **state)
     free(materials);
     remove_file("b.1.png");
     remove_file("b.2.png");
+    rig_begin();
+    begin_scan(1, 1);
+    put_step(0);
+    struct native_descriptor d = descriptor(2);
+    const struct native_anchor a = anchor_of(2);
+    strcpy(d.profile, "other");
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(3);
+    text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .n_heads = 2}, NULL);
+    has(text, "comment station 1 scan 1 profile model\ncomment station 2 scan 2 profile other\n");
+    free(text);
     rig_begin();
     begin_scan(1, 1);
     put_step(0);
@@ -375,6 +439,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_step_as_ply),
         cmocka_unit_test(points_spread_over_the_step),
+        cmocka_unit_test(sweeps_are_apart),
+        cmocka_unit_test(a_wall_beside_the_way),
         cmocka_unit_test(a_full_turn_and_its_texture),
         cmocka_unit_test(two_stations_are_two_objects),
         cmocka_unit_test(later_echoes_and_lines_that_go_back),

@@ -57,6 +57,40 @@ static void test_several_heads(void **state)
     }
 }
 
+/* Names of a stream can't end their line. As long as more may come, a header with another head still says so. */
+static void test_header_of_part(void **state)
+{
+    (void)state;
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1), b = rig_anchor_of(NATIVE_CRS_UTM, 32632, 2);
+    const char *path = rig_path("a.ply");
+    char part[160];
+    struct scanhead *sh;
+    struct scanhead_frame frame;
+    struct recorder *rec;
+    struct sh_err err = {0};
+    rig_begin();
+    put_scan("Maker,Model\nend_header,SN1,1", "mo\ndel", 1, &a);
+    put_scan("Maker,Model,SN2,1", "model", 1, &b);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    snprintf(part, sizeof part, "%s.part", path);
+    assert_int_equal(
+        recorder_open(recorder_find(path, &err), path, &(struct recorder_options){.n_heads = 2}, &rec, &err), 0);
+    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+    while (scanhead_next(sh, &frame, -1) == 0)
+        assert_int_equal(recorder_frame(rec, sh, &frame, &err), 0);
+    assert_int_equal(recorder_save(rec, &err), 0);
+    char *text = (char *)rig_read(part, NULL);
+    assert_non_null(strstr(text, "comment incomplete: its end is missing, and losses were not counted\n"));
+    assert_non_null(strstr(text, "comment station 1 idn Maker,Model?end_header,SN1,1\n"));
+    assert_non_null(strstr(text, "comment station 1 profile mo?del\n"));
+    assert_non_null(strstr(text, "comment station 2 idn Maker,Model,SN2,1\n"));
+    free(text);
+    assert_int_equal(recorder_close(rec, 0, &err), 0);
+    scanhead_close(sh);
+    unlink(part);
+}
+
 /* Two heads take turns at 130 stations. The header names 128 of these turns, and a note counts the others. */
 static void test_many_heads(void **state)
 {
@@ -101,6 +135,32 @@ static void test_other_kinds(void **state)
     expect_refused(&b, &a, "a head that stands still");
     b.moving = NATIVE_STOP;
     expect_refused(&a, &b, "stops on a trajectory");
+    expect_refused(&b, &a, "a head that stands still");
+    b = a;
+    b.heights = NATIVE_HEIGHTS_GEOID;
+    expect_refused(&b, &a, "the stream changed to other heights (ellipsoid)");
+    b = a;
+    b.epsg = 32633;
+    expect_refused(&a, &b, "the stream changed from EPSG 32632 to 32633; a file holds one CRS");
+    b = a;
+    b.station = 65536;
+    expect_refused(&a, &b, "station 65536; a file holds stations up to 65535");
+}
+
+/* These are the last stations, and stops, that a file takes. */
+static void test_same_kinds(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 65535);
+    a.moving = NATIVE_STOP;
+    rig_begin();
+    put_scan("a,b,c,d", "model", 1, &a);
+    put_scan("a,b,c,d", "model", 2, &a);
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL);
+    assert_int_equal(rig_count(text, " 7 65535"), 2);
+    assert_int_equal(rig_count(text, "comment the stations are stops on a trajectory; frame: its frame scalar there"),
+                     1);
+    free(text);
 }
 
 /* PLY describes its coordinates. As float, degrees would be wrong by metres. */
@@ -129,6 +189,25 @@ static void test_ply_says(void **state)
     unlink(rig_path("a.ply.part"));
 }
 
+/* As float, coordinates of a kilometre have steps of 0.06 mm. A station farther away on any axis is refused. */
+static void test_floats(void **state)
+{
+    (void)state;
+    for (int axis = 0; axis < 3; axis++)
+        for (int sign = -1; sign <= 1; sign += 2)
+            for (int beyond = 0; beyond < 2; beyond++) {
+                struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+                struct sh_err err = {0};
+                memset(a.anchor, 0, sizeof a.anchor);
+                a.anchor[axis] = sign * (beyond ? 1000.5 : 1000.0);
+                rig_begin();
+                put_scan("a,b,c,d", "model", 1, &a);
+                assert_int_equal(record("a.ply", (struct recorder_options){.columns = PLY_XYZ | PLY_FLOAT}, &err),
+                                 beyond ? SH_EINPUT : SH_OK);
+                unlink(rig_path(beyond ? "a.ply.part" : "a.ply"));
+            }
+}
+
 static void put_emitter(const struct native_emitter *e, const struct native_beam *beam)
 {
     rig_put(out, native_encode_emitter(out, sizeof out, e, beam, 0, 0));
@@ -148,27 +227,32 @@ static void test_rows_of_beams(void **state)
     int16_t refl = 0;
     uint16_t label = 0;
     uint8_t echo = 0x11;
-    const struct line_block block = {.line = 1,
-                                     .pulse0 = 8,
-                                     .n_pulses = 1,
-                                     .t0_ns = 20000,
-                                     .line_t0_ns = 12000,
-                                     .n_points = 1,
-                                     .dt_ns = &zero,
-                                     .a = &x,
-                                     .b = &x,
-                                     .c = &x,
-                                     .refl_cdb = &refl,
-                                     .echo = &echo,
-                                     .label = &label};
-    rig_begin();
-    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
-    put_emitter(&e, beam);
-    rig_anchor(&a);
-    rig_put(out, native_encode_points(out, sizeof out, &block, 0));
-    e57rig_record_one((struct recorder_options){0});
-    e57rig_scan(0, 0, 0);
-    assert_int_equal(e57rig_record[0].row, 2);
+    struct line_block block = {.line = 1,
+                               .pulse0 = 8,
+                               .n_pulses = 1,
+                               .t0_ns = 20000,
+                               .n_points = 1,
+                               .dt_ns = &zero,
+                               .a = &x,
+                               .b = &x,
+                               .c = &x,
+                               .refl_cdb = &refl,
+                               .echo = &echo,
+                               .label = &label};
+    static const struct {
+        int first, t0_ns;
+    } lines[] = {{3, 9999}, {4, 10000}, {4, 10999}, {6, 12000}};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        block.line_t0_ns = lines[i].t0_ns;
+        rig_begin();
+        rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+        put_emitter(&e, beam);
+        rig_anchor(&a);
+        rig_put(out, native_encode_points(out, sizeof out, &block, 0));
+        e57rig_record_one((struct recorder_options){0});
+        e57rig_scan(0, 0, 0);
+        assert_int_equal(e57rig_record[0].row, 8 - lines[i].first);
+    }
 }
 
 /* A sphere of ten rings has ten lines, and the first and the last one are in one grid. */
@@ -193,6 +277,28 @@ static void test_lines_of_rings(void **state)
     assert_memory_equal(text, "10\n1\n", 5);
     assert_null(strstr(rig_notes, "grids begun"));
     free(text);
+}
+
+/* A head of several rings, and one that pans, have sweeps. Others have lines of one grid. */
+static void test_sweeps(void **state)
+{
+    (void)state;
+    static const struct {
+        int kind;
+        uint32_t rings;
+        double pan_deg_s;
+        int is_apart;
+    } cases[] = {{SCANHEAD_EMIT_SPHERE, 1, 0, 0}, {SCANHEAD_EMIT_SPHERE, 2, 0, 1}, {SCANHEAD_EMIT_SPHERE, 1, 10, 0},
+                 {SCANHEAD_EMIT_LINE, 0, 0, 0},   {SCANHEAD_EMIT_LINE, 0, 10, 1},  {SCANHEAD_EMIT_PLANAR, 2, 10, 0}};
+    static struct track t;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct mesh_grid g = {.kind = cases[i].kind, .rings = cases[i].rings, .sweep = 3};
+        t.info.pan_deg_s = cases[i].pan_deg_s;
+        t.sweep = 3;
+        assert_int_equal(mesh_grid_takes(&g, &t, 0), 1);
+        t.sweep = 4;
+        assert_int_equal(mesh_grid_takes(&g, &t, 0), !cases[i].is_apart);
+    }
 }
 
 /* Elevations are rounded to 1e-6 degrees. An elevation a degree from the pole is a ring. */
@@ -220,7 +326,7 @@ static void test_sparse_labels(void **state)
     double area_m2 = 0;
     int seen[3] = {0};
     for (int k = 0; k < 3; k++) {
-        struct mesh_point p = {.label = (uint16_t)(10 * k), .station = 1};
+        struct mesh_point p = {.label = (uint16_t)(10 * k), .station = 1, .rgb = {255, 0, 128}};
         memcpy(p.xyz_m, corner[k], sizeof p.xyz_m);
         assert_int_equal(mesh_points_add(&from, &p, &err), 0);
     }
@@ -231,11 +337,29 @@ static void test_sparse_labels(void **state)
         const double x = to.xyz_m[i][0], y = to.xyz_m[i][1], rest = 1 - x - y;
         const int nearest = x > y && x > rest ? 1 : y > rest ? 2 : 0;
         assert_int_equal(to.label[i], 10 * nearest);
+        assert_memory_equal(to.rgb[i], from.rgb[0], 3);
         seen[nearest]++;
     }
     assert_true(seen[0] > 0 && seen[1] > 0 && seen[2] > 0);
     mesh_points_free(&from);
     mesh_points_free(&to);
+}
+
+/* The limit is that of the file, of all parts together. */
+static void test_sparse_limit(void **state)
+{
+    (void)state;
+    static double corner[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    static const uint32_t face[1][3] = {{0, 1, 2}};
+    const struct mesh_points from = {.xyz_m = corner, .n = 3};
+    struct mesh_points to = {.n = INT32_MAX - 99};
+    const struct mesh_sparse sparse = {.per_m2 = 200};
+    const struct mesh_sparse_part part = {face, 1, 1, 1};
+    struct sh_err err = {0};
+    double area_m2 = 7;
+    assert_int_equal(mesh_sparse_add(&sparse, &from, &part, &to, &area_m2, &err), SH_EINPUT);
+    assert_non_null(
+        strstr(err.text, "--sparse 200: 7.5 m2 of mesh would get 2.147e+09 points; a file holds 2147483647: give"));
 }
 
 static int tear_down(void **state)
@@ -247,10 +371,11 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads), cmocka_unit_test(test_many_heads),
-        cmocka_unit_test(test_other_kinds),   cmocka_unit_test(test_ply_says),
-        cmocka_unit_test(test_rows_of_beams), cmocka_unit_test(test_lines_of_rings),
-        cmocka_unit_test(test_poles),         cmocka_unit_test(test_sparse_labels),
+        cmocka_unit_test(test_several_heads),  cmocka_unit_test(test_many_heads), cmocka_unit_test(test_header_of_part),
+        cmocka_unit_test(test_other_kinds),    cmocka_unit_test(test_same_kinds), cmocka_unit_test(test_sparse_limit),
+        cmocka_unit_test(test_ply_says),       cmocka_unit_test(test_floats),     cmocka_unit_test(test_rows_of_beams),
+        cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_sweeps),     cmocka_unit_test(test_poles),
+        cmocka_unit_test(test_sparse_labels),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -92,10 +92,10 @@ static void test_moving(void **state)
     assert_string_equal(at, want);
 }
 
-static void put_scan_start(uint32_t scan)
+static void put_event(uint32_t code, uint32_t scan)
 {
     static uint8_t out[256];
-    const struct native_event e = {.code = NATIVE_EV_SCAN_START, .a = scan};
+    const struct native_event e = {.code = code, .a = scan};
     rig_put(out, native_encode_event(out, sizeof out, &e, 0, 0));
 }
 
@@ -106,9 +106,10 @@ static void test_other_settings(void **state)
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
     a.moving = NATIVE_MOVING;
     rig_begin();
-    put_scan_start(1);
+    put_event(NATIVE_EV_SCAN_START, 1);
     put_scan(0, 1, &a);
     put_poses(0, 100, 5);
+    put_event(NATIVE_EV_SETTINGS, 0);
     put_scan(0, 1, &a);
     put_poses(100, 200, 6);
     const char *at = record();
@@ -130,7 +131,7 @@ static void test_same_numbers(void **state)
     a.moving = NATIVE_MOVING;
     rig_begin();
     for (int i = 0; i < 2; i++) {
-        put_scan_start(5);
+        put_event(NATIVE_EV_SCAN_START, 5);
         put_scan(0, 5, &a);
         put_poses(0, 100, 5);
         put_poses(100, 200, 6);

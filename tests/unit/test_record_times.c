@@ -49,6 +49,7 @@ static void test_las(void **state)
         assert_int_equal(rig_uint(las + 92, 2), 2024);
         assert_true(fabs(rig_double(p + time_at[old]) - (419724790.002)) < 1e-7);
         assert_true(fabs(rig_double(p + len[old] + time_at[old]) - (419724850.002)) < 1e-7);
+        assert_null(strstr(rig_notes, "times count from the scan's start"));
         free(las);
     }
 }

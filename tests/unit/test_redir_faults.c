@@ -145,10 +145,43 @@ static void test_slow(void **state)
     bench_close(&bench);
 }
 
+static void send_control(struct guest *g, uint64_t id)
+{
+    struct usb_redir_control_packet_header h = {.endpoint = 0x80, .requesttype = 0x80, .length = 2};
+    usbredirparser_send_control_packet(g->parser, id, &h, NULL, 0);
+}
+
+/* As many as 256 requests wait. One more ends the connection, since no virtual machine sends so many at once. */
+static void test_most_slow(void **state)
+{
+    enum { MOST = 256 };
+    (void)state;
+    struct bench bench = redir_bench(1);
+    struct guest *g = guest_new(&bench);
+    guest_configure(g);
+    fault(&bench, LINK_FAULT_SLOW_ENUMERATION, 0, 1e6);
+    for (uint64_t id = 1; id <= MOST; id++)
+        send_control(g, id);
+    for (uint64_t id = MOST; id <= MOST + 1; id++) {
+        const int n_seen = g->n_seen;
+        usbredirparser_send_cancel_data_packet(g->parser, id);
+        const struct seen *s = guest_await(g, n_seen + 1);
+        assert_int_equal(s->id, id);
+        assert_int_equal(s->status, usb_redir_cancelled);
+        send_control(g, id + 1); /* it takes the place */
+    }
+    send_control(g, MOST + 3);
+    for (const int64_t end_ms = now_ms() + DEADLINE_MS; !g->ended; guest_turn(g, 0))
+        assert_true(now_ms() < end_ms);
+    guest_free(g);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_unplug), cmocka_unit_test(test_late_guest),
-                                       cmocka_unit_test(test_stall), cmocka_unit_test(test_slow)};
+                                       cmocka_unit_test(test_stall), cmocka_unit_test(test_slow),
+                                       cmocka_unit_test(test_most_slow)};
     return cmocka_run_group_tests(tests, guest_setup, guest_teardown);
 }
 

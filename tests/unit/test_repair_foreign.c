@@ -7,6 +7,7 @@
 
 #include "core/bytes.h"
 #include "core/newfile.h"
+#include "drivers/protocol/pcapng.h"
 #include "drivers/record/repair.h"
 #include "tests/unit/repair_rig.h"
 
@@ -65,6 +66,10 @@ static void test_whole_elsewhere(void **state)
     assert_int_equal(repair_untouched("f.pcapng", capture, sizeof capture - 1), SH_OK);
     assert_int_equal(repair_untouched("f.pcapng", more, sizeof more - 1), SH_EFORMAT);
     assert_non_null(strstr(repair_err.text, "was written by another program"));
+    uint8_t other[128]; /* its name is as long as ours */
+    size_t len = pcapng_put_section(other, "Scanhead");
+    memcpy(other + len, PCAPNG_INTERFACE "\x06\0\0\0", 24);
+    assert_int_equal(repair_untouched("f.pcapng", other, len + 24), SH_EFORMAT);
 }
 
 /* A grid of absurd size is not filled up. */
@@ -107,12 +112,37 @@ static void test_damaged_capture(void **state)
     }
 }
 
+/* A capture whose last block is whole was not cut: what lies before it is damage. The least block has 12 bytes. */
+static void test_block_at_the_end(void **state)
+{
+    (void)state;
+    static const uint8_t cut[16] = {6, 0, 0, 0, 0, 2, 0, 0}, last[2][16] = {{9, 0, 0, 0, 12, 0, 0, 0, 12, 0, 0, 0},
+                                                                            {9, 0, 0, 0, 16, 0, 0, 0, 1, 1, 1, 1, 16}};
+    for (int i = 0; i < 3; i++) {
+        const size_t n = i == 2 ? 0 : i == 0 ? 12 : 16;
+        struct repaired file = {0};
+        uint8_t *all = malloc(repair_whole[1].len + sizeof cut + n);
+        memcpy(all, repair_whole[1].data, repair_whole[1].len);
+        memcpy(all + repair_whole[1].len, cut, sizeof cut);
+        memcpy(all + repair_whole[1].len + sizeof cut, last[i % 2], n);
+        repair_name("a.pcapng");
+        repair_write_file(repair_part, all, repair_whole[1].len + sizeof cut + n);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), i == 2 ? SH_OK : SH_EFORMAT);
+        if (i < 2) assert_non_null(strstr(repair_err.text, "is damaged at byte"));
+        if (i == 2) assert_int_equal(file.cut_bytes, sizeof cut);
+        repair_free(&file);
+        free(all);
+        unlink(i == 2 ? repair_path : repair_part);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_whole_elsewhere),
         cmocka_unit_test(test_absurd_grid),
         cmocka_unit_test(test_damaged_capture),
+        cmocka_unit_test(test_block_at_the_end),
     };
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }

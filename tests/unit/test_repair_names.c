@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair, in process: it finds the meant file, replaces none, and changes nothing when given up. And the moments at
  * which a recorder writes its bytes. */
+#include <fcntl.h>
 #include <sys/stat.h>
 
 #include "core/newfile.h"
+#include "drivers/protocol/pcapng.h"
 #include "drivers/record/outfile.h"
 #include "tests/unit/repair_rig.h"
 
@@ -98,6 +100,8 @@ static void test_moving_poses(void **state)
 /* The disk was full for a while, and points were lost. Later writes do not make the file whole. */
 static void test_full_for_a_while(void **state)
 {
+    static const char *const unit[REPAIR_FORMATS] = {"frames", "packets", "points", "points", "points",
+                                                     "points", "points",  "points", "poses"};
     (void)state;
     for (int i = 0; i < REPAIR_FORMATS; i++) {
         struct scanhead *sh;
@@ -125,9 +129,118 @@ static void test_full_for_a_while(void **state)
         assert_int_equal(access(repair_path, F_OK), -1);
         assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
         assert_true(file.was_left && file.n_kept > 0);
+        assert_string_equal(file.unit, unit[i]);
         repair_free(&file);
+        struct bytes got = repair_slurp(repair_path);
+        if (strstr(repair_path, ".ply") != NULL) /* it says so once */
+            assert_int_equal(rig_count((char *)got.data, "comment incomplete:"), 1);
+        if (strcmp(unit[i], "packets") == 0)
+            assert_non_null(memmem(got.data, got.len, REPAIR_INCOMPLETE, sizeof REPAIR_INCOMPLETE - 1));
+        if (strcmp(unit[i], "poses") == 0)
+            assert_int_equal(rig_count((char *)got.data, "\n# " REPAIR_INCOMPLETE "\n"), 1);
+        free(got.data);
         assert_int_equal(unlink(repair_path), 0);
     }
+}
+
+static void take_row(void *ctx, const uint8_t *row)
+{
+    (void)row;
+    ++*(int *)ctx;
+}
+
+/* A folder stands for a disk that cannot be read, and /dev/full for one that is full. */
+static void test_broken_disk(void **state)
+{
+    (void)state;
+    struct repair r = {.path = "a.las", .fd = open("/", O_RDONLY | O_CLOEXEC), .len = 100};
+    char text[16];
+    int n = 0;
+    assert_int_equal(repair_read(&r, 0, text, sizeof text, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be read: Is a directory");
+    assert_int_equal(repair_rows(&r, &(struct repair_rows){0, 2, 50}, take_row, &n, &repair_err), SH_EIO);
+    assert_int_equal(n, 0);
+    assert_int_equal(repair_write(&r, 0, "x", 1, &repair_err), SH_EPERM);
+    assert_int_equal(repair_cut(&r, 99, &repair_err), SH_EPERM);
+    assert_int_equal(repair_cut(&r, 100, &repair_err), SH_OK);
+    close(r.fd);
+    r.fd = open("/dev/full", O_RDWR | O_CLOEXEC);
+    assert_int_equal(repair_write(&r, 0, "x", 1, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be repaired: No space left on device");
+    assert_int_equal(repair_cut(&r, 99, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be cut: Invalid argument");
+    assert_int_equal(r.cut_bytes, 0);
+    close(r.fd);
+    repair_name("a.las");
+    repair_write_file(repair_path, "abc", 3);
+    r.fd = open(repair_path, O_RDWR | O_CLOEXEC);
+    assert_int_equal(repair_read(&r, 0, text, 4, &repair_err), SH_EIO);
+    assert_string_equal(repair_err.text, "a.las: cannot be read: it got shorter while it was read");
+    assert_int_equal(repair_read(&r, 1, text, 2, &repair_err), SH_OK);
+    assert_memory_equal(text, "bc", 2);
+    close(r.fd);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
+static int take_long_line(void *ctx, const char *line, size_t len)
+{
+    ++*(int *)ctx;
+    return len == 99 && line[0] == 'a' && line[98] == 'z';
+}
+
+/* Files are read in blocks of 1 MiB. Lines and rows lie across their edges. */
+static void test_several_blocks(void **state)
+{
+    enum { LINES = 30000, LINE = 100 };
+    (void)state;
+    char *text = malloc(LINES * LINE);
+    struct repair r = {.path = "a.csv", .len = LINES * LINE};
+    uint64_t end;
+    int n = 0;
+    memset(text, 'b', LINES * LINE);
+    for (int i = 0; i < LINES; i++) {
+        text[i * LINE] = 'a';
+        text[i * LINE + 98] = 'z';
+        text[i * LINE + 99] = '\n';
+    }
+    repair_name("a.las");
+    repair_write_file(repair_path, text, LINES * LINE);
+    free(text);
+    r.fd = open(repair_path, O_RDONLY | O_CLOEXEC);
+    assert_int_equal(repair_lines(&r, 0, take_long_line, &n, &end, &repair_err), SH_OK);
+    assert_int_equal(n, LINES);
+    assert_int_equal(end, LINES * LINE);
+    n = 0;
+    assert_int_equal(repair_rows(&r, &(struct repair_rows){0, LINES * LINE / 24, 24}, take_row, &n, &repair_err), 0);
+    assert_int_equal(n, LINES * LINE / 24);
+    close(r.fd);
+    assert_int_equal(unlink(repair_path), 0);
+}
+
+static void test_large_capture(void **state)
+{
+    enum { PACKETS = 40000 };
+    (void)state;
+    struct repaired file;
+    const struct bytes *whole = &repair_whole[1];
+    uint8_t *all = malloc(whole->len + PACKETS * pcapng_packet_len(50));
+    size_t len = whole->len;
+    memcpy(all, whole->data, len);
+    for (int i = 0; i < PACKETS; i++)
+        len += pcapng_put_packet(all + len, 0, i, "0123456789012345678901234567890123456789012345678",
+                                 1 + (size_t)i % 50, 0);
+    repair_name("a.pcapng");
+    repair_write_file(repair_path, whole->data, whole->len);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_OK);
+    const uint64_t n = file.n_kept;
+    repair_free(&file);
+    repair_write_file(repair_path, all, len);
+    free(all);
+    if (repair_file(repair_path, NULL, &file, &repair_err) != SH_OK) fail_msg("%s", repair_err.text);
+    assert_int_equal(file.n_kept, n + PACKETS);
+    assert_int_equal(file.was_whole, 1);
+    repair_free(&file);
+    assert_int_equal(unlink(repair_path), 0);
 }
 
 static int stop(void *ctx)
@@ -237,9 +350,16 @@ static void test_save(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names),        cmocka_unit_test(test_not_ours),
-                                       cmocka_unit_test(test_moving_poses), cmocka_unit_test(test_full_for_a_while),
-                                       cmocka_unit_test(test_stopped),      cmocka_unit_test(test_save),
-                                       cmocka_unit_test(test_zeros),        cmocka_unit_test(test_scans_of_a_stream)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_names),
+                                       cmocka_unit_test(test_not_ours),
+                                       cmocka_unit_test(test_moving_poses),
+                                       cmocka_unit_test(test_full_for_a_while),
+                                       cmocka_unit_test(test_broken_disk),
+                                       cmocka_unit_test(test_stopped),
+                                       cmocka_unit_test(test_several_blocks),
+                                       cmocka_unit_test(test_large_capture),
+                                       cmocka_unit_test(test_save),
+                                       cmocka_unit_test(test_zeros),
+                                       cmocka_unit_test(test_scans_of_a_stream)};
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }

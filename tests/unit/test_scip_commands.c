@@ -297,6 +297,15 @@ static void reset_and_reboot(void **state)
     assert_string_equal(rig.line[rig.n_lines - 1], "HEAD:REBOOT");
     assert_false(rig.hung_up); /* the power cycle ends it */
 
+    /* The laser is off from the second RB on, and sends no scan any more. */
+    scip_open("UTM-30LX");
+    scip_flat(1.0);
+    scip_ask("BM\nMD0000000101000\n", "BM\n00P\n\nMD0000000101000\n00P\n\n");
+    scip_ask("RB\nRB\n", "RB\n01Q\n\nRB\n00P\n\n");
+    scip_turn(0);
+    scip_turn(1);
+    scip_expect("");
+
     /* There is no head to reboot. Only the session begins anew, and the device's time goes on. */
     static const struct protocol_rig_reply recorded[] = {{"HEAD:REBOOT", "ERR", -221}, {NULL, NULL, 0}};
     scip_open("UTM-30LX");

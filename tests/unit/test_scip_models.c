@@ -2,6 +2,7 @@
 /* SCIP, the sensor's side: each model's description of itself, and of its state. Whole replies of the URG-04LX and the
  * UTM-30LX are those of real devices (SCIP.md, source D), with their sums. Sums of the others were added up apart from
  * this program. */
+#include "drivers/protocol/scip_model.h"
 #include "tests/unit/scip_rig.h"
 
 static const struct protocol_rig_reply BOOTS[] = {{"HEAD:STATE?", "boot", 0}, {NULL, NULL, 0}},
@@ -194,13 +195,48 @@ static void times_in_microseconds(void **state)
     }
 }
 
+/* The table of SCIP.md. */
+static void models_are_those_of_the_document(void **state)
+{
+    (void)state;
+    enum { ECHOES = SCIP_MULTI_ECHO, MOTOR = SCIP_MOTOR_SPEED, RATE = SCIP_BIT_RATE, STRICT = SCIP_TIME_ALONE };
+    enum { REBOOTS = SCIP_REBOOT | SCIP_SLEEP, HEX = SCIP_TIME_HEX, SIMULATES = SCIP_SIMULATION };
+    static const struct {
+        const char *name;
+        uint32_t features, bit_rate;
+        int no_object, too_near, no_step;
+    } rows[] = {
+        {"URG-04LX", MOTOR | RATE | SIMULATES | STRICT | HEX, 19200, 0, 6, 19},
+        {"UTM-30LX", SCIP_INTENSITY | RATE | REBOOTS | SIMULATES | HEX | SCIP_FIRST_AT_ONCE, 115200, 1, 4, 5},
+        {"UTM-30LX-EW", SCIP_INTENSITY | ECHOES | REBOOTS | HEX | SCIP_STATE, 115200, 1, 4, 5},
+        {"UST-10LX", SCIP_INTENSITY | REBOOTS | SCIP_STATE | SCIP_TIME_US, 115200, 1, 4, 5},
+        {"UST-20LX", SCIP_INTENSITY | REBOOTS | SCIP_STATE | SCIP_TIME_US, 115200, 1, 4, 5},
+        {"UST-30LC", /* any other */
+         SCIP_INTENSITY | ECHOES | MOTOR | RATE | REBOOTS | SCIP_STATE | SCIP_TIME_US | SIMULATES | HEX, 115200, 1, 4,
+         5},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct scip_model *m = scip_model_find(rows[i].name);
+        assert_int_equal(m->features, rows[i].features);
+        assert_int_equal(m->bit_rate, rows[i].bit_rate);
+        assert_int_equal(m->no_object, rows[i].no_object);
+        assert_int_equal(m->too_near, rows[i].too_near);
+        assert_int_equal(m->no_step, rows[i].no_step);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_utm_with_usb),      cmocka_unit_test(a_urg),
-        cmocka_unit_test(a_utm_with_ethernet), cmocka_unit_test(usts),
-        cmocka_unit_test(numbers_of_states),   cmocka_unit_test(boots_and_fails),
-        cmocka_unit_test(time_since_power_up), cmocka_unit_test(times_in_microseconds),
+        cmocka_unit_test(a_utm_with_usb),
+        cmocka_unit_test(a_urg),
+        cmocka_unit_test(a_utm_with_ethernet),
+        cmocka_unit_test(usts),
+        cmocka_unit_test(numbers_of_states),
+        cmocka_unit_test(boots_and_fails),
+        cmocka_unit_test(time_since_power_up),
+        cmocka_unit_test(times_in_microseconds),
+        cmocka_unit_test(models_are_those_of_the_document),
     };
     return cmocka_run_group_tests(tests, NULL, scip_teardown);
 }

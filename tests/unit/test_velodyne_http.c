@@ -242,6 +242,10 @@ static void test_documents(void **state)
     http_rig.fix.lon_deg = 11.999999;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "{\"pps_state\":\"Locked\",\"position\":\"48 06.00S 12 00.00E\"}"));
+    http_rig.fix.lat_deg = 89.9999; /* the last 0.01 minutes before 90 degrees: 59.994 */
+    http_rig.fix.lon_deg = -179.9999;
+    http_get("/cgi/status.json");
+    assert_non_null(strstr(http_body(), "\"position\":\"89 59.99N 179 59.99W\"}"));
     http_rig.pps = PROTOCOL_PPS_ERROR;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "{\"pps_state\":\"Error\","));
@@ -259,6 +263,9 @@ static void test_documents(void **state)
     assert_non_null(strstr(http_body(), "\"phaselock\":{\"enabled\":\"On\",\"offset\":9001,\"offsetInput\":90.01},"));
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "\"rpm\":600,\"lock\":\"On\",\"phase\":9000}"));
+    http_replies[2].reply = "FIRSt"; /* the device has no such mode */
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "{\"laser\":\"On\",\"returns\":\"\",\"rpm\":600,"));
     http_replies[2].reply = "ALL";
     http_replies[1].reply = "10.166667";
     http_get("/cgi/settings.json");
@@ -267,6 +274,12 @@ static void test_documents(void **state)
     assert_non_null(strstr(http_body(), "\"lm20_temp\":1126"));
     http_get("/cgi/snapshot.hdl");
     assert_non_null(strstr(http_body(), "\"config\":{\"laser\":\"On\""));
+    int depth = 0; /* its brackets are in pairs, and the last one ends it */
+    for (const char *at = http_body(); *at != '\0'; at++) {
+        depth += (*at == '{') - (*at == '}');
+        assert_true(depth > 0 || at[1] == '\0');
+    }
+    assert_int_equal(depth, 0);
     for (uint32_t i = 0; i < http_rig.n_lines; i++)
         assert_non_null(strchr(http_rig.line[i], '?')); /* reading changes nothing */
 }

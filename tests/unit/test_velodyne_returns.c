@@ -136,11 +136,11 @@ static void test_reflectivities(void **state)
     /* A packet has the same ones. */
     struct protocol_rig_shot shot[384];
     for (int i = 0; i < 384; i++)
-        shot[i] = (struct protocol_rig_shot){.n = 1, .range_m = {5.0}, .refl_cdb = {(int16_t)(-3000 + 17 * i)}};
+        shot[i] = (struct protocol_rig_shot){.n = 1, .range_m = {5.0}, .refl_cdb = {(int16_t)(-3000 + 16 * i)}};
     protocol_rig_describe(&rig, 0);
     velodyne_head_fire(0, 384, shot, 600.0, 0.0);
-    for (int i = 0; i < 384; i++)
-        assert_int_equal(reflectivity(0, i / 32, i % 32), velodyne_reflectivity(-3000 + 17 * i));
+    for (int i = 0; i < 384; i++) /* shot 380 has 3080, the first with 255 */
+        assert_int_equal(reflectivity(0, i / 32, i % 32), velodyne_reflectivity(-3000 + 16 * i));
 }
 
 /* After pulses that the head did not send the next packet begins with the next firing sequence. The begun packet is not

@@ -22,7 +22,16 @@ static int get(void *ctx, const char *path, const char *query, struct web_body *
     return SH_OK;
 }
 
-static const struct web_source source = {.get = get};
+int web_n_released;
+
+static void release(void *ctx, char *bytes)
+{
+    (void)ctx;
+    free(bytes);
+    web_n_released++;
+}
+
+static const struct web_source source = {.get = get, .release = release};
 static const struct link_spec spec = {.type = LINK_WEB, .max_sessions = WEB_SESSIONS, .web = &source};
 
 struct bench web_open(char place[64])
