@@ -56,27 +56,28 @@ static void groups_have_their_own_figures(void **state)
     assert_true(f[2].points == 0 && isnan(f[2].mean_m) && isnan(f[2].p95_m) && isnan(f[2].max_m));
 }
 
-/* Group 1 comes first in the file. The 95th percentile of 20 values is the 19th. Without groups all points are one. */
+/* Group 1 comes first in the file, and two of its points are far. The 95th percentile of 20 values is the 19th. Without
+ * groups all points are one. */
 static void percentiles_by_group(void **state)
 {
     (void)state;
-    double distance_m[23];
-    uint32_t group[23];
+    double distance_m[25];
+    uint32_t group[25];
     struct figures f[2];
     struct sh_err err;
-    for (uint32_t i = 0; i < 23; i++) {
-        distance_m[i] = i < 3 ? 7.0 + i : 0.1 * ((7 * i) % 20 + 1);
-        group[i] = i < 3;
+    for (uint32_t i = 0; i < 25; i++) {
+        distance_m[i] = i < 3 ? 0.01 * (i + 1) : i >= 23 ? (double)INFINITY : 0.1 * ((7 * i) % 20 + 1);
+        group[i] = i < 3 || i >= 23;
     }
-    const struct figures_in in = {23, distance_m, NULL};
+    const struct figures_in in = {25, distance_m, NULL};
     assert_int_equal(figures_by(&in, 2, group_of, group, f, &err), SH_OK);
     near_to(f[0].p95_m, 1.9);
     near_to(f[0].max_m, 2.0);
-    near_to(f[1].p95_m, 9.0);
-    assert_true(f[0].points == 20 && f[1].points == 3 && f[0].along == 0 && isnan(f[0].along_max_m));
+    near_to(f[1].p95_m, 0.03);
+    assert_true(f[0].points == 20 && f[1].points == 5 && f[1].far == 2 && f[0].along == 0 && isnan(f[0].along_max_m));
     assert_int_equal(figures_by(&in, 1, NULL, NULL, f, &err), SH_OK);
-    near_to(f[0].p95_m, 8.0); /* the 22nd of 23 */
-    assert_int_equal(f[0].points, 23);
+    near_to(f[0].p95_m, 1.9); /* the 22nd of 23 */
+    assert_int_equal(f[0].points, 25);
 }
 
 /* A sigma of 0 is known, but no deviation can be counted in it. At 80 degrees a point still has a deviation along the
@@ -111,6 +112,12 @@ static void nice_numbers_are_1_2_5(void **state)
                              {70, 100},  {0.03, 0.05}, {1e-6, 1e-6}, {1.2e-5, 2e-5}, {0.001, 0.001}};
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++)
         near_to(figures_nice(row[i][0]), row[i][1]);
+    for (int power = -20; power <= 20; power++) /* those that are such numbers stay as they are, to the last bit */
+        for (int k = 0; k < 3; k++) {
+            char text[16];
+            snprintf(text, sizeof text, "%de%d", k == 0 ? 1 : k == 1 ? 2 : 5, power);
+            assert_true(figures_nice(strtod(text, NULL)) == strtod(text, NULL));
+        }
 }
 
 static void histograms_count_each_value_once(void **state)
@@ -144,6 +151,33 @@ static void histograms_count_each_value_once(void **state)
     const double zero = 0.0;
     figures_histogram_of(&zero, 1, 0.99, &h);
     assert_true(h.bins > 0 && h.count[0] == 1);
+}
+
+/* The size of values counts without their sign. What is beyond the axis is counted on its side, however large it is. */
+static void histograms_of_one_side(void **state)
+{
+    (void)state;
+    float value[104];
+    double size[104];
+    struct figures_histogram h;
+    uint64_t sum = 0;
+    for (int i = 0; i < 100; i++)
+        value[i] = -1.0f - 0.01f * (float)i; /* from -1 to -1.99 */
+    value[100] = -1e30f;
+    value[101] = -50.0f;
+    value[102] = 1e30f;
+    value[103] = 40.0f;
+    figures_histogram_of_signed(value, 104, 0.96, &h);
+    for (uint32_t k = 0; k < h.bins; k++)
+        sum += h.count[k];
+    assert_true(sum == 100 && h.below == 2 && h.above == 2);
+    assert_true(h.from <= -1.99 && h.from >= -2.5 && h.bins <= FIGURES_MAX_BINS);
+    for (int i = 0; i < 104; i++)
+        size[i] = i < 4 ? 0.0 : 1e300;
+    figures_histogram_of(size, 104, 0.01, &h);
+    assert_true(h.count[0] == 4 && h.above == 100 && h.bins > 0);
+    figures_histogram_of(size, 104, 0.99, &h);
+    assert_true(h.count[0] == 4 && h.above == 100 && isfinite(h.width));
 }
 
 /* A square of 2 m at 45 degrees has cells of 1 m with 1.414 m2. There are 4 columns of points with 9, 9, 1, 1. */
@@ -224,9 +258,9 @@ static void times_go_by_station_and_scan(void **state)
 static void gaps_are_longer_than_allowed(void **state)
 {
     (void)state;
-    double time_s[] = {1.0, 2.0, 1.5, 1.75, 3.0, 4.0};
-    uint16_t station[] = {1, 2, 1, 1, 2, 2};
-    const struct cloud cloud = {.n = 6, .station = station, .time_s = time_s};
+    double time_s[] = {1.0, 2.0, 1.5, 1.75, 1.75, 3.0, 4.0}; /* echoes of one shot have one time */
+    uint16_t station[] = {1, 2, 1, 1, 1, 2, 2};
+    const struct cloud cloud = {.n = 7, .station = station, .time_s = time_s};
     struct figures_times t[3];
     figures_times_of(&cloud, 3, (const double[]){0.25, 0.5, 1}, t);
     assert_true(t[0].gaps == 1 && t[0].longest_s == 0.5 && t[0].longest_at_s == 1.0 && t[0].scans == 1);
@@ -264,6 +298,7 @@ int main(void)
         cmocka_unit_test(sigmas_and_angles_at_their_bounds),
         cmocka_unit_test(nice_numbers_are_1_2_5),
         cmocka_unit_test(histograms_count_each_value_once),
+        cmocka_unit_test(histograms_of_one_side),
         cmocka_unit_test_setup_teardown(density_is_points_by_area, make_folder, remove_folder),
         cmocka_unit_test(times_go_by_station_and_scan),
         cmocka_unit_test(gaps_are_longer_than_allowed),
