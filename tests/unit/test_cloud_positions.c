@@ -73,6 +73,52 @@ static void test_text(void **state)
     assert_non_null(strstr(err.text, "PTX is not read"));
 }
 
+/* The third column of 64 is read, and the last one; a line of names may have 64, too. The names begin with a # or don't,
+ * and a column may be called #. */
+static void test_many_columns(void **state)
+{
+    (void)state;
+    static const double one[1][3] = {{1, 2, 3}};
+    for (int form = 0; form < 3; form++) {
+        char text[1024], *p = text;
+        for (int line = 0; line < 2; line++)
+            for (int k = 0; k < 64; k++) {
+                static const char *const names[] = {"x", "y", "z"};
+                const int axis = k >= 61 ? k - 61 : -1;
+                if (line == 0)
+                    p += sprintf(p, "%s%s", form == 1 && k == 0 ? "#" : "", axis >= 0 ? names[axis] : "c");
+                else
+                    p += sprintf(p, "%d", axis >= 0 ? axis + 1 : 9);
+                *p++ = k == 63 ? '\n' : form == 2 ? ',' : ' ';
+            }
+        expect(text, (size_t)(p - text), 1, one, 1);
+        assert_string_equal(warnings, "");
+    }
+    /* Each of the three may be the first, and its # belongs to the line. */
+    expect("#x y z\n1 2 3\n", 13, 1, one, 1);
+    expect("#z y x\n3 2 1\n", 13, 1, one, 1);
+    expect("#y z x\n2 3 1\n", 13, 1, one, 1);
+    expect("# z y x\n3 2 1\n", 14, 1, one, 1);
+    /* One name is no line of names, nor are two. */
+    expect("x\n1 2 3\n", 8, 1, one, 1);
+    expect("z x\n1 2 3\n", 10, 1, one, 1);
+    expect("y z\n1 2 3\n", 10, 1, one, 1);
+}
+
+/* One line that is no point may be a title. More are reported, with the first one's number. */
+static void test_lines_left_out(void **state)
+{
+    (void)state;
+    expect("title\n1.5 -2.25 3.125\n-0.5 8 0\n", 31, 2, TWO, 1);
+    assert_string_equal(warnings, "");
+    expect("1.5 -2.25 3.125\n\nwall\n-0.5 8 0\n1 2\n", 35, 2, TWO, 1);
+    assert_non_null(strstr(warnings, "2 lines are no points, and are left out; the first is line 3"));
+    struct cloud cloud;
+    struct sh_err err;
+    assert_int_equal(try("hello\nyou\n", 10, &cloud, &err), SH_EINPUT);
+    assert_null(strstr(err.text, "line 1")); /* no line is to blame */
+}
+
 static size_t put_header(char *to, const char *fields, unsigned n, const char *data)
 {
     return (size_t)sprintf(to,
@@ -295,6 +341,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_text),
+        cmocka_unit_test(test_many_columns),
+        cmocka_unit_test(test_lines_left_out),
         cmocka_unit_test(test_pcd_as_text_and_binary),
         cmocka_unit_test(test_pcd_compressed),
         cmocka_unit_test(test_pcd_runs),
