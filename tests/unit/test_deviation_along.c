@@ -74,9 +74,9 @@ static void footprints_beside_an_edge(void **state)
     (void)state;
     beam_init(&beam.beam, 0.02, 0.35e-3, 4e-9);
     const double radius_m = beam_radius(&beam.beam, 10.0);
-    for (int turn = 0; turn < 24; turn++)
+    for (int turn = 0; turn < 48; turn++)
         for (int clear = 0; clear < 2; clear++) {
-            const double c = cos(turn * M_PI / 12), s = sin(turn * M_PI / 12),
+            const double c = cos(turn * M_PI / 24), s = sin(turn * M_PI / 24),
                          off_m = radius_m * (clear ? 1.101 : 1.061);
             char text[512];
             snprintf(text, sizeof text, "v %.17g 10 %.17g\nv %.17g 10 %.17g\nv %.17g 10 %.17g\nf 1 2 3\n",
@@ -86,7 +86,7 @@ static void footprints_beside_an_edge(void **state)
             add(0, 10.001, 0);
             compare();
             follow();
-            if (isnan(out.along_m[0]) == clear) fail_msg("edge at %d: %g", 15 * turn, (double)out.along_m[0]);
+            if (isnan(out.along_m[0]) == clear) fail_msg("edge at %g: %g", 7.5 * turn, (double)out.along_m[0]);
             head[0].setup.beam = NULL; /* a ray by itself is not cut */
             follow();
             assert_true(fabs((double)out.along_m[0] - 0.001) < 1e-6);
@@ -201,6 +201,7 @@ static void stations_and_numbers(void **state)
     static const size_t n[] = {1, 2, 1024, 1025, 16384, 16385};
     open_scene(WALL);
     head[1].setup.station_m[0] = 4;
+    head[1].setup.station_m[1] = 1; /* nearer to the wall */
     site.n_stations = 2;
     cloud.station = station;
     for (size_t j = 0; j < sizeof n / sizeof n[0]; j++)
@@ -208,10 +209,10 @@ static void stations_and_numbers(void **state)
             cloud.n = 0;
             for (size_t i = 0; i < n[j]; i++) {
                 station[i] = (uint16_t)(together ? 1 + (i >= n[j] / 2) : 1 + i / 3 % 2);
-                const double x = head[station[i] - 1].setup.station_m[0], along = 1e-3 * (1 + (double)(i % 7));
-                /* on the beam to the wall 10 m ahead and 10 m aside, that much beyond */
-                const double share = 1 + along / (10 * M_SQRT2);
-                add(x + 10 * share, 10 * share, 0);
+                const double *at = head[station[i] - 1].setup.station_m, along = 1e-3 * (1 + (double)(i % 7));
+                /* on the beam to the wall as far ahead as aside, that much beyond */
+                const double far = 10 - at[1], share = 1 + along / (far * M_SQRT2);
+                add(at[0] + far * share, at[1] + far * share, 0);
             }
             compare();
             follow();
@@ -219,35 +220,54 @@ static void stations_and_numbers(void **state)
                 const double want_m = 1e-3 * (1 + (double)(i % 7));
                 if (!(fabs((double)out.along_m[i] - want_m) < 1e-7)) fail_msg("point %zu of %zu", i, n[j]);
                 assert_true(fabs((double)out.cosine[i] - M_SQRT1_2) < 1e-6);
-                assert_true(fabs((double)out.range_m[i] - 10 * M_SQRT2 - want_m) < 1e-5);
+                assert_true(fabs((double)out.range_m[i] - (station[i] == 1 ? 10 : 9) * M_SQRT2 - want_m) < 1e-5);
             }
         }
     close_scene();
 }
 
-/* Another wall is 30 um behind. With a noise of 4 um, 8 sigma are 32 um, and a ball of that radius would reach it. With
- * one of 2 um the ball would be 16 um, and surfaces nearer to each other than 20 um can't be told apart. */
+/* A small wall is 30 um behind. With a noise of 4 um, 8 sigma are 32 um, and a ball of that radius would reach it. With
+ * one of 2 um the ball would be 16 um, and surfaces nearer to each other than 20 um can't be told apart. Elsewhere
+ * nothing is near. */
 static void surfaces_that_are_near(void **state)
 {
     (void)state;
     static const struct {
         double sigma_m;
         int is_judged;
-    } row[] = {{4e-6, 0}, {2e-6, 1}, {0, 1}};
+    } row[] = {{4e-6, 0}, {3e-6, 0}, {2e-6, 1}, {0, 1}};
     char text[512];
-    snprintf(text, sizeof text, "%sv -50 10.00003 -50\nv 50 10.00003 -50\nv 50 10.00003 50\nf 5 6 7\n", WALL);
+    snprintf(text, sizeof text, "%sv 8 10.00003 -12\nv 12 10.00003 -12\nv 12 10.00003 -8\nf 5 6 7\n", WALL);
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
         open_scene(text);
         head[0].setup.noise_on = 1;
         head[0].setup.range_sigma_m = row[i].sigma_m;
-        add(10, 10, -10);
+        add(11, 10, -11);
+        add(-11, 10, -11);
         compare();
         follow();
-        assert_true(!isnan(out.along_m[0]));
+        assert_true(!isnan(out.along_m[0]) && !isnan(out.sigma_m[1]) && !isnan(out.counts_m[1]));
         assert_int_equal(isnan(out.sigma_m[0]), !row[i].is_judged);
         assert_int_equal(isnan(out.counts_m[0]), !row[i].is_judged);
         close_scene();
     }
+}
+
+/* The search for a beam's hit reaches far enough also near the head. */
+static void points_near_the_head(void **state)
+{
+    (void)state;
+    static const double far_m[] = {0.9, 0.3, 0.01};
+    open_scene("v -50 0.3 -50\nv 50 0.3 -50\nv 50 0.3 50\nf 1 2 3\n");
+    for (int i = 0; i < 3; i++) {
+        cloud.n = 0; /* each by itself: the farthest of a batch sets the reach */
+        add(0.01, far_m[i], -0.01);
+        compare();
+        follow();
+        const double range_m = sqrt(far_m[i] * far_m[i] + 2e-4), want_m = range_m * (1 - 0.3 / far_m[i]);
+        assert_true(fabs((double)out.along_m[0] - want_m) < 1e-7); /* a float of 0.6 m steps by 6e-8 */
+    }
+    close_scene();
 }
 
 static int stop(void *ctx)
@@ -322,7 +342,8 @@ int main(void)
         cmocka_unit_test(what_the_beam_meets),        cmocka_unit_test(distances_that_fit),
         cmocka_unit_test(points_without_a_deviation), cmocka_unit_test(stations_and_numbers),
         cmocka_unit_test(surfaces_that_are_near),     cmocka_unit_test(a_stop_is_heard),
-        cmocka_unit_test(sigma_by_the_signal),        cmocka_unit_test(sigma_straight_up),
+        cmocka_unit_test(points_near_the_head),       cmocka_unit_test(sigma_by_the_signal),
+        cmocka_unit_test(sigma_straight_up),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
