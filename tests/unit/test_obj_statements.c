@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Statements of OBJ that other tests don't have: several meshes with faces before their vertices, lines that go on, how
  * many numbers a statement may have, and the lines that errors name. */
+#include <sys/stat.h>
+
 #include "core/studio/picture.h"
 #include "tests/unit/scene_files.h"
 
@@ -38,6 +40,14 @@ static void faces_before_their_vertices(void **state)
         unlink(file[i]);
 }
 
+static void write_image(const char *name)
+{
+    struct picture picture;
+    assert_int_equal(picture_make(&picture, 2, 2, (const uint8_t[3]){1, 2, 3}, &err), SH_OK);
+    assert_int_equal(picture_write_png(&picture, "test", path_in(name), &err), SH_OK);
+    picture_free(&picture);
+}
+
 static void numbers_of_texture_coordinates(void **state)
 {
     (void)state;
@@ -48,11 +58,8 @@ static void numbers_of_texture_coordinates(void **state)
     } row[] = {{"vt 0.5", 0, 1}, {"vt 0.5 0.25", 0.25f, 1}, {"vt 0.5 0.25 7", 0.25f, 1}, {"vt 0.5 0.25 7 8", 0, 0},
                {"vt", 0, 0},     {"vt 0.5 x", 0, 0}};
     char image[160], library[160];
-    struct picture picture;
-    assert_int_equal(picture_make(&picture, 2, 2, (const uint8_t[3]){1, 2, 3}, &err), SH_OK);
+    write_image("a.png");
     snprintf(image, sizeof image, "%s", path_in("a.png"));
-    assert_int_equal(picture_write_png(&picture, "test", image, &err), SH_OK);
-    picture_free(&picture);
     snprintf(library, sizeof library, "%s", write_text("a.mtl", "newmtl a\nmap_Kd a.png\n"));
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
         char text[128];
@@ -90,6 +97,61 @@ static void lines_that_go_on(void **state)
     assert_true(s->n_vertices == 3 && s->n_triangles == 1);
     assert_null(strstr(warnings, "unknown statement"));
     scene_free(s);
+}
+
+#define FACE(material) "usemtl " material "\nf 1/1 2/1 3/1\n"
+
+/* An image may lie beside the library that names it, in a folder of its own. Names of libraries may be in quotes, with
+ * blanks, and several in a line. A comment after a material's name, as some programs write it, is not a part of it. */
+static void libraries_and_their_images(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "mtllib \"sub/a b.mtl\" c.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\n" FACE("red   # as paint") FACE("blue")
+            FACE("green");
+    assert_int_equal(mkdir(path_in("sub"), 0700), 0);
+    write_image("sub/a.png");
+    write_text("sub/a b.mtl", "newmtl red\nKd 1 0 0.5\nmap_Kd a.png\nnewmtl green\nKd 0 1 0\n");
+    write_text("c.mtl", "newmtl blue\nKd 0.25\nd 0.75\n");
+    struct scene *s = load_textured("a.obj", text);
+    if (n_warnings > 0) fail_msg("%s", warnings);
+    assert_int_equal(s->n_surfaces, 3);
+    static const float want[3][4] = {{1, 0, 0.5f, 0}, {0.25f, 0.25f, 0.25f, 0.25f}, {0, 1, 0, 0}};
+    for (int i = 0; i < 3; i++) {
+        assert_memory_equal(s->surface[i].colour, want[i], sizeof s->surface[i].colour);
+        assert_true(s->surface[i].has_colour && s->surface[i].clear == want[i][3]);
+        assert_int_equal(s->surface[i].texture, i == 0);
+    }
+    assert_non_null(strstr(s->texture[0].file, "sub/a.png"));
+    scene_free(s);
+    static const char *const made[] = {"sub/a.png", "sub/a b.mtl", "c.mtl"};
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(unlink(path_in(made[i])), 0);
+    assert_int_equal(rmdir(path_in("sub")), 0);
+}
+
+/* Each file of a scene has its own libraries: a material of the same name may look otherwise. */
+static void libraries_of_two_files(void **state)
+{
+    (void)state;
+    static const char *const name[4] = {"a.obj", "b.obj", "a.mtl", "b.mtl"};
+    static const char *const text[4] = {"mtllib a.mtl\no a\nv 0 0 0\nv 1 0 0\nv 1 1 0\n" FACE("paint"),
+                                        "mtllib b.mtl\no b\nv 0 0 0\nv 1 0 0\nv 1 1 0\n" FACE("paint") FACE("glass"),
+                                        "newmtl paint\nKd 1 0 0\nd 0.5\n",
+                                        "newmtl paint\nKd 0 1 0\nd 0.25\nnewmtl glass\nTr 0.875\nnewmtl paint\nd 1\n"};
+    char file[4][160];
+    struct scene *s;
+    for (int i = 0; i < 4; i++)
+        snprintf(file[i], sizeof file[i], "%s", write_text(name[i], text[i]));
+    const struct scene_mesh_spec spec[2] = {{.file = file[0], .scale = 1}, {.file = file[1], .scale = 1}};
+    if (scene_load(spec, 2, 1e-3, NULL, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(s->n_surfaces, 3);
+    assert_true(s->surface[0].colour[0] == 1 && s->surface[0].clear == 0.5f);
+    assert_true(s->surface[1].colour[1] == 1 && s->surface[1].clear == 0.75f); /* the first definition counts */
+    assert_true(!s->surface[2].has_colour && s->surface[2].clear == 0.875f);
+    scene_free(s);
+    for (int i = 0; i < 4; i++)
+        unlink(file[i]);
 }
 
 /* The first unknown statement is named with its line; each counts. */
@@ -146,6 +208,8 @@ int main(void)
         cmocka_unit_test(lines_that_go_on),
         cmocka_unit_test(unknown_statements),
         cmocka_unit_test(lines_of_errors),
+        cmocka_unit_test(libraries_and_their_images),
+        cmocka_unit_test(libraries_of_two_files),
         cmocka_unit_test(corners_of_a_polygon),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
