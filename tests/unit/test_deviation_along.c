@@ -125,8 +125,8 @@ static void what_the_beam_meets(void **state)
     beam_init(&beam.beam, 0.02, 0.35e-3, 4e-9);
     head[0].setup.beam = &beam;
     out.met = met;
-    add(0.005, 10.001, 0); /* beside the diagonal x = z, with rays on both of its sides */
-    add(0, 10.001, 0.005);
+    add(0.0005, 10.001, 0); /* beside the diagonal x = z, with rays on both of its sides */
+    add(0, 10.001, 0.0005);
     add(3, 9.999, -7);
     compare();
     follow();
