@@ -70,6 +70,25 @@ static void cells_grow_until_they_hold_sixteen(void **state)
     scene_free(scene);
 }
 
+/* Of few points the cell is doubled as long as it stays within 50 m. */
+static void cells_of_few_points(void **state)
+{
+    (void)state;
+    static const double row[][2] = {{0.1, 25.6}, {12.5, 50}, {25, 50}, {25.1, 25.1}, {60, 60}}; /* first, last */
+    struct scene *scene = load_text("floor.obj", "v 0 0 0\nv 200 0 0\nv 200 200 0\nv 0 200 0\nf 1 2 3 4\n");
+    for (int i = 0; i < 4; i++)
+        add(30 + 110 * (i % 2), 20 + 110 * (double)(i / 2), 0, 0, 5);
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        const struct figures_on_scene in = {&compared, scene, range_m};
+        struct figures_density d;
+        struct figures_density_row all;
+        assert_int_equal(figures_density_fit(&in, row[i][0], NULL, &d, &all, &err), SH_OK);
+        assert_true(d.cell_m == row[i][1] && all.cells == 4 && all.points == 4);
+        figures_density_free(&d);
+    }
+    scene_free(scene);
+}
+
 /* Three squares of 4 m face x, y and z. Their corner is at 10.5, 20.25, 30.75 m, and cells begin there. Each one's cells
  * have a metre's square, or 1.25 of it where the square is tilted by 3 to 4. */
 static void cells_begin_at_the_scene_s_corner(void **state)
@@ -231,6 +250,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(cells_grow_until_they_hold_sixteen, begin),
+        cmocka_unit_test_setup(cells_of_few_points, begin),
         cmocka_unit_test_setup(cells_begin_at_the_scene_s_corner, begin),
         cmocka_unit_test_setup(planes_have_their_own_cells, begin),
         cmocka_unit_test_setup(cells_are_not_too_many, begin),
