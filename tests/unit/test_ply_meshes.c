@@ -2,6 +2,7 @@
 /* Meshes from .ply as text: strips, vertices that are not finite, faces of few corners. */
 #include <math.h>
 
+#include "core/studio/picture.h"
 #include "tests/unit/scene_files.h"
 
 #define VERTICES(n) \
@@ -85,13 +86,55 @@ static void indices_at_their_bounds(void **state)
     }
 }
 
+static void write_image(const char *name)
+{
+    struct picture picture;
+    struct sh_err err;
+    assert_int_equal(picture_make(&picture, 2, 2, (const uint8_t[3]){1, 2, 3}, &err), SH_OK);
+    assert_int_equal(picture_write_png(&picture, "test", path_in(name), &err), SH_OK);
+    picture_free(&picture);
+}
+
+/* Programs have several names for texture coordinates, and for colours. A comment names the image. */
+static void names_of_texture_coordinates(void **state)
+{
+    (void)state;
+    static const char *const names[4][2] = {{"s", "t"}, {"u", "v"}, {"texture_u", "texture_v"}, {"up", "v2"}};
+    struct sh_err err;
+    write_image("a b.png");
+    for (int i = 0; i < 4; i++) {
+        char text[1024];
+        struct scene *s;
+        snprintf(text, sizeof text,
+                 "ply\nformat ascii 1.0\ncomment TextureFile\ncomment TextureFile a b.png\nelement vertex 3\n"
+                 "property double x\nproperty double y\nproperty double z\nproperty float %s\nproperty float %s\n"
+                 "property uchar %sred\nproperty uchar %sgreen\nproperty uchar %sblue\n" FACES(
+                     "1") "0 0 0 0.5 0.25 1 2 3\n"
+                          "1 0 0 0.75 1 4 5 6\n0 1 0 0 0.125 7 8 9\n3 0 1 2\n",
+                 names[i][0], names[i][1], i % 2 ? "diffuse_" : "", i % 2 ? "diffuse_" : "", i % 2 ? "diffuse_" : "");
+        const struct scene_mesh_spec spec = {.file = write_text("a.ply", text), .scale = 1, .textures = 1};
+        if (load_spec(&spec, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+        unlink(path);
+        static const float uv[3][2] = {{0.5f, 0.25f}, {0.75f, 1}, {0, 0.125f}};
+        for (int k = 0; k < 3; k++) {
+            assert_true(s->rgb != NULL && s->rgb[0][k][0] == 3 * k + 1 && s->rgb[0][k][2] == 3 * k + 3);
+            if (i < 3) assert_memory_equal(s->uv[0][k], uv[k], sizeof uv[k]);
+        }
+        if (i < 3) {
+            assert_int_equal(s->n_textures, 1);
+            assert_non_null(strstr(s->texture[0].file, "a b.png"));
+        }
+        scene_free(s);
+    }
+    unlink(path_in("a b.png"));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(strips_are_triangles),
-        cmocka_unit_test(vertices_that_are_not_finite),
-        cmocka_unit_test(faces_of_few_corners),
-        cmocka_unit_test(indices_at_their_bounds),
+        cmocka_unit_test(strips_are_triangles),         cmocka_unit_test(vertices_that_are_not_finite),
+        cmocka_unit_test(faces_of_few_corners),         cmocka_unit_test(indices_at_their_bounds),
+        cmocka_unit_test(names_of_texture_coordinates),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
