@@ -85,6 +85,29 @@ static void no_file_stays_alone(void **state)
     free(many_uv);
 }
 
+static int stop_now(void *ctx)
+{
+    (void)ctx;
+    return 1;
+}
+
+/* A stop among the vertices is one of the whole file, though the few faces after them would be written. */
+static void a_stop_among_vertices(void **state)
+{
+    (void)state;
+    enum { MANY = 70000 };
+    double(*many)[3] = calloc(MANY, sizeof *many);
+    const struct sh_report report = {.stop = stop_now};
+    assert_non_null(many);
+    const struct mesh mesh = {.n_vertices = MANY, .n_faces = 2, .xyz_m = (const double(*)[3])many, .face = rig_face};
+    static const char *const name[] = {"a.obj", "a.ply"};
+    for (int i = 0; i < 2; i++) {
+        assert_int_equal(mesh_write(path_in(name[i]), &mesh, &report, &rig_err), SH_ESTOPPED);
+        assert_int_equal(access(path_in(name[i]), F_OK), -1);
+    }
+    free(many);
+}
+
 /* ---- glTF */
 
 static const json_t *item(const json_t *root, const char *list, size_t i)
@@ -244,9 +267,8 @@ static void fbx_axes_and_time(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(images_are_beside_the_mesh),
-        cmocka_unit_test(no_file_stays_alone),
-        cmocka_unit_test(gltf_as_json),
+        cmocka_unit_test(images_are_beside_the_mesh), cmocka_unit_test(no_file_stays_alone),
+        cmocka_unit_test(a_stop_among_vertices),      cmocka_unit_test(gltf_as_json),
         cmocka_unit_test(fbx_axes_and_time),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
