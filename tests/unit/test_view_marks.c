@@ -34,22 +34,26 @@ static const uint8_t *at(const struct picture *p, long column, long row)
 /* Whether a text stands at x, with its foot in the 40 rows from `top` on, in one of the two styles of views. */
 static int has_text(const struct picture *p, const char *text, enum picture_anchor anchor, double x, long top)
 {
+    enum { FOOT = 20, ROWS = 30 }; /* it is drawn once in a strip, and looked for with its foot in each row */
     static const struct picture_type types[2] = {{11.5, 1, 2.5}, {10.5, 0, 2.5}};
     static const uint8_t ink[3] = {40, 44, 52};
-    for (long y = top; y < top + 40 && y < (long)p->height; y++)
-        for (int k = 0; k < 2; k++) {
-            struct picture one = blank(p->height);
+    int found = 0;
+    for (int k = 0; k < 2; k++) {
+        struct picture one = blank(ROWS);
+        picture_text(&one, (const double[2]){x, FOOT}, anchor, &types[k], ink, text);
+        for (long y = top; y < top + 40 && !found; y++) {
             int n = 0, same = 1;
-            picture_text(&one, (const double[2]){x, (double)y}, anchor, &types[k], ink, text);
-            for (size_t i = 0; i < (size_t)WIDTH * p->height && same; i++)
-                if (one.rgb[3 * i] < 128) { /* the strokes, without their soft borders */
-                    n++;
-                    same = memcmp(one.rgb + 3 * i, p->rgb + 3 * i, 3) == 0;
-                }
-            picture_free(&one);
-            if (same && n > 0) return 1;
+            for (long i = 0; i < WIDTH * ROWS && same; i++) {
+                const long row = y - FOOT + i / WIDTH;
+                if (one.rgb[3 * i] >= 128) continue; /* the strokes alone, without their soft borders */
+                n++;
+                same = row >= 0 && row < (long)p->height && memcmp(one.rgb + 3 * i, at(p, i % WIDTH, row), 3) == 0;
+            }
+            found = same && n > 0;
         }
-    return 0;
+        picture_free(&one);
+    }
+    return found;
 }
 
 /* Blue grows with the value from 0 to 20. Red and green are of no other thing. */
