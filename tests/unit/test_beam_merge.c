@@ -51,6 +51,33 @@ static void test_surface_of_many_returns(void **state)
     }
 }
 
+/* Returns of one surface have different texels. The echo has the colour of the strongest one, also where the nearest is
+ * another. With two surfaces it is the first return of the one that returns most, or else the strongest of all. */
+static void test_colour_of_the_strongest(void **state)
+{
+    (void)state;
+    struct beam_merging by_return = how;
+    uint64_t left_out = 0;
+    by_return.by_surface = 0;
+    for (int surfaces = 1; surfaces <= 2; surfaces++)
+        for (uint32_t strongest = 0; strongest < 4; strongest++) {
+            struct beam_return r[4];
+            for (uint32_t i = 0; i < 4; i++)
+                r[i] = (struct beam_return){.range_m = 20.0 + 0.1 * i,
+                                            .energy = i == strongest ? 0.3 : 0.2,
+                                            .label = surfaces == 2 && i != strongest,
+                                            .colour = 100 + i};
+            merge(r, 4);
+            assert_int_equal(n_echoes, 1);
+            const uint32_t first_other = strongest == 0; /* three weak returns of one surface are 0.6 */
+            assert_int_equal(echo[0].colour, surfaces == 1 ? 100 + strongest : 100 + first_other);
+            assert_int_equal(echo[0].label, surfaces == 2);
+            assert_int_equal(beam_merge(&by_return, r, 4, echo, &left_out), 1);
+            assert_int_equal(echo[0].colour, 100 + strongest);
+            assert_int_equal(echo[0].label, 0);
+        }
+}
+
 /* A gap above the resolution begins a new echo, and less than 1 % is none. Returns that are each within the resolution
  * of the next stay together, however far the first is from the last. */
 static void test_gaps(void **state)
@@ -263,6 +290,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_surface_of_many_returns),
+        cmocka_unit_test(test_colour_of_the_strongest),
         cmocka_unit_test(test_gaps),
         cmocka_unit_test(test_two_caps),
         cmocka_unit_test(test_crowd),

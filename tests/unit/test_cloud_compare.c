@@ -101,6 +101,31 @@ static void threads_change_nothing(void **state)
     free(triangle);
 }
 
+/* Each point is compared, also where one more begins another part of the work. */
+static void the_last_point_counts(void **state)
+{
+    (void)state;
+    enum { MOST = 2 * 4096 + 1 };
+    static double xyz[MOST][3], distance_m[MOST];
+    static uint32_t triangle[MOST];
+    struct scene *s = make_plate();
+    struct distance *d = make_index(s);
+    const struct cloud_site site = {.index = d, .n_stations = 1, .max_m = 10, .threads = 1};
+    for (size_t n = 4095; n <= MOST; n += n == 4097 ? 4096 - 2 : 1) {
+        for (size_t i = 0; i < n; i++) {
+            xyz[i][0] = xyz[i][1] = 1.0;
+            xyz[i][2] = 0.25;
+            distance_m[i] = -1.0;
+        }
+        const struct cloud c = {.n = n, .xyz_m = xyz, .epsg = CLOUD_EPSG_UNKNOWN};
+        assert_int_equal(cloud_compare(&c, &site, NULL, distance_m, triangle, NULL), SH_OK);
+        for (size_t i = 0; i < n; i++)
+            assert_true(distance_m[i] == 0.25);
+    }
+    distance_free(d);
+    scene_free(s);
+}
+
 static const struct georef *make_georef(enum georef_crs crs, int station)
 {
     /* The stations are half a degree apart, though two metres apart in the scene: a mixed-up station is kilometres
@@ -146,6 +171,21 @@ static void check_crs(enum georef_crs crs, int epsg)
     const double tolerance_m = 1.2e-8;
     for (int i = 0; i < 4; i++)
         assert_true(fabs(distance_m[i] - p_prcs[i][2]) < tolerance_m);
+    /* Moved into the scene, once for all, they are where they were, and need no georefs. */
+    double moved[4][3];
+    memcpy(moved, xyz, sizeof xyz);
+    struct cloud within = {.n = 4, .xyz_m = moved, .station = station, .epsg = epsg};
+    struct cloud_site there = site;
+    assert_int_equal(cloud_into_scene(&within, &there, NULL, &err), SH_OK);
+    assert_true(within.epsg == 0 && there.georef == NULL);
+    for (int i = 0; i < 4; i++)
+        for (int k = 0; k < 3; k++)
+            assert_true(fabs(moved[i][k] - p_prcs[i][k]) < tolerance_m);
+    assert_int_equal(cloud_compare(&within, &there, NULL, distance_m, triangle, &err), SH_OK);
+    within.epsg = epsg + 1;
+    there = site;
+    assert_int_equal(cloud_into_scene(&within, &there, NULL, &err), SH_EINPUT);
+    assert_true(within.epsg == epsg + 1 && there.georef != NULL);
     c.epsg = epsg + 1;
     assert_int_equal(cloud_compare(&c, &site, NULL, distance_m, triangle, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "EPSG"));
@@ -153,6 +193,9 @@ static void check_crs(enum georef_crs crs, int epsg)
     site.n_stations = 1;
     assert_int_equal(cloud_compare(&c, &site, NULL, distance_m, triangle, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "point 2 is of station 2; there are 1"));
+    station[0] = 3;
+    assert_int_equal(cloud_compare(&c, &site, NULL, distance_m, triangle, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "point 1 is of station 3; there are 1"));
     for (int i = 0; i < 2; i++)
         georef_free((struct georef *)(uintptr_t)georef[i]);
     bvh_free(bvh);
@@ -172,8 +215,8 @@ static void coverage_is_counted(void **state)
 {
     (void)state;
     struct scene *s = make_plate();
-    uint16_t label[4] = {1, CLOUD_LABEL_NONE, 1, 2};
-    const uint32_t triangle[4] = {1, CLOUD_TRIANGLE_NONE, 1, CLOUD_TRIANGLE_NONE};
+    uint16_t label[5] = {1, CLOUD_LABEL_NONE, 1, 2, 0};
+    const uint32_t triangle[5] = {1, CLOUD_TRIANGLE_NONE, 1, CLOUD_TRIANGLE_NONE, 0};
     struct cloud c = {.n = 4, .label = label};
     struct cloud_coverage cover;
     struct sh_err err;
@@ -186,6 +229,12 @@ static void coverage_is_counted(void **state)
     assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_OK);
     assert_int_equal(cover.surfaces_hit, 1);
     c.label = label;
+    c.n = 1; /* the first point by itself, and the last of five with its own */
+    assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_OK);
+    assert_true(cover.surfaces_hit == 1 && cover.triangles_hit == 1);
+    c.n = 5;
+    assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_OK);
+    assert_true(cover.surfaces_hit == 3 && cover.triangles_hit == 2);
     label[2] = 3;
     assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "point 3 has label 3; the scene has 3 surfaces"));
@@ -286,10 +335,11 @@ static void sums_do_not_drift(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(offsets_from_a_plate),          cmocka_unit_test(threads_change_nothing),
-        cmocka_unit_test(points_go_back_to_the_scene),   cmocka_unit_test(coverage_is_counted),
-        cmocka_unit_test(statistics_of_whole_numbers),   cmocka_unit_test(statistics_of_little),
-        cmocka_unit_test(percentiles_are_nearest_ranks), cmocka_unit_test(sums_do_not_drift),
+        cmocka_unit_test(the_last_point_counts),  cmocka_unit_test(offsets_from_a_plate),
+        cmocka_unit_test(threads_change_nothing), cmocka_unit_test(points_go_back_to_the_scene),
+        cmocka_unit_test(coverage_is_counted),    cmocka_unit_test(statistics_of_whole_numbers),
+        cmocka_unit_test(statistics_of_little),   cmocka_unit_test(percentiles_are_nearest_ranks),
+        cmocka_unit_test(sums_do_not_drift),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
  * the library's page "The PCD file format", and for LZF the format of liblzf: both are packed here by hand. */
 #include <math.h>
 
+#include "core/bytes.h"
 #include "core/studio/cloud.h"
 #include "tests/unit/scene_files.h"
 
@@ -72,6 +73,52 @@ static void test_text(void **state)
     assert_non_null(strstr(err.text, "PTX is not read"));
 }
 
+/* The third column of 64 is read, and the last one; a line of names may have 64, too. The names begin with a # or don't,
+ * and a column may be called #. */
+static void test_many_columns(void **state)
+{
+    (void)state;
+    static const double one[1][3] = {{1, 2, 3}};
+    for (int form = 0; form < 3; form++) {
+        char text[1024], *p = text;
+        for (int line = 0; line < 2; line++)
+            for (int k = 0; k < 64; k++) {
+                static const char *const names[] = {"x", "y", "z"};
+                const int axis = k >= 61 ? k - 61 : -1;
+                if (line == 0)
+                    p += sprintf(p, "%s%s", form == 1 && k == 0 ? "#" : "", axis >= 0 ? names[axis] : "c");
+                else
+                    p += sprintf(p, "%d", axis >= 0 ? axis + 1 : 9);
+                *p++ = k == 63 ? '\n' : form == 2 ? ',' : ' ';
+            }
+        expect(text, (size_t)(p - text), 1, one, 1);
+        assert_string_equal(warnings, "");
+    }
+    /* Each of the three may be the first, and its # belongs to the line. */
+    expect("#x y z\n1 2 3\n", 13, 1, one, 1);
+    expect("#z y x\n3 2 1\n", 13, 1, one, 1);
+    expect("#y z x\n2 3 1\n", 13, 1, one, 1);
+    expect("# z y x\n3 2 1\n", 14, 1, one, 1);
+    /* One name is no line of names, nor are two. */
+    expect("x\n1 2 3\n", 8, 1, one, 1);
+    expect("z x\n1 2 3\n", 10, 1, one, 1);
+    expect("y z\n1 2 3\n", 10, 1, one, 1);
+}
+
+/* One line that is no point may be a title. More are reported, with the first one's number. */
+static void test_lines_left_out(void **state)
+{
+    (void)state;
+    expect("title\n1.5 -2.25 3.125\n-0.5 8 0\n", 31, 2, TWO, 1);
+    assert_string_equal(warnings, "");
+    expect("1.5 -2.25 3.125\n\nwall\n-0.5 8 0\n1 2\n", 35, 2, TWO, 1);
+    assert_non_null(strstr(warnings, "2 lines are no points, and are left out; the first is line 3"));
+    struct cloud cloud;
+    struct sh_err err;
+    assert_int_equal(try("hello\nyou\n", 10, &cloud, &err), SH_EINPUT);
+    assert_null(strstr(err.text, "line 1")); /* no line is to blame */
+}
+
 static size_t put_header(char *to, const char *fields, unsigned n, const char *data)
 {
     return (size_t)sprintf(to,
@@ -133,6 +180,114 @@ static void test_pcd_compressed(void **state)
     expect_error(text, len + sizeof back, "damaged");
 }
 
+/* The longest run of literals has 32 bytes, and a control of 32 is the shortest copy, of three. Here three points have
+ * 36 bytes: 32 literals, one more, and the three before the last. Copies begin up to 8192 bytes back. */
+static void test_pcd_runs(void **state)
+{
+    (void)state;
+    static float value[9] = {1, 2, 3, 4, 5, 6, 7, 8, 0}; /* x x x y y y z z z */
+    char text[512], big[20000];
+    uint8_t bytes[36], packed[64] = {0};
+    memset(bytes, 0, sizeof bytes);
+    memcpy(bytes, value, sizeof value);
+    bytes[32] = 0x40;
+    size_t n = 8, len = put_header(text, XYZ, 3, "binary_compressed");
+    packed[n++] = 31;
+    memcpy(packed + n, bytes, 32);
+    n += 32;
+    packed[n++] = 0; /* one literal */
+    packed[n++] = 0x40;
+    packed[n++] = 32; /* three bytes, from 4 back: the last three of the 32 */
+    packed[n++] = 3 - 1;
+    le_put32(packed, (uint32_t)n - 8);
+    le_put32(packed + 4, 36);
+    memcpy(bytes + 33, bytes + 30, 3);
+    memcpy(text + len, packed, n);
+    float last;
+    memcpy(&last, bytes + 32, 4);
+    const double three[3][3] = {{1, 4, 7}, {2, 5, 8}, {3, 6, (double)last}};
+    expect(text, len + n, 3, three, 0);
+    /* 700 points of zeros: one literal, then copies of 264 bytes, the longest, from one byte back. */
+    len = put_header(big, XYZ, 700, "binary_compressed");
+    n = len + 8;
+    big[n++] = 0;
+    big[n++] = 0;
+    for (int left = 8400 - 1; left > 0; left -= 264) {
+        const int run = left < 264 ? left : 264; /* 8399 is 31 times 264, and 215 */
+        big[n++] = (char)0xe0;
+        big[n++] = (char)(run - 9);
+        big[n++] = 0;
+    }
+    le_put32((uint8_t *)big + len, (uint32_t)(n - len - 8));
+    le_put32((uint8_t *)big + len + 4, 8400);
+    static const double zero[700][3];
+    expect(big, n, 700, zero, 0);
+}
+
+/* A position is three finite numbers, or NaN three times. Each point of each form is looked at. */
+static void test_pcd_that_is_no_position(void **state)
+{
+    (void)state;
+    char text[512];
+    for (int point = 0; point < 2; point++)
+        for (int k = 0; k < 3; k++)
+            for (int form = 0; form < 2; form++) {
+                size_t len = put_header(text, XYZ, 2, form ? "binary" : "ascii");
+                for (int i = 0; i < 6; i++) {
+                    const float v = i == 3 * point + k ? INFINITY : 1.0f;
+                    if (form)
+                        memcpy(text + len, &v, 4), len += 4;
+                    else
+                        len += (size_t)sprintf(text + len, "%g%c", (double)v, i % 3 == 2 ? '\n' : ' ');
+                }
+                expect_error(text, len, "is not a position");
+            }
+    /* Any one of the three axes may be missing. */
+    static const char *const two[] = {"FIELDS y z\n", "FIELDS x z\n", "FIELDS x y\n"};
+    for (int k = 0; k < 3; k++) {
+        char fields[96];
+        snprintf(fields, sizeof fields, "%sSIZE 4 4\nTYPE F F\nCOUNT 1 1\n", two[k]);
+        size_t len = put_header(text, fields, 1, "ascii");
+        len += (size_t)sprintf(text + len, "1 2\n");
+        expect_error(text, len, "no fields x, y and z");
+    }
+}
+
+/* Coordinates in single precision are rounded, by up to 6e-8 of the largest one, and that is said from 0.1 mm on. As
+ * text, or in double, they are as they stand. */
+static void test_pcd_precision(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *fields, *data;
+        int size, is_single;
+        float far;
+    } row[] = {{XYZ, "binary", 4, 1, -5000},
+               {XYZ, "binary", 4, 1, 1000},
+               {XYZ, "ascii", 0, 0, 5000},
+               {"FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\n", "binary", 8, 0, 5000}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        char text[512];
+        struct cloud cloud;
+        struct sh_err err;
+        size_t len = put_header(text, row[i].fields, 1, row[i].data);
+        for (int k = 0; k < 3; k++) {
+            const double v = k == 1 ? (double)row[i].far : 1;
+            if (row[i].size == 4)
+                memcpy(text + len, &(float){(float)v}, 4);
+            else if (row[i].size == 8)
+                memcpy(text + len, &v, 8);
+            len += (size_t)(row[i].size > 0 ? row[i].size : sprintf(text + len, "%g ", v));
+        }
+        assert_int_equal(try(text, len, &cloud, &err), SH_OK);
+        assert_int_equal(cloud.is_single, row[i].is_single);
+        assert_int_equal(strstr(warnings, "stored in single precision, with errors up to 0.0003 m") != NULL, i == 0);
+        /* two units in the last place of a float, of which one is at most 2^-23 of the number */
+        if (row[i].is_single) assert_true(fabs(cloud.count_m - 1.2e-7 * fabs((double)row[i].far)) < 1e-12);
+        cloud_free(&cloud);
+    }
+}
+
 /* Without POINTS the sides of the grid count. What follows the points is left out with a word, but blank lines. */
 static void test_pcd_counts(void **state)
 {
@@ -186,8 +341,13 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_text),
+        cmocka_unit_test(test_many_columns),
+        cmocka_unit_test(test_lines_left_out),
         cmocka_unit_test(test_pcd_as_text_and_binary),
         cmocka_unit_test(test_pcd_compressed),
+        cmocka_unit_test(test_pcd_runs),
+        cmocka_unit_test(test_pcd_that_is_no_position),
+        cmocka_unit_test(test_pcd_precision),
         cmocka_unit_test(test_pcd_counts),
         cmocka_unit_test(test_pcd_that_is_wrong),
     };

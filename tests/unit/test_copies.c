@@ -262,6 +262,33 @@ static void names_say_which_copy(void **state)
     scene_free(scene);
 }
 
+/* What was left out of a mesh that has copies is counted once, and added to the others' counts. Each copy counts as a
+ * mesh. Its error grows with its scale. */
+static void counts_of_copied_meshes(void **state)
+{
+    (void)state;
+    static const char part[] = "a_name_that_is_longer_than_it_may_be_"; /* eight times */
+    static const char rest[] = "\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2 2\nl 1 2\nl 2 3\n";
+    char text[1024], file[2][128], *p = text;
+    struct scene *s;
+    struct sh_err err;
+    struct scene_place place[3] = {{.scale = 1}, {.at_m = {5, 0, 0}, .scale = 2}, {.at_m = {9, 0, 0}, .scale = 0.5}};
+    p = stpcpy(p, "o ");
+    for (int i = 0; i < 8; i++)
+        p = stpcpy(p, part);
+    stpcpy(p, rest);
+    for (int i = 0; i < 2; i++)
+        snprintf(file[i], sizeof file[i], "%s", write_text(i == 0 ? "tree.obj" : "ground.obj", text));
+    const struct scene_mesh_spec spec[2] = {
+        {.file = file[0], .scale = 1, .places = {.place = place, .n = 3, .says = "p"}}, {.file = file[1], .scale = 1}};
+    if (scene_load(spec, 2, 1e-3, NULL, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_true(s->counts.zero_area == 2 && s->counts.not_triangles == 4 && s->counts.names_cut == 2);
+    assert_true(s->n_meshes == 4 && s->n_copies == 3 && s->n_copied == 1 && s->n_all == 4 && s->n_surfaces == 2);
+    scene_free(s);
+    for (int i = 0; i < 2; i++)
+        unlink(file[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -271,6 +298,7 @@ int main(void)
         cmocka_unit_test(a_copy_turns_clockwise),
         cmocka_unit_test(bounds_are_exact),
         cmocka_unit_test(names_say_which_copy),
+        cmocka_unit_test(counts_of_copied_meshes),
     };
     return cmocka_run_group_tests_name("copies", tests, make_folder, remove_folder);
 }

@@ -197,6 +197,106 @@ static void test_brute_force(void **state)
     cover_close(c);
 }
 
+/* The cell that a ray from the middle meets, and how far away. */
+static uint32_t cell_towards(const struct cover *c, const double from_m[3], const double dir[3], double *area_m2)
+{
+    struct search s = {from_m, dir, INFINITY, 0};
+    struct coverage_cell cell;
+    coverage_pieces(c->coverage, try_piece, &s);
+    coverage_get(c->coverage, s.cell, &cell);
+    *area_m2 = cell.area_m2;
+    return s.cell;
+}
+
+/* All directions but the last meet one wall, and the last one the opposite wall: each counts, whatever their number. The
+ * cells that are met have their bits, and no other. */
+static void test_every_direction(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-2, -2, -2}, hi[3] = {2, 2, 2}, at[1][3] = {{0.1, 0.2, 0.3}};
+    static const uint32_t n[] = {1, 2, 1024, 1025, 2048, 2049};
+    struct cover *c = cover_open(cover_box(lo, hi), 3.0, 1);
+    const uint32_t n_words = (coverage_cells(c->coverage) + 63) / 64;
+    _Atomic uint64_t *cells = calloc(n_words, sizeof *cells);
+    struct rays *rays = calloc(1, sizeof *rays);
+    static const double ahead[3] = {1, 0, 0}, back[3] = {-1, 0, 0};
+    assert_true(cells != NULL && rays != NULL);
+    for (size_t i = 0; i < sizeof n / sizeof n[0]; i++) {
+        double area_m2[2] = {0.0, 0.0};
+        uint32_t cell[2] = {0, cell_towards(c, at[0], back, &area_m2[1])};
+        cell[0] = n[i] > 1 ? cell_towards(c, at[0], ahead, &area_m2[0]) : cell[1];
+        for (uint32_t k = 0; k < n[i]; k++) {
+            memcpy(rays->dir[k], k + 1 < n[i] ? ahead : back, sizeof rays->dir[k]);
+            rays->sr[k] = INFINITY;
+        }
+        for (uint32_t k = 0; k < n_words; k++)
+            atomic_store(&cells[k], 0);
+        const struct coverage_directions d = {n[i], rays->dir, rays->sr, 0.0, 1000.0};
+        struct coverage_gain gain;
+        struct sh_err err;
+        assert_int_equal(coverage_gains(c->coverage, &d, &(struct coverage_places){1, at, cells}, NULL, &gain, &err),
+                         0);
+        assert_true(fabs(gain.gain_m2 - area_m2[0] - area_m2[1]) < 1e-9 && gain.front == 1.0);
+        for (uint32_t k = 0; k < coverage_cells(c->coverage); k++)
+            assert_int_equal(atomic_load(&cells[k / 64]) >> k % 64 & 1, k == cell[0] || k == cell[1]);
+    }
+    free(cells);
+    free(rays);
+    cover_close(c);
+}
+
+/* A ray stands for range^2 sr / cosine, and the cosine is at least 0.02. It counts within the range of the head, both
+ * ends included. From outside, walls are met from behind. */
+static void test_one_ray(void **state)
+{
+    (void)state;
+    static const double lo[3] = {-2, -2, -2}, hi[3] = {2, 2, 2};
+    static const struct {
+        double at[3], dir[3], min_m, max_m, gain_m2, front;
+    } row[] = {{{0, 0.1, 0.1}, {1, 0, 0}, 0, 1000, 4.0 * 0.5, 1},
+               {{0, 0.1, 0.1}, {0.8, 0.6, 0}, 0, 1000, 6.25 * 0.5 / 0.8, 1},
+               {{0, 0.1, 0.1}, {1, 0, 0}, 2, 1000, 4.0 * 0.5, 1},
+               {{0, 0.1, 0.1}, {1, 0, 0}, 2.001, 1000, 0, NAN},
+               {{0, 0.1, 0.1}, {1, 0, 0}, 0, 1.999, 0, NAN},
+               {{0, 0.1, 0.1}, {1, 0, 0}, 0, 2, 4.0 * 0.5, 1},
+               {{-4, 0.1, 0.1}, {1, 0, 0}, 0, 1000, 4.0 * 0.5, 0},
+               {{-4, 0.1, 0.1}, {-1, 0, 0}, 0, 1000, 0, NAN},
+               {{1.99, 0.1, 0.1}, {0.01, 0.99994999874993751, 0}, 0, 1000, 1.0 * 0.5 / 0.02, 1}};
+    struct cover *c = cover_open(cover_box(lo, hi), 0.3, 1);
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        const double sr[1] = {0.5}; /* more than a cell, so that the ray's area counts */
+        const struct coverage_directions d = {1, &row[i].dir, sr, row[i].min_m, row[i].max_m};
+        struct coverage_gain gain;
+        struct sh_err err;
+        assert_int_equal(
+            coverage_gains(c->coverage, &d, &(struct coverage_places){1, &row[i].at, NULL}, NULL, &gain, &err), 0);
+        if (fabs(gain.gain_m2 - row[i].gain_m2) > 1e-6 * row[i].gain_m2) fail_msg("%zu: %g m2", i, gain.gain_m2);
+        assert_true(isnan(row[i].front) ? isnan(gain.front) : gain.front == row[i].front);
+    }
+    cover_close(c);
+}
+
+/* The six sides of a box are of one surface, and in one cube. Each is a cell of its own, since it faces elsewhere. */
+static void test_sides_are_cells(void **state)
+{
+    (void)state;
+    static const double vertex[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
+                                        {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+    static const uint32_t face[12][3] = {{0, 2, 6}, {0, 6, 4}, {1, 5, 7}, {1, 7, 3}, {0, 4, 5}, {0, 5, 1},
+                                         {2, 3, 7}, {2, 7, 6}, {0, 1, 3}, {0, 3, 2}, {4, 6, 7}, {4, 7, 5}};
+    struct scene *scene;
+    struct sh_err err;
+    assert_int_equal(scene_from_arrays(&(struct scene_arrays){vertex, 8, face, 12, NULL, NULL, 0}, &scene, &err), 0);
+    struct cover *c = cover_open(scene, 10.0, 1);
+    assert_int_equal(coverage_cells(c->coverage), 6);
+    for (uint32_t i = 0; i < 6; i++) {
+        struct coverage_cell cell;
+        coverage_get(c->coverage, i, &cell);
+        assert_true(fabs(cell.area_m2 - 1.0) < 1e-6);
+    }
+    cover_close(c);
+}
+
 /* Cells are much smaller than a ray. The gain is the sum of the rays' areas, and that is the area. Lines of rays end
  * within a ray's width of the edges, 12 edges of a box; by chance half of that, in either direction. */
 static void test_coarse_rays(void **state)
@@ -259,11 +359,12 @@ static void test_the_other_leg(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_places),      cmocka_unit_test(test_no_floors),     cmocka_unit_test(test_too_many),
+        cmocka_unit_test(test_places),          cmocka_unit_test(test_no_floors),       cmocka_unit_test(test_too_many),
 #ifndef SH_SANITIZE /* millions of polygons, and of pulses */
-        cmocka_unit_test(test_brute_force), cmocka_unit_test(test_the_other_leg),
+        cmocka_unit_test(test_brute_force),     cmocka_unit_test(test_the_other_leg),
 #endif
-        cmocka_unit_test(test_coarse_rays),
+        cmocka_unit_test(test_coarse_rays),     cmocka_unit_test(test_every_direction), cmocka_unit_test(test_one_ray),
+        cmocka_unit_test(test_sides_are_cells),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

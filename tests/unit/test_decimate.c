@@ -132,6 +132,29 @@ static void plane_has_counts_by_hand(void **state)
     free_sheet(&s);
 }
 
+/* 100 triangles, each of three corners in a row and as far apart as no cell is wide, and one that is there twice: the
+ * number that was asked for is reached exactly. The first of the two stays as it was. */
+static void as_many_as_allowed(void **state)
+{
+    (void)state;
+    static double v[300][3];
+    static uint32_t face[101][3];
+    for (uint32_t i = 0; i < 101; i++)
+        for (uint32_t k = 0; k < 3; k++) {
+            face[i][k] = i < 100 ? 3 * i + k : 2 - k;
+            if (i < 100)
+                memcpy(v[3 * i + k], (const double[3]){10.0 * i + 2.0 * k, k == 1 ? 0.001 : 0, 0}, sizeof v[0]);
+        }
+    const struct decimate_mesh mesh = {(const double(*)[3])v, 300, (const uint32_t(*)[3])face, 101};
+    struct decimated m;
+    struct sh_err err;
+    assert_int_equal(decimate(&mesh, 100, NULL, &m, &err), SH_OK);
+    assert_true(m.n_triangles == 100 && m.n_vertices == 300 && m.cell_m > 0 && m.cell_m < 2);
+    assert_memory_equal(m.vertex_m, v, sizeof v);
+    assert_memory_equal(m.triangle, face, 100 * sizeof *face);
+    decimated_free(&m);
+}
+
 /* A rough sheet far from the origin, as in UTM: no more triangles than asked for, not far fewer, bounds within half a
  * cell along each axis, all heights within the bounds. */
 static void limit_holds(void **state)
@@ -219,9 +242,8 @@ static void refuses(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cube_stays),  cmocka_unit_test(plane_has_counts_by_hand),
-        cmocka_unit_test(limit_holds), cmocka_unit_test(doubles_become_one),
-        cmocka_unit_test(refuses),
+        cmocka_unit_test(cube_stays),  cmocka_unit_test(plane_has_counts_by_hand), cmocka_unit_test(as_many_as_allowed),
+        cmocka_unit_test(limit_holds), cmocka_unit_test(doubles_become_one),       cmocka_unit_test(refuses),
     };
     return cmocka_run_group_tests_name("decimate", tests, NULL, NULL);
 }

@@ -88,6 +88,97 @@ static void what_follows_is_broken(void **state)
     unlink(path);
 }
 
+/* Adds an image of 5 x 4 cells to a file. */
+static void append(const char *file, uint32_t kind)
+{
+    float row[5] = {0};
+    TIFF *tif = TIFFOpen(file, "a");
+    assert_non_null(tif);
+    TIFFSetField(tif, TIFFTAG_SUBFILETYPE, kind);
+    TIFFSetField(tif, TIFFTAG_IMAGEWIDTH, 5);
+    TIFFSetField(tif, TIFFTAG_IMAGELENGTH, 4);
+    TIFFSetField(tif, TIFFTAG_BITSPERSAMPLE, 32);
+    TIFFSetField(tif, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
+    TIFFSetField(tif, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    for (uint32_t y = 0; y < 4; y++)
+        assert_int_equal(TIFFWriteScanline(tif, row, y, 0), 1);
+    TIFFClose(tif);
+}
+
+/* Other images are counted, but smaller copies of the first are not. */
+static void other_images_are_counted(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t kind[3];
+        int n;
+        const char *warning; /* NULL: none */
+    } row[] = {{{FILETYPE_REDUCEDIMAGE, FILETYPE_REDUCEDIMAGE}, 2, NULL},
+               {{0}, 1, "only its first image is read; there is 1 more"},
+               {{0, FILETYPE_REDUCEDIMAGE, FILETYPE_PAGE}, 3, "only its first image is read; there are 2 more"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        const struct tif t = tif_of(5, 4, heights);
+        struct scene *s;
+        struct sh_err err;
+        tif_write(tif_path("more.tif"), &t);
+        for (int k = 0; k < row[i].n; k++)
+            append(path, row[i].kind[k]);
+        const struct scene_mesh_spec spec = {.file = path, .scale = 1};
+        if (load_spec(&spec, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+        assert_int_equal(n_warnings, row[i].warning != NULL);
+        if (row[i].warning != NULL && strstr(warnings, row[i].warning) == NULL) fail_msg("%s", warnings);
+        assert_true(s->max_m[2] == 100.0);
+        scene_free(s);
+        unlink(path);
+    }
+}
+
+/* The packed cells of the first strip or tile are no LZW. The message says which one it is. */
+static void the_broken_block_is_named(void **state)
+{
+    (void)state;
+    for (uint32_t tile = 0; tile <= 16; tile += 16) {
+        static uint8_t data[8192];
+        struct tif t = tif_of(5, 4, heights);
+        t.compression = COMPRESSION_LZW;
+        t.tile = tile;
+        tif_write(tif_path("whole.tif"), &t);
+        FILE *f = fopen(path, "rb");
+        assert_non_null(f);
+        const size_t n = fread(data, 1, sizeof data, f);
+        fclose(f);
+        unlink(path);
+        memset(data + 8, 0xff, 12);
+        refuse("block.tif", data, n,
+               tile ? "the tile of cells at column 0, row 0 can't be read: "
+                    : "the strip of cells at column 0, row 0 can't be read: ");
+    }
+}
+
+/* Up to 9000 m and down to -11500 m heights may be of the Earth. -9999 is what many files have where there are none. */
+static void heights_at_their_bounds(void **state)
+{
+    (void)state;
+    static const struct {
+        double odd;
+        int is_odd;
+    } row[] = {{9000, 0}, {9001, 1}, {-11500, 0}, {-11501, 1}, {-9999, 1}, {-9998, 0}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        double value[20];
+        struct scene *s;
+        struct sh_err err;
+        memcpy(value, heights, sizeof value);
+        value[7] = row[i].odd;
+        const struct tif t = tif_of(5, 4, value);
+        tif_write(tif_path("odd.tif"), &t);
+        const struct scene_mesh_spec spec = {.file = path, .scale = 1};
+        if (load_spec(&spec, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+        if (n_warnings != row[i].is_odd) fail_msg("%g m: %s", row[i].odd, warnings);
+        scene_free(s);
+        unlink(path);
+    }
+}
+
 /* A raster that is too large is refused by its figures, before its cells are read. */
 static void too_many_triangles(void **state)
 {
@@ -115,9 +206,9 @@ static void too_many_triangles(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cut_off_anywhere),
-        cmocka_unit_test(broken_bytes),
-        cmocka_unit_test(what_follows_is_broken),
+        cmocka_unit_test(cut_off_anywhere),          cmocka_unit_test(broken_bytes),
+        cmocka_unit_test(what_follows_is_broken),    cmocka_unit_test(other_images_are_counted),
+        cmocka_unit_test(the_broken_block_is_named), cmocka_unit_test(heights_at_their_bounds),
         cmocka_unit_test(too_many_triangles),
     };
     return cmocka_run_group_tests_name("geotiff_broken", tests, make_folder, remove_folder);

@@ -125,6 +125,34 @@ static void one_reader_may_fail(void **state)
     }
 }
 
+/* A product's object is its type, name and GlobalId, in up to 255 bytes. "IFCBUILDINGELEMENTPROXY_" and
+ * "_guid_of_product__00000" take 47, so the name has 208. A longer one is cut between two letters, here of two bytes each, and is counted. */
+static void long_names_are_cut_between_letters(void **state)
+{
+    (void)state;
+    enum { LETTERS = 104 };
+    needs_node();
+    make_stubs(ONE END, ONE END);
+    for (int more = 0; more < 2; more++) {
+        char name[2048] = "", want[SCENE_NAME_LEN + 1] = "IFCBUILDINGELEMENTPROXY_";
+        struct ifc_shape wall = ifc_shapes[0];
+        strcat(name, more ? "a" : "");
+        strcat(want, more ? "a" : "");
+        for (int i = 0; i < LETTERS; i++) {
+            strcat(name, "\\X2\\00FC\\X0\\");
+            if (!more || i < LETTERS - 1) strcat(want, "\xc3\xbc");
+        }
+        strcat(want, "_guid_of_product__00000");
+        wall.name = name;
+        ifc_write_text(text, "IFC4", NULL, NULL, &wall, 1, NULL);
+        must_read(1e-3);
+        assert_string_equal(scene->surface[0].object, want);
+        assert_int_equal(scene->counts.names_cut, more);
+        assert_int_equal(strstr(warnings, "cut") != NULL, more);
+        scene_free(scene);
+    }
+}
+
 /* Both readers assume metres. */
 static void missing_unit_is_said(void **state)
 {
@@ -214,7 +242,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_reader_may_fail),         cmocka_unit_test(missing_unit_is_said),
         cmocka_unit_test(facets_of_ifc_lite_are_said), cmocka_unit_test(reader_that_hangs_is_ended),
-        cmocka_unit_test(without_node_assimp_reads),
+        cmocka_unit_test(without_node_assimp_reads),   cmocka_unit_test(long_names_are_cut_between_letters),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_all);
 }

@@ -176,6 +176,26 @@ static void unpacked_texels_have_the_same_picture(void **state)
     check_source(&source, 0, 3);
 }
 
+/* A JPEG that lacks its quantisation tables has tables of zeros: each coefficient is 0, so the image is even grey. */
+static void a_jpeg_without_tables_is_grey(void **state)
+{
+    (void)state;
+    uint8_t bytes[sizeof JPEG];
+    struct texture_image image;
+    struct sh_err err;
+    memcpy(bytes, JPEG, sizeof JPEG);
+    for (int i = 0; i < 2; i++) {
+        uint8_t *table = memmem(bytes, sizeof JPEG, "\xff\xdb", 2);
+        assert_non_null(table);
+        table[1] = 0xfe; /* a comment */
+    }
+    const struct texture_source source = {.file = "within", .bytes = bytes, .n_bytes = sizeof bytes};
+    if (texture_read(&source, &image, &err) != SH_OK) fail_msg("%s", err.text);
+    for (int i = 0; i < 4 * TEXELS; i++)
+        assert_int_equal(image.rgba[i], i % 4 == 3 ? 255 : 128);
+    texture_image_free(&image);
+}
+
 /* Many programs write zeros in the fourth channel. */
 static void a_channel_of_zeros_is_no_alpha(void **state)
 {
@@ -391,6 +411,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(each_format_has_the_same_picture),
                                        cmocka_unit_test(unpacked_texels_have_the_same_picture),
+                                       cmocka_unit_test(a_jpeg_without_tables_is_grey),
                                        cmocka_unit_test(a_channel_of_zeros_is_no_alpha),
                                        cmocka_unit_test(wrap_modes_by_hand),
                                        cmocka_unit_test(what_makes_a_hole),

@@ -106,6 +106,46 @@ static void test_walls(void **state)
     }
 }
 
+/* A name stays in the image, wherever its station is near the border. Columns and rows are tried one by one. */
+static void test_borders(void **state)
+{
+    (void)state;
+    enum { SIDE = 480, NEAR = 130 };
+    const struct map_spec spec = {{0, 0}, {SIDE, SIDE}, 1};
+    for (int k = 0; k < 4 * NEAR; k++) {
+        const double from = k / 4 + 0.5, near = k % 2 ? SIDE - from : from;
+        struct map *map = NULL;
+        struct map_label label;
+        struct map_layout at;
+        struct sh_err err;
+        assert_int_equal(map_create(&spec, &map, &err), SH_OK);
+        add(map, k & 2 ? near : 100, k & 2 ? 100 : near, NAN, "north-east", "z 12.25 m");
+        map_get_layout(map, &at);
+        assert_int_equal(map_place_labels(map, &label), 0);
+        assert_true(label.left >= 2 && label.top >= 2 && label.right <= at.width - 2);
+        assert_true(label.bottom <= at.top + at.map_height); /* below the map is the scale */
+        map_free(map);
+    }
+}
+
+/* The first place is to the right. There the tick of a station that looks east would be covered, so its name is to the
+ * left. Without a tick, or with one that looks elsewhere, it stays to the right. */
+static void test_ticks(void **state)
+{
+    (void)state;
+    static const double heading_deg[] = {0, 90, 180, 270, (double)NAN};
+    for (int i = 0; i < 5; i++) {
+        struct map *map = make(60);
+        struct map_label label;
+        struct map_layout at;
+        add(map, 30, 30, heading_deg[i] * M_PI / 180, "gate", "");
+        map_get_layout(map, &at);
+        assert_int_equal(map_place_labels(map, &label), 0);
+        assert_int_equal(label.left > at.left + 300, i != 1);
+        map_free(map);
+    }
+}
+
 /* ---- SVG */
 
 struct element {
@@ -325,10 +365,8 @@ static void test_font(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_labels),
-        cmocka_unit_test(test_walls),
-        cmocka_unit_test(test_svg),
-        cmocka_unit_test(test_font),
+        cmocka_unit_test(test_labels), cmocka_unit_test(test_walls), cmocka_unit_test(test_borders),
+        cmocka_unit_test(test_ticks),  cmocka_unit_test(test_svg),   cmocka_unit_test(test_font),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

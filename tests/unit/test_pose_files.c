@@ -205,6 +205,79 @@ static void test_waypoints(void **state)
     }
 }
 
+/* Each column is needed, whichever the others are. Without a column of frames the samples are counted from 0. */
+static void test_columns_and_frames(void **state)
+{
+    (void)state;
+    static const char *const angles[5] = {"t_s", "x_m", "y_m", "z_m", "heading_deg"}, *const quats[8] = {
+                                                                                          "t_s", "x_m", "y_m", "z_m",
+                                                                                          "qw",  "qx",  "qy",  "qz"};
+    struct sh_err err;
+    struct trajectory *tr;
+    for (int form = 0; form < 2; form++) {
+        const int n = form ? 8 : 5;
+        for (int without = 0; without <= n; without++) {
+            char text[256] = "pitch_deg", *p = text + (form ? 0 : strlen(text));
+            for (int k = 0; k < n; k++)
+                if (k != without) p += sprintf(p, "%s%s", p == text ? "" : ",", (form ? quats : angles)[k]);
+            strcpy(p, "\n");
+            write_file(text);
+            assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
+            assert_int_equal(strstr(err.text, "columns must be") != NULL, without < n);
+        }
+    }
+    write_file("t_s,x_m,y_m,z_m,heading_deg\n0,0,0,0,0\n1,1,0,0,0\n2,3,0,0,0\n4,5,0,0,0\n");
+    if (trajectory_read_csv(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    static const double t_s[4] = {0, 1, 2, 4};
+    for (int i = 0; i < 4; i++) {
+        struct pose pose;
+        double frame;
+        trajectory_at(tr, t_s[i], &pose, &frame);
+        assert_true(fabs(frame - i) < 1e-12);
+    }
+    trajectory_free(tr);
+}
+
+/* Limits are allowed themselves. A pause of less than a second is one, too. */
+static void test_speeds_and_pauses(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *speed, *pause;
+        double last_s; /* NaN: refused */
+        const char *says;
+    } row[] = {{"0.001", "0", 10000.0, NULL},
+               {"0.00099", "0", NAN, "speed_m_s 0.00099; allowed 0.001 to 1000"},
+               {"1000", "0", 0.01, NULL},
+               {"1000.1", "0", NAN, "speed_m_s 1000.1; allowed 0.001 to 1000"},
+               {"2", "0.5", 5.5, NULL},
+               {"2", "0.0001", 5.0001, NULL},
+               {"2", "0.00009", NAN, "pause_s 9e-05; allowed 0, or 0.0001 to 86400"},
+               {"2", "86400", 86405.0, NULL},
+               {"2", "86401", NAN, "pause_s 86401; allowed 0, or 0.0001 to 86400"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        char text[160];
+        struct sh_err err;
+        struct trajectory *tr;
+        snprintf(text, sizeof text, "x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,%s,%s\n10,0,0,1,0\n", row[i].speed,
+                 row[i].pause);
+        write_file(text);
+        const int rc = trajectory_read_waypoints(path, NULL, NULL, &tr, &err);
+        assert_int_equal(rc, isnan(row[i].last_s) ? SH_EINPUT : SH_OK);
+        if (rc != SH_OK) {
+            if (strstr(err.text, row[i].says) == NULL) fail_msg("%s", err.text);
+            continue;
+        }
+        double first_s, last_s, frame;
+        struct pose pose;
+        trajectory_span(tr, &first_s, &last_s);
+        assert_true(fabs(last_s - row[i].last_s) < 1e-9 * row[i].last_s);
+        trajectory_at(tr, 0.9 * strtod(row[i].pause, NULL), &pose, &frame); /* it stands */
+        assert_true(fabs(pose.position_m[0]) < 1e-12 && frame < 1e-12);
+        trajectory_free(tr);
+    }
+}
+
 /* 10 m at 1 mm/s give as many samples as their length needs. More than there is room for are an error, and so is a time
  * beyond the nanosecond counter. */
 static void test_slow_waypoints(void **state)
@@ -307,6 +380,8 @@ int main(void)
         cmocka_unit_test(test_csv_upright),
         cmocka_unit_test(test_csv_lengths),
         cmocka_unit_test(test_waypoints),
+        cmocka_unit_test(test_columns_and_frames),
+        cmocka_unit_test(test_speeds_and_pauses),
         cmocka_unit_test(test_slow_waypoints),
         cmocka_unit_test(test_level_waypoints),
         cmocka_unit_test(test_messages_are_lines),

@@ -114,6 +114,27 @@ static void two_columns_do_not_close(void **state)
     assert_int_equal(t.faces.n_faces, 4 * 2);
 }
 
+/* Rows 0, 1, 2 go round the head. One of two columns lacks the last row: there is a cell of four points, and two more of
+ * three, one of them across the turn's end. */
+static void turns_close_beside_a_gap(void **state)
+{
+    (void)state;
+    for (uint32_t short_one = 0; short_one < 2; short_one++) {
+        begin();
+        t.grid.rows_per_turn = 3;
+        for (uint32_t column = 0; column < 2; column++) {
+            add_column(column, 0);
+            for (uint32_t row = 0; row < (column == short_one ? 2u : 3u); row++)
+                add_point(row, cos(2 * PI * row / 3), column, sin(2 * PI * row / 3));
+        }
+        make(0);
+        const struct edges edges = edges_of();
+        assert_int_equal(t.faces.n_faces, 4);
+        assert_edges_as_counted(&edges);
+        assert_faces_the_head();
+    }
+}
+
 /* Points are at random places of the grid. The counted edges are those of the faces, whatever is missing. There are no
  * faces without a direction: only by chance would a point lie in the plane of two others and the head. */
 static void edges_of_a_ragged_grid(void **state)
@@ -143,7 +164,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sphere_in_a_box_is_closed), cmocka_unit_test(the_sphere_has_the_boxs_volume),
         cmocka_unit_test(a_full_turn_closes),          cmocka_unit_test(two_columns_do_not_close),
-        cmocka_unit_test(edges_of_a_ragged_grid),
+        cmocka_unit_test(edges_of_a_ragged_grid),      cmocka_unit_test(turns_close_beside_a_gap),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

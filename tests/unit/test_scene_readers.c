@@ -327,6 +327,23 @@ static void stl_may_be_large(void **state)
     free(data);
 }
 
+/* A facet of two points or fewer is left out and counted. One of four makes two triangles. Errors name the line of the
+ * vertex. */
+static void test_stl_facets(void **state)
+{
+    (void)state;
+    struct scene *s = load_text("a.stl", "solid a\nfacet normal 0 0 1\nouter loop\nendloop\nendfacet\n"
+                                         "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n"
+                                         "endfacet\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                                         "vertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n");
+    assert_true(s->n_triangles == 2 && s->counts.not_triangles == 2 && s->counts.zero_area == 0);
+    assert_true(fabs(total_area(s) - 1.0) < 1e-12);
+    scene_free(s);
+    static const char far[] = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\nvertex 1 2e9 0\n"
+                              "endloop\nendfacet\nendsolid a\n";
+    refuse("a.stl", far, sizeof far - 1, "a.stl, line 7: ");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -341,6 +358,7 @@ int main(void)
         cmocka_unit_test(ply_is_read_exactly),
         cmocka_unit_test(ply_in_float_warns),
         cmocka_unit_test(stl_words_stand_in_any_lines),
+        cmocka_unit_test(test_stl_facets),
         cmocka_unit_test(stl_may_be_large),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -184,6 +184,25 @@ static void a_tail_is_no_echo(void **state)
     wave_close(&w);
 }
 
+/* Strong echoes have a tail above the level that is more than 4 widths of the pulse long, within a window of 80 ns. A
+ * fit knows it as a part of the pulse. */
+static void a_long_tail_is_no_echo(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.shape = WAVEFORM_ASYMMETRIC;
+    spec.skew = 2.5;
+    spec.sample_s = 0.5e-9;
+    spec.after_s = 80e-9;
+    wave_open(&w, &spec);
+    for (uint64_t p = 0; p < 200; p++) {
+        const struct waveform_return r = {30.0 + 1e-3 * (double)p, 200.0, 0.0, WAVEFORM_POINT};
+        assert_int_equal(wave_shoot(&w, WAVEFORM_GAUSSIANS, p, &r, 1), 1);
+    }
+    wave_close(&w);
+}
+
 /* Half of the pulses see a target at the level; twice the level is 8 sigma above it, half of it 4 below. A fit has less
  * noise than a sample; a sample near the top is up to 3 % lower. */
 static void the_level_decides(void **state)
@@ -420,6 +439,7 @@ int main(void)
         cmocka_unit_test(the_weakest_are_left_out),
         cmocka_unit_test(noise_is_no_echo),
         cmocka_unit_test(a_tail_is_no_echo),
+        cmocka_unit_test(a_long_tail_is_no_echo),
         cmocka_unit_test(the_level_decides),
         cmocka_unit_test(two_surfaces_are_two_echoes),
         cmocka_unit_test(three_surfaces_are_three_echoes),

@@ -140,7 +140,7 @@ int ifc_bodies_read(struct ifc_bodies *b, int fd, struct sh_err *err)
     if (b->n > 0) qsort(b->body, b->n, sizeof *b->body, ifc_compare);
     for (size_t i = 0; i < b->n; i++) {
         if (i > 0 && b->body[i].id == b->body[i - 1].id) return wrong(&r, "a product twice");
-        ifc_figures(&b->part[b->body[i].first], b->body[i].n_parts, &b->body[i].figures);
+        if (b->body[i].n_parts > 0) ifc_figures(&b->part[b->body[i].first], b->body[i].n_parts, &b->body[i].figures);
     }
     return SH_OK;
 }

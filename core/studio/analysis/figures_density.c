@@ -164,7 +164,7 @@ int figures_density_fit(const struct figures_on_scene *in, double first_m, const
         const int rc = figures_density_of(in, cell_m, report, out, err);
         if (rc != SH_OK) return rc;
         figures_density_within(out, 0, 0.0, (double)INFINITY, all);
-        if (!(all->p50 * out->cell_m * out->cell_m < CELL_POINTS) || cell_m > MOST_CELL_M) return SH_OK;
+        if (!(all->p50 * out->cell_m * out->cell_m < CELL_POINTS) || 2.0 * cell_m > MOST_CELL_M) return SH_OK;
         figures_density_free(out);
     }
 }

@@ -7,12 +7,11 @@ double figures_nice(double v)
 {
     static const double step[] = {1.0, 2.0, 5.0, 10.0};
     const double power = floor(log10(v));
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0;; i++) {
         /* No double is exactly 10^-k, so this divides by 10^k. pow is good to a unit or two in the last place. */
         const double nice = power < 0.0 ? step[i] / pow(10.0, -power) : step[i] * pow(10.0, power);
-        if (nice >= v * (1.0 - 1e-12)) return nice;
+        if (i == 3 || nice >= v * (1.0 - 1e-12)) return nice;
     }
-    return 10.0 * pow(10.0, power);
 }
 
 /* Counts values by size, in eight classes an octave from 2^-60 m to 2^60 m: enough to choose an axis. */

@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: MIT */
+/* Materials of glTF 2.0 and their defaults: colours, transparency, holes, and how images repeat. */
+#include <math.h>
+
+#include "core/studio/picture.h"
+#include "tests/unit/gltf_files.h"
+
+/* A quad with a material; `material` is what stands in its braces. */
+static struct scene *load_material(const char *material, const char *more)
+{
+    char rest[4096];
+    snprintf(rest, sizeof rest,
+             "\"nodes\":[{\"mesh\":0}],\"materials\":[{%s}],\"meshes\":[" GLTF_QUAD_MESH
+             "],%s\"accessors\":[" GLTF_QUAD_ACCESSORS "]",
+             material, more);
+    struct scene *s = gltf_load(rest);
+    assert_int_equal(s->n_surfaces, 1);
+    return s;
+}
+
+/* sRGB of a linear share (IEC 61966-2-1). */
+static double srgb(double v)
+{
+    return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055;
+}
+
+/* A factor that is not given is white and opaque. Alpha is transparency of blended materials alone. What is transmitted
+ * counts where it is more. */
+static void colours_and_transparency(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *material;
+        double rgb[3], clear;
+    } row[] = {
+        {"", {1, 1, 1}, 0},
+        {"\"pbrMetallicRoughness\":{}", {1, 1, 1}, 0},
+        {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.25,0.5,0.75,0.125]}", {0.25, 0.5, 0.75}, 0},
+        {"\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[0,0.001,1,0.25]}", {0, 0.001, 1}, 0},
+        {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,0,0.5,0.25]}", {1, 0, 0.5}, 0.75},
+        {"\"alphaMode\":\"BLEND\"", {1, 1, 1}, 0},
+        {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,0.5,0.25]},\"extensions\":{"
+         "\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}",
+         {1, 1, 0.5},
+         0.75},
+        {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.5,1,1,0.75]},\"extensions\":{"
+         "\"KHR_materials_transmission\":{\"transmissionFactor\":0.875}}",
+         {0.5, 1, 1},
+         0.875},
+    };
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        gltf_quad();
+        struct scene *s = load_material(row[i].material, "");
+        assert_int_equal(s->surface[0].has_colour, 1);
+        for (int k = 0; k < 3; k++)
+            if (!(fabs((double)s->surface[0].colour[k] - srgb(row[i].rgb[k])) < 1e-6))
+                fail_msg("%zu: channel %d", i, k);
+        assert_true((double)s->surface[0].clear == row[i].clear && s->surface[0].texture == 0);
+        scene_free(s);
+    }
+}
+
+/* Masked materials have holes below alphaCutoff, by default 0.5, and blended ones below 0.5. Opaque ones have none, and
+ * that is the default. */
+static void opacities_of_holes(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *material;
+        float solid;
+    } row[] = {{"", 0},
+               {"\"alphaMode\":\"OPAQUE\",\"alphaCutoff\":0.25", 0},
+               {"\"alphaMode\":\"MASK\"", 0.5f},
+               {"\"alphaMode\":\"MASK\",\"alphaCutoff\":0.25", 0.25f},
+               {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1.5", 1},
+               {"\"alphaMode\":\"MASK\",\"alphaCutoff\":-1", 0.5f},
+               {"\"alphaMode\":\"MASK\",\"alphaCutoff\":\"0.25\"", 0.5f},
+               {"\"alphaMode\":\"BLEND\",\"alphaCutoff\":0.25", 0.5f}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        char *png = NULL, material[256];
+        size_t len = 0;
+        struct picture picture;
+        struct sh_err err;
+        FILE *out = open_memstream(&png, &len);
+        assert_int_equal(picture_make(&picture, 2, 2, (const uint8_t[3]){1, 2, 3}, &err), SH_OK);
+        assert_int_equal(picture_put_png(out, &picture, &err), SH_OK);
+        fclose(out);
+        picture_free(&picture);
+        gltf_quad();
+        gltf_block(png, len, "");
+        snprintf(material, sizeof material, "\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}%s%s",
+                 row[i].material[0] != '\0' ? "," : "", row[i].material);
+        struct scene *s = load_material(
+            material, "\"textures\":[{\"source\":0}],\"images\":[{\"bufferView\":3,\"mimeType\":\"image/png\"}],");
+        if (s->surface[0].solid != row[i].solid) fail_msg("%zu: %g", i, (double)s->surface[0].solid);
+        assert_int_equal(s->n_textures, 1);
+        assert_true(s->texture[0].n_bytes == len && memcmp(s->texture[0].bytes, png, len) == 0);
+        assert_non_null(strstr(s->texture[0].file, "a.glb*0")); /* named as its file, and by its number */
+        assert_true(s->texture[0].wrap[0] == TEXTURE_REPEAT && s->texture[0].wrap[1] == TEXTURE_REPEAT);
+        scene_free(s);
+        free(png);
+    }
+}
+
+/* Both directions repeat by themselves; without a number they repeat as they are. */
+static void images_repeat(void **state)
+{
+    (void)state;
+    static const int code[4] = {0, 10497, 33071, 33648};
+    static const enum texture_wrap wrap[4] = {TEXTURE_REPEAT, TEXTURE_REPEAT, TEXTURE_CLAMP, TEXTURE_MIRROR};
+    for (int i = 0; i < 16; i++) {
+        char more[512], s_code[32] = "\"name\":\"s\"", t_code[32] = "";
+        if (code[i / 4] > 0) snprintf(s_code, sizeof s_code, "\"wrapS\":%d", code[i / 4]);
+        if (code[i % 4] > 0) snprintf(t_code, sizeof t_code, ",\"wrapT\":%d", code[i % 4]);
+        snprintf(more, sizeof more,
+                 "\"textures\":[{\"source\":0,\"sampler\":1}],\"samplers\":[{\"wrapS\":33071,\"wrapT\":33648},{%s%s}],"
+                 "\"images\":[{\"uri\":\"a%%20b.png\"}],",
+                 s_code, t_code);
+        gltf_quad();
+        struct scene *s = load_material("\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}", more);
+        assert_true(s->texture[0].wrap[0] == wrap[i / 4] && s->texture[0].wrap[1] == wrap[i % 4]);
+        assert_non_null(strstr(s->texture[0].file, "a b.png"));
+        scene_free(s);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(colours_and_transparency),
+        cmocka_unit_test(opacities_of_holes),
+        cmocka_unit_test(images_repeat),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
