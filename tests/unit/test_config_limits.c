@@ -158,6 +158,16 @@ static void expect_limits(const struct cfg_key *key)
     if (key->min < 0 && key->min != -key->max) fail_msg("%s: %.17g is not the other side", key->path, key->min);
 }
 
+/* There is more than one value, and the usual one is among them. */
+static void expect_room(const struct cfg_key *key)
+{
+    char *end = NULL;
+    const double usual = key->def != NULL ? strtod(key->def, &end) : 0;
+    if (!(key->min < key->max)) fail_msg("%s: %.17g to %.17g", key->path, key->min, key->max);
+    if (end == NULL || end == key->def || *end != '\0') return; /* none, or no number */
+    if (usual < key->min || usual > key->max) fail_msg("%s: the usual %s is not allowed", key->path, key->def);
+}
+
 static void limits_come_from_somewhere(void **state)
 {
     (void)state;
@@ -165,7 +175,9 @@ static void limits_come_from_somewhere(void **state)
     for (int t = 0; t < 2; t++)
         for (size_t i = 0; i < tables[t]->n; i++) {
             const struct cfg_key *key = &tables[t]->keys[i];
-            if (is_number(key) || key->type == CFG_LIST) expect_limits(key);
+            if (!is_number(key) && key->type != CFG_LIST) continue;
+            expect_limits(key);
+            expect_room(key);
         }
 }
 
