@@ -6,6 +6,7 @@
 #include "tests/unit/output_rig.h"
 #include "tests/unit/plain_source.h"
 
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 
@@ -290,6 +291,64 @@ static void a_message_of_a_link_has_its_name(void **state)
     stats_run_close(&run);
 }
 
+/* ---- real time */
+
+static enum loop_source_tick until_it_ends(struct plain_source *self, uint64_t tick, int again, struct ring_tick *out)
+{
+    (void)tick, (void)again, (void)out;
+    return atomic_load(&self->ending) ? LOOP_SOURCE_OVER : LOOP_SOURCE_TICK;
+}
+
+/* The limit that the service's unit gives (config/packaging). */
+static int limit_of_unit(void)
+{
+    char line[256];
+    int limit = 0;
+    FILE *f = fopen("config/packaging/scanhead@.service.in", "r");
+    assert_non_null(f);
+    while (fgets(line, sizeof line, f) != NULL)
+        if (sscanf(line, "LimitRTPRIO=%d", &limit) == 1) break;
+    fclose(f);
+    assert_true(limit > 0);
+    return limit;
+}
+
+/* The pacing thread has the priority that the service's unit allows. Where the system does not allow it here, the warning
+ * has that number. */
+static void the_pacing_thread_has_the_allowed_priority(void **state)
+{
+    (void)state;
+    static const struct link_spec null_link = {.type = LINK_NULL};
+    const struct loop_options options = {.extra = &null_link, .report = &app_report_stderr};
+    struct plain_source source = {.next = until_it_ends};
+    const struct loop_source self = {&plain_source_ops, &source};
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct loop *loop;
+    struct loop_stats stats;
+    struct output output;
+    struct sched_param param;
+    struct sh_err err;
+    char want[64];
+    int policy;
+    need(loop_create_of(rig->cfg, &self, &options, &loop, &err), &err);
+    output_take(&output, stderr);
+    const int rc = loop_start(loop, &err);
+    char *said = output_give(&output);
+    need(rc, &err);
+    assert_int_equal(pthread_getschedparam(loop->pacer.thread, &policy, &param), 0);
+    loop_end(loop);
+    loop_join(loop, &stats);
+    loop_free(loop);
+    munlockall(); /* the loop locks its memory */
+    rig_close(rig);
+    snprintf(want, sizeof want, "raise RLIMIT_RTPRIO to %d\n", limit_of_unit());
+    if (policy == SCHED_FIFO)
+        assert_int_equal(param.sched_priority, limit_of_unit());
+    else
+        assert_non_null(strstr(said, want));
+    free(said);
+}
+
 /* ---- the link of --view */
 
 /* It takes as many clients as a web link of a configuration that does not give their number. */
@@ -342,6 +401,7 @@ int main(void)
         cmocka_unit_test(few_echoes_are_a_warning_below_a_twentieth),
         cmocka_unit_test(the_ready_line_has_the_endpoints),
         cmocka_unit_test(a_message_of_a_link_has_its_name),
+        cmocka_unit_test(the_pacing_thread_has_the_allowed_priority),
         cmocka_unit_test(view_adds_a_page_where_there_is_none),
         cmocka_unit_test(view_needs_a_place_among_the_links),
     };
