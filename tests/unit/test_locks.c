@@ -4,12 +4,12 @@
  * that it has none left at its end. */
 #include <dlfcn.h>
 
-#include "drivers/protocol/native_encode.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/replay/replay_state.h"
 #include "tests/unit/device_rig.h"
+#include "tests/unit/event_recording.h"
 
 static _Thread_local int n_taken, n_held;
 
@@ -149,25 +149,6 @@ static void the_faults_are_locked(void **state)
 
 static char recording_path[] = "/tmp/scanhead-locks-XXXXXX";
 
-static void write_recording(void)
-{
-    uint8_t frame[1024];
-    struct native_descriptor d = {.prr_uhz = UINT64_C(1000000000000), .range_scale_m = 1, .scan = 1};
-    const struct native_event event = {.code = NATIVE_EV_CONTROL, .a = 1};
-    d.mirror_counts_per_turn = d.pan_counts_per_turn = 1000;
-    FILE *f = fdopen(mkstemp(recording_path), "wb");
-    assert_non_null(f);
-    size_t len = native_encode_descriptor(frame, sizeof frame, &d, 0, 0);
-    native_finish_frame(frame, 0);
-    assert_int_equal(fwrite(frame, 1, len, f), len);
-    for (uint32_t ms = 0; ms < 20; ms++) {
-        len = native_encode_event(frame, sizeof frame, &event, (int64_t)ms * 1000000, 0);
-        native_finish_frame(frame, 1 + ms);
-        assert_int_equal(fwrite(frame, 1, len, f), len);
-    }
-    assert_int_equal(fclose(f), 0);
-}
-
 static void a_recording_is_locked(void **state)
 {
     (void)state;
@@ -181,7 +162,8 @@ static void a_recording_is_locked(void **state)
     int64_t hour_ns;
     assert_non_null(cfg);
     cfg->loop.tick_hz = 1000;
-    write_recording();
+    close(mkstemp(recording_path));
+    event_recording_write(recording_path, 20);
     const struct replay_options options = {.path = recording_path, .speed = 1, .start = 1};
     need(replay_open(cfg, &options, &r, &err), &err);
     TAKES(1, (replay_source.session_opened(r, 1, "who"), 0));

@@ -1,13 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The settings that a replay reports for its head follow from the recording. */
+/* The settings that a replay reports for its head follow from the recording, and so do its counts. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <math.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <cmocka.h>
 
 #include "drivers/protocol/native_encode.h"

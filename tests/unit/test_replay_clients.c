@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: MIT */
+/* The clients of a recording that is replayed come and go as those of a head, and it may wait for them. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/replay/replay_state.h"
+#include "tests/unit/event_recording.h"
+
+static void expect_next_error(struct replay *r, const char *start, const char *text)
+{
+    char error[256];
+    command_queue_pop(&r->cmd.queue, error, sizeof error);
+    if (strncmp(error, start, strlen(start)) != 0 || strstr(error, text) == NULL) fail_msg("%s, not %s", error, start);
+}
+
+/* A client goes: an error where it had control, or while the recording is played; half a line is one by itself. Its
+ * control is free then. */
+static void a_client_that_goes_is_an_error_where_it_is_missed(void **state)
+{
+    (void)state;
+    struct replay *r = calloc(1, sizeof *r);
+    assert_non_null(r);
+    pthread_mutex_init(&r->lock, NULL);
+    replay_session_opened(r, 1, "tcp a");
+    replay_session_opened(r, 2, "tcp b");
+    assert_int_equal(r->n_clients, 2);
+    r->cmd.control = 1;
+    replay_session_closed(r, 2, "tcp b", 0);
+    expect_next_error(r, "0,", "");
+    replay_session_closed(r, 2, "tcp b", 1);
+    expect_next_error(r, "105,", "session 2, tcp b");
+    expect_next_error(r, "0,", "");
+    assert_int_equal(r->cmd.control, 1);
+    replay_session_closed(r, 1, "tcp a", 1);
+    expect_next_error(r, "105,", "session 1, tcp a");
+    expect_next_error(r, "101,", "session 1, tcp a");
+    expect_next_error(r, "0,", "");
+    assert_int_equal(r->cmd.control, 0);
+    r->playing = 1;
+    replay_session_closed(r, 3, "tcp c", 0);
+    expect_next_error(r, "101,", "session 3, tcp c");
+    replay_session_over(r);
+    assert_int_equal(r->n_clients, 1);
+    struct command_result result;
+    char longest[64];
+    snprintf(longest, sizeof longest, "session 4, longest line %d bytes", COMMAND_MAX_LINE);
+    replay_overlong(r, 4, &result);
+    assert_int_equal(result.error, CMD_E_OVERRUN);
+    expect_next_error(r, "-363,", longest);
+    replay_report(r, CMD_E_REFUSED, "why");
+    expect_next_error(r, "104,", "why");
+    pthread_mutex_destroy(&r->lock);
+    free(r);
+}
+
+static char path[] = "/tmp/scanhead-clients-XXXXXX";
+
+static int make_file(void **state)
+{
+    (void)state;
+    const int fd = mkstemp(path);
+    if (fd >= 0) close(fd);
+    return fd < 0;
+}
+
+static int remove_file(void **state)
+{
+    (void)state;
+    return unlink(path);
+}
+
+/* Returns how many events the tick has. */
+static int events_of(struct replay *r, uint64_t number)
+{
+    struct ring_tick tick;
+    int n = 0;
+    assert_int_equal(replay_source.next(r, number, 0, 0, &tick), LOOP_SOURCE_TICK);
+    for (uint32_t at = 0; at < tick.len; at += (uint32_t)native_frame_len(tick.bytes + at))
+        n += tick.bytes[at + 1] == NATIVE_EVENT;
+    return n;
+}
+
+/* With two clients wanted it begins when the second one is there, and not when one of two has gone. A link that opens a
+ * session for itself is no client. */
+static void it_waits_for_its_clients(void **state)
+{
+    (void)state;
+    struct config *cfg = calloc(1, sizeof *cfg);
+    struct replay *r;
+    struct ring_tick tick;
+    struct sh_err err;
+    assert_non_null(cfg);
+    event_recording_write(path, 3);
+    cfg->loop.tick_hz = 1000;
+    cfg->n_links = 2;
+    cfg->link[0].type = LINK_NULL;
+    cfg->link[1].type = LINK_TCP;
+    const struct replay_options options = {.path = path, .speed = 1, .start = 1, .clients = 2};
+    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    replay_source.session_opened(r, 1, "null"); /* the link's own */
+    replay_source.session_opened(r, 2, "tcp a");
+    assert_int_equal(replay_source.next(r, 0, 1, 0, &tick), LOOP_SOURCE_IDLE);
+    replay_source.session_over(r);
+    replay_source.session_opened(r, 3, "tcp b");
+    assert_int_equal(events_of(r, 1), 0);
+    replay_source.session_opened(r, 4, "tcp c");
+    assert_int_equal(events_of(r, 2), 1);
+    assert_int_equal(events_of(r, 3), 1);
+    replay_free(r);
+    free(cfg);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_client_that_goes_is_an_error_where_it_is_missed),
+        cmocka_unit_test(it_waits_for_its_clients),
+    };
+    return cmocka_run_group_tests_name("replay clients", tests, make_file, remove_file);
+}
