@@ -88,11 +88,13 @@ static int events_of(struct replay *r, uint64_t number)
     return n;
 }
 
-/* With two clients wanted it begins when the second one is there, and not when one of two has gone. A link that opens a
- * session for itself is no client. */
+/* With two clients wanted it begins when the second one is there, and not when one of two has gone. Links that open a
+ * session for themselves are no clients. */
 static void it_waits_for_its_clients(void **state)
 {
     (void)state;
+    enum { N_OWN = 4 };
+    static const enum link_type own[N_OWN] = {LINK_NULL, LINK_NULL, LINK_UDP, LINK_FILE};
     struct config *cfg = calloc(1, sizeof *cfg);
     struct replay *r;
     struct ring_tick tick;
@@ -100,12 +102,13 @@ static void it_waits_for_its_clients(void **state)
     assert_non_null(cfg);
     event_recording_write(path, 3);
     cfg->loop.tick_hz = 1000;
-    cfg->n_links = 2;
-    cfg->link[0].type = LINK_NULL;
-    cfg->link[1].type = LINK_TCP;
+    cfg->n_links = N_OWN;
+    for (uint32_t i = 0; i < N_OWN; i++)
+        cfg->link[i].type = own[i];
     const struct replay_options options = {.path = path, .speed = 1, .start = 1, .clients = 2};
     if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
-    replay_source.session_opened(r, 1, "null"); /* the link's own */
+    for (uint32_t i = 0; i < N_OWN; i++)
+        replay_source.session_opened(r, 10 + i, "the link's own");
     replay_source.session_opened(r, 2, "tcp a");
     assert_int_equal(replay_source.next(r, 0, 1, 0, &tick), LOOP_SOURCE_IDLE);
     replay_source.session_over(r);

@@ -50,6 +50,10 @@ static void expect_covered(const struct site *site)
             const double far_m = vec3_distance(site->knot[k].pose.position_m, s->centre_m);
             if (far_m > s->reach_m) fail_msg("pose %zu is %g m from its anchor, beyond %g m", k, far_m, s->reach_m);
         }
+    for (size_t k = 1; k < site->n_knots; k++) { /* on the way to a pose the head is between it and the one before */
+        const struct site_stretch *s = stretch_at(site, site->knot[k].t_ns);
+        assert_true(vec3_distance(site->knot[k - 1].pose.position_m, s->centre_m) <= s->reach_m);
+    }
     for (size_t i = 0; i + 1 < site->n_stretches; i++)
         assert_true(site->stretch[i].until_ns % 1000000 == 0 &&
                     site->stretch[i].until_ns < site->stretch[i + 1].until_ns);
