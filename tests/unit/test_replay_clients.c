@@ -61,6 +61,28 @@ static void a_client_that_goes_is_an_error_where_it_is_missed(void **state)
     free(r);
 }
 
+/* A client of another protocol has control for its one command alone. What another session has stays with it. */
+static void a_single_command_keeps_no_control(void **state)
+{
+    (void)state;
+    struct config *cfg = calloc(1, sizeof *cfg);
+    struct replay *r = calloc(1, sizeof *r);
+    struct command_result result;
+    assert_true(cfg != NULL && r != NULL);
+    pthread_mutex_init(&r->lock, NULL);
+    r->cfg = cfg;
+    replay_open_commands(r);
+    replay_command_once(r, 4, "SYST:CONT:TAKE", 0, &result);
+    assert_true(result.error == 0 && r->cmd.control == 0);
+    replay_command(r, 4, "SYST:CONT:TAKE", 0, &result);
+    assert_true(result.error == 0 && r->cmd.control == 4);
+    replay_command_once(r, 5, "HEAD:STATE?", 0, &result);
+    assert_true(result.error == 0 && r->cmd.control == 4);
+    pthread_mutex_destroy(&r->lock);
+    free(r);
+    free(cfg);
+}
+
 static char path[] = "/tmp/scanhead-clients-XXXXXX";
 
 static int make_file(void **state)
@@ -125,6 +147,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_client_that_goes_is_an_error_where_it_is_missed),
+        cmocka_unit_test(a_single_command_keeps_no_control),
         cmocka_unit_test(it_waits_for_its_clients),
     };
     return cmocka_run_group_tests_name("replay clients", tests, make_file, remove_file);
