@@ -110,6 +110,14 @@ static int events_of(struct replay *r, uint64_t number)
     return n;
 }
 
+/* The state is that of the last released tick. */
+static void expect_state(struct replay *r, uint64_t released, const char *state)
+{
+    struct command_result result;
+    replay_source.command(r, 1, "HEAD:STATE?", released, &result);
+    assert_string_equal(result.reply, state);
+}
+
 /* With two clients wanted it begins when the second one is there, and not when one of two has gone. Links that open a
  * session for themselves are no clients. */
 static void it_waits_for_its_clients(void **state)
@@ -136,9 +144,15 @@ static void it_waits_for_its_clients(void **state)
     replay_source.session_over(r);
     replay_source.session_opened(r, 3, "tcp b");
     assert_int_equal(events_of(r, 1), 0);
+    expect_state(r, 2, "idle");
     replay_source.session_opened(r, 4, "tcp c");
     assert_int_equal(events_of(r, 2), 1);
+    expect_state(r, 2, "idle"); /* the tick that begins it has number 2, and is not released yet */
+    expect_state(r, 3, "scanning");
     assert_int_equal(events_of(r, 3), 1);
+    replay_stop(r, 4, 0);
+    expect_state(r, 4, "scanning");
+    expect_state(r, 5, "idle");
     replay_free(r);
     free(cfg);
 }
