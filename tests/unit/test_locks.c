@@ -6,7 +6,9 @@
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/settings_file.h"
 #include "firmware_sim/fault/board.h"
+#include "firmware_sim/loop/mover.h"
 #include "firmware_sim/replay/replay_state.h"
 #include "tests/unit/device_rig.h"
 #include "tests/unit/event_recording.h"
@@ -145,6 +147,49 @@ static void the_faults_are_locked(void **state)
     fault_board_free(board);
 }
 
+/* With a file of the truth a note takes three: the board's, the file's, and that of its queue. */
+static void notes_of_faults_are_locked(void **state)
+{
+    (void)state;
+    static const struct fault_list none;
+    const struct fault_note note = {.number = 1};
+    _Atomic uint64_t lost = 0;
+    struct fault_board *board;
+    struct sh_err err;
+    need(fault_board_create(&none, journal_path, &lost, &board, &err), &err);
+    TAKES(3, (fault_board_note(board, &note), 0));
+    need(fault_board_close(board, &err), &err);
+    fault_board_free(board);
+    unlink(journal_path);
+}
+
+/* ---- what other threads write and plan */
+
+static void stored_settings_are_locked(void **state)
+{
+    (void)state;
+    char text[SETTINGS_FILE_TEXT];
+    struct settings_file *file;
+    struct sh_err err;
+    need(settings_file_open(journal_path, "head", NULL, &file, &err), &err);
+    TAKES(1, settings_file_put(file, "head", "a 1\n"));
+    TAKES(1, (settings_file_get(file, "head", text), 0));
+    assert_string_equal(text, "a 1\n");
+    TAKES(1, settings_file_close(file, &err));
+    unlink(journal_path);
+}
+
+static void replies_of_moves_are_locked(void **state)
+{
+    (void)state;
+    static struct mover mover;
+    struct move_box box = {.ticket = 0};
+    char reply[COMMAND_MAX_REPLY];
+    mover_create(&mover, NULL, NULL);
+    TAKES(1, mover_take(&mover, &box, reply));
+    TAKES(1, (mover_join(&mover), 0));
+}
+
 /* ---- a recording */
 
 static char recording_path[] = "/tmp/scanhead-locks-XXXXXX";
@@ -204,6 +249,9 @@ int main(void)
         cmocka_unit_test(a_move_is_locked),
         cmocka_unit_test(the_head_follows_a_pose_with_its_lock),
         cmocka_unit_test(the_faults_are_locked),
+        cmocka_unit_test(notes_of_faults_are_locked),
+        cmocka_unit_test(stored_settings_are_locked),
+        cmocka_unit_test(replies_of_moves_are_locked),
         cmocka_unit_test(a_recording_is_locked),
     };
     return cmocka_run_group_tests_name("locks", tests, make_folder, remove_folder);
