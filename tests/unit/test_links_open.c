@@ -82,12 +82,12 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     cfg->profile.arrangement.geometry[1].lines_uhz = 25000000;
     cfg->profile.arrangement.geometry[1].steps_per_turn = 720;
     cfg->n_links = 4;
-    cfg->link[0] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE_POSITION, .port = 9};
-    cfg->link[1] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE, .port = 4001};
-    cfg->link[2] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE, .port = 4002};
+    cfg->link[0] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE, .port = 4001};
+    cfg->link[1] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE, .port = 4002};
+    cfg->link[2] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE_POSITION, .port = 9};
     cfg->link[3] = (struct link_spec){.type = LINK_NULL, .protocol = PROTOCOL_VELODYNE, .port = 4003};
-    strcpy(cfg->link[1].address, "127.0.0.2");
-    strcpy(cfg->link[2].address, "127.0.0.3");
+    strcpy(cfg->link[0].address, "127.0.0.2");
+    strcpy(cfg->link[1].address, "127.0.0.3");
     struct loop *loop = open_links(cfg, &err);
     if (loop == NULL) fail_msg("%s", err.text);
     const struct links *links = &loop->links;
