@@ -179,15 +179,28 @@ static void stored_settings_are_locked(void **state)
     unlink(journal_path);
 }
 
+/* After the end a move is carried out by who asks: the box, the two of the device, and the reply. */
 static void replies_of_moves_are_locked(void **state)
 {
     (void)state;
     static struct mover mover;
+    static struct stream stream;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct command_result result;
     struct move_box box = {.ticket = 0};
     char reply[COMMAND_MAX_REPLY];
-    mover_create(&mover, NULL, NULL);
+    wakeup_create(&stream.work);
+    wakeup_create(&stream.pace);
+    mover_create(&mover, rig->device, &stream);
+    rig_go_to(rig, 230);
+    device_command(rig->device, 1, "SITE:POSE 1, 0.1,0,0,0,0,0", rig->next, &result);
+    assert_int_equal(result.effect, COMMAND_MOVE);
+    TAKES(2, (mover_join(&mover), 0)); /* and the device's, which ends */
+    TAKES(4, (mover_ask(&mover, &box, -1), 0));
     TAKES(1, mover_take(&mover, &box, reply));
-    TAKES(1, (mover_join(&mover), 0));
+    wakeup_free(&stream.work);
+    wakeup_free(&stream.pace);
+    rig_close(rig);
 }
 
 /* ---- a recording */
