@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a part of the program prints to standard output or standard error. */
+/* Text that a part of the program prints to standard output or standard error is kept here. */
 #ifndef TESTS_UNIT_OUTPUT_RIG_H
 #define TESTS_UNIT_OUTPUT_RIG_H
 

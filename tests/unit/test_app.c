@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What all commands share: messages and exit statuses, endings of files, and files that a user names for output. */
+/* All commands share these: messages and exit statuses, endings of files, and files that a user names for output. */
 #include "firmware_sim/app/app.h"
 
 #include <setjmp.h>

@@ -63,7 +63,7 @@ static void events_keep_their_order(void **state)
     assert_int_equal(work.n_events, 3);
 }
 
-/* What finds no room is counted, and said once there is some. */
+/* An event that finds no room is counted. That is said once there is some. */
 static void events_without_room_are_said(void **state)
 {
     (void)state;

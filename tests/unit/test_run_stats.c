@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a run says at its end: each member of its statistics, of its links and of its endpoints, and the warnings. The
- * source's counters are numbers of the test's own, each another one. */
+/* A run says at its end what it did: each member of its statistics, of its links and of its endpoints, and the warnings,
+ * is compared here. The source's counters are numbers of the test's own, each another one. */
 #include "firmware_sim/app/run/run.h"
 #include "tests/unit/device_rig.h"
 #include "tests/unit/output_rig.h"
@@ -133,7 +133,6 @@ static void note_all(struct lateness *lateness, int64_t first_ns)
             lateness_note(lateness, first_ns + i);
 }
 
-/* The first group are the counters, in the order of the document (firmware_sim/loop/README.md). */
 static const char MEMBERS[] = "{\n  \"pulses\": 1000,\n  \"fired_pulses\": 2000,\n  \"blind_pulses\": 100,\n"
                               "  \"cast_pulses\": 1900,\n  \"lost_pulses\": 31,\n  \"lost_ticks\": 3,\n"
                               "  \"echoes\": 60,\n  \"lines\": 17,\n  \"scans\": 7,\n  \"wall_s\": 2.5,\n";
