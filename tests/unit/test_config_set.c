@@ -271,6 +271,33 @@ static void stations_take_the_grid_of_the_anchor(void **state)
     write_file(config_path, base, strlen(base));
 }
 
+/* With the last station that there is room for, the first and the last one are checked as all others are, and nothing
+ * beyond it. */
+static void all_stations_are_checked(void **state)
+{
+    (void)state;
+    enum { N = CONFIG_MAX_STATIONS, ROOM = 96 };
+    static char text[N][ROOM];
+    const char *sets[N + 1];
+    for (int i = 0; i < N; i++) {
+        snprintf(text[i], ROOM, "stations[%d]={position_m: [%d, 0, 2], tripod: {leg_m: 1.5, legs: on}}", i, i);
+        sets[i] = text[i];
+    }
+    write_file(config_path, base, strlen(base));
+    assert_loads(load_sets(sets, N));
+    assert_int_equal(cfg->n_stations, N);
+    for (int i = 0; i < N; i++)
+        assert_true(cfg->station[i].position_m[0] == i && cfg->station[i].tripod.given);
+    static const char *const wrong[] = {"stations[0].tripod.leg_diameter_m=0.75",
+                                        "stations[63].tripod.leg_diameter_m=0.75"};
+    for (int k = 0; k < 2; k++) {
+        sets[N] = wrong[k];
+        assert_int_equal(load_sets(sets, N + 1), SH_EINPUT);
+        assert_says(k == 0 ? "stations[0].tripod" : "stations[63].tripod");
+        assert_says("0.75 m, but a leg is 1.5 m long; allowed is less than half of that, 0.75 m");
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -284,6 +311,7 @@ int main(void)
         cmocka_unit_test(settings_become_lengths),
         cmocka_unit_test(stations_take_the_grid_of_the_anchor),
         cmocka_unit_test(a_full_list_takes_no_more),
+        cmocka_unit_test(all_stations_are_checked),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -87,12 +87,118 @@ static void a_replay_says_what_it_refused(void **state)
     }
 }
 
+/* The error that the next query takes from the queue. */
+static const char *next_error(struct rig *rig)
+{
+    static struct command_result result;
+    device_command(rig->device, 7, "SYST:ERR?", rig->next, &result);
+    return result.reply;
+}
+
+static void expect_error(struct rig *rig, int number, const char *text)
+{
+    char start[32];
+    snprintf(start, sizeof start, "%d,", number);
+    const char *error = next_error(rig);
+    if (strncmp(error, start, strlen(start)) != 0 || strstr(error, text) == NULL)
+        fail_msg("%s, not %s%s", error, start, text);
+}
+
+/* A client goes. It is an error where it had control, or while a scan is on, and half a line is one by itself. */
+static void a_client_that_goes_is_an_error_where_it_is_missed(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, 300);
+    device_session_closed(rig->device, 2, "tcp 127.0.0.1:9", 0);
+    expect_error(rig, 0, "");
+    device_session_closed(rig->device, 2, "tcp 127.0.0.1:9", 1);
+    expect_error(rig, CMD_E_PARTIAL, "session 2, tcp 127.0.0.1:9");
+    expect_error(rig, 0, "");
+    assert_true(rig_claim(rig));
+    const struct native_event *event = rig_event(rig, NATIVE_EV_ERROR);
+    assert_true(event != NULL && (int64_t)event->a == CMD_E_PARTIAL && event->b == 0);
+    assert_null(rig_event(rig, NATIVE_EV_CONTROL));
+    rig_tell(rig, "SCAN:START", 300); /* session 1 has control now */
+    rig_wait(rig, NATIVE_EV_SCAN_START, 100);
+    device_session_closed(rig->device, 2, "tcp 127.0.0.1:9", 0);
+    expect_error(rig, CMD_E_CLIENT_LOST, "session 2, tcp 127.0.0.1:9");
+    device_session_closed(rig->device, 1, "pty", 1);
+    expect_error(rig, CMD_E_PARTIAL, "session 1, pty");
+    expect_error(rig, CMD_E_CLIENT_LOST, "session 1, pty");
+    expect_error(rig, 0, "");
+    assert_true(rig_claim(rig));
+    event = rig_event(rig, NATIVE_EV_CONTROL);
+    assert_true(event != NULL && event->a == 0);
+    assert_string_equal(event->text, "client gone");
+    struct command_result result;
+    device_command(rig->device, 3, "SCAN:STOP", rig->next, &result); /* control is free */
+    assert_int_equal(result.error, 0);
+    rig_close(rig);
+}
+
+static void a_line_that_is_too_long_is_an_error_of_its_session(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct command_result result;
+    char text[64];
+    snprintf(text, sizeof text, "session 5, longest line %d bytes", COMMAND_MAX_LINE);
+    device_overlong(rig->device, 5, &result);
+    assert_true(result.error == CMD_E_OVERRUN && strstr(result.reply, text) != NULL);
+    expect_error(rig, CMD_E_OVERRUN, text);
+    assert_true(rig_claim(rig));
+    const struct native_event *event = rig_event(rig, NATIVE_EV_ERROR);
+    assert_true(event != NULL && (int64_t)event->a == CMD_E_OVERRUN && event->b == 5);
+    assert_string_equal(event->text, text);
+    rig_close(rig);
+}
+
+/* Telemetry comes with each full second, and with the end of a scan. What the release completes (stream.c) is here the
+ * number of pulses cast. */
+static void telemetry_has_the_figures_of_its_tick(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"head.pan_deg_s=60"};
+    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 1);
+    struct device_counters *counters = device_counters(rig->device);
+    struct command_result result;
+    atomic_store(&counters->late_blocks, 5);
+    atomic_store(&counters->late_max_ns, 1234999);
+    atomic_store(&counters->lost_journal_lines, 3);
+    atomic_store(&counters->lost_truth_lines, 4);
+    device_report(rig->device, CMD_E_REFUSED, "once");
+    device_command(rig->device, 1, "nonsense", 0, &result);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+    uint64_t cast = rig->work.n_cast, full = 0;
+    int ends = 0;
+    while (!ends) {
+        assert_true(rig_claim(rig));
+        const struct native_telemetry *t = &rig->work.telemetry_frame;
+        cast += rig->work.n_cast;
+        ends = rig_event(rig, NATIVE_EV_SCAN_END) != NULL;
+        assert_int_equal(rig->work.telemetry != 0, rig->work.tick % 1000 == 0);
+        if (!ends && !rig->work.telemetry) continue;
+        full += rig->work.telemetry != 0;
+        assert_int_equal(t->state, ends ? HEAD_SPIN_DOWN : HEAD_SCANNING);
+        assert_true(t->scan == 1 && t->scan_fired == rig->work.pulse_end);
+        assert_true(t->scan_cast == cast && t->scan_lost == cast && t->lost_pulses == cast);
+        assert_true(t->late_blocks == 5 && t->late_max_us == 1234 && t->lost_lines == 7);
+        assert_true(t->errors_queued >= 2 && t->utc_ns == 0);
+    }
+    assert_int_equal(full, 1); /* the scan is from 0.23 s to 1.73 s */
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_last_events_are_said_however_many),
         cmocka_unit_test(errors_are_held_back_by_session),
         cmocka_unit_test(a_replay_says_what_it_refused),
+        cmocka_unit_test(a_client_that_goes_is_an_error_where_it_is_missed),
+        cmocka_unit_test(a_line_that_is_too_long_is_an_error_of_its_session),
+        cmocka_unit_test(telemetry_has_the_figures_of_its_tick),
     };
     return cmocka_run_group_tests_name("device errors", tests, make_folder, remove_folder);
 }

@@ -13,6 +13,7 @@
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
+#include "tests/unit/event_recording.h"
 
 /* ---- times of frames */
 
@@ -148,16 +149,6 @@ static struct config *config_new(void)
     return cfg;
 }
 
-/* A recording of n events, one a tick. */
-static void write_events(int n)
-{
-    FILE *f = begin_file();
-    put_descriptor(f);
-    for (int ms = 0; ms < n; ms++)
-        put_event(f, NATIVE_EV_CONTROL, ms * TICK_NS);
-    assert_int_equal(fclose(f), 0);
-}
-
 static struct {
     uint64_t tick;
     struct native_header header;
@@ -246,7 +237,7 @@ static void each_time_has_its_numbers(void **state)
 static void a_part_begins_with_the_head(void **state)
 {
     (void)state;
-    write_events(20);
+    event_recording_write(path, 20);
     const int n = play(&(struct replay_options){.speed = 1, .from_s = 0.005, .to_s = 0.012}, 3, MOST);
     assert_int_equal(n, 1 + 8);
     assert_int_equal(played[0].header.type, NATIVE_DESCRIPTOR);
@@ -305,7 +296,7 @@ static void a_command_seeks_paces_and_loops(void **state)
     struct config *cfg = config_new();
     struct replay *r;
     struct sh_err err;
-    write_events(20);
+    event_recording_write(path, 20);
     const struct replay_options options = {.path = path, .speed = 1, .start = 1};
     if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
     assert_string_equal(said(r, "SCAN:REPL?"), "PLAYING,0.000000,0.019000,1,OFF");
@@ -363,7 +354,7 @@ static void what_a_replay_refuses(void **state)
     struct config *cfg = config_new();
     struct replay *r;
     struct sh_err err;
-    write_events(3);
+    event_recording_write(path, 3);
     struct replay_options options = {.path = path, .speed = 1};
     if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {

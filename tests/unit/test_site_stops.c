@@ -98,6 +98,12 @@ static void the_mount_turns_the_head(void **state)
     pose_attitude(angle_rad(40.0), angle_rad(-25.0), angle_rad(10.0), want);
     for (int i = 0; i < 9; i++)
         assert_true(fabs(at->rotation[i] - want[i]) < 1e-12);
+    const struct config_station *stop = site->station[0].station;
+    assert_string_equal(stop->name, "stop-1");
+    assert_true(fabs(stop->heading_deg - 40.0) < 1e-9 && fabs(stop->pitch_deg + 25.0) < 1e-9 &&
+                fabs(stop->roll_deg - 10.0) < 1e-9);
+    assert_true(stop->has_position);
+    assert_memory_equal(stop->position_m, at->position_m, sizeof stop->position_m);
     assert_true(fabs(at->position_m[0] - 0.1) < 1e-12 && fabs(at->position_m[1] - 0.2) < 1e-12 &&
                 fabs(at->position_m[2] - 2.3) < 1e-12);
     site_free(site);

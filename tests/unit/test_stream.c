@@ -120,6 +120,22 @@ static void a_line_that_lacks_a_tick_has_no_count(void **state)
     }
 }
 
+/* Power goes with tick 2 and comes back with tick 3. The lines before have no end; what they lacked, and their echoes,
+ * are none of the next line's. */
+static void a_power_cycle_leaves_nothing_to_the_next_line(void **state)
+{
+    (void)state;
+    stream_power(&stream, 2);
+    stream_power(&stream, 3);
+    release(make_tick(0, 0, -1, 5), 0);
+    assert_true(stream_lose(&stream, 1));
+    release(make_tick(2, 1, -1, 0), 2);
+    release(make_tick(3, 0, 7, 2), 3);
+    assert_int_equal(read_echoes(3, 1, 1), 7);
+    release(make_tick(4, 0, 1, 0), 4);
+    assert_int_equal(read_echoes(4, 2, 1), 2 + 1);
+}
+
 /* Makes a tick of a scan with n_cast pulses, then telemetry and the scan's end where `cast` is not 0: so many pulses
  * were to be cast up to it. */
 static struct ring_slot *make_pulses(uint64_t tick, uint32_t scan, uint64_t n_cast, uint64_t cast)
@@ -238,6 +254,33 @@ static void a_reader_that_stands_still_delays_the_end_for_a_limited_time(void **
     assert_true(clock_now_ns() - begin_ns >= 2000000000); /* it has that time, as stream.h says */
 }
 
+/* Before the pacing thread sleeps, those that wait for what was released are woken, though it is less than a batch. */
+static void the_pacing_thread_tells_all_before_it_sleeps(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        int value;
+        eventfd_t count;
+        close_stream(NULL);
+        open_stream(NULL);
+        stream.waits = 1;
+        stream.say_ticks = 100;
+        stream.n_casters = 1;
+        const int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+        stream_listen(&stream, fd, 1);
+        release(make_tick(0, 1, -1, 0), 0);
+        assert_int_equal(eventfd_read(fd, &count), -1);
+        assert_true(sem_getvalue(&stream.work.signals, &value) == 0 && value == 0);
+        stream_say_ready(&stream); /* it does not sleep in this test */
+        if (i == 0) stream_wait_for_casters(&stream);
+        if (i == 1) stream_wait_for_readers(&stream, 1);
+        if (i == 2) stream_wait_for_files(&stream);
+        assert_int_equal(eventfd_read(fd, &count), 0);
+        assert_true(sem_getvalue(&stream.work.signals, &value) == 0 && value == 1);
+        close(fd);
+    }
+}
+
 /* ---- who is woken in real time */
 
 enum { LISTENERS = 3, POWER_TICK = 57, END_TICK = 100 };
@@ -315,12 +358,14 @@ int main(void)
     const struct CMUnitTest tests[] = {
         WITH_STREAM(a_line_has_the_echoes_of_all_its_ticks),
         WITH_STREAM(a_line_that_lacks_a_tick_has_no_count),
+        WITH_STREAM(a_power_cycle_leaves_nothing_to_the_next_line),
         WITH_STREAM(a_scan_end_counts_what_was_lost_after_it_was_made),
         WITH_STREAM(a_scan_end_that_comes_late_counts_its_own_scan),
         WITH_STREAM(active_readers_hold_back),
         WITH_STREAM(grants_add_up),
         WITH_STREAM(time_that_may_pass_is_not_taken_back),
         WITH_STREAM(a_reader_that_stands_still_delays_the_end_for_a_limited_time),
+        WITH_STREAM(the_pacing_thread_tells_all_before_it_sleeps),
         WITH_STREAM(nobody_is_woken_too_late),
     };
     return cmocka_run_group_tests_name("stream", tests, NULL, NULL);

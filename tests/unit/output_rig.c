@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT */
+#include "tests/unit/output_rig.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+void output_take(struct output *output, FILE *stream)
+{
+    output->stream = stream;
+    strcpy(output->path, "/tmp/scanhead-output-XXXXXX");
+    const int fd = mkstemp(output->path);
+    assert_true(fd >= 0);
+    fflush(stream);
+    output->was = dup(fileno(stream));
+    assert_true(output->was >= 0 && dup2(fd, fileno(stream)) >= 0);
+    close(fd);
+}
+
+char *output_give(struct output *output)
+{
+    enum { MOST = 65536 };
+    char *text = calloc(1, MOST);
+    fflush(output->stream);
+    assert_true(dup2(output->was, fileno(output->stream)) >= 0);
+    close(output->was);
+    FILE *f = fopen(output->path, "r");
+    assert_true(f != NULL && text != NULL);
+    assert_true(fread(text, 1, MOST, f) < MOST);
+    fclose(f);
+    unlink(output->path);
+    return text;
+}

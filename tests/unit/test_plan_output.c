@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: MIT */
+/* `scanhead plan`: what it prints, as JSON and as text, are the rows of the site's plan, member by member. The last row
+ * is measured anew each time, so of it only the words count. */
+#include "firmware_sim/app/app.h"
+#include "tests/unit/device_rig.h"
+#include "tests/unit/output_rig.h"
+
+#include <math.h>
+
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/site/site.h"
+
+static char config_file[96];
+
+static char *print_plan(const char *option)
+{
+    char name[] = "plan", form[16];
+    char *argv[] = {name, config_file, form, NULL};
+    struct output output;
+    snprintf(form, sizeof form, "%s", option != NULL ? option : "");
+    output_take(&output, stdout);
+    const int status = app_plan.run(option != NULL ? 3 : 2, argv);
+    char *text = output_give(&output);
+    assert_int_equal(status, APP_OK);
+    return text;
+}
+
+static struct site *load_plan(struct config *cfg)
+{
+    struct site *site;
+    struct sh_err err;
+    need(config_load(config_file, NULL, 0, cfg, &err), &err);
+    need(site_load_for(cfg, SITE_FOR_PLAN, NULL, NULL, &site, &err), &err);
+    return site;
+}
+
+/* The next member after *at has this key; *at goes on to its value. */
+static void go_to(const char **at, const char *key)
+{
+    char name[64];
+    snprintf(name, sizeof name, "\"%s\": ", key);
+    const char *next = strchr(*at, '"');
+    if (next == NULL || strncmp(next, name, strlen(name)) != 0) fail_msg("no %s at: %.80s", key, *at);
+    *at = next + strlen(name);
+}
+
+static void expect_text(const char **at, const char *key, const char *want)
+{
+    go_to(at, key);
+    const size_t len = strlen(want);
+    if (**at != '"' || strncmp(*at + 1, want, len) != 0 || (*at)[1 + len] != '"')
+        fail_msg("%s: %.80s, not %s", key, *at, want);
+    *at += len + 2;
+}
+
+/* NaN stands for what is not known. */
+static void expect_number(const char **at, const char *key, double want, int is_measured)
+{
+    char *end;
+    go_to(at, key);
+    const double got = strncmp(*at, "null", 4) == 0 ? (double)NAN : strtod(*at, &end);
+    if (!is_measured && got != want && !(isnan(got) && !isfinite(want))) fail_msg("%s: %g, not %g", key, got, want);
+}
+
+static void expect_row(const char **at, const struct plan_row *row, int is_measured)
+{
+    expect_text(at, "stage", row->stage);
+    expect_text(at, "method", row->method);
+    expect_number(at, "error_m", row->error_m, is_measured);
+    expect_number(at, "echo_share", row->echo_share, is_measured);
+    expect_number(at, "cost_ns", row->cost_ns, is_measured);
+    go_to(at, "forced");
+    assert_int_equal(strncmp(*at, row->forced ? "true" : "false", 4), 0);
+    if (is_measured) return;
+    expect_text(at, "why", row->why);
+    go_to(at, "left_out");
+    for (uint32_t k = 0; k < row->n_left; k++) {
+        expect_text(at, "method", row->left[k].method);
+        expect_number(at, "error_m", row->left[k].error_m, 0);
+        expect_number(at, "echo_share", row->left[k].echo_share, 0);
+        expect_number(at, "cost_ns", row->left[k].cost_ns, 0);
+        expect_text(at, "why", row->left[k].why_not);
+    }
+}
+
+static void the_json_has_each_figure(void **state)
+{
+    (void)state;
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_non_null(cfg);
+    struct site *site = load_plan(cfg);
+    char *text = print_plan("--json");
+    const char *at = text;
+    assert_true(site->plan.n > 2);
+    for (size_t i = 0; i < site->plan.n; i++)
+        expect_row(&at, &site->plan.row[i], i + 1 == site->plan.n);
+    free(text);
+    site_free(site);
+    free(cfg);
+}
+
+/* A figure that is not known is "-". */
+static void the_text_has_each_row(void **state)
+{
+    (void)state;
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_non_null(cfg);
+    struct site *site = load_plan(cfg);
+    char *text = print_plan(NULL);
+    assert_int_equal(strncmp(text, "stage ", 6), 0);
+    const char *at = strchr(text, '\n') + 1;
+    for (size_t i = 0; i + 1 < site->plan.n; i++) {
+        const struct plan_row *row = &site->plan.row[i];
+        char stage[32], figure[3][32], want[32];
+        const double is[3] = {row->error_m, row->echo_share, row->cost_ns};
+        const char *method = at + 9; /* the stage has 8 columns */
+        assert_int_equal(sscanf(at, "%31s", stage), 1);
+        assert_string_equal(stage, row->stage);
+        assert_int_equal(strncmp(method, row->method, strlen(row->method)), 0);
+        assert_int_equal(sscanf(method + strlen(row->method), "%31s %31s %31s", figure[0], figure[1], figure[2]), 3);
+        for (int k = 0; k < 3; k++) {
+            snprintf(want, sizeof want, k < 2 ? "%.2g" : "%.3g", is[k]);
+            assert_string_equal(figure[k], isfinite(is[k]) ? want : "-");
+        }
+        const char *end = strchr(at, '\n');
+        assert_true((size_t)(end - at) >= strlen(row->why));
+        assert_int_equal(strncmp(end - strlen(row->why), row->why, strlen(row->why)), 0);
+        for (at = end + 1; *at == ' ';) /* the methods that were left out */
+            at = strchr(at, '\n') + 1;
+    }
+    assert_int_equal(strncmp(at, "total ", 6), 0);
+    free(text);
+    site_free(site);
+    free(cfg);
+}
+
+static int make_all(void **state)
+{
+    const int failed = make_folder(state);
+    snprintf(config_file, sizeof config_file, "%s/run.yaml", folder);
+    return failed;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_json_has_each_figure),
+        cmocka_unit_test(the_text_has_each_row),
+    };
+    return cmocka_run_group_tests_name("plan's output", tests, make_all, remove_folder);
+}
