@@ -70,7 +70,8 @@ static int main_run(int argc, char **argv)
     return fail_unknown(argv[1]);
 }
 
-/* Configurations and blocks of pulses lie on stacks, which threads get as large as this limit; 384 KiB were enough. */
+/* Configurations and blocks of pulses lie on stacks. Each thread's stack is as large as this limit. In trials 384 KiB
+ * were enough. */
 static int check_stack(void)
 {
     enum { NEEDED_KIB = 1024 };
@@ -108,7 +109,8 @@ int main(int argc, char **argv)
     errno = 0;
     const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
     if (failed && status == APP_OK) {
-        /* A write that failed earlier has emptied the buffer, so that the last one had no reason to fail. */
+        /* Where an earlier write failed, its errno is gone. So one more byte is written, which fails for the same
+         * reason. */
         if (errno == 0 && write(STDOUT_FILENO, "\n", 1) == 1) errno = 0;
         app_say("standard output: writing failed%s%s", errno != 0 ? ": " : "", errno != 0 ? strerror(errno) : "");
         status = APP_FAILED;

@@ -112,7 +112,7 @@ void app_warn_settings_file(const struct config *cfg, const char *why)
 }
 
 static pthread_mutex_t messages_lock = PTHREAD_MUTEX_INITIALIZER;
-static const char *warned_of; /* NULL: the work is one */
+static const char *warned_of; /* the part of the work that warnings name; NULL: it has no parts */
 
 void app_warn_of(const char *what)
 {
@@ -168,7 +168,7 @@ void app_say(const char *fmt, ...)
     const int begin = snprintf(text, sizeof text, "%s: ", app_program);
     va_list ap;
     va_start(ap, fmt);
-    vsnprintf(text + begin, sizeof text - (size_t)begin - 1, fmt, ap); /* and the line's end */
+    vsnprintf(text + begin, sizeof text - (size_t)begin - 1, fmt, ap); /* the line's end has room, too */
     va_end(ap);
     sh_keep_line(text); /* a path may have any bytes, and so may texts of files */
     strcat(text, "\n");
@@ -188,9 +188,17 @@ static void print_warning(void *ctx, const char *text)
         app_say("warning: %s: %s", warned_of, text);
 }
 
+static int is_quiet;
+
+void app_set_quiet(int quiet)
+{
+    is_quiet = quiet;
+}
+
 static void print_progress(void *ctx, const char *what, double fraction)
 {
     static struct progress_pace pace;
+    if (is_quiet) return;
     const double left_s = progress_left_s(&pace, what, fraction, clock_now_ns());
     char left[48] = "";
     (void)ctx;

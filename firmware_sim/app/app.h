@@ -80,6 +80,9 @@ extern const struct sh_report app_report_seconds;
 /* Warnings alone. */
 extern const struct sh_report app_report_quiet;
 
+/* 1: the others print no progress either. app_parse calls it, for --quiet. */
+void app_set_quiet(int quiet);
+
 /* From now on warnings begin with `what`, the name of a part of the work, which must live on. A warning that several
  * parts give is printed once. NULL, as at first: warnings have no name, and each is printed. */
 void app_warn_of(const char *what);

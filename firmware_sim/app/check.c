@@ -233,7 +233,7 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     struct check_run *run = ctx;
     const struct sh_report report = {run, check_warn, app_report_stderr.progress, app_report_stderr.stop};
     struct sites sites = {0};
-    FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* the table has it for itself */
+    FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* CSV alone is on standard output */
     int rc = sites_load(cfg, SITE_FOR_SCANS, &report, &sites, err);
     const double all_mb = peak_mb(); /* of the scene, without the head's queues */
     if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);

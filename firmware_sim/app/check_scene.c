@@ -67,7 +67,7 @@ static const char *colour_of(const struct part *p, uint32_t object, char text[CS
     return first != NULL ? csv_file_colour(first, text) : "none";
 }
 
-/* An object is as clear as the clearest surface of its name. */
+/* An object is as transparent as the most transparent surface of its name. */
 static float clear_of(const struct part *p, uint32_t object)
 {
     const struct scene_surface *s;

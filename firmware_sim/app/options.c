@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "core/err.h"
+#include "firmware_sim/app/app.h"
 #include "firmware_sim/base/nearest.h"
 
 const char *app_program = "scanhead";
@@ -61,7 +62,7 @@ static int add_key(struct app_sets *sets, const char *key, const char *value)
     return app_add_set(sets, text);
 }
 
-/* The whole text as a number within the row's limits. */
+/* Reads the whole text as a number within the row's limits. */
 static int parse_number(const struct app_command *command, const struct app_option *row, const char *text, double *out)
 {
     char *end;
@@ -263,7 +264,7 @@ const char *app_nearest(const char *word, const char *const *known, size_t n)
     return best;
 }
 
-/* The long option that a word without its dashes may have meant; a value after '=' is none of it. */
+/* Returns the long option that a word without its dashes may have meant. The word ends at '='. */
 static const char *nearest_option(const struct app_command *command, const char *word)
 {
     const char *known[APP_MAX_OPTIONS + 1] = {"help"};
@@ -428,5 +429,6 @@ int app_parse(const struct app_command *command, int argc, char **argv, struct a
     }
     for (; optind < argc; optind++)
         count_operand(words, &n, argv[optind]); /* after -- */
+    app_set_quiet(app_is_given(in, "quiet"));
     return take_operands(command, n, words, in);
 }

@@ -133,7 +133,7 @@ int app_is_given(const struct app_input *in, const char *option);
  * printed. */
 int app_add_file(struct app_input *in, const struct app_file *file);
 
-/* From now on --help of a command is what `print` makes of its table; NULL: the text. The parts of a help stay text. */
+/* From now on --help of a command calls `print` with its table; NULL: it prints the text. --help PART stays text. */
 void app_set_help(void (*print)(const struct app_command *command));
 
 /* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
@@ -150,7 +150,7 @@ int app_read_numbers(const char *text, char between, double *out, int n);
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */
 int app_usage(const struct app_command *command, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
-/* A command that may have been meant, of `n` words; NULL: none is near. */
+/* Finds the one of `n` words that may have been meant. NULL: none is near. */
 const char *app_nearest(const char *word, const char *const *known, size_t n);
 
 /* What follows the command's name in its usage line: operands, needed options, [options]. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of the files that a command names. It writes none twice, and none that it reads, so that none is destroyed.
- * There is a place for each that it writes. */
+/* Checks the files that a command names: it writes none twice, and none that it reads, so that none is destroyed. The
+ * folder of each file that it writes is there. */
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -20,7 +20,7 @@ struct named {
     int is_there, is_written;
     struct stat st;  /* where it is there */
     int needs_place; /* its folder must be there already */
-    int is_beside;   /* it is written with another: meshes of one scan share their image */
+    int is_sidecar;  /* it is written beside another file: meshes of one scan share their image */
     size_t n_ending; /* of files of each scan: bytes of the path's ending; 0: it is one file */
 };
 
@@ -34,7 +34,7 @@ struct files {
 
 /* ---- the same file */
 
-/* The folder of a path, and the name in it. */
+/* Finds the folder of a path, and the name in it. */
 static int split(const char *path, struct stat *folder, const char **name)
 {
     char dir[PATH_MAX] = ".";
@@ -64,7 +64,8 @@ static int is_same_name(const struct named *a, const struct named *b)
            app_is_name_of_scan(name[1], b->n_ending, name[0]);
 }
 
-/* The same file, also under two names. Devices and pipes may be given twice, and so may -, which is standard output. */
+/* Whether both are the same file, also under two names. Devices and pipes may be given twice, and so may -, which is
+ * standard output. */
 static int outputs_is_same(const struct named *a, const struct named *b)
 {
     const int both = a->is_there && b->is_there;
@@ -104,7 +105,7 @@ static int add_option(struct files *f, const struct app_file *file)
     const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending;
     const int rc = outputs_add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
     if (rc != SH_OK) return rc;
-    f->file[f->n - 1].is_beside = file->ending != NULL;
+    f->file[f->n - 1].is_sidecar = file->ending != NULL;
     f->file[f->n - 1].needs_place = file->is_given && file->use == APP_WRITES;
     return SH_OK;
 }
@@ -114,7 +115,8 @@ static int add_key(void *ctx, const char *key, const char *path, int is_written)
     struct files *f = ctx;
     if (is_written && !f->keeps_written) return SH_OK;
     const int rc = outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
-    /* Not every run uses another one: where a journal is replayed, no settings are stored. */
+    /* Only files of links are written in every run. head.settings_file, for one, is not written where a journal is
+     * replayed. */
     if (rc == SH_OK) f->file[f->n - 1].needs_place = is_written && strncmp(key, "links", 5) == 0;
     return rc;
 }
@@ -187,7 +189,7 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 
 /* ---- the check */
 
-/* Some files are made at the end of long work. That there is no place for one shows now. */
+/* Some files are made at the end of long work. A missing folder shows now. */
 static int check_place(const struct named *file, struct sh_err *err)
 {
     struct stat st;
@@ -210,7 +212,7 @@ static int check(const struct files *f, struct sh_err *err)
             if (!other->is_written && other->is_there && outputs_is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: is also read as %s, and would be overwritten; name another file",
                                out->who, out->path, other->who);
-            if (other->is_written && k < i && !(out->is_beside && other->is_beside) && outputs_is_same(out, other))
+            if (other->is_written && k < i && !(out->is_sidecar && other->is_sidecar) && outputs_is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: %s writes the same file; name another one", out->who, out->path,
                                other->who);
         }

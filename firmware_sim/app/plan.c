@@ -56,7 +56,7 @@ static void print_line(const char *stage, const char *method, const double figur
     printf("%-8s %-22s %8s %8s %6s  %s\n", stage, method, shown[0], shown[1], shown[2], why);
 }
 
-/* Both not measured, for the same reason: printed once. */
+/* Whether neither is measured, for the same reason: it is then printed once. */
 static int is_like(const struct plan_option *a, const struct plan_option *b)
 {
     return isnan(a->error_m) && isnan(b->error_m) && strcmp(a->why_not, b->why_not) == 0;
@@ -134,8 +134,8 @@ static const char NOTES[] =
     "errors are not added up.\n"
     "\n"
     "sight is a visibility map of the station, made where it saves more time than it takes; head.frames: 0 counts\n"
-    "as an hour. It changes no hit. Its cost is below 0: the time saved per pulse, with the time to make it. Its\n"
-    "map orders surfaces in double precision where that costs almost nothing.\n"
+    "as an hour. It changes no hit. Its cost is negative: the time to make it minus the time that it saves, per\n"
+    "pulse.\n"
     "\n"
     "Where stations have scanners of their own, the plan is that of the scanner of head.station.\n"
     "\n"

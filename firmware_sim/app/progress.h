@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How far long work is, and how long it will take. In: what a stream or a report says. Out: a fraction, and
+/* How far long work has come, and how long it will take. In: what a stream or a report says. Out: a fraction, and
  * seconds left. Pure; the caller brings the time. */
 #ifndef FIRMWARE_SIM_APP_PROGRESS_H
 #define FIRMWARE_SIM_APP_PROGRESS_H
@@ -19,7 +19,8 @@ struct progress_pace {
  * where it is not known: the first report, an unknown fraction, or nothing done since. */
 double progress_left_s(struct progress_pace *pace, const char *what, double fraction, int64_t now_ns);
 
-/* How long a scan lasts by its descriptor, from the first pulse on; 0: it has no end, or the frame is no descriptor. */
+/* Returns how long a scan lasts by its descriptor, from the first pulse on; 0: it has no end, or the frame is no
+ * descriptor. */
 double progress_scan_s(const struct scanhead_frame *descriptor);
 
 #endif

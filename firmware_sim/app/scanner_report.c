@@ -12,8 +12,8 @@ static void scanner_report_warn(void *ctx, const char *text)
     uint32_t i = 0;
     while (i < w->n && strcmp(w->one[i].text, text) != 0)
         i++;
-    if (i < w->n && w->are_said) return;
-    if (i == w->n && (w->are_said || w->n == SITE_MAX_WARNINGS || (w->one[i].text = strdup(text)) == NULL)) {
+    if (i < w->n && w->are_printed) return;
+    if (i == w->n && (w->are_printed || w->n == SITE_MAX_WARNINGS || (w->one[i].text = strdup(text)) == NULL)) {
         sh_warn(r->to, "scanner of station %u: %s", r->station, text);
         return;
     }
@@ -37,10 +37,10 @@ void scanner_report_set_up(struct scanner_report *report, const struct sh_report
                            struct scanner_warnings *warnings)
 {
     *report = (struct scanner_report){{report, scanner_report_warn, progress, stop}, to, warnings, station};
-    warnings->n_scanners += !warnings->are_said;
+    warnings->n_scanners += !warnings->are_printed;
 }
 
-static int was_said(const struct site *first, const char *text)
+static int was_printed(const struct site *first, const char *text)
 {
     for (uint32_t i = 0; first != NULL && i < first->warnings.n; i++)
         if (strcmp(first->warnings.text[i], text) == 0) return 1;
@@ -48,7 +48,7 @@ static int was_said(const struct site *first, const char *text)
 }
 
 /* Where all scanners give the warning, that of the first one, which was printed, stands for all. */
-static void scanner_report_say(const struct scanner_warnings *w, uint32_t i, int is_said, const struct sh_report *to)
+static void scanner_report_say(const struct scanner_warnings *w, uint32_t i, int is_printed, const struct sh_report *to)
 {
     char stations[4 * CONFIG_MAX_STATIONS + 1] = "";
     uint32_t n = 0;
@@ -56,16 +56,16 @@ static void scanner_report_say(const struct scanner_warnings *w, uint32_t i, int
     for (uint32_t s = 0; s < CONFIG_MAX_STATIONS; s++)
         if (w->one[i].is_of[s])
             used += (size_t)snprintf(stations + used, sizeof stations - used, "%s%u", n++ > 0 ? ", " : "", s + 1);
-    if (is_said && n == w->n_scanners) return;
-    sh_warn(to, "scanner%s of station%s %s%s: %s", n > 1 ? "s" : "", n > 1 ? "s" : "", stations, is_said ? ", too" : "",
-            w->one[i].text);
+    if (is_printed && n == w->n_scanners) return;
+    sh_warn(to, "scanner%s of station%s %s%s: %s", n > 1 ? "s" : "", n > 1 ? "s" : "", stations,
+            is_printed ? ", too" : "", w->one[i].text);
 }
 
 void scanner_warnings_say(struct scanner_warnings *warnings, const struct site *first, const struct sh_report *to)
 {
-    for (uint32_t i = 0; i < warnings->n && !warnings->are_said; i++)
-        scanner_report_say(warnings, i, was_said(first, warnings->one[i].text), to);
-    warnings->are_said = 1;
+    for (uint32_t i = 0; i < warnings->n && !warnings->are_printed; i++)
+        scanner_report_say(warnings, i, was_printed(first, warnings->one[i].text), to);
+    warnings->are_printed = 1;
 }
 
 void scanner_warnings_free(struct scanner_warnings *warnings)

@@ -14,7 +14,7 @@ struct scanner_warnings {
         char *text;
         uint8_t is_of[CONFIG_MAX_STATIONS]; /* by the scanner's first station, from 0 */
     } one[SITE_MAX_WARNINGS];
-    int are_said; /* from now on only a new warning is printed, at once */
+    int are_printed; /* from now on only a new warning is printed, at once */
 };
 
 /* A report that notes warnings, and hands on all else. It must not move. */

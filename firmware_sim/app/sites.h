@@ -26,7 +26,7 @@ int sites_load(const struct config *cfg, enum site_purpose purpose, const struct
 /* The same beside the first site of a head that runs, which stays the caller's. */
 int sites_load_beside(const struct config *cfg, const struct site *first, const struct sh_report *report,
                       struct sites *sites, struct sh_err *err);
-/* The site of the scanner at a station, from 0. */
+/* Returns the site of the scanner at a station, from 0. */
 struct site *sites_of(const struct sites *sites, uint32_t station);
 void sites_free(struct sites *sites);
 

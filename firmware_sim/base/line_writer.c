@@ -2,6 +2,7 @@
 #include "firmware_sim/base/line_writer.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -113,12 +114,17 @@ static void take_piece(struct line_writer *w, struct piece *piece)
     piece->len += len;
 }
 
-/* 0, or why it failed. */
+/* Returns 0, or the errno of the write that failed. A descriptor that another program made non-blocking is waited for
+ * as any other. */
 static int write_piece(int fd, const struct piece *piece)
 {
+    struct pollfd slot = {.fd = fd, .events = POLLOUT};
     for (size_t at = 0; at < piece->len;) {
         const ssize_t n = write(fd, piece->text + at, piece->len - at);
-        if (n < 0 && errno != EINTR) return errno;
+        if (n < 0 && errno == EAGAIN)
+            poll(&slot, 1, -1);
+        else if (n < 0 && errno != EINTR)
+            return errno;
         if (n > 0) at += (size_t)n;
     }
     return 0;

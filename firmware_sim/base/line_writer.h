@@ -22,7 +22,7 @@ enum line_kind { LINE_PLAIN, LINE_REMARK, LINE_KINDS };
 enum { LINE_MOST_BYTES = 2048, LINE_GAP_BYTES = 160 };
 
 struct line_writer_spec {
-    int fd;                  /* for writing, blocking; the writer's from here on, also after a failure */
+    int fd;                  /* for writing; the writer's from here on, also after a failure */
     const char *what, *path; /* errors begin with them: "journal: FILE"; the caller's */
     size_t room;             /* size of the queue in bytes, at least 2 * (LINE_MOST_BYTES + LINE_GAP_BYTES) */
     _Atomic uint64_t *lost;  /* counts the lines that are not in the file; the caller's; may be NULL */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A call: a line whose row is found, with its value and its reply. Rows and what they do get nothing else. */
+/* A call: a line whose row is found, with its value and its reply. It is all that the functions of rows are given. */
 #ifndef FIRMWARE_SIM_COMMAND_CALL_H
 #define FIRMWARE_SIM_COMMAND_CALL_H
 
@@ -30,8 +30,8 @@ struct command_call {
     struct command_device *dev;
     uint32_t session;
     const struct command_row *row;
-    char *param;      /* as written; of a step, up to the pose */
-    const char *pose; /* what follows the step; NULL: nothing */
+    char *param;      /* as written; of TIME:STEP, the part before the pose */
+    const char *pose; /* the part of TIME:STEP after the time; NULL: none */
     struct command_value value;
     struct command_result *out;
 };

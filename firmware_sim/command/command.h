@@ -25,8 +25,8 @@
  * pulse are sent. On a head with fixed pulse rates HEAD:PRR takes only these; another rate is -222 with the list of
  * them.
  *
- * Ranges, noise, and the step of a sphere or of a planar head with geometries hold from the next scan on, and can't
- * change within one.
+ * Ranges and noise hold from the next scan on, and can't change within one. So does the step of a head whose emitter is
+ * a sphere, or is planar with several geometries (pairs of a line rate and a step).
  *
  * Stations. HEAD:STATION takes stations that have this scanner; a station with another scanner is -221.
  *
@@ -128,7 +128,7 @@ struct command_time_server {
     uint8_t address[4];
     uint32_t update_s; /* from request to request */
     int32_t zone_h;    /* how far local time is ahead of UTC */
-    uint32_t n_roles;  /* how often the role has changed: a reader that looks only now and then may miss a change */
+    uint32_t n_roles;  /* how often the role has changed, also where it changed and changed back */
 };
 /* Its answers since power-up. */
 struct command_time_answers {
@@ -138,8 +138,8 @@ struct command_time_answers {
     const char *state; /* one word; NULL: OFF */
 };
 
-/* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. There are 8 sessions on
- * each of 9 links (one is the observer's), which count from 1. */
+/* The sessions' clients by kind of link and address, "tcp 127.0.0.1:40312"; empty: not known. Sessions count from 1.
+ * There are 8 on each of 9 links, one of which is the page's (STREAM_MAX_LINKS). */
 enum { COMMAND_PEERS = 73, COMMAND_PEER_LEN = 80 };
 struct command_peers {
     char name[COMMAND_PEERS][COMMAND_PEER_LEN];
@@ -161,13 +161,13 @@ struct command_replay {
     const char *fixed_speed; /* why the speed does not change; NULL: it may */
     int loop;
 };
-/* Negative values leave what there is. */
+/* Where a value is negative, that part stays as it is. */
 struct command_replay_change {
     double position_s, speed;
     int loop;
 };
 
-/* Settings that a recording does not say. */
+/* These stand for the value of a setting that is not in the recording. */
 #define COMMAND_NOT_RECORDED     INT64_MIN
 #define COMMAND_NOT_RECORDED_U32 UINT32_MAX
 
@@ -207,7 +207,7 @@ struct command_device {
     const struct command_place *first_place; /* at power-up */
     struct command_replay replay;
     const char *recorded; /* a recording is replayed: why no setting changes; NULL: none is */
-    int is_played;        /* it is playing, whatever its head's state was: SCAN:STOP ends it */
+    int is_played;        /* the recording is playing, whatever its head's state was: SCAN:STOP ends it */
     const char *fixed;    /* why no station can be moved; NULL: they can */
     uint32_t moving;      /* the station that is being moved; 0: none. Meanwhile no scan starts */
 };
@@ -222,7 +222,7 @@ enum command_effect {
     COMMAND_STORE,   /* settings are now those of power-up, and are to be kept */
     COMMAND_STEP,    /* let step_ns of device time pass, then send the reply */
     COMMAND_MOVE,    /* move a station; the reply is that of success */
-    COMMAND_TAKE,    /* control, and nothing else */
+    COMMAND_TAKE,    /* control was taken; nothing else has changed */
     COMMAND_FAULTS,  /* faults were added or taken out */
     COMMAND_CLOCK,   /* the scanner's clock was set */
     COMMAND_SERVER,  /* its time server has changed */

@@ -13,7 +13,7 @@
 
 const struct command_unit command_unit_fault = {"", 0, "no unit", {{NULL, 0}}};
 
-static int none(struct command_call *call)
+static int fail_no_faults(struct command_call *call)
 {
     return command_fail(call, CMD_E_SETTINGS, "%s: this head has no faults", call->row->header);
 }
@@ -23,7 +23,7 @@ int command_fault_add(struct command_call *call)
     struct command_device *dev = call->dev;
     char why[COMMAND_TEXT_LEN];
     uint32_t number;
-    if (dev->faults == NULL) return none(call);
+    if (dev->faults == NULL) return fail_no_faults(call);
     if (call->param[0] != '{')
         return command_fail(call, CMD_E_DATA_TYPE, "%s takes a fault as {kind: drop, every: 10}", call->row->header);
     if (dev->faults->add(dev->faults_owner, call->param, &number, why, sizeof why) != 0)
@@ -48,7 +48,7 @@ static int fault_commands_take_number(struct command_call *call, int64_t *number
                         clip);
 }
 
-static int no_such(struct command_call *call, int64_t number)
+static int fail_no_such_fault(struct command_call *call, int64_t number)
 {
     return command_fail(call, CMD_E_RANGE, "%s: there is no fault %u; FAULt:LIST? lists the faults", call->row->header,
                         (uint32_t)number);
@@ -58,9 +58,10 @@ int command_fault_clear(struct command_call *call)
 {
     struct command_device *dev = call->dev;
     int64_t number;
-    if (dev->faults == NULL) return none(call);
+    if (dev->faults == NULL) return fail_no_faults(call);
     if (fault_commands_take_number(call, &number) != 0) return -1;
-    if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0) return no_such(call, number);
+    if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0)
+        return fail_no_such_fault(call, number);
     call->out->effect = COMMAND_FAULTS;
     return command_reply(call, "OK");
 }
@@ -70,9 +71,9 @@ int command_fault_injected(struct command_call *call)
     struct command_device *dev = call->dev;
     int64_t number;
     uint64_t n;
-    if (dev->faults == NULL) return none(call);
+    if (dev->faults == NULL) return fail_no_faults(call);
     if (fault_commands_take_number(call, &number) != 0) return -1;
-    if (dev->faults->injected(dev->faults_owner, (uint32_t)number, &n) != 0) return no_such(call, number);
+    if (dev->faults->injected(dev->faults_owner, (uint32_t)number, &n) != 0) return fail_no_such_fault(call, number);
     return command_reply(call, "%llu", (unsigned long long)n);
 }
 
@@ -80,7 +81,7 @@ int command_fault_list(struct command_call *call)
 {
     struct command_device *dev = call->dev;
     char text[COMMAND_MAX_REPLY];
-    if (dev->faults == NULL) return none(call);
+    if (dev->faults == NULL) return fail_no_faults(call);
     dev->faults->list(dev->faults_owner, text, sizeof text);
     return command_reply(call, "%s", text[0] != '\0' ? text : "none");
 }

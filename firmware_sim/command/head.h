@@ -96,8 +96,9 @@ struct head_limits {
     int64_t sequence_ps; /* a head with beams: from firing sequence to firing sequence */
     int step_fixed;      /* a head on a platform that moves keeps its step */
     int64_t range_min_nm, range_max_nm;
-    int64_t near_most_nm, far_least_nm; /* largest range_min, smallest range_max: each pulse rate keeps some range */
-    /* The largest number of a kind of range noise, of angle noise. noise_most is 0 where echoes are found in samples. */
+    int64_t near_most_nm, far_least_nm; /* largest range_min, smallest range_max: each rate still measures */
+    /* The largest number of a kind of range noise, of angle noise. noise_most is 0 where echoes are found in samples.
+     * */
     uint32_t noise_most, angle_most;
     uint32_t phase_lock_most; /* 1: it has a rotor whose phase can be held */
     uint32_t waves_most;      /* 1: it samples waveforms, and may send them */

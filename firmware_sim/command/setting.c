@@ -111,7 +111,7 @@ static void narrow_to_rates(const struct command_call *call, int64_t *min, int64
         if (rate[i] <= to) *max = rate[i];
 }
 
-/* The pulse rate of a head whose lines have a fixed number of pulses. */
+/* Returns the pulse rate of a head whose lines have a fixed number of pulses. */
 static int64_t rate_of_lines(const struct command_call *call)
 {
     return call->dev->settings.lines_uhz * head_line_pulses(&call->dev->limits, &call->dev->settings);
@@ -142,7 +142,7 @@ static int is_sphere(const struct command_call *call)
     return call->dev->limits.emitter == EMITTER_SPHERE;
 }
 
-/* The most lines of a sphere: with more pulses a line, the largest pulse rate allows fewer lines. */
+/* Returns the most lines of a sphere: with more pulses a line, the largest pulse rate allows fewer lines. */
 static int64_t most_lines_of_sphere(const struct command_call *call)
 {
     return call->dev->limits.prr_max_uhz / head_line_pulses(&call->dev->limits, &call->dev->settings);
@@ -375,7 +375,9 @@ static int check_value(struct command_call *call, int64_t value)
     if (is_setting(call, offsetof(struct head_settings, station)) && head_is_elsewhere(&call->dev->limits, value))
         return command_fail(call, CMD_E_SETTINGS, "%s %lld has another scanner; run that: --set head.station=%lld",
                             call->row->header, (long long)value, (long long)value);
-    const int as_before = setting->derived != NULL && call->value.kind == COMMAND_VALUE_DEF; /* the rates of power-up */
+    /* DEF of a step brings back the rates of power-up. They are allowed together, even where the step that is computed
+     * from them is outside its present range (is_default_beyond). */
+    const int as_before = setting->derived != NULL && call->value.kind == COMMAND_VALUE_DEF;
     const enum emitter_kind head = call->dev->limits.emitter;
     const int sets = head == EMITTER_LINE || (head == EMITTER_SPHERE && setting->derived == &command_step_both);
     if (!(as_before && sets) && check_other(call, value) != 0) return -1;

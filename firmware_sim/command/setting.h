@@ -51,7 +51,7 @@ int command_setting_change(struct command_call *call);
 
 /* 0: a recording is replayed that does not have the setting. */
 int command_setting_is_known(const struct command_call *call);
-/* The index of the last word that the head takes. */
+/* Returns the index of the last word that the head takes. */
 uint32_t command_setting_last_word(const struct command_call *call);
 /* The only values that a setting takes, rising: pulse rates of programs, rates or steps of geometries. Returns how
  * many; 0: it takes any value in its range. */
@@ -60,7 +60,8 @@ uint32_t command_setting_values(const struct command_call *call, int64_t value[H
 int command_setting_is_free(const struct command_device *dev, const struct command_setting *setting,
                             enum head_state state);
 
-/* The number in call->value in the row's unit. Outside of the range: -222 with the allowed range, and returns -1. */
+/* Gives the number in call->value in the row's unit. Outside of the range it returns -1, after error -222 with the
+ * allowed range. */
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);
 
 #endif

@@ -35,7 +35,7 @@ int64_t command_step_ndeg(uint32_t steps)
     return nearest(TURN_NDEG, steps);
 }
 
-/* The step of a sphere, which has a whole number of steps in a turn. */
+/* Returns the step of a sphere, which has a whole number of steps in a turn. */
 static int64_t sphere_step(int64_t step_udeg)
 {
     return HALF_UDEG % step_udeg == 0 ? step_udeg * NDEG_PER_UDEG : nearest(TURN_NDEG, emitter_sphere_steps(step_udeg));
@@ -56,7 +56,7 @@ static int64_t pan_step(const struct command_device *dev, const struct head_sett
     return nearest((wide)s->pan_udeg_s * NANO, s->lines_uhz);
 }
 
-/* The coarser one of both steps: no two neighbours are further apart. */
+/* Returns the coarser one of both steps: no two neighbours are further apart. */
 static int64_t both_step(const struct command_device *dev, const struct head_settings *s)
 {
     const int64_t in_line = line_step(dev, s), of_pan = dev->limits.emitter == EMITTER_LINE ? pan_step(dev, s) : 0;
@@ -90,7 +90,7 @@ static int64_t step_of_lines(const struct command_device *dev, int64_t lines_uhz
     return nearest((wide)lines_uhz * dev->limits.sweep_udeg * NDEG_PER_UDEG, dev->settings.prr_uhz);
 }
 
-/* The largest step up to `most` at which the pan is fast enough for the lines. Both rates rise with it. */
+/* Returns the largest step up to `most` at which the pan is fast enough for the lines. Both rates rise with it. */
 static int64_t most_of_both(const struct command_device *dev, int64_t most)
 {
     int64_t low = 0, high = most;

@@ -20,7 +20,7 @@ static int is_stored(const struct command_device *dev, const struct command_row 
            setting->offset != offsetof(struct head_settings, frames);
 }
 
-/* The value that a header's query gives. */
+/* Returns the value that a header's query gives. */
 static const char *ask(struct command_device *dev, const char *header, struct command_result *out)
 {
     char line[COMMAND_MAX_LINE + 2];
@@ -96,7 +96,7 @@ static int is_set(struct command_device *dev, const char *line, struct command_r
     return line[n] == ' ' && strcmp(ask(dev, header, out), line + n + 1) == 0;
 }
 
-/* One pass over the lines that are not done. trial: takes each one first. Returns how many were done. */
+/* Tries the lines that are not done: first on `trial`, then with `set`. Returns how many were done. */
 static int try_lines(struct command_device *trial, struct lines *lines, void (*set)(void *ctx, const char *line),
                      void *ctx, const char **left, struct command_result *refused)
 {

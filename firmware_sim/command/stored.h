@@ -12,8 +12,8 @@
  * -1: cap is too small. */
 int command_stored_text(struct command_device *dev, const struct head_settings *configured, char *text, size_t cap);
 
-/* Carries out such lines in an order in which none is refused, since a setting's limits depend on others. set: does one
- * of them. A line whose value is set already is left out. Returns 0; or -1: a line is refused, and why has it with the
+/* Carries out such lines in an order in which none is refused, since a setting's limits depend on others: calls `set`
+ * for each. A line whose value is set already is left out. Returns 0; or -1: a line is refused, and why has it with the
  * reason. */
 int command_stored_apply(struct command_device *dev, const char *text, void (*set)(void *ctx, const char *line),
                          void *ctx, char *why, size_t len);

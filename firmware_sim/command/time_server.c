@@ -58,7 +58,7 @@ int command_server_query(struct command_call *call)
                          s->zone_h, interfaces[s->interface]);
 }
 
-/* The index of a word; n: it is none of them. */
+/* Returns the index of a word; n: it is none of them. */
 static uint32_t find_word(const char *const words[], uint32_t n, const char *word)
 {
     uint32_t i = 0;

@@ -43,7 +43,8 @@ static void note(const struct device_beam *beam, const struct device_beam_fault 
 
 /* ---- when faults strike */
 
-/* Pulses begin .. end of the scan, without end, by the segment's times; pulses before the segment don't matter. */
+/* Finds the pulses at which the fault strikes: from *begin up to the one before *end, by the segment's times. Pulses
+ * before the segment don't matter. */
 static void find_window(const struct device_beam *beam, const struct fault_entry *entry, uint64_t *begin, uint64_t *end)
 {
     const struct fault *f = &entry->fault;
@@ -159,7 +160,7 @@ static void add_up(struct device_beam *beam)
     if (now->stuck) cast->n_wobbles = 0;
 }
 
-/* The turn of the mirror, or of the rotor, at a pulse. */
+/* Returns the turn that the mirror, or the rotor, is in at a pulse. */
 static double find_turn(const struct device_beam *beam, uint64_t pulse, int64_t t_ns)
 {
     const struct device_disturbance *now = &beam->now;

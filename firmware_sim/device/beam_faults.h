@@ -39,7 +39,7 @@ void device_set_rates(struct device_beam *beam, uint64_t pulse);
 /* Begins and ends the faults that do so at the scan's next pulse, if that fires before until_ns of the scan. The
  * segment has the new rates from there on; each change is noted on the board. Sets the next edge. */
 void device_turn_beam(struct device_beam *beam, int64_t until_ns);
-/* The loss of optical power by the faults that strike, dB. */
+/* Returns the loss of optical power by the faults that strike, dB. */
 double device_beam_loss_db(const struct device_beam *beam);
 /* A scan begins, or is over at a time since its start: ends all faults that strike. */
 void device_end_beam(struct device_beam *beam, int64_t t_ns);

@@ -12,7 +12,7 @@ static void change_settings(struct device *device)
 {
     if (!device->scan.on) return;
     struct schedule_spec spec;
-    if (device->cmd.settings.lines_uhz != device->scan.lines_uhz) device->beam.held_uhz = 0; /* up to the next pulse */
+    if (device->cmd.settings.lines_uhz != device->scan.lines_uhz) device->beam.held_uhz = 0; /* until the next PPS */
     device_fill_spec(&device->beam, device->scan.site, &spec);
     schedule_change(&device->scan.segment, &device->scan.segment, &spec, device->scan.pulse_next);
     device->scan.describe = 1;

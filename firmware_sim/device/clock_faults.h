@@ -13,12 +13,14 @@ struct head_clock;
 /* Begins and ends the faults that do so in a tick. */
 void device_run_clock_faults(struct head_faults *faults, struct head_clock *clock, struct device_events *events,
                              uint64_t tick);
-/* Both are for kinds that strike at pulses and sentences, after a step of the tick. The first says whether a fault of
- * the kind has this device time. The other counts a pulse or a sentence there, for the note of the fault's end. */
+/* Both are for kinds that strike at pulses per second and at sentences, after a step of the tick. The first says
+ * whether a fault of the kind holds at a device time. The other counts a pulse or a sentence, for the note of the
+ * fault's end. */
 int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 void device_count_clock_fault(struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 
-/* How late all of them together make a sentence; a pulse: of each fault the first one, the third and so on are late. */
+/* How late all faults together make a sentence, or a pulse per second. Each fault makes every second pulse late, from
+ * the first in its window on. */
 int64_t device_sentence_late_ns(const struct head_faults *faults, int64_t t_ns);
 int64_t device_pulse_late_ns(const struct head_faults *faults, int64_t edge_ns);
 

@@ -84,7 +84,7 @@ static int open_journals(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
-/* Parts that know nothing of the whole point to what they need of it. */
+/* Gives the parts that don't use struct device pointers to what they need of it. */
 static void set_parts(struct device *device)
 {
     device->events.tick_hz = device->overrun.tick_hz = device->tick_hz;
@@ -224,8 +224,7 @@ static void run_faults(struct device *device, uint64_t tick, struct device_work 
     const struct head_faults_tick at = {.t_ns = (int64_t)tick * device->tick_ns,
                                         .has_pulses = device->scan.on,
                                         .pulse0 = device->scan.pulse_next,
-                                        .n_pulses =
-                                            1}; /* from the tick on that begins with the fault's pulse or later */
+                                        .n_pulses = 1}; /* a fault waits for a tick that begins at its pulse or later */
     static const uint64_t kinds = HEAD_FAULTS_CLOCK | HEAD_FAULTS_SERVER | HEAD_FAULT(FAULT_POWER_CYCLE);
     if (head_faults_step(&device->head_faults, kinds, &at))
         device_run_clock_faults(&device->head_faults, &device->clock, &device->events, tick);
@@ -319,7 +318,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
-    /* 0: if the run ends here all the same, its one scan is over, and this tick was part of it. */
+    /* 1: the run was to end before this tick. Else, where it is over, this tick was the last of its one scan. */
     const int told = device->ending || tick >= device->end_tick;
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;

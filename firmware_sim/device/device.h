@@ -56,8 +56,8 @@ struct device_disturbance {
     struct cast_disturbance cast;
 };
 
-/* The work of one tick. All members are copies, so that no thread waits for another. Frames leave in the
- * order of the members. */
+/* The work of one tick. All members are copies, so that no thread waits for another. Stream frames
+ * leave in the order of the members. */
 struct device_work {
     uint64_t tick;
     struct device_version *version; /* where stations stand: device_site_of, until device_done; NULL: as at power-up */
@@ -130,12 +130,12 @@ int device_close_journal(void *self, struct sh_err *err);
 /* 1: one of these files is behind; callers that can wait should. Any thread; takes no lock. */
 int device_files_fill(const void *self);
 
-/* The board of injected faults, from the configuration and from commands. It belongs to the device. */
+/* Returns the board of injected faults, from the configuration and from commands. It belongs to the device. */
 struct fault_board *device_faults(const void *self);
 
 struct device_counters *device_counters(void *self);
 
-/* The next tick's work. Returns 0, or 1 when the run is over and there is no next tick. */
+/* Claims the next tick: its work. Returns 0, or 1 when the run is over and there is no next tick. */
 int device_claim(struct device *device, struct device_work *work);
 /* A claimed tick was lost, and with it the pulses that it should have cast. They are counted. The tick's other frames
  * go out with a later one. */
@@ -217,7 +217,7 @@ int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second, and the time since the top of the hour, at a device time that was claimed (pps.h). */
 enum protocol_pps device_pps(void *self, int64_t t_ns, int64_t *hour_ns);
 
-/* The tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
+/* Returns the tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
 uint64_t device_rests_from(void *self);
 
 /* The last power-up. While power is off, all but the time are those of the power-up before. */
@@ -235,7 +235,7 @@ double device_window_loss_db(void *self);
 /* The number of the last scan that began, which is how many have begun; 0: none. *station: where it stands, from 1;
  * NULL: not asked for. */
 uint32_t device_last_scan(struct device *device, uint32_t *station);
-/* The length of the last scan, in whole ticks; 0: none has ended. */
+/* Returns the length of the last scan, in whole ticks; 0: none has ended. */
 int64_t device_scan_ns(struct device *device);
 
 int64_t device_tick_ns(const void *self);
@@ -245,7 +245,7 @@ void device_describe_now(struct device *device, struct device_work *work);
 /* The anchor of a station's points; the stretch matters only along a trajectory (site_georef). */
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a);
 
-/* The most pulses that one tick consists of, and the most lines that end in it, whatever the settings. */
+/* Returns the most pulses that one tick consists of, and the most lines that end in it, whatever the settings. */
 uint32_t device_tick_pulses(const struct config *cfg);
 uint32_t device_tick_lines(const struct config *cfg);
 

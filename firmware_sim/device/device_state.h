@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to the files of this folder: the state of the device, and what works on all of it. Parts that know nothing of
- * the whole have headers of their own. */
+/* Private to the files of this folder: the state of the device, and the functions that need all of it. Parts that don't
+ * use struct device have headers of their own. */
 #ifndef FIRMWARE_SIM_DEVICE_DEVICE_STATE_H
 #define FIRMWARE_SIM_DEVICE_DEVICE_STATE_H
 
@@ -41,7 +41,7 @@ enum { DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAME = 64 };
 struct device_machine {
     enum head_state state; /* as of the next tick to be claimed */
     uint64_t due_tick;     /* of the next timed transition; UINT64_MAX: none */
-    /* The last ones: readers see the state of the last released tick. Number i is at i %
+    /* The last changes, since clients see the state of the last released tick. Number i is at i %
      * DEVICE_MAX_CHANGES. */
     struct device_state_change {
         uint64_t tick;
@@ -145,7 +145,7 @@ void device_describe(struct device *device, struct device_work *work);
 /* Carries out commands of the replayed journal that are due at the tick. Returns 1 when one of them moves a station:
  * that has to be planned and finished before the others. */
 int device_run_replay(struct device *device, uint64_t tick);
-/* Notes the result of the command that was carried out of it last. */
+/* Notes the result of the command of the replayed journal that was carried out last. */
 void device_note_replayed(struct device *device, const struct command_result *result);
 
 void device_carry_out_line(struct device *device, const char *line);
@@ -168,7 +168,7 @@ void device_take_move(struct device *device, int64_t t_ns, struct command_result
 void device_end_move(struct device *device);
 
 /* live_pose.c */
-/* The end of the head's path, since the scan's start; INT64_MAX: there is none. */
+/* Returns the end of the head's path, since the scan's start; INT64_MAX: there is none. */
 int64_t device_path_end_ns(const struct device *device);
 /* The head's pose at a device time; 0: it stands at its station. A trajectory runs from the start of the
  * last scan to its end; then the platform stands there until the next scan begins. */
@@ -178,17 +178,17 @@ void device_take_poses(struct device *device, struct device_work *work);
 
 /* power.c */
 void device_first_power(struct device *device);
-/* Changes power that goes or comes with the tick, and begins boots. */
+/* Turns power off or on where that is due with the tick, and begins boots. */
 void device_run_power(struct device *device, uint64_t tick, struct device_work *work);
 /* The end of a boot is due. 1: the self-test failed, and the head is in its fault state. */
 int device_end_boot(struct device *device, uint64_t tick);
 /* Whether power has gone since `released`, or will go before an answer could come, and is not back. */
 int device_is_dead(const struct device *device, uint64_t released);
 
-/* phase_lock.c: the rotor's phase, held to the receiver's pulses. */
-/* A pulse comes in the tick at hand. */
+/* phase_lock.c: the rotor's phase, held to the receiver's pulses per second. */
+/* A pulse per second comes in the tick at hand. */
 void device_hold_phase(struct device *device, int64_t edge_ns);
-/* A tick begins: chooses the rotor's speed after a pulse; without locked pulses it runs free. */
+/* A tick begins: chooses the rotor's speed after a pulse per second. While these are not locked, it runs free. */
 void device_check_phase(struct device *device, int64_t t_ns);
 
 /* scanner_clock.c */

@@ -15,7 +15,7 @@ struct native_emitter;
 void device_fill_descriptor(const struct device_scan *scan, const char *idn, uint32_t waves,
                             struct native_descriptor *d);
 /* For a line head, which has no such frame, the kind is NATIVE_EMIT_LINE. echoes: those that are sent, enum
- * beam_echoes. beam: [NATIVE_MAX_BEAMS]. */
+ * beam_select. beam: [NATIVE_MAX_BEAMS]. */
 void device_fill_emitter(const struct device_scan *scan, uint32_t echoes, struct native_emitter *e,
                          struct native_beam *beam);
 

@@ -20,7 +20,7 @@ void gnss_init(struct gnss *gnss, const struct site *site, const struct head_clo
     if (gnss->on) gnss->period_ns = UTC_SECOND_NS / cfg->gnss.rate_hz;
 }
 
-/* Number of the first position at or after a time since 1970; TAI's full seconds are UTC's. */
+/* Returns the number of the first position at or after a time since 1970. A full second of TAI is one of UTC, too. */
 static int64_t number_at(const struct gnss *gnss, int64_t tai_ns)
 {
     return (tai_ns + gnss->period_ns - 1) / gnss->period_ns;
@@ -44,7 +44,7 @@ struct gnss_place {
     double velocity_m_s[3]; /* east, north, up */
 };
 
-/* The place on the Earth of a point of the scene; 0: there is none. */
+/* Finds the place on the Earth of a point of the scene. 0: there is none. */
 static int locate(const struct site *site, const struct placement *at, const double p_prcs[3], double geodetic[3])
 {
     struct georef_place place;
@@ -86,7 +86,7 @@ static void set_velocity(const double before[3], const double here[3], const dou
     if (locate_axes(&place[1], at_ecef, enu, NULL) == SH_OK) mat3_apply_transposed(enu, d, velocity_m_s);
 }
 
-/* The antenna's place, with its error shift_m east, north and up. 0: it is nowhere on the Earth. */
+/* Finds the antenna's place, with its error shift_m east, north and up. 0: it is nowhere on the Earth. */
 static int gnss_position(const struct gnss *gnss, uint32_t station, const struct gnss_track *track,
                          const double shift_m[3], struct gnss_place *out)
 {

@@ -106,7 +106,7 @@ int64_t head_clock_true_ns(const struct head_clock *clock, int64_t t_ns)
     return clock->tai0_ns + t_ns;
 }
 
-/* The clock's time, rounded down. */
+/* Returns the clock's time at t_ns, rounded down. */
 static int64_t piece_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
 {
     const head_clock_wide gained = piece->gained + (head_clock_wide)(t_ns - piece->from_ns) * piece->rate_ppt;
@@ -131,7 +131,8 @@ int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s
     return utc_table_add(&clock->table, *posix_s);
 }
 
-/* The clock's time a nanosecond before t_ns. A jump is no edge: at a jump the piece is extended backward. */
+/* Returns the clock's time a nanosecond before t_ns. At a jump it extends the piece backward, for a jump counts as no
+ * edge. */
 static int64_t before_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
 {
     const int begins = t_ns == piece->from_ns && piece != clock->piece && piece->change.jump_ns == 0;

@@ -31,7 +31,7 @@ void head_faults_note(struct head_faults *faults, const struct head_fault *fault
     note(faults, fault, &(struct head_faults_tick){.t_ns = t_ns}, ended, NULL);
 }
 
-/* The start of the first tick that begins at t_ns or later. */
+/* Returns the start of the first tick that begins at t_ns or later. */
 static int64_t round_up(const struct head_faults *faults, int64_t t_ns)
 {
     const int64_t rest_ns = t_ns % faults->tick_ns;
@@ -85,7 +85,7 @@ static int is_active(const struct head_faults *faults, const struct head_fault *
            tick->pulse0 + tick->n_pulses > f->fault.from_pulse;
 }
 
-/* The moment in or before this tick at which the fault began, or ended. */
+/* Returns the moment in or before this tick at which the fault began, or ended. */
 static int64_t at_ns(const struct head_faults_tick *tick, const struct head_fault *f)
 {
     if (f->begins) return f->from_ns > tick->t_ns ? f->from_ns : tick->t_ns;

@@ -75,7 +75,7 @@ void head_faults_init(struct head_faults *faults, struct fault_board *board, int
  * Returns 1 when one of the faults is active or has just ended. */
 int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct head_faults_tick *tick);
 
-/* The faults of a kind that are active, one after the other; from NULL to NULL. */
+/* Returns the fault of a kind that is active and comes next in the list: after NULL the first, after the last NULL. */
 struct head_fault *head_faults_next(struct head_faults *faults, enum fault_kind kind, const struct head_fault *before);
 
 /* The same for a kind that strikes at an event, such as a boot: the faults whose window has this moment. After a step

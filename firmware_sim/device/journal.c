@@ -122,7 +122,7 @@ int journal_close(struct journal *journal, struct sh_err *err)
     return rc;
 }
 
-/* A decimal number up to max and the blank after it. Digits only: strtoull would take signs and blanks. */
+/* Takes a decimal number up to max and the blank after it. It takes digits only: strtoull would take signs, too. */
 static int journal_take_number(const char **p, uint64_t max, uint64_t *value)
 {
     const char *q = *p;
@@ -137,7 +137,7 @@ static int journal_take_number(const char **p, uint64_t max, uint64_t *value)
     return 0;
 }
 
-/* NULL, or why the line is wrong. */
+/* Returns NULL, or why the line is wrong. */
 static const char *parse_entry(const char *text, struct journal_entry *entry)
 {
     uint64_t t_ns, session;
@@ -152,8 +152,8 @@ static const char *parse_entry(const char *text, struct journal_entry *entry)
     return NULL;
 }
 
-/* Limits that no journal reaches: longer than any line that is written, also by people; and more commands than a day
- * has at one each 10 ms. A larger file would only take memory. */
+/* No journal reaches these limits: lines are shorter, also those that people write, and a command each 10 ms makes 8.6
+ * million a day. A larger file would only take memory. */
 enum { LINE_MAX_LEN = 1023, MAX_ENTRIES = 10000000 };
 
 struct reader {

@@ -34,7 +34,7 @@ int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t
 /* The run ended at this tick; journal_close writes it. SH_EINPUT: t_ns is negative. */
 int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns);
 
-/* A note, which replaying passes over: one printable line. Failures as in journal_write. */
+/* Writes a note, which replaying passes over: one printable line. Failures as in journal_write. */
 int journal_note(struct journal *journal, const char *text);
 
 /* 1: a caller that can wait should, so that nothing is dropped. 0 for NULL. */

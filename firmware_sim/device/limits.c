@@ -13,7 +13,7 @@ static int64_t to_nm(double m)
 }
 
 /* Whether commands may only narrow the ranges of power-up. Methods that were chosen by trying them on the scene, and
- * the outlines of an adaptive beam, hold for these ranges. */
+ * the outlines of an adaptive beam, hold only for these ranges. */
 static int was_tried(const struct site *site)
 {
     const struct config *cfg = site->cfg;

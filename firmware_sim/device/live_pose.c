@@ -86,7 +86,7 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
     return 0;
 }
 
-/* The pose of the head on the platform. Returns the pose's flags. */
+/* Finds the pose of the head on the platform. Returns the pose's flags. */
 static uint32_t live_head_at(const struct device *device, int64_t t_ns, struct pose *head)
 {
     struct pose body;

@@ -62,8 +62,8 @@ static int move_stops(void *ctx)
     return atomic_load(&device->moves.stops);
 }
 
-/* Makes the site of a plan beside `from`. Warnings go to the device's report; no progress is drawn, since the head
- * serves meanwhile. */
+/* Makes the site of a plan from the site `from`. Warnings go to the device's report; no progress is drawn, since the
+ * head serves meanwhile. */
 static struct device_version *make_moved(struct device *device, const struct site *from, const struct device_move *plan,
                                          struct sh_err *err)
 {

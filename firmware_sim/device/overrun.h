@@ -11,7 +11,8 @@
 
 struct command_queue;
 
-/* Ticks and pulses that the head could not compute in time, lines that its files lack, and what events told of both. */
+/* Ticks and pulses that the head could not compute in time, lines that its files lack, and what events have reported of
+ * both. */
 struct device_overrun {
     struct device_counters *counters; /* these four are the device's */
     struct device_events *events;

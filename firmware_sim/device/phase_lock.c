@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The phase lock of a rotor: at each pulse per second it looks at one azimuth.
+/* The phase lock of a rotor: at each pulse per second it shall point to one azimuth. Here a pulse is one per second,
+ * unless it is said to be the scan's.
  *
  *     at a pulse         the speed until the next one is chosen so that the azimuth will be right then
  *     pulses not locked  the rotor runs free: at the speed that is set, with the error of its motor
@@ -76,7 +77,8 @@ void device_hold_phase(struct device *device, int64_t edge_ns)
     device->edge = (struct device_edge){1, edge_ns};
 }
 
-/* The tick of the edge has its pulses at the speed that was planned for it. */
+/* Pulses of the scan up to the edge keep the speed that was chosen before. So the edge waits until the scan's next
+ * pulse is after it. */
 static void take_edge(struct device *device)
 {
     const struct device_scan *scan = &device->scan;

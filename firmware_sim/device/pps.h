@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The head as a follower of a receiver's pulses and sentences: the state of the pulses, and the counter of time since
- * the top of the hour that data and position packets carry (VLP-16 User Manual, appendix G).
+/* The head as a follower of a receiver's pulses per second, called pulses here, and of its sentences: the state of the
+ * pulses, and the counter of time since the top of the hour that data and position packets carry (VLP-16 User Manual,
+ * appendix G).
  *
  * In: each pulse and each sentence as it arrives, in order of time, with the head's own clock at that moment. Out: both
  * at a device time.
@@ -47,7 +48,7 @@ void pps_power_up(struct pps *pps, struct pps_moment at, int64_t hour_ns, int pu
 void pps_take(struct pps *pps, struct pps_moment edge);
 /* A sentence came that names this second of the hour, 0..3600. */
 void pps_take_sentence(struct pps *pps, struct pps_moment at, int64_t second);
-/* The state at `at`, and the counter then, 0..3599999999999. Before power-up: absent, and 0. */
+/* Returns the state at `at`, and the counter then, 0..3599999999999. Before power-up: absent, and 0. */
 enum protocol_pps pps_at(const struct pps *pps, struct pps_moment at, int64_t *hour_ns);
 
 #endif

@@ -41,7 +41,7 @@ void ptp_init(struct ptp *ptp, const struct config_ptp *cfg, uint64_t seed)
     ptp->key = rng_key(seed, RNG_PTP);
 }
 
-/* ---- what is said */
+/* ---- reports to telemetry and events */
 
 static void ptp_keep(struct ptp *ptp, int64_t t_ns)
 {
@@ -97,7 +97,7 @@ void ptp_text(const struct ptp_status *status, char text[PTP_TEXT_LEN])
 
 /* ---- what faults do */
 
-/* The faults of a kind that hold at a device time of the tick, one after the other. */
+/* Returns the fault of a kind that holds at a device time of the tick and comes next in the list. */
 static const struct head_fault *ptp_next(const struct ptp *ptp, enum fault_kind kind, int64_t t_ns,
                                          const struct head_fault *before)
 {
@@ -131,7 +131,7 @@ static const struct head_fault *fault_of(const struct ptp *ptp, uint64_t identit
     return last;
 }
 
-/* The identity of the best grandmaster. Of several faults, the last one in the list decides. */
+/* Returns the identity of the best grandmaster. Of several faults, the last one in the list decides. */
 static uint64_t best_master(const struct ptp *ptp, int64_t t_ns)
 {
     const struct head_fault *f = NULL;
@@ -174,7 +174,8 @@ static enum native_ptp_servo take_rate(struct ptp *ptp, int64_t t_ns, int64_t of
     return jumps ? NATIVE_PTP_JUMP : NATIVE_PTP_LOCKED;
 }
 
-/* Where the rate is at its limit, the estimate stays: it would wind up. */
+/* The PI controller of ptp.h, with 3/10 and 7/10 of the offset per interval. Where the rate is at its limit, the
+ * estimate stays: it would wind up. */
 static enum native_ptp_servo take_locked(struct ptp *ptp, int64_t t_ns, int64_t offset_ns)
 {
     const head_clock_wide per_interval = (head_clock_wide)offset_ns * PPT, whole = 10 * ptp->cfg->sync_ms * MS_NS;
@@ -292,7 +293,7 @@ static int64_t least_of(int64_t a_ns, int64_t b_ns)
     return a_ns < b_ns ? a_ns : b_ns;
 }
 
-/* The first multiple of an interval that is not before a time. */
+/* Returns the first multiple of an interval that is not before a time. */
 static int64_t next_multiple(int64_t t_ns, int64_t interval_ns)
 {
     const int64_t rest_ns = t_ns % interval_ns;
@@ -304,7 +305,7 @@ static int64_t lost_at(const struct ptp *ptp)
     return ptp->announce_ns + PTP_INTERVALS_TO_LOSE * ptp->cfg->announce_ms * MS_NS;
 }
 
-/* The first moment in [t_ns, end_ns) at which something may happen; or end_ns. */
+/* Returns the first moment in [t_ns, end_ns) at which something may happen; or end_ns. */
 static int64_t next_moment(const struct ptp *ptp, int64_t t_ns, int64_t end_ns)
 {
     const struct head_fault *f = NULL;

@@ -25,8 +25,9 @@
  * In holdover the rate stays as it was last corrected, and a fault's drift is added (clock_faults.c). Offset, delay and
  * grandmaster stay those of the last master, as ptp4l reports them.
  *
- * All is integers of ns and 1e-12; each correction is exact and nothing is summed up. A jitter's number is keyed by
- * noise.seed and the number of the Sync. The last PTP_KEPT changes are kept, since sessions ask for past times.
+ * All figures are integers of ns and 1e-12; each correction is exact and nothing is summed up. A jitter's number is
+ * keyed by noise.seed and the number of the Sync. The last PTP_KEPT changes are kept, since sessions ask for past
+ * times.
  *
  * Thread: with the device's lock. A head without a follower costs one comparison a tick. */
 #ifndef FIRMWARE_SIM_DEVICE_PTP_H
@@ -82,7 +83,7 @@ void ptp_init(struct ptp *ptp, const struct config_ptp *cfg, uint64_t seed);
 /* A tick, [t_ns, end_ns) of device time, after the faults of the tick have begun and ended. is_up: the head has power
  * and has booted. */
 void ptp_run(struct ptp *ptp, int64_t t_ns, int64_t end_ns, int is_up);
-/* As of a device time that was run. NULL: the head has no follower, or has not had power yet. */
+/* Returns the status at a device time that was run. NULL: the head has no follower, or has not had power yet. */
 const struct ptp_status *ptp_at(const struct ptp *ptp, int64_t t_ns);
 /* "SLAVE,s2,-12,850,00b0ae.fffe.000001,6,0x21,1": port, servo, offset and path delay in ns, grandmaster, its class and
  * accuracy, whether its offset to UTC is valid. */

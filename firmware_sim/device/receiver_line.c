@@ -48,7 +48,7 @@ void receiver_line_run(struct receiver_line *line, const struct gnss *gnss, stru
         send_fix(line, gnss, faults, line->next);
 }
 
-/* Fixes whose sentences arrive before t_ns, if nothing is wrong. */
+/* Counts the fixes whose sentences arrive before t_ns, if nothing is wrong. */
 static uint64_t count_due(const struct gnss *gnss, int64_t t_ns)
 {
     t_ns -= configured_ns(gnss);

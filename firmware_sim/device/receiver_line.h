@@ -29,11 +29,11 @@ struct receiver_line {
 
 /* Sends the fixes before end_ns that were not reached before. */
 void receiver_line_run(struct receiver_line *line, const struct gnss *gnss, struct head_faults *faults, int64_t end_ns);
-/* The last sentence that had arrived at t_ns. 0: there is none. */
+/* Finds the last sentence that had arrived at t_ns. 0: there is none. */
 int receiver_line_last(const struct receiver_line *line, const struct gnss *gnss, int64_t t_ns,
                        struct receiver_sentence *out);
-/* The first that arrives at t_ns or later, as far as it is known; INT64_MAX: none ever does. An answer that no tick has
- * reached yet may be too early, so it has to be asked for again then. */
+/* Returns when the first sentence arrives at t_ns or later, as far as it is known; INT64_MAX: none ever does. An answer
+ * that no tick has reached yet may be too early, so it has to be asked for again then. */
 int64_t receiver_line_next_ns(const struct receiver_line *line, const struct gnss *gnss, int64_t t_ns);
 
 #endif

@@ -101,7 +101,7 @@ static void count_pulses(struct device *device, struct device_work *work)
     atomic_fetch_add(&device->counters.cast, work->n_cast);
 }
 
-/* The time since its start at which the scan ends, whatever its frames: after its time, or at its path's end. */
+/* Returns when the scan ends, since its start, whatever its frames: after its time, or at its path's end. */
 static int64_t scan_end_ns(const struct device *device)
 {
     int64_t path_end_ns = device_path_end_ns(device);

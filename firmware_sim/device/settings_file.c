@@ -113,7 +113,7 @@ static int has_setting(const char *text, const char *line)
     return 0;
 }
 
-/* A line "NAME TEXT". */
+/* Takes a line "NAME TEXT". */
 static int settings_file_take_line(struct settings_file *file, unsigned line_no, char *line, struct sh_err *err)
 {
     char *blank = strchr(line, ' ');

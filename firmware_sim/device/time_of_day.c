@@ -81,7 +81,7 @@ static void follow_from_power_up(struct device *device, int64_t t_ns)
     pps_power_up(&device->pps, at, warm ? utc_posix_from_tai(&device->clock.table, at.head_ns) : 0, pulses);
 }
 
-/* Minutes and seconds of the sentence, as it has them. One with a wrong checksum isn't used. */
+/* Takes minutes and seconds as the sentence has them. One with a wrong checksum isn't used. */
 static void take_sentence(struct device *device, const struct receiver_sentence *sentence)
 {
     const int64_t tai_ns = head_clock_true_ns(&device->clock, gnss_time_ns(&device->gnss, sentence->index));
@@ -91,7 +91,7 @@ static void take_sentence(struct device *device, const struct receiver_sentence 
     pps_take_sentence(&device->pps, moment_at(device, sentence->t_ns), utc.minute * 60 + utc.second);
 }
 
-/* Sentences that have arrived before end_ns. One that comes with a pulse names its second. */
+/* Takes the sentences that have arrived before end_ns. One that comes with a pulse per second names its second. */
 static void take_sentences(struct device *device, int64_t end_ns)
 {
     const struct receiver_line *line = &device->line;

@@ -110,7 +110,7 @@ const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t numb
     return NULL;
 }
 
-/* A number for a new fault, whose count begins at 0. Returns 0 without memory. */
+/* Returns a number for a new fault, whose count begins at 0. Without memory it returns 0. */
 static uint32_t board_take_number(struct fault_board *board)
 {
     const uint32_t number = board->last_number + 1;
@@ -126,6 +126,9 @@ int fault_board_add(struct fault_board *board, const struct fault *fault, int64_
     pthread_mutex_lock(&board->lock);
     if (board->n == FAULT_MAX) {
         rc = sh_fail(err, SH_EINPUT, "there are %d faults already; allowed %d", FAULT_MAX, FAULT_MAX);
+    } else if (board->last_number >= FAULT_MOST_OF_A_RUN) {
+        rc = sh_fail(err, SH_EINPUT, "there were %u faults in this run; allowed %d; a new run counts anew",
+                     board->last_number, FAULT_MOST_OF_A_RUN);
     } else if ((*number = board_take_number(board)) == 0) {
         rc = sh_fail(err, SH_ENOMEM, "no memory for another fault");
     } else {

@@ -9,7 +9,10 @@
 
 #include "firmware_sim/fault/truth.h"
 
-enum { FAULT_KEPT = 2 * FAULT_MAX }; /* faults in the list, and those that were taken out last */
+enum {
+    FAULT_KEPT = 2 * FAULT_MAX,   /* faults in the list, and those that were taken out last */
+    FAULT_MOST_OF_A_RUN = 1000000 /* each number has a count until the run's end: this bounds their memory */
+};
 
 struct fault_entry {
     uint32_t number;  /* first member, for fault_find. From 1, in the order of adding; never used again */
@@ -33,7 +36,7 @@ void fault_board_free(struct fault_board *board);
 
 /* Changes with the list; 0: it has always been empty. Real-time safe. */
 uint32_t fault_board_version(const struct fault_board *board);
-/* A copy of the list, of the version that it returns. */
+/* Copies the list, and returns its version. */
 uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[FAULT_MAX], uint32_t *n);
 
 /* The same, with the faults that were taken out last. These still hit frames from before they were taken out. */
@@ -43,7 +46,7 @@ uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entr
  * callers that keep a state per fault and take over a changed list. */
 const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t number);
 
-/* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX. */
+/* Adds a fault that counts from t_ns. SH_EINPUT: there are FAULT_MAX, or the run has had FAULT_MOST_OF_A_RUN. */
 int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,
                     struct sh_err *err);
 /* Takes out the fault of that number; 0: all. Frames from before device time t_ns are still hit, since they are on
@@ -54,9 +57,9 @@ uint32_t fault_board_remove(struct fault_board *board, uint32_t number);
 
 /* Notes an injection: counts it, writes it to the truth, and passes it to the listeners. */
 void fault_board_note(struct fault_board *board, const struct fault_note *note);
-/* The number of the fault that was added last; 0: there never was one. */
+/* Returns the number of the fault that was added last; 0: there never was one. */
 uint32_t fault_board_last(struct fault_board *board);
-/* How often the fault of that number was injected; 0: all together. Those that were taken out count, too. */
+/* Returns how often the fault of that number was injected; 0: all together. Those that were taken out count, too. */
 uint64_t fault_board_injected(struct fault_board *board, uint32_t number);
 /* Adds a listener, which is called for each note in the thread that injected it. Before the run; up to 4. */
 void fault_board_listen(struct fault_board *board, void (*heard)(void *ctx, const struct fault_note *note), void *ctx);

@@ -38,7 +38,7 @@ enum fault_kind {
     FAULT_CABLE,          /* nothing comes or goes for for_ms; reset: what was connected is reset after that */
     FAULT_USB_RESET,      /* the bus is reset */
     FAULT_ENDPOINT_STALL, /* the endpoint of the stream is halted, until the host clears it */
-    FAULT_SHORT_PACKETS,  /* of the next n transfers each ends early, and goes on in the next */
+    FAULT_SHORT_PACKETS,  /* each of the next n transfers ends early, and goes on in the next */
     /* of the link, at a connection (USB: at an enumeration) */
     FAULT_REFUSE,            /* a client is turned away */
     FAULT_SLOW_ENUMERATION,  /* each control request takes for_ms */
@@ -71,7 +71,7 @@ enum fault_kind {
     FAULT_PTP_JITTER,      /* of each measurement, up to ns to either side */
     FAULT_LEAP_SECOND,     /* at the end of the minute at hand; no table has it */
     FAULT_COUNTERS_HIGH,   /* counters begin n below their wrap at power-up */
-    /* what a SICK scanner's time server answers */
+    /* the answer of a SICK scanner's time server is: */
     FAULT_NTP_SILENT, /* nothing */
     FAULT_NTP_KISS,   /* DENY */
     FAULT_NTP_UNSYNC, /* that it is not synchronised */
@@ -138,7 +138,7 @@ uint32_t fault_n(const struct fault *fault);
 
 /* Whether it strikes there, without regard to its count. index: in the list; link: the spot's. */
 int fault_strikes(const struct fault *fault, uint32_t index, uint32_t link, const struct fault_spot *spot);
-/* A random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
+/* Returns a random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
 uint64_t fault_random(const struct fault *fault, uint32_t index, uint32_t link, uint64_t number, uint32_t draw);
 
 #endif

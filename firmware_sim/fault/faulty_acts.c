@@ -54,6 +54,7 @@ void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piec
     wire_pop(wire);
     if (what == LINK_FAULT_BUS_RESET) f->plug_ns = in_ms(0.0); /* a reset may unplug, and fail to plug in again */
     if (rc != SH_OK) {
+        fault_tally_take_back(&f->tally, note.fault);
         wire_go_on(wire);
         char text[96];
         snprintf(text, sizeof text, "the fault %s could not be carried out now", fault_names[note.kind]);
@@ -84,7 +85,7 @@ int faulty_is_same_pull(const struct faulty_link *f, const struct wire_piece *ac
 
 void faulty_drop_act(struct faulty_link *f, int session, const struct wire_piece *act)
 {
-    --*fault_tally_hits(&f->tally, wire_act_note(act)->fault);
+    fault_tally_take_back(&f->tally, wire_act_note(act)->fault);
     wire_pop(f->session[session].wire);
 }
 

@@ -47,7 +47,7 @@ struct faulty_link {
 /* faulty_acts.c */
 /* Carries out the act that is first in the session's wire. */
 void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piece *act);
-/* The cable of the link is pulled now. */
+/* Whether the cable of the link is pulled now. */
 int faulty_is_pulled(const struct faulty_link *f);
 /* The act is another session's of the fault that has pulled the cable, and came due before the cable was in again. A
  * link has one cable, which is pulled once. */

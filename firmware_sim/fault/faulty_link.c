@@ -43,7 +43,8 @@ static int has_wire(struct faulty_link *f, int session)
 
 /* ---- bytes from the owner */
 
-/* A frame, a reply line or a unit. Replies lie between frames, and have no byte that begins a frame. */
+/* Returns the first frame, reply line or unit of the bytes. Replies lie between frames, and have no byte that begins a
+ * frame. */
 static struct wire_item first_item(const struct faulty_link *f, int session, const uint8_t *bytes, size_t len)
 {
     const struct faulty_session *s = &f->session[session];
@@ -162,7 +163,7 @@ struct faulty_unwritten faulty_forget(struct faulty_link *f, int session)
 
 /* ---- link_ops */
 
-/* The time to wait for events, or for the first wire or act that is due before. */
+/* Returns the time to wait for events, or for the first wire or act that is due before. */
 static int wait_ms(const struct faulty_link *f, int most_ms)
 {
     int64_t next_ns = f->plug_ns != 0 ? f->plug_ns : INT64_MAX;

@@ -22,3 +22,9 @@ uint64_t *fault_tally_hits(struct fault_tally *tally, uint32_t number)
     tally->hits[at] = 0;
     return &tally->hits[at];
 }
+
+void fault_tally_take_back(struct fault_tally *tally, uint32_t number)
+{
+    for (uint32_t i = 0; i < FAULT_KEPT; i++)
+        if (tally->number[i] == number && tally->hits[i] != 0) tally->hits[i]--;
+}

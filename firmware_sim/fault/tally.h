@@ -15,7 +15,9 @@ struct fault_tally {
 
 /* The list has changed: drops the counts of faults that are not in it. */
 void fault_tally_renew(struct fault_tally *tally, const struct fault_entry *entry, uint32_t n);
-/* The count of a fault that is in the list. */
+/* Returns the count of a fault that is in the list. */
 uint64_t *fault_tally_hits(struct fault_tally *tally, uint32_t number);
+/* Takes back one count: what it stands for was not carried out. */
+void fault_tally_take_back(struct fault_tally *tally, uint32_t number);
 
 #endif

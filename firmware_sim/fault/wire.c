@@ -23,6 +23,9 @@ struct wire *wire_create(const struct wire_spec *spec)
 void wire_free(struct wire *wire)
 {
     if (wire == NULL) return;
+    for (const struct wire_piece *left = wire->queue.first; left != NULL; left = left->next)
+        if (left->kind == WIRE_ACT && wire->spec.tally != NULL)
+            fault_tally_take_back(wire->spec.tally, wire_act_note(left)->fault);
     wire_queue_clear(&wire->queue);
     free(wire->unit);
     free(wire->mask);
@@ -54,7 +57,7 @@ void wire_renew(struct wire *wire, uint64_t ahead)
 
 enum { LAST_RANK = 4 };
 
-/* The order in which faults strike at a frame. */
+/* Returns the fault's place in the order in which faults strike at a frame. */
 static int rank_of(const struct wire *wire, const struct fault *f)
 {
     switch (f->kind) {
@@ -75,7 +78,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
     }
 }
 
-/* How often the fault has struck: an act of the link counts for all its sessions. */
+/* Returns the count of how often the fault has struck: an act of the link counts for all its sessions. */
 static uint64_t *hits_of(struct wire *wire, struct wire_fault *fault)
 {
     return fault_is_act(fault->entry.fault.kind) && wire->spec.tally != NULL
@@ -224,7 +227,7 @@ static void look_at_frame(struct wire_item *item, struct wire_making *making)
 static void look_at(struct wire *wire, struct wire_item *item, struct wire_making *making)
 {
     making->spot.t_ns = item->t_ns;
-    making->kind = wire->spec.units ? WIRE_UNIT : item->of == FAULT_OF_REPLIES ? WIRE_TEXT : WIRE_FRAMES;
+    making->kind = item->of == FAULT_OF_REPLIES ? WIRE_REPLY : WIRE_FRAMES;
     if (wire->spec.native && item->of != FAULT_OF_REPLIES)
         look_at_frame(item, making);
     else
@@ -266,7 +269,7 @@ void wire_go_on(struct wire *wire)
 
 int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len)
 {
-    struct wire_piece *piece = wire_piece_new(wire->spec.units ? WIRE_UNIT : WIRE_FRAMES, bytes, len);
+    struct wire_piece *piece = wire_piece_new(WIRE_FRAMES, bytes, len);
     if (piece == NULL) return SH_ENOMEM;
     piece->alone = 1;
     return wire_queue_put(&wire->queue, piece);

@@ -43,6 +43,7 @@ struct wire_spec {
 
 /* NULL: no memory. */
 struct wire *wire_create(const struct wire_spec *spec);
+/* Acts that were not carried out no longer count in the tally. */
 void wire_free(struct wire *wire);
 
 /* A frame, unit or reply that the session would write. t_ns: device time. Native frames have their own time and
@@ -55,7 +56,7 @@ struct wire_item {
 };
 /* Returns 0, or SH_ENOMEM: the item is lost, or part of it. */
 int wire_put(struct wire *wire, const struct wire_item *item, int64_t now_ns);
-/* The rest of a frame, unit or reply that was begun without the wire: goes out as it is, and is not counted. */
+/* Puts the rest of a frame, unit or reply that was begun without the wire. It goes out as it is, and is not counted. */
 int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len);
 /* An act that should have ended the session could not be carried out. Items that were put since then are lost. */
 void wire_go_on(struct wire *wire);
@@ -65,13 +66,13 @@ void wire_renew(struct wire *wire, uint64_t ahead);
 /* All items from before device time t_ns were put. INT64_MAX: no more items come, so none is waited for. */
 int wire_time(struct wire *wire, int64_t t_ns);
 
-/* The note that the owner puts on the board once it has carried out an act. Valid as long as the act. */
+/* Returns the note that the owner puts on the board once it has carried out an act. Valid as long as the act. */
 const struct fault_note *wire_act_note(const struct wire_piece *act);
 
 /* The first piece or act, if it may go out now; else NULL. The owner writes the piece's bytes from `out` on, and moves
  * `out`. */
 struct wire_piece *wire_due(struct wire *wire, int64_t now_ns);
-/* When the next one may go out; INT64_MAX: there is none. */
+/* Returns when the next one may go out; INT64_MAX: there is none. */
 int64_t wire_next_ns(const struct wire *wire);
 void wire_pop(struct wire *wire);
 /* Whether cap bytes wait, or WIRE_DELAY_BYTES while frames are delayed. Pieces held for later frames don't count. */

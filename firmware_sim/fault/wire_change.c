@@ -130,7 +130,7 @@ static uint64_t mark_bits(const struct change *c)
     return n;
 }
 
-/* The place of the mask's bit number k, from 0. The mask has more than k bits. */
+/* Returns the place of the mask's bit number k, from 0. The mask has more than k bits. */
 static uint64_t find_bit(const uint8_t *mask, uint64_t k)
 {
     size_t i = 0;
@@ -142,7 +142,7 @@ static uint64_t find_bit(const uint8_t *mask, uint64_t k)
     return 8 * i + (uint64_t)__builtin_ctz(left);
 }
 
-/* The next bit of the mask after this one; after the last comes the first. */
+/* Returns the next bit of the mask after this one; after the last comes the first. */
 static uint64_t next_bit(const uint8_t *mask, size_t len, uint64_t at)
 {
     for (at++;; at = (at / 8 + 1) * 8) {

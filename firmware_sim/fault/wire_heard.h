@@ -20,9 +20,9 @@ struct wire_heard {
 };
 
 void wire_heard_add(struct wire_heard *heard, const void *bytes, size_t len);
-/* The oldest line without its line end, or all bytes; NULL: none. Valid until the next call. */
+/* Returns the oldest line without its line end, or all bytes; NULL: none. Valid until the next call. */
 const uint8_t *wire_heard_first(const struct wire_heard *heard, size_t *len);
-/* The oldest line is answered: drops it. Without lines, all bytes are. */
+/* The oldest line is answered: drops it. In a protocol without lines, drops all bytes. */
 void wire_heard_answered(struct wire_heard *heard);
 void wire_heard_free(struct wire_heard *heard);
 

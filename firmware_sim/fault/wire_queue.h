@@ -3,7 +3,7 @@
  * and pauses between them. Beside the queue are pieces that are held back, until frames have overtaken them or their
  * time has come.
  *
- * A piece of text, of frames or of a unit is one write. Thread: one. Allocates as it grows. Times are of the owner's
+ * A piece of a reply, or of frames or units, is one write. Thread: one. Allocates as it grows. Times are of the owner's
  * clock, ns; only t_ns is device time. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_QUEUE_H
 #define FIRMWARE_SIM_FAULT_WIRE_QUEUE_H
@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum wire_piece_kind { WIRE_TEXT, WIRE_FRAMES, WIRE_UNIT, WIRE_ACT, WIRE_PAUSE };
+enum wire_piece_kind { WIRE_REPLY, WIRE_FRAMES, WIRE_ACT, WIRE_PAUSE };
 
 struct wire_piece {
     struct wire_piece *next;
@@ -39,7 +39,7 @@ struct wire_queue {
     size_t n_bytes;          /* memory of the pieces that wait, without those that are held until frames have come */
 };
 
-/* A new piece with a copy of the bytes; NULL: no memory. */
+/* Returns a new piece with a copy of the bytes; NULL: no memory. */
 struct wire_piece *wire_piece_new(enum wire_piece_kind kind, const void *bytes, size_t len);
 void wire_piece_free(struct wire_piece *piece);
 /* Puts a piece at the end, or into the last one's write if that is open; takes it over. SH_ENOMEM: it is lost. */
@@ -52,9 +52,9 @@ void wire_queue_close(struct wire_queue *queue);
 int wire_queue_pass(struct wire_queue *queue, int of, uint64_t number, int64_t t_ns);
 /* Held pieces whose time has come go to the end. */
 int wire_queue_let_go(struct wire_queue *queue, int64_t now_ns);
-/* The first piece if it may go out now; NULL: none may. Pauses that are over are taken out. */
+/* Returns the first piece if it may go out now; NULL: none may. Pauses that are over are taken out. */
 struct wire_piece *wire_queue_due(struct wire_queue *queue, int64_t now_ns);
-/* When the next piece may go out; INT64_MAX: there is none that waits for a time. */
+/* Returns when the next piece may go out; INT64_MAX: there is none that waits for a time. */
 int64_t wire_queue_next_ns(const struct wire_queue *queue);
 /* Removes the first piece. */
 void wire_queue_pop(struct wire_queue *queue);

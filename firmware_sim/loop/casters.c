@@ -75,15 +75,15 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
         if (atomic_load(&casters->in_vain)) atomic_store(&casters->in_vain, 0);
         return whole;
     }
-    /* This tick was computed in vain, and the next ones are as late. Computing each in turn just before its time is
-     * over would lose them all. So leave out half the ticks ahead, so that the others have that time; and all but one
-     * where half was not enough. */
+    /* This tick came too late, and the next ones are as late: computing each in turn would lose them all. So half of
+     * the ticks ahead are left out, which gives the others their time. Where half was not enough, all but one are left
+     * out. */
     const uint64_t lead = atomic_exchange(&casters->in_vain, 1) ? casters->ahead_ticks - 1 : casters->ahead_ticks / 2;
     atomic_store(&casters->drop_until, stream_released(&loop->stream) + lead);
     return 0;
 }
 
-/* A tick is ready. In the paces that wait, the pacing thread is told once per batch: before the ticks ahead are used
+/* A tick is ready. In the paces that wait, the pacing thread is notified once per batch: before the ticks ahead are used
  * up, after SAY_NS, and when this caster goes to sleep. */
 static void note_ready(struct loop_caster *caster, uint64_t tick)
 {

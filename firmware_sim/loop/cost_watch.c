@@ -10,7 +10,7 @@
 #include "firmware_sim/site/plan_rows.h"
 
 static const double TIMES = 10.0;
-static const double TICK_NS = 10000.0; /* time of a tick beside its pulses; an upper bound */
+static const double TICK_NS = 10000.0; /* processor time of a tick without its pulses; an upper bound */
 static const int64_t EVERY_NS = 1000000000;
 
 struct cost_watch {

@@ -8,7 +8,7 @@ static uint32_t bin_of(uint64_t ns)
     return shift * LATENESS_PER_OCTAVE + (uint32_t)(ns >> shift); /* the top bit of this adds LATENESS_PER_OCTAVE */
 }
 
-/* The first lateness of the next bin. */
+/* Returns the first lateness of the next bin. */
 static uint64_t end_of(uint32_t bin)
 {
     if (bin < LATENESS_PER_OCTAVE) return bin + 1;

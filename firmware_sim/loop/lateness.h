@@ -26,7 +26,7 @@ struct lateness {
 /* Notes one lateness. What is early (negative) counts as 0. */
 void lateness_note(struct lateness *lateness, int64_t late_ns);
 uint64_t lateness_count(const struct lateness *lateness);
-/* The quantile q (0 to 1) in microseconds; never more than the latest. 0 when nothing was noted. */
+/* Returns the quantile q (0 to 1) in microseconds; never more than the latest. 0 when nothing was noted. */
 double lateness_us(const struct lateness *lateness, double q);
 /* The histogram, octave by octave. Row i counts the latenesses below *below_ns that no row before it counts. Returns 0
  * when there is no row i. Most rows are empty. */

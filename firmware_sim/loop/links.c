@@ -20,8 +20,8 @@ static double stream_rate(const struct links *links, const struct config *cfg)
     return config_cast_hz(cfg) * point_len + links->waves_bytes_s;
 }
 
-/* Says how the stream becomes this share of what it is. A head that fires at steps of a turn has no pulse rate of its
- * own. Some heads have no rate that is low enough. */
+/* Writes how to reduce the stream to this share of its rate. A head that fires at steps of a turn has no pulse rate of
+ * its own. Some heads have no rate that is low enough. */
 static void advise(const struct config *cfg, double share, char *text, size_t len)
 {
     const struct config_profile *p = &cfg->profile;

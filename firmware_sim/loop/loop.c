@@ -55,7 +55,7 @@ static int keep_description(struct loop *loop, struct sh_err *err)
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "no memory");
 }
 
-/* A new loop, with nothing open. */
+/* Makes a new loop, with nothing open. */
 static struct loop *loop_begin(const struct config *cfg, const struct loop_source *source,
                                const struct loop_options *options)
 {

@@ -19,8 +19,8 @@ struct loop_caster {
     struct loop *loop;
     struct worker *worker;
     pthread_t thread;
-    uint64_t unsaid; /* ticks made since the pacing thread was last told */
-    int64_t said_ns; /* when it was last told, clock_now_ns() */
+    uint64_t unsaid; /* ticks made since the pacing thread was last notified */
+    int64_t said_ns; /* when it was last notified, clock_now_ns() */
 };
 
 /* casters.c */

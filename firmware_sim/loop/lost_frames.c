@@ -68,7 +68,8 @@ uint32_t session_check_lost(struct pump *pump, struct session *s, const struct r
     return frames;
 }
 
-/* Ticks that the head itself lost have no frames and no numbers. So the last tick before them tells what comes next. */
+/* Ticks that the head itself lost have no frames and no numbers. So the last tick before them says which number comes
+ * next. */
 void session_know_next(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;

@@ -3,7 +3,7 @@
 
 static int64_t due_of(const struct pace *pace, uint64_t tick)
 {
-    if (tick < pace->with) tick = pace->with;
+    if (tick < pace->together_until) tick = pace->together_until;
     return pace->epoch_ns + (int64_t)(tick + 1) * pace->tick_ns;
 }
 
@@ -14,7 +14,8 @@ void pace_begin(struct pace *pace, int64_t now_ns)
     pace->asleep = 0;
 }
 
-/* The pacing thread looks again. Between two looks it may sleep; any time beyond that it stood still. */
+/* Notes a call of pace_look. Until the next call the thread may sleep as long as it was told to. Any longer time means
+ * that it stood still. */
 static void note_look(struct pace *pace, int64_t now_ns)
 {
     const int64_t still_ns = now_ns - pace->expected_ns;

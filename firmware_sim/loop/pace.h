@@ -4,9 +4,9 @@
  * In: the tick whose turn it is, whether it is ready, and the time. Out: sleep, wait for the tick, release it, or give
  * it up; and how late wake-ups and releases were.
  *
- * A tick is due when its last pulse has fired, or with the tick that it goes out with. A late tick is released as soon
- * as it is ready. The pacing thread does not sleep until the next tick is due meanwhile, since a head with few ticks
- * ahead would never catch up.
+ * A tick is due when its last pulse has fired. Ticks that go out together are due with the last of them. A late tick is
+ * released as soon as it is ready. The pacing thread does not sleep until the next tick is due meanwhile, since a head
+ * with few ticks ahead would never catch up.
  *
  * A tick that is not ready late_ns after its time is given up. A machine that stood still gets credit, since the
  * casters stood still, too: the longest such time is added to late_ns until the pacing thread has caught up.
@@ -23,7 +23,7 @@ struct pace {
     int64_t epoch_ns, tick_ns; /* tick i is due at epoch_ns + (i + 1) tick_ns */
     int64_t late_ns;           /* loop.late_ms */
     struct device_counters *counters;
-    uint64_t with; /* ticks up to this one go out together; to be set before a look at a later one */
+    uint64_t together_until; /* ticks up to this one go out together; set it before pace_look gets a later one */
 
     int64_t credit_ns;
     int64_t expected_ns;  /* when it should look again; beyond that time it stood still */

@@ -20,7 +20,7 @@ static void pace_realtime(struct loop *loop)
     for (uint64_t tick = 0; !atomic_load(&loop->stopping) && tick < atomic_load(&loop->final_tick);
          now_ns = clock_now_ns()) {
         struct ring_slot *slot = ring_peek(&stream->ring, tick);
-        if (tick > pace->with) pace->with = stream_next_wake(stream, tick);
+        if (tick > pace->together_until) pace->together_until = stream_next_wake(stream, tick);
         switch (pace_look(pace, tick, slot != NULL, now_ns, &until_ns)) {
         case PACE_SLEEP:
             clock_sleep_until_ns(until_ns);

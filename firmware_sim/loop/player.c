@@ -27,7 +27,7 @@ static int player_put(struct loop *loop, const struct ring_tick *tick, uint64_t 
     return ring_ready(slot, number);
 }
 
-/* In the paces that wait, the pacing thread is told once per batch, as by casters. */
+/* In the paces that wait, the pacing thread is notified once per batch, as by casters. */
 static void say_made(struct loop *loop, uint64_t *unsaid, uint64_t most)
 {
     if (!loop->stream.waits || *unsaid < most) return;

@@ -79,7 +79,7 @@ struct pump {
     int wake_fd;
     struct stream_listener *listener;
     uint32_t index;                  /* of the link, from 0 */
-    uint32_t n_told, told[MAX_TOLD]; /* lines that a protocol told the user: their checksums */
+    uint32_t n_told, told[MAX_TOLD]; /* checksums of the lines that the user got from a protocol */
     uint32_t out_cap;                /* of each session */
     int holds;                       /* its readers hold back the paces fast and step */
     int is_clean;                    /* its readers see nothing of faults, power cycles included */
@@ -107,7 +107,7 @@ void session_close(struct pump *pump, struct session *s);
 void session_shut(struct pump *pump, struct session *s);
 /* The same when power goes: the device knows that already. */
 void session_cut(struct pump *pump, struct session *s);
-/* The first tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
+/* Returns the first tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
 uint64_t session_off_tick(const struct pump *pump, const struct session *s);
 /* Begins a session anew with a tick: one that no client can end, such as a file's. */
 void session_restart(struct pump *pump, struct session *s, uint64_t tick);
@@ -183,7 +183,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index);
 void session_read_protocol(struct pump *pump, struct session *s, int index);
 /* Whether something is still due to a client that sends nothing more. */
 int session_owes_protocol(const struct pump *pump, const struct session *s);
-/* The first tick from the cursor on that must wake the protocol although it has no frames. */
+/* Returns the first tick from the cursor on that must wake the protocol although it has no frames. */
 uint64_t session_wake_tick(const struct pump *pump, const struct session *s);
 
 #endif

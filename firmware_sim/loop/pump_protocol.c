@@ -96,7 +96,9 @@ static void host_tell_once(void *ctx, const char *text)
         if (pump->told[i] == mark) return;
     if (pump->n_told == MAX_TOLD) return;
     pump->told[pump->n_told++] = mark;
-    pump_say(pump, pump->n_told < MAX_TOLD ? text : "more is not told here; the statistics count it");
+    pump_say(pump, pump->n_told < MAX_TOLD
+                       ? text
+                       : "further messages of its protocol are not shown; the statistics count what they are about");
 }
 
 static void host_count(void *ctx, enum protocol_count what, uint64_t n)

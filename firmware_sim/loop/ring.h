@@ -56,7 +56,7 @@ struct ring_tick {
     uint64_t n_fired, n_cast, n_lines;
     struct ring_hits hits; /* of the whole tick */
     struct ring_hits tail; /* after the last mark */
-    int64_t shift_ns;      /* run's device time less that of the frames; only a recording's differ */
+    int64_t shift_ns;      /* the run's device time minus that of the frames; only a recording's differ */
 };
 
 struct ring_slot {
@@ -87,7 +87,7 @@ struct ring_size {
 int ring_create(struct ring *ring, const struct ring_size *size, struct sh_err *err);
 void ring_free(struct ring *ring);
 
-/* The slot for `tick`, empty; or NULL when the tick is lost already. */
+/* Returns the slot for `tick`, empty; or NULL when the tick is lost already. */
 struct ring_slot *ring_claim(struct ring *ring, uint64_t tick);
 /* Begins a claimed slot's tick, empty: its bytes are written to tick.bytes + tick.len, after ring_grow. */
 void ring_begin(struct ring_slot *slot);
@@ -107,7 +107,7 @@ int ring_ready(struct ring_slot *slot, uint64_t tick);
 /* The caster gives the slot up. The pacing thread loses the tick when its time is over. */
 void ring_drop(struct ring_slot *slot);
 
-/* The slot of the next tick to release when it is ready, else NULL. */
+/* Returns the slot of the next tick to release when it is ready, else NULL. */
 struct ring_slot *ring_peek(struct ring *ring, uint64_t tick);
 /* Publishes the tick that ring_peek gave. */
 void ring_release(struct ring *ring, uint64_t tick);

@@ -117,7 +117,7 @@ void session_close(struct pump *pump, struct session *s)
     leave(pump, s);
 }
 
-/* Leaves after the lines that wait for a step, a move or room are carried out. */
+/* The session leaves only after its lines that wait for a step, a move or room are carried out. */
 static void leave_when_done(struct pump *pump, struct session *s)
 {
     const struct session_commands *c = &s->commands;
@@ -185,8 +185,8 @@ static int follows(const struct session *s, const struct ring_copy *tick)
     return !s->lost.have_seq || tick->first_seq == s->lost.next_seq;
 }
 
-/* Returns whether ticks are lent. In the paces that wait for this reader, the ring still has the last LENT_TICKS before
- * its cursor. */
+/* Returns whether ticks are lent to the link, which then reads them in the ring after this call (link_ops.lend). In the
+ * paces that wait for this reader, the ring still has the last LENT_TICKS before its cursor. */
 static int lends(const struct pump *pump)
 {
     return pump->ops->lend != NULL && pump->holds && pump->stream->waits;
@@ -261,7 +261,7 @@ static void session_fill(struct pump *pump, struct session *s)
     stream_move_reader(pump->stream, s->reader, s->cursor);
 }
 
-/* The end of what is written next. On a link with messages, replies and frames go into messages of their own. */
+/* Returns the end of what is written next. On a link with messages, replies and frames have messages of their own. */
 static uint32_t write_to(const struct pump *pump, const struct session *s)
 {
     if (!pump->ops->messages) return s->out_len;

@@ -3,7 +3,7 @@
  *
  * In: command lines of sessions. Out: their replies; and, where the source makes its ticks itself, the frames of each.
  * The head is device_source.c: casters compute its ticks. A recording is firmware_sim/replay: one thread takes its
- * ticks (player.h). Their frames keep their numbers in the stream. */
+ * ticks (player.h). Recorded frames keep their numbers in the stream. */
 #ifndef FIRMWARE_SIM_LOOP_SOURCE_H
 #define FIRMWARE_SIM_LOOP_SOURCE_H
 

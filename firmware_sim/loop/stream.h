@@ -163,9 +163,9 @@ void stream_say_late(struct stream *stream, uint64_t tick);
 
 /* ---- any thread */
 uint64_t stream_released(const struct stream *stream);
-/* The first tick from `cursor` on with which power goes; UINT64_MAX: none so far. */
+/* Returns the first tick from `cursor` on with which power goes; UINT64_MAX: none so far. */
 uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor);
-/* The tick of change number i, from 0; UINT64_MAX: there is none so far. */
+/* Returns the tick of change number i of power, from 0; UINT64_MAX: there is none so far. */
 uint64_t stream_power_tick(const struct stream *stream, uint32_t i);
 /* A peer grants time. Returns the sum of all grants, ns. */
 uint64_t stream_grant(struct stream *stream, uint64_t ns);

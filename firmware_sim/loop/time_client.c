@@ -31,7 +31,7 @@ struct time_client {
     int64_t asked_ns;   /* clock: when it asked last */
     int64_t give_up_ns; /* clock: until when an answer is awaited; INT64_MAX: none is */
     int64_t t1_ns;      /* of the request, UTC by the scanner's clock */
-    int64_t zone_ns;    /* what the scanner's clock is ahead of UTC since it was set */
+    int64_t zone_ns;    /* how far the scanner's clock is ahead of UTC since it was set */
     int is_set;
     unsigned halvings; /* of the rate of requests */
 };

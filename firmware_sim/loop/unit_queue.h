@@ -32,9 +32,9 @@ struct unit_kind {
 
 /* Returns 0, or 1: it has no room. */
 int unit_queue_put(struct unit_queue *queue, const void *unit, size_t len, const struct unit_kind *kind);
-/* The kind of the oldest unit. The queue must not be empty. */
+/* Returns the kind of the oldest unit. The queue must not be empty. */
 struct unit_kind unit_queue_kind(const struct unit_queue *queue);
-/* The rest of the oldest unit; NULL: the queue is empty. */
+/* Returns the rest of the oldest unit; NULL: the queue is empty. */
 const uint8_t *unit_queue_next(const struct unit_queue *queue, size_t *len);
 /* n bytes of the oldest unit were written. Returns 1 when they were its last. */
 int unit_queue_written(struct unit_queue *queue, size_t n);

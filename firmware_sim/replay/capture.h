@@ -22,7 +22,7 @@ struct capture_place {
     int source_port; /* UDP: the device's */
     char device[64]; /* its address */
     struct talk talk;
-    uint32_t n_messages, n_connections;
+    uint32_t n_messages;
 };
 
 struct capture_counts {
@@ -44,7 +44,7 @@ void capture_free(struct replay_capture *capture);
 uint32_t capture_n(const struct replay_capture *capture);
 const struct capture_place *capture_place(const struct replay_capture *capture, uint32_t i);
 void capture_get_counts(const struct replay_capture *capture, struct capture_counts *counts);
-/* Time from the first packet to the last. */
+/* Returns the time from the first packet to the last. */
 double capture_duration_s(const struct replay_capture *capture);
 
 #endif

@@ -18,7 +18,7 @@ struct capture_segment {
 struct capture_flow {
     int is_tcp;
     struct ethernet_end end[2]; /* 0: the end that sent the first packet */
-    int device, has_begin;      /* side of the device, which a SYN says */
+    int device, has_begin;      /* side of the device, known from a SYN */
     uint64_t n_sent[2], bytes_sent[2];
     struct capture_segment *segment; /* in the order of the file */
     size_t n, room;
@@ -66,7 +66,7 @@ struct capture_list {
 };
 int capture_add_messages(struct replay_capture *capture, const struct capture_flow *flow, uint32_t side,
                          const struct talk_kind *kind, struct capture_store *store, struct capture_list *list);
-/* The first bytes that a side sent, at most room. */
+/* Copies the first bytes that a side sent, at most room. Returns how many. */
 size_t capture_first_bytes(const struct capture_flow *flow, uint32_t side, uint8_t *to, size_t room);
 
 /* capture.c: frees what a place has. */

@@ -232,7 +232,6 @@ static int add_flow(struct builder *b, const struct capture_flow *f, int64_t t0_
     if (rc == SH_OK && b->said.n != 0) qsort(b->said.said, b->said.n, sizeof *b->said.said, by_order);
     if (rc == SH_OK) rc = own_all(b, f->device);
     if (rc == SH_OK) rc = put_messages(b, f->device, t0_ns);
-    b->place->n_connections++;
     return rc;
 }
 
@@ -271,7 +270,7 @@ static int build_place(struct replay_capture *c, const struct capture_flow *firs
     return rc;
 }
 
-/* The first flow of a place: those before it are of others. */
+/* Whether it is the first flow of its place: those before it are of other places. */
 static int is_first(const struct replay_capture *c, const struct capture_flow *f)
 {
     for (const struct capture_flow *before = c->flow; before < f; before++)

@@ -20,7 +20,7 @@ struct wishes {
     int paces, paused;      /* paces: another speed holds from now on */
 };
 
-/* is_late: frames of the tick before are still to be sent. A new time of playing, and the run's end, wait for them. */
+/* is_late: frames of the tick before are still to be sent. A new round, and the run's end, wait for them. */
 static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
 {
     struct wishes wishes;

@@ -4,9 +4,9 @@
  * In: a recording, and commands of clients. Out: ticks with its frames. It is played when a client commands SCAN:STARt,
  * or at once; SCAN:STARt begins it anew at any time. Queries are answered from its descriptor, and no setting changes.
  *
- * The first time that it is played, each frame has the bytes that were recorded. Each further time the sequence numbers
- * of frames go back by 2^30; a reader takes that for a head that was started again. All else is as it was recorded,
- * device times, too.
+ * In its first round, each frame has the bytes that were recorded. In each further round the sequence numbers of frames
+ * go back by 2^30; a reader takes that for a head that was started again. All else is as it was recorded, device times,
+ * too.
  *
  * Threads: next() belongs to the player; commands come from links. One lock, held for microseconds; files are read
  * without it. */

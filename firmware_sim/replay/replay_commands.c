@@ -15,7 +15,7 @@ void replay_set_state(struct replay *r, uint64_t tick, enum head_state state)
     r->change[r->n_changes++ % REPLAY_CHANGES] = (struct replay_change){tick, state};
 }
 
-/* The state at the last released tick. */
+/* Returns the state at the last released tick. */
 static enum head_state visible_state(const struct replay *r, uint64_t released)
 {
     for (uint32_t i = r->n_changes; i > 0 && i + REPLAY_CHANGES > r->n_changes; i--)

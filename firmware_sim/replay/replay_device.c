@@ -100,7 +100,7 @@ enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns)
     return utc_ns != INT64_MIN ? PROTOCOL_PPS_LOCKED : PROTOCOL_PPS_ABSENT;
 }
 
-/* A receiver of one fix a second, at full seconds. */
+/* The receiver has one fix a second, at full seconds. */
 int64_t replay_next_fix_ns(void *self, int64_t t_ns)
 {
     const int64_t utc_ns = utc_at(self, t_ns);
@@ -109,7 +109,7 @@ int64_t replay_next_fix_ns(void *self, int64_t t_ns)
     return since_ns == 0 ? t_ns : t_ns + UTC_SECOND_NS - since_ns;
 }
 
-/* The station's place; none where the head moves, since the stream has its way in the scene alone. */
+/* Gives the station's place; none where the head moves, since the stream has its way in the scene alone. */
 int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
 {
     struct replay *r = self;

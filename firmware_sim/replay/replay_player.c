@@ -91,7 +91,7 @@ static void add_front(struct replay *r, uint64_t tick)
 
 /* ---- time */
 
-/* Counts frames anew from this tick on: it is the first tick of a time, or of another head within the recording. */
+/* Counts frames anew from this tick on: it is the first tick of a round, or of another head within the recording. */
 static void rebase(struct replay *r, uint64_t tick)
 {
     r->start_tick = tick;
@@ -104,14 +104,14 @@ static void set_shift(struct replay *r)
     r->shift_ns = (int64_t)((r->start_tick - (uint64_t)r->base) * (uint64_t)r->tick_ns);
 }
 
-/* The first time that it is played, the time of day becomes the recorded one. */
+/* In the first round, the time of day becomes the recorded one. */
 static void set_clock(struct replay *r)
 {
     set_shift(r);
     if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns = native_since_ns(r->utc0_ns, r->shift_ns);
 }
 
-/* The tick with which the next frame goes out. */
+/* Returns the tick with which the next frame goes out. */
 static uint64_t due_tick(struct replay *r, uint64_t tick)
 {
     const int64_t at = tick_of(r, r->frame.t_ns);

@@ -37,7 +37,7 @@ struct replay {
     int64_t position_ns; /* of the frame that was sent last, since the first one */
     int wants_again;     /* it is to begin anew by itself */
     int n_clients;       /* without links that are readers themselves */
-    int ends_then;       /* the run ends when it was played */
+    int ends_then;       /* the run ends when the recording was played */
     uint32_t times;      /* how often it was begun so far */
     uint64_t frames;     /* sent */
     uint64_t scans, frames_done;
@@ -49,8 +49,8 @@ struct replay {
     } change[REPLAY_CHANGES];
     uint32_t n_changes;
     struct sh_err failure; /* code 0: none */
-    /* Time of day at device time 0 of the run, ns since 1970. The first time that it is played sets it so that frames
-     * have the time that they were recorded with; it then goes on. INT64_MIN: the recording has none. */
+    /* Time of day at device time 0 of the run, ns since 1970. The first round sets it so that frames have the time
+     * that they were recorded with; it then goes on. INT64_MIN: the recording has none. */
     int64_t utc0_ns;
     struct native_anchor anchor; /* the last one */
 
@@ -67,12 +67,12 @@ struct replay {
     int64_t base;                    /* the tick of the recording at start_tick */
     int64_t last;                    /* tick of the recording of the frame sent last */
     double pace;                     /* the speed at which frames are sent since start_tick */
-    int64_t shift_ns;                /* of the frames being sent: the run's device time less theirs */
+    int64_t shift_ns;                /* of the frames being sent: the run's device time minus theirs */
     uint32_t seq_shift;              /* added to sequence numbers */
     int has_seq;                     /* a frame was sent since power-up; last_seq is its number as it was sent */
     uint32_t last_seq;
     int restarts;              /* the next frame begins another sequence */
-    int in_range, has_skipped; /* this time: frames are being sent; some were skipped before them */
+    int in_range, has_skipped; /* in this round: frames are being sent; some were skipped before them */
     int has_frame;
     struct recording_frame frame; /* the next one */
     uint8_t *bytes;               /* of a tick */

@@ -310,6 +310,29 @@ static void what_cannot_be_written_is_said(void **state)
     assert_int_equal(truth_close(truth, &err), SH_OK);
 }
 
+/* A client that adds and clears faults on and on takes no more memory than a count for each of so many. */
+static void a_run_has_a_bounded_number_of_faults(void **state)
+{
+    (void)state;
+    struct fault_list list = {.n = 1};
+    struct fault_board *board;
+    struct sh_err err = {0};
+    uint32_t number = 0;
+    int rc = SH_OK;
+    list.fault[0] = fault_of_kind(FAULT_DROP);
+    assert_int_equal(fault_board_create(&list, NULL, NULL, &board, &err), SH_OK);
+    for (uint32_t i = 0; i < FAULT_MOST_OF_A_RUN && rc == SH_OK; i++) {
+        rc = fault_board_add(board, &list.fault[0], 0, &number, &err);
+        if (rc == SH_OK) fault_board_remove(board, number);
+    }
+    assert_int_equal(rc, SH_EINPUT);
+    assert_string_equal(err.text, "there were 1000000 faults in this run; allowed 1000000; a new run counts anew");
+    assert_int_equal(fault_board_last(board), FAULT_MOST_OF_A_RUN);
+    fault_board_note(board, &(struct fault_note){.fault = FAULT_MOST_OF_A_RUN, .byte = -1});
+    assert_int_equal(fault_board_injected(board, FAULT_MOST_OF_A_RUN), 1);
+    fault_board_free(board);
+}
+
 /* A fault that is taken out is forgotten. Those that stay keep their counts, wherever they are in the list. */
 static void a_tally_keeps_what_is_in_the_list(void **state)
 {
@@ -339,6 +362,7 @@ int main(void)
         cmocka_unit_test(what_belongs_to_different_places_is_independent),
         cmocka_unit_test(numbers_are_at_their_ends_as_said),
         cmocka_unit_test(the_list_changes_and_counts_stay),
+        cmocka_unit_test(a_run_has_a_bounded_number_of_faults),
         cmocka_unit_test(a_tally_keeps_what_is_in_the_list),
         cmocka_unit_test(the_truth_is_written_line_by_line),
         cmocka_unit_test(a_dash_is_standard_output),

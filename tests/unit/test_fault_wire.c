@@ -307,6 +307,37 @@ static void what_was_begun_without_the_wire_goes_first_as_it_is(void **state)
     assert_memory_equal(rig.out + 4, rig.item[1].bytes, rig.item[1].len);
 }
 
+/* Two clients of a link come to the frame of an unplugging, which ends both sessions. It is carried out once. */
+static void an_act_that_is_not_carried_out_does_not_count(void **state)
+{
+    (void)state;
+    struct fault_tally tally = {0};
+    struct wire *wire[2];
+    f = fault_of_kind(FAULT_UNPLUG);
+    f.count = 2;
+    rig_open(&f, 1, 1);
+    const struct rig_item *frame = rig_frame(RIG_STREAM);
+    const struct wire_item item = {FAULT_OF_STREAM, frame->bytes, frame->len, 0};
+    const struct wire_spec spec = {.board = rig.board,
+                                   .link = 1,
+                                   .session = 2,
+                                   .max_unit = 64,
+                                   .native = 1,
+                                   .acts = UINT32_MAX,
+                                   .tally = &tally,
+                                   .heard = &rig.heard};
+    for (int i = 0; i < 2; i++) {
+        wire[i] = wire_create(&spec);
+        assert_non_null(wire[i]);
+        assert_int_equal(wire_put(wire[i], &item, rig.now_ns), SH_OK);
+        assert_int_equal(wire_due(wire[i], rig.now_ns)->kind, WIRE_ACT);
+    }
+    wire_pop(wire[0]);
+    for (int i = 0; i < 2; i++)
+        wire_free(wire[i]);
+    assert_int_equal(*fault_tally_hits(&tally, 1), 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -321,6 +352,7 @@ int main(void)
         cmocka_unit_test_teardown(a_dropped_frame_is_hit_by_nothing_else, rig_teardown),
         cmocka_unit_test_teardown(a_session_that_ends_takes_nothing_more, rig_teardown),
         cmocka_unit_test_teardown(what_is_not_written_is_counted, rig_teardown),
+        cmocka_unit_test_teardown(an_act_that_is_not_carried_out_does_not_count, rig_teardown),
         cmocka_unit_test_teardown(what_was_begun_without_the_wire_goes_first_as_it_is, rig_teardown),
     };
     return cmocka_run_group_tests_name("faults on the wire", tests, NULL, NULL);

@@ -181,6 +181,13 @@ static void merged_frames_go_out_in_one_write(void **state)
     rig_frame(RIG_STREAM);
     assert_int_equal(rig_take(0), 1);
     rig_end(3);
+    rig_open(&f, 1, 0); /* nor does an answer of another protocol */
+    rig_unit(20, 0);
+    rig_unit(20, 1);
+    assert_int_equal(rig_take(0), 2);
+    rig_unit(20, 0);
+    assert_int_equal(rig_take(0), 1);
+    rig_end(3);
     struct fault two[2] = {f, fault_of_kind(FAULT_SPLIT)}; /* a frame that is split is in writes of its own */
     two[0].at = 1;
     two[1].at = 2;

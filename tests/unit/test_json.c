@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include <errno.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -228,13 +229,40 @@ static void a_full_disk_is_reported(void **ctx)
     fclose(full);
 }
 
+/* Fails once, as a disk that is full for a moment. */
+static ssize_t write_but_once(void *cookie, const char *bytes, size_t len)
+{
+    int *n = cookie;
+    (void)bytes;
+    if ((*n)++ > 0) return (ssize_t)len;
+    errno = ENOSPC;
+    return 0;
+}
+
+static void an_earlier_failure_gets_no_wrong_reason(void **ctx)
+{
+    (void)ctx;
+    int n = 0;
+    struct sh_err err = {0};
+    struct json json;
+    FILE *file = fopencookie(&n, "w", (cookie_io_functions_t){.write = write_but_once});
+    assert_non_null(file);
+    json_begin(&json, file);
+    json_int(&json, NULL, 1);
+    assert_int_not_equal(fflush(file), 0);
+    errno = ENOENT; /* of another call since then */
+    assert_int_equal(json_end(&json, &err), SH_EIO);
+    assert_string_equal(err.text, "json: writing failed");
+    fclose(file);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(objects_arrays_and_values), cmocka_unit_test(one_line_has_no_blanks),
         cmocka_unit_test(strings_are_escaped),       cmocka_unit_test(doubles_as_a_person_would_write_them),
         cmocka_unit_test(doubles_read_back_exactly), cmocka_unit_test(misuse_is_told),
-        cmocka_unit_test(a_full_disk_is_reported),
+        cmocka_unit_test(a_full_disk_is_reported),   cmocka_unit_test(an_earlier_failure_gets_no_wrong_reason),
     };
     return cmocka_run_group_tests_name("json", tests, NULL, NULL);
 }

@@ -96,9 +96,11 @@ static unsigned fill(struct line_writer *writer, int fd)
 {
     struct pollfd slot = {.fd = fd, .events = POLLOUT};
     unsigned n = 0;
+    int rc;
     do {
-        while (put(writer, LINE_PLAIN, n++) == SH_OK)
+        while ((rc = put(writer, LINE_PLAIN, n++)) == SH_OK)
             continue;
+        assert_int_equal(rc, SH_ELOST);
         sched_yield(); /* to the thread that writes */
     } while (poll(&slot, 1, 0) != 0 || !line_writer_is_filling(writer));
     return n;
@@ -127,14 +129,14 @@ static void all_lines_are_in_the_file_or_counted_there(void **state)
 }
 
 /* No one reads the pipe. Putting a line returns all the same, and the file goes on once it is read. */
-static void a_file_that_stands_still_holds_up_nobody(void **state)
+static void check_pipe_that_stands_still(int flags)
 {
-    (void)state;
     int fd[2];
     pthread_t reader;
     void *text;
     struct sh_err err = {0};
     assert_int_equal(pipe(fd), 0);
+    assert_int_equal(fcntl(fd[1], F_SETFL, flags), 0);
     struct line_writer *writer = open_writer(fd[1]);
     const unsigned n = fill(writer, fd[1]);
     const uint64_t dropped = lost;
@@ -151,6 +153,19 @@ static void a_file_that_stands_still_holds_up_nobody(void **state)
     assert_int_equal(lost, dropped);
     free(text);
     close(fd[0]);
+}
+
+static void a_file_that_stands_still_holds_up_nobody(void **state)
+{
+    (void)state;
+    check_pipe_that_stands_still(0);
+}
+
+/* Standard error may be such a pipe: who made it may have made it so for itself. */
+static void a_pipe_that_never_blocks_is_waited_for(void **state)
+{
+    (void)state;
+    check_pipe_that_stands_still(O_NONBLOCK);
 }
 
 /* The end waits 2 s and then reports what is missing. */
@@ -226,6 +241,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_lines_are_in_the_file_or_counted_there),
         cmocka_unit_test(a_file_that_stands_still_holds_up_nobody),
+        cmocka_unit_test(a_pipe_that_never_blocks_is_waited_for),
         cmocka_unit_test(the_end_does_not_wait_for_ever),
         cmocka_unit_test(remarks_leave_room_for_the_others),
         cmocka_unit_test(a_full_disk_is_said_once_and_counted),

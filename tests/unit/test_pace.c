@@ -79,7 +79,7 @@ static void run(struct machine *m, uint64_t n_ticks)
     for (uint64_t tick = m->n_ticks; tick < n_ticks;) {
         const int64_t ready_ns = ready_at(m, tick);
         if (m->naive_credit) m->pace.credit_ns = 0;
-        if (tick > m->pace.with) m->pace.with = tick + m->together;
+        if (tick > m->pace.together_until) m->pace.together_until = tick + m->together;
         const enum pace_step step = pace_look(&m->pace, tick, ready_ns <= m->now_ns, m->now_ns, &until_ns);
         switch (step) {
         case PACE_SLEEP:

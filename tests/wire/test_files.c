@@ -3,6 +3,7 @@
  * nothing, or a stream's file that does not take its end. */
 #include <sys/resource.h>
 
+#include "tests/common/collada.h"
 #include "tests/wire/room.h"
 
 static const struct room_config SCAN = {.prr_hz = 20000,
@@ -191,6 +192,35 @@ static void test_no_room_for_the_end(void **state)
     }
 }
 
+/* A file that Assimp reads is announced where it has more than 8 MiB. With --quiet it is not; warnings stay. */
+static void test_quiet(void **state)
+{
+    struct wire *wire = *state;
+    static char blanks[9 << 20];
+    FILE *f = fopen(wire_write_text(wire, "hall.dae", COLLADA_TRIANGLE("-1 -1 0 31 -1 0 0 31 0")), "ab");
+    assert_non_null(f);
+    memset(blanks, '\n', sizeof blanks);
+    assert_int_equal(fwrite(blanks, 1, sizeof blanks, f), sizeof blanks);
+    assert_int_equal(fclose(f), 0);
+    char config[352], points[352];
+    snprintf(
+        config, sizeof config, "%s",
+        wire_write_text(wire, "config.yaml",
+                        "head: {profile: riegl-vz400i}\nscene:\n  meshes:\n    - {file: hall.dae, up: z, scale: 1}\n"
+                        "stations:\n  - {position_m: [1, 1, 2]}\noutput: {crs: local}\nlinks: [{type: \"null\"}]\n"));
+    snprintf(points, sizeof points, "%s", wire_path(wire, "points.ply"));
+    const char *const args[][9] = {{"run", config, "--pace", "fast", "--duration", "0.01"},
+                                   {"run", config, "--pace", "fast", "--duration", "0.01", "--quiet"},
+                                   {"record", config, "--duration", "0.01", "-o", points, "--quiet"}};
+    for (size_t i = 0; i < sizeof args / sizeof args[0]; i++) {
+        assert_int_equal(wire_wait(wire, wire_spawn(wire, args[i], "out", "err", -1)), 0);
+        char *text = wire_read(wire_path(wire, "err"), NULL);
+        if ((strstr(text, "reading ") != NULL) != (i == 0)) fail_msg("%s: %s", args[i][0], text);
+        assert_non_null(strstr(text, "warning: "));
+        free(text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -200,6 +230,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_map_on_a_fifo, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_full_output, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_room_for_the_end, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_quiet, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("files", tests, NULL, NULL);
 }

@@ -109,7 +109,7 @@ static void put_keys(void)
     puts("    esac\n}\n");
 }
 
-/* The words among an argument's alternatives: "N|all" -> all; those in capitals stand for something. */
+/* Prints the alternatives of an argument that are typed as they stand: "N|all" -> all. Capitals stand for a value. */
 static int put_alternatives(const char *argument)
 {
     int n = 0;

@@ -14,7 +14,7 @@
 /* The help of the program as a whole. commands ends with NULL. */
 void help_print(const struct app_command *const *commands, FILE *out);
 
-/* A command that a wrong word may have meant; NULL: none is near. */
+/* Finds the command that a wrong word may have meant. NULL: none is near. */
 const char *help_nearest(const struct app_command *const *commands, const char *word);
 
 /* The command itself. Returns the exit status. */

@@ -13,7 +13,7 @@ static const char KEYS[] = "scanhead.yaml.5";
 /* This command has a second help, by an option. */
 static const char SECOND[] = "record", SECOND_OPTION[] = "--raw", SECOND_PAGE[] = "record-raw";
 
-/* The name of a command's page. */
+/* Writes the name of a command's page. */
 static const char *page_name(const char *command, char *name)
 {
     snprintf(name, NAME_MAX_LEN, "%s-%s", app_program, command);

@@ -40,7 +40,7 @@ static void put_lines(const char *text, size_t n)
     }
 }
 
-/* A block of lines is a paragraph where no line is set in, and none has columns. */
+/* A block of lines is a paragraph where no line is indented, and none has columns. */
 static int is_paragraph(const char *text, size_t n)
 {
     for (size_t i = 0; i < n; i++)

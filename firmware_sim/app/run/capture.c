@@ -60,7 +60,7 @@ static void name_places(const struct capture_run *run, char *text, size_t cap)
     }
 }
 
-/* The place that a link serves: one with its port, else the first one that no link has. */
+/* Returns the place that a link serves: one with its port, else the first one that no link has. */
 static const struct capture_place *place_for(const struct capture_run *run, const struct link_spec *spec)
 {
     const struct capture_place *found = NULL;
@@ -194,7 +194,7 @@ static int check_options(struct run_options *o)
     return app_usage(&app_run, "--unknown '%.40s': allowed are silence, error, close", o->unknown);
 }
 
-/* The links of --link, or one for each port. */
+/* Serves with the links of --link, or with one for each port. */
 static int with_links(struct capture_run *run)
 {
     struct run_options *o = run->o;

@@ -23,15 +23,16 @@ struct watch_options {
     double cpu_share;         /* of a processor, for looking at points; 0: no limit, and no low priority */
     int waits;                /* 1: the observer holds back the paces fast and step, and so sees everything */
     struct device *device;    /* whose scans they are; is to be closed after the watch */
-    uint32_t scene_triangles; /* of /scene, at most, without what moves */
+    uint32_t scene_triangles; /* the most in the page's /scene, without bodies that move */
     const struct sh_report *report;
 };
 enum { WATCH_SCENE_TRIANGLES = 100000 };
 #define WATCH_CPU_SHARE 0.05
 
 struct run_page {
-    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report hears of it,
-     * and is warned of what there is no room for. cfg and site outlive the watch. On failure *out is NULL. */
+    /* Builds what the observer needs: index of distances, cells of coverage, the coarse scene. report gets the
+     * progress, and a warning where there is no room for a part. cfg and site outlive the watch. On failure *out is
+     * NULL. */
     int (*open)(const struct config *cfg, const struct site *site, const struct watch_options *options,
                 struct watch **out, struct sh_err *err);
     /* The loop takes its descriptor over. */

@@ -22,7 +22,7 @@ int run_take_link(void *values, const char *text)
     return APP_OK;
 }
 
-/* Options that are for some kinds alone of what is run. The first rows name the kinds, in enum run_kind's order. */
+/* Options that only some kinds of input allow. The first rows name the kinds, in enum run_kind's order. */
 enum { HEAD = 1 << RUN_HEAD, RECORDING = 1 << RUN_RECORDING, CAPTURE = 1 << RUN_CAPTURE };
 static const struct {
     int kinds;

@@ -78,12 +78,12 @@ static void warn_of_replay(const struct run_options *o, const struct device *dev
 
 static const struct run_page *page; /* NULL: a page gets the stream alone */
 
-void run_take_page(const struct run_page *told)
+void run_take_page(const struct run_page *of_program)
 {
-    page = told;
+    page = of_program;
 }
 
-static int tells_page(const struct config *cfg)
+static int has_page(const struct config *cfg)
 {
     int is_there = 0;
     for (uint32_t i = 0; i < cfg->n_links; i++)
@@ -102,7 +102,7 @@ static int open_watch(const struct config *cfg, const struct site *site, struct 
                                     .report = &app_report_seconds};
     for (uint32_t i = 0; i < cfg->n_links; i++)
         options.waits |= cfg->link[i].type == LINK_WEB && cfg->link[i].waits == LINK_WAITS_YES;
-    if (!tells_page(cfg)) return SH_OK;
+    if (!has_page(cfg)) return SH_OK;
     if (options.waits && cfg->loop.pace != PACE_REALTIME) options.cpu_share = 0.0;
     const int rc = page->open(cfg, site, &options, watch, err);
     if (rc != SH_OK) return rc;
@@ -137,7 +137,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     int rc = run_complete_links(o, cfg, err);
     if (rc != SH_OK) return rc;
     /* The page looks at triangles. */
-    rc = site_load_for(cfg, tells_page(cfg) ? SITE_WRITTEN_OUT : SITE_FOR_SCANS, NULL, &app_report_stderr, &site, err);
+    rc = site_load_for(cfg, has_page(cfg) ? SITE_WRITTEN_OUT : SITE_FOR_SCANS, NULL, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->surfaces != NULL) rc = surfaces_write(o->surfaces, site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
     /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
@@ -256,15 +256,15 @@ static const char NOTES[] =
     "As a service (systemd, Type=notify) it sends READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
     "when its end begins.\n"
     "\n"
-    "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served unchanged, or as\n"
-    "what another protocol of the link makes of them, with their recorded timing, from the first one on each time\n"
-    "that a client commands SCAN:STARt, or starts scans in that protocol. With --start they are served at once, and\n"
-    "the run ends with them. Queries are answered from the recording's descriptor;\n"
-    "settings can't change. Faults on the wire and of links apply.\n"
+    "A recording, FILE.shs or FILE.pcapng, may take the place of CONFIG. Its frames are served with their recorded\n"
+    "timing: unchanged, or translated where the link has another protocol. They begin each time that a client\n"
+    "commands SCAN:STARt, or starts scans in that protocol. With --start they are served at once, and the run ends\n"
+    "with them. Queries are answered from the recording's descriptor; settings can't change. Faults on the wire and\n"
+    "of links apply.\n"
     "\n"
-    "A capture of any device's traffic may take it, too: FILE.pcap or FILE.pcapng of tcpdump, Wireshark or\n"
-    "record --raw. Each port of the device then has a link: a TCP port of this machine, or datagrams to the port\n"
-    "that it sent to. A client's requests are answered by what the device answered to the same bytes.\n";
+    "A capture of any device's traffic may also take the place of CONFIG: FILE.pcap or FILE.pcapng of tcpdump,\n"
+    "Wireshark or record --raw. Each port of the device then has a link: a TCP port of this machine, or datagrams\n"
+    "to the port that it sent to. A client's requests are answered by what the device answered to the same bytes.\n";
 
 const struct app_command app_run = {
     .name = "run",
