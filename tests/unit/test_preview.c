@@ -153,6 +153,22 @@ static void test_scanners(void **state)
     room_close(&r);
 }
 
+/* A scanner whose ranges do not fit its counts can't be set up. Stations of the head itself still have previews. */
+static void test_broken_scanner(void **state)
+{
+    (void)state;
+    struct room r =
+        room_open("}\n  - {position_m: [1, 3, 1.2], heading_deg: 0, scanner: {output: {layout: polar, scale_m: 1e-9}}");
+    struct web_body body;
+    assert_int_equal(room_ask(&r, "/preview", "station=2&x_m=4&y_m=1&z_m=1.2&heading_deg=0&step_deg=4", &body),
+                     SH_EINPUT);
+    assert_string_equal(err.text, "station 2 has a scanner that can't be previewed");
+    struct web_body b = room_need(&r, "/preview", "station=3&x_m=4&y_m=1&z_m=1.2&heading_deg=0&step_deg=4");
+    assert_int_equal(le_get32(b.bytes + 20), 25 * 90); /* 100 by 360 degrees */
+    preview_release(r.preview, b.bytes);
+    room_close(&r);
+}
+
 /* A scene without a coverage has points, and no cells. */
 static void test_without_cells(void **state)
 {
@@ -206,9 +222,9 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),   cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_tripod),   cmocka_unit_test(test_scanners), cmocka_unit_test(test_without_cells),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points),        cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_tripod),        cmocka_unit_test(test_scanners), cmocka_unit_test(test_broken_scanner),
+        cmocka_unit_test(test_without_cells), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

@@ -67,6 +67,19 @@ static void test_failing(void **state)
     assert_int_not_equal(access(wire_path(wire, "none"), F_OK), 0); /* nothing was begun */
 }
 
+/* A scanner whose scans never end can't record. It stops only campaigns in which its station is chosen. */
+static void test_chosen_stations(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    batch_change(config, "heading_deg: 30,", "heading_deg: 30, scanner: {head: {frames: 0}},");
+    wire_run(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list", "--stations", "1"), 0);
+    wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list", "--stations", "2"),
+                      "head.frames");
+    wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list"), "head.frames");
+}
+
 /* All files that are written with a mesh are the job's: for two frames, two images. Without one of them the job isn't
  * whole. */
 static void expect_images(struct wire *wire, const char *format)
@@ -201,6 +214,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_shards, batch_setup_with_ref, batch_teardown),
         cmocka_unit_test_setup_teardown(test_shared, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_failing, batch_setup, batch_teardown),
+        cmocka_unit_test_setup_teardown(test_chosen_stations, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_images, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_one_warning, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_scenario, batch_setup, batch_teardown),
