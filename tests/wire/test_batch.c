@@ -80,6 +80,30 @@ static void test_chosen_stations(void **state)
     wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list"), "head.frames");
 }
 
+/* Jobs are counted from 1 over all shards; a job's shard is its number modulo their count (batch.h). */
+static void test_list(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], dir[352];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(dir, sizeof dir, "%s", wire_path(wire, "listed"));
+    static const char *const sweeps[] = {"head.prr_hz=100000,150000", "head.lines_hz=50,60"};
+    const char *const list[] = {"batch",      config, "-o",      dir,       "--format", "ply",
+                                "--stations", "2",    "--sweep", sweeps[0], "--sweep",  sweeps[1],
+                                "--shard",    "2/2",  "--list",  "--json",  NULL};
+    wire_run(wire, list, 0);
+    char *text = wire_read(wire_path(wire, "out"), NULL);
+    assert_string_equal(text, "[\n  {\n    \"job\": 2,\n"
+                              "    \"name\": \"0002_station-2_head.prr_hz=100000_head.lines_hz=60\",\n"
+                              "    \"station\": 2,\n    \"set\": [\n      \"head.prr_hz=100000\",\n"
+                              "      \"head.lines_hz=60\"\n    ],\n    \"done\": false\n  },\n"
+                              "  {\n    \"job\": 4,\n"
+                              "    \"name\": \"0004_station-2_head.prr_hz=150000_head.lines_hz=60\",\n"
+                              "    \"station\": 2,\n    \"set\": [\n      \"head.prr_hz=150000\",\n"
+                              "      \"head.lines_hz=60\"\n    ],\n    \"done\": false\n  }\n]\n");
+    free(text);
+}
+
 /* All files that are written with a mesh are the job's: for two frames, two images. Without one of them the job isn't
  * whole. */
 static void expect_images(struct wire *wire, const char *format)
@@ -215,6 +239,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_shared, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_failing, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_chosen_stations, batch_setup, batch_teardown),
+        cmocka_unit_test_setup_teardown(test_list, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_images, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_one_warning, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_scenario, batch_setup, batch_teardown),
