@@ -318,11 +318,69 @@ static void each_row_of_the_page_is_right(void **state)
     free(page);
 }
 
+/* ---- the map: places are in units of the bar that shows its scale, with one decimal */
+
+static double number_after(const char **at, const char *what)
+{
+    *at = strstr(*at, what);
+    if (*at == NULL) fail_msg("no %s", what);
+    return strtod(*at += strlen(what), (char **)at);
+}
+
+/* The station's triangle, whose middle is 9 units below its first corner, with its name to the right. */
+static void next_station(const char **at, const char *name, double place[2])
+{
+    char text[128];
+    place[0] = number_after(at, "<polygon class=\"station\" points=\"");
+    place[1] = number_after(at, ",") + 9.0;
+    snprintf(text, sizeof text,
+             " %.1f,%.1f %.1f,%.1f\"><title>%s</title></polygon>\n"
+             "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"start\">%s</text>\n",
+             place[0] - 8.0, place[1] + 6.0, place[0] + 8.0, place[1] + 6.0, name, place[0] + 12.0, place[1] + 5.0,
+             name);
+    if (strncmp(*at, text, strlen(text)) != 0) fail_msg("not %s but %.250s", text, *at);
+}
+
+/* The second station is 1 m to the east and 1 m to the north of the first. Colours end at the figure that 99.9 % of the
+ * distances do not exceed, rounded up to 1, 2 or 5 mm. */
+static void the_map_shows_the_stations(void **state)
+{
+    struct wire *wire = *state;
+    struct made all[N_POINTS];
+    char html[256], text[128];
+    double first[2], second[2];
+    report_make(all);
+    all[N_NEAR + 1] = all[0]; /* no point is far, which would make the rest of the map small */
+    report_write(wire, all);
+    snprintf(html, sizeof html, "%s", wire_path(wire, "page.html"));
+    report_run(wire, (const char *const[]){"--html", html, NULL});
+    char *page = wire_read(html, NULL);
+    const char *at = strstr(page, "<svg class=\"map\" viewBox=\"0 0 900 ");
+    assert_non_null(at);
+    next_station(&at, "1 first", first);
+    next_station(&at, "2 second", second);
+    const double bar = number_after(&at, "<line class=\"mark\" x1=\"20\" y1=\"");
+    const double length = number_after(&at, "x2=\"") - 20.0, end = number_after(&at, "<text x=\"");
+    assert_true(fabs(end - 28.0 - length) < 0.11); /* both are rounded to 0.1 */
+    assert_true(fabs(number_after(&at, "y=\"") - 5.0 - bar) < 0.11);
+    const double unit_m = length / number_after(&at, ">");
+    assert_true(fabs(second[0] - first[0] - unit_m) < 0.21 && fabs(first[1] - second[1] - unit_m) < 0.21);
+    const double p999_m = report_want(all, BY_NOTHING, 0, 1).p999_m;
+    snprintf(text, sizeof text, ">%g mm</text>\n</svg><figcaption>The cloud from above, the scene's y axis up.",
+             p999_m > 0.005   ? 10.0
+             : p999_m > 0.002 ? 5.0
+                              : 2.0);
+    has_once(page, text);
+    has_once(page, "black: nothing within 10 m. Red triangles are the stations.</figcaption>");
+    free(page);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(each_row_of_the_text_is_right, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(each_row_of_the_page_is_right, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(the_map_shows_the_stations, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
