@@ -373,6 +373,15 @@ static void the_map_shows_the_stations(void **state)
     has_once(page, text);
     has_once(page, "black: nothing within 10 m. Red triangles are the stations.</figcaption>");
     free(page);
+    /* Stations beside all points are on the map, too. */
+    report_run(wire, (const char *const[]){"--html", html, "--set", "stations.0.position_m=[-30,0,0.1]", "--set",
+                                           "stations.1.position_m=[50,0,0.2]", NULL});
+    page = wire_read(html, NULL);
+    at = page;
+    const double west = number_after(&at, "<polygon class=\"station\" points=\"");
+    const double east = number_after(&at, "<polygon class=\"station\" points=\"");
+    assert_true(west >= 0.0 && east <= 900.0 && east - west > 800.0); /* the map is little wider than these 80 m */
+    free(page);
 }
 
 int main(void)
