@@ -325,7 +325,7 @@ test: deps-test
 	$(MAKE) --no-print-directory -j$(JOBS) $(STRICT) BUILD=$(BUILD)/test JOIN=shipped test-programs || status=1; wait; exit $$status
 	$(if $(HAS_CLANG),,@echo "no clang: its warnings are not looked at")
 	@$(MAKE) --no-print-directory $(READERS)/pcl_vlp16 & status=0; \
-	$(MAKE) --no-print-directory -j$(JOBS) $(ASAN) JOIN=unit objects test-unit-programs $(if $(HAS_CLANG),fuzz-objects) || status=1; wait; exit $$status
+	$(MAKE) --no-print-directory -j$(JOBS) $(ASAN) JOIN=unit objects test-unit-programs $(BUILD)/asan/scanhead $(if $(HAS_CLANG),fuzz-objects) || status=1; wait; exit $$status
 	$(if $(HAS_CLANG),@$(MAKE) --no-print-directory -j$(JOBS) $(TSAN_SHORT))
 	@$(RUN) sh tests/run_all.sh $(BUILD)
 else

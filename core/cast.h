@@ -5,7 +5,7 @@
  * pulses). Out: a block of line.h. The stages are aim, nearest, optics, sub-rays, echoes, points;
  * core/cast/caster.c has them in that order.
  *
- * Frames: the station is a point of prcs (m), beams are directions there, turned from socs. On a
+ * Coordinate frames: the station is a point in prcs (m). Beams are directions in socs that are turned to prcs. On a
  * moving platform each pulse has its own origin and rotation, from its firing time alone; a head that stands still
  * pays nothing for that. The hits of a pulse depend on that pulse alone: runs may be cut anywhere. */
 #ifndef CORE_CAST_H
@@ -30,8 +30,8 @@
 enum { CAST_MAX_MOVERS = 16, CAST_MAX_WOBBLES = 32 };
 
 /* A rigid body that moves, with a BVH of its own, built at rest: p_prcs = rotation * p_rest + shift_m. The
- * pose holds for the runs that are cast with it; rays that miss the sphere around the body cost one test a
- * chunk. */
+ * pose holds for the runs that are cast with it. Pulses are cast in chunks of BVH_CHUNK: where all rays of a chunk
+ * miss the sphere around the body, the body costs one test. */
 struct cast_mover {
     const struct bvh *bvh;
     double centre_m[3], radius_m; /* sphere around the body at rest */
@@ -66,7 +66,7 @@ struct cast_detect {
     uint32_t depth;                       /* up to CAST_MAX_DEPTH; 0: no glass, no mirrors */
     uint32_t ghost_label;
     uint32_t max_echoes;
-    double separation_m; /* returns of glass and mirrors that are nearer to each other make one echo; 0: each its own */
+    double separation_m; /* returns of glass and mirrors that are nearer to each other make one echo; 0: none do */
     enum detect_ambiguity ambiguity;
     uint32_t zones;
     const struct detect_ball *ball;
@@ -78,18 +78,18 @@ struct cast_detect {
  * not known. */
 struct cast_beam {
     struct beam beam;
-    enum beam_mode mode; /* BEAM_RINGS, or BEAM_ADAPTIVE with outlines: then the head and the scene stand still,
-                          * and beams begin at station_m (instrument_has_offset) */
+    enum beam_mode mode; /* BEAM_RINGS or BEAM_ADAPTIVE. Adaptive needs outlines, a head and a scene that stand still, a
+                          * tripod without legs, and beams that begin at station_m (no instrument_has_offset). */
     uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
-    struct beam_pattern pattern, fine; /* sub-rays; BEAM_FINE_RINGS, for beam_cut */
+    struct beam_pattern pattern, fine; /* sub-rays of a whole footprint; places for beam_cut */
     const struct beam_outlines *outlines;
 };
 
-/* Colours of points. A colour by range shows the range that is sent. A colour by height is computed along the true
- * beam, also where the encoders err. The frame scalar is that at the pulse's firing time. */
+/* Colours of points. Colours by range go by the range that is sent. Height is that of the true beam, also where
+ * encoders err. The frame scalar, a number that a trajectory has at each time, is that of the pulse's firing time. */
 struct cast_colour {
     struct colour_scale scale;
-    double frame;                           /* frame scalar of a standing head; a moving one has those of its knots */
+    double frame;                           /* the frame scalar of a head that stands; that of others is in the knots */
     const struct surface_colours *surfaces; /* texture; must outlive the scan */
 };
 
@@ -98,10 +98,10 @@ struct cast_colour {
 struct cast_disturbance {
     int dark;         /* the laser does not fire: shots are empty, except for echoes that noise makes in waveforms */
     double slip_turn; /* the beam's pan is this much more than the encoder reads */
-    /* The optical power that the window lets through, both ways together; 1: as a clean window. With a signal model
-     * each return is so much weaker, and detect.h has the rest. Without one the fixed part of the range noise grows by
-     * 1 / share. That is the jitter of detect.h: rise time over the ratio of signal and noise as voltages (Skolnik).
-     * The voltage goes with the optical power, and a receiver's thermal noise is the same without light. */
+    /* The optical power that a soiled window lets through, both ways together, as a share of that of a clean one. With
+     * a signal model each return is weaker by this factor, and detect.h has the rest. Without one the fixed part of the
+     * range noise is divided by it. That is the jitter of detect.h: rise time over the ratio of signal and noise as
+     * voltages (Skolnik). The voltage is proportional to the optical power, and thermal noise does not depend on it. */
     double share;
     uint32_t n_wobbles; /* each adds turn * sin(2 pi hz (t - begin)) to the axes, t since the scan's start */
     struct cast_wobble {
@@ -127,9 +127,9 @@ void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, doubl
 /* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
-    /* NULL: none. Else it belongs to bvh and station_m. Rays that begin there are looked up in it, with the same
-     * hits. All other rays are cast into the BVH: beams that begin beside the station, sub-rays, rays beyond
-     * glass and mirrors, and those to moving bodies. A head that moves has no sight. */
+    /* NULL: none. It is made for `bvh` and `station_m`. Rays that begin at the station are looked up in it, with the
+     * same hits. All other rays are cast into the BVH: beams that begin beside the station, sub-rays, rays beyond
+     * glass and mirrors, and rays to moving bodies. A head that moves has no sight. */
     const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
@@ -145,16 +145,15 @@ struct cast_setup {
     double xyz_scale[3]; /* units of the CRS per count, see georef_scale */
     /* NULL: pulses are single rays. Else blocks have room for beam->max_echoes entries a pulse. */
     const struct cast_beam *beam;
-    enum beam_select echoes; /* the ones of a pulse that are reported */
+    enum beam_select echoes; /* which echoes of a pulse are sent */
     uint32_t max_echoes;     /* of a pulse, no more than detect or beam allow; 0: as many as they allow */
-    /* c tau / 2 of the pulse, as a beam's resolution_m; for the widths of echoes, where a block has room for these */
-    double pulse_m;
+    double pulse_m;          /* c tau / 2, as a beam's resolution_m; for the widths of echoes, where a block has room */
     uint32_t n_movers;
     struct cast_mover mover[CAST_MAX_MOVERS];
     const struct cast_tripod *tripod; /* NULL: none. For a head that stands still */
-    /* The poses of a moving head (socs -> prcs), in order of time; between two of them pose_between holds. They cover
-     * the firing times of the runs: before the first and after the last the head stands. Then geo positions are
-     * relative to station_m, and rotation is not used. n_knots 0: the head stands still at station_m. */
+    /* The poses of a moving head (socs -> prcs), in order of time; between two of them pose_between holds. Before the
+     * first and after the last the head stands. With knots, geo positions are relative to station_m, and rotation is
+     * not used. n_knots 0: the head stands still at station_m. */
     uint32_t n_knots;
     const struct pose_knot *knot;
     const uint8_t *silent; /* by label: surfaces that hide what is behind them and give no echo; NULL: none */
@@ -183,17 +182,17 @@ struct cast_counters {
 
 struct caster;
 
-/* Working memory of one thread. */
+/* Makes the working memory of one thread. */
 int caster_create(struct caster **out, struct sh_err *err);
 void caster_free(struct caster *caster);
 /* Makes memory for waveforms. Without it a caster casts as if its setups had none. */
 int caster_add_waves(struct caster *caster, struct sh_err *err);
 
-/* Fills block from the run, with attributes where it has room for them. The echo of a single ray has the
- * width of the pulse. An echo of a footprint, or of returns merged from glass and mirrors, has the width that
- * core/footprint.h defines. An amplitude needs a signal model. Range noise moves echoes, and doesn't widen them. The
- * block has capacity >= run->n times the echoes that a pulse may have (1 + depth, beam->max_echoes; where they are
- * found in waveforms, max_echoes also with single rays). Returns the number of echoes. Allocates nothing. */
+/* Fills block from the run, with attributes where it has room for them. Returns the number of echoes. Allocates
+ * nothing. The echo of a single ray has the width of the pulse. The echo of a footprint, or of returns merged from
+ * glass and mirrors, has the width that core/footprint.h defines. An amplitude needs a signal model. Range noise moves
+ * echoes, and doesn't widen them. The block has capacity for run->n times the echoes that a pulse may have: 1 + depth
+ * with a single ray, beam->max_echoes with a beam, and max_echoes with either where echoes are found in waveforms. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 
@@ -204,17 +203,17 @@ struct cast_hit {
     uint32_t pulse;         /* of the run, from 0 */
     uint32_t triangle;      /* of the scene, or of the body */
     uint8_t body;           /* 0: what stands still; k + 1: mover k; CAST_MAX_MOVERS + 1: the legs of the tripod */
-    uint8_t front;          /* the triangle's corners go counter-clockwise as seen from there */
+    uint8_t front;          /* the triangle's corners go counter-clockwise as seen from the head */
 };
 
-/* The hits of a run's pulses that the head can report, each pulse as one ray, without noise. They lie within its
- * ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit, and so is the surface
- * beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit has room for (1 +
- * depth) run->n. Returns the number of hits. They are in order of chunks only. Allocates nothing. */
+/* Casts a run's pulses as single rays without noise, and fills `hit` with the hits that the head can report. They lie
+ * within its ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit, and so is
+ * the surface beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit has room
+ * for (1 + depth) run->n. Returns the number of hits. They are in order of chunks only. Allocates nothing. */
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 
-/* bvh_hits, with the caster's working memory. */
+/* Finds exact hits (bvh.h) with the caster's working memory. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Makes the outlines of a scene that are steps as seen from the station: beam_outlines_create, with rays into bvh.
@@ -232,7 +231,8 @@ enum cast_stage {
     CAST_POSITIONS,
     CAST_STAGES
 };
-/* NULL: off, which costs nothing that could be measured. The profile stays the caller's. */
+/* Measures the cost of each stage. NULL: off, which costs nothing that could be measured. The profile stays the
+ * caller's. */
 void caster_set_profile(struct caster *caster, struct bvh_profile *profile);
 
 void caster_get_counters(const struct caster *caster, struct cast_counters *counters);

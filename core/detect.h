@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Detection: from the light that comes back to the echoes that the head reports. Arrays have one entry per
- * echo, and several per pulse.
+ * echo, so a pulse may have several.
  *
  * Signal. The range equation for a target that the beam doesn't miss (W. Wagner et al., Gaussian
  * decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser scanner,
@@ -21,8 +21,8 @@
  * Detection. The signal carries Gaussian noise of sigma 1/k in units of the threshold, k the signal-to-noise
  * ratio at the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the
  * pulses see a target at the data sheet's range. Reflectance, relative to a white Lambertian target at that
- * range, hit head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). The amplitude that a head reports, in
- * dB above the threshold, is 10 log10 (A + n/k). It is 0 dB or more for every echo, since others are not detected.
+ * range, hit head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the
+ * threshold, as a head measures it, is 10 log10 (A + n/k). A detected echo has 0 dB or more.
  *
  * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik,
  * Introduction to radar systems, 1980), and a part that no signal makes smaller (clock, digits):
@@ -30,8 +30,7 @@
  *     sigma^2 = floor^2 + (X^2 - floor^2) (A_Y / A)^2,  and a part per distance added to sigma
  *
  * for a data sheet's `X at Y m`, A_Y the amplitude of a target of its reflectance at Y, head on. With k below 8 noise
- * alone may be detected, where A is nearly 0: A counts as DETECT_LEAST_AMPLITUDE or more here, so that ranges stay
- * finite.
+ * alone may be detected, where A is nearly 0. A counts as DETECT_LEAST_AMPLITUDE or more here: ranges stay finite.
  *
  * Random numbers are keyed by (seed, scan, pulse, echo, purpose): nothing depends on what else was detected.
  * Entries without echo stay so. Pure; any thread; allocates nothing. */
@@ -59,15 +58,15 @@ struct detect_signal_spec {
     int sharp;             /* no noise on the signal: detected where A >= 1 */
     double overlap_m;      /* R_o; 0: all light is caught at any range */
     double extinction_1_m; /* beyond that of the data sheet's day; may be below 0 */
-    /* range noise: X, Y and the target's reflectance; the part that no signal makes smaller; the part per distance */
+    /* X at Y m on a target of that reflectance; sigma_floor_m is the part that no signal makes smaller */
     double sigma_m, sigma_at_m, sigma_reflectance, sigma_floor_m, sigma_ppm;
     uint64_t seed;
 };
 
 struct detect_signal {
-    uint32_t n; /* of the following: pieces of g */
-    double g0, at_m[DETECT_MAX_REACHES],
-        more_1_m[DETECT_MAX_REACHES]; /* g = g0 + sum of more (R - at): the first everywhere, others where R > at */
+    /* g = g0 + sum over n pieces of more_1_m (R - at_m): the first holds everywhere, the others where R > at_m */
+    uint32_t n;
+    double g0, at_m[DETECT_MAX_REACHES], more_1_m[DETECT_MAX_REACHES];
     double per_overlap2, extinction2_1_m;
     double per_snr;         /* 1/k; 0: sharp */
     double floor2, jitter2; /* parts of sigma^2: the constant one, and the other one at A = 1 */
@@ -80,13 +79,13 @@ struct detect_signal {
  * order. */
 int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err);
 
-/* A of a return E rho(i). */
+/* Returns A of a return E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
 
 /* Returns the reflectance that a head reports for an amplitude at range_m, in the data sheet's air. */
 double detect_reflectance(const struct detect_signal *signal, double range_m, double amplitude);
 
-/* Extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's
+/* Returns the extinction for a visibility (Koschmieder: contrast of 2 % at 550 nm), by Kruse's formula with Kim's
  * exponents (I. Kim et al., Comparison of laser beam propagation at 785 nm and 1550 nm in fog and haze,
  * 2001). */
 double detect_extinction_1_m(double visibility_m, double wavelength_m);
@@ -103,19 +102,19 @@ struct detect_echoes {
 
 /* Fills amplitude and refl_cdb; range_m becomes NaN where nothing is detected. */
 void detect_by_signal(const struct detect_signal *signal, const struct detect_echoes *echoes);
-/* After that: amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo. */
+/* Called after that. Sets amplitudes in 0.01 dB above the threshold; LINE_AMPLITUDE_NONE where there is no echo. */
 void detect_amplitudes(const struct detect_signal *signal, const struct detect_echoes *echoes, int16_t *amplitude_cdb);
-/* Range noise by the amplitude. */
+/* Adds range noise by the amplitude. */
 void detect_range_noise(const struct detect_signal *signal, const struct detect_echoes *echoes);
-/* Range noise of sigma0 + sigma1 * range, whatever the signal. */
+/* Adds range noise of sigma0 + sigma1 * range, whatever the signal. */
 void detect_fixed_noise(double sigma0_m, double sigma1, uint64_t range_key, uint32_t n, const uint64_t *key,
                         double *range_m);
 
-/* Range ambiguity: an echo that comes back after the next pulse has left, beyond R_u = c T / 2 (T: time
- * between pulses). Folded: reported as an echo of the last pulse that had left by then, at R mod R_u. (It stays with
- * its own pulse here, so that its direction is that of the pulse it belongs to.) Resolved: reported where it is,
- * within so many zones; what lies beyond is lost. In both an echo is lost that comes back while the head is blind,
- * less than range_min_m after a pulse. */
+/* Range ambiguity: an echo from beyond R_u = c T / 2 (T: time between pulses) comes back after the next pulse has left.
+ * Folded: its range is measured from the last pulse that had left by then: R mod R_u. (It stays with its own pulse
+ * here, and so it has that pulse's direction.) Resolved: its range is right up to a number of zones; echoes beyond
+ * them are lost. In both an echo is lost that comes back while the head is blind, less than range_min_m after a
+ * pulse. */
 enum detect_ambiguity { DETECT_AMBIGUITY_NONE, DETECT_FOLDED, DETECT_RESOLVED };
 void detect_zones(enum detect_ambiguity how, double period_s, uint32_t zones, double range_min_m, uint32_t n,
                   double *range_m);
@@ -136,7 +135,7 @@ struct detect_points {
     double *range_m, *mirror_turn, *pan_turn;
     uint64_t scan_key; /* rng_scan */
 };
-/* rotation: socs -> prcs; NULL with local axes. */
+/* Moves each point within its ball. rotation: socs -> prcs; NULL with local axes. */
 void detect_move_in_ball(const struct detect_ball *ball, const double rotation[9], const struct detect_points *points);
 
 #endif

@@ -17,8 +17,8 @@
 #include "core/err.h"
 #include "core/vecmath.h"
 
-/* Turns an error of Embree into ours. what: the thing that was to be made. */
-int embree_fail(enum RTCError code, const char *what, struct sh_err *err);
+/* Turns an error of Embree into ours. */
+int embree_fail(enum RTCError code, struct sh_err *err);
 
 /* Whether Embree takes packets of that many rays (4, 8 or 16) as they are. It takes others apart, and a leaf then
  * gets rays of several. */

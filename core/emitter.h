@@ -44,7 +44,7 @@ struct emitter_firing {
 struct emitter {
     enum emitter_kind kind;
     uint32_t steps;                             /* pulses of a line; line and beams: 0 */
-    uint32_t first_step, last_step, front_step; /* planar: the first and last step cast; the step that looks along y */
+    uint32_t first_step, last_step, front_step; /* planar: the first and the last cast; the one that looks along y */
     int turn;                                   /* +1: clockwise seen from above; -1: the other way */
     /* sphere: `rings` of elevations -90 + 180 (first_ring + i) / gaps deg; gaps 0: one, at circle_udeg */
     uint32_t rings, first_ring, gaps;
@@ -60,49 +60,49 @@ struct emitter {
     const struct emitter_firing *direction;
 };
 
-/* A planar head; figures must be checked: first <= last < steps, front < steps. */
+/* Makes a planar head of checked figures: first <= last < steps, front < steps. */
 void emitter_set_planar(struct emitter *emitter, uint32_t steps, uint32_t first, uint32_t last, uint32_t front,
                         int turn);
-/* A firing sequence of sequence_ps picoseconds. SH_EINPUT says what does not fit: no beam, offsets that don't
- * rise from 0, a sequence that ends before its last firing. */
+/* Makes a head of beams with a firing sequence of sequence_ps picoseconds. SH_EINPUT says what does not fit: no
+ * beam, offsets that don't rise from 0, a sequence that ends before its last firing. */
 int emitter_set_beams(struct emitter *emitter, const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps,
                       int turn, struct sh_err *err);
-/* Steps and rings nearest to step_udeg (0.01 to 90 deg): a turn has 360 / step steps, and from pole to pole there are
- * 180 / step gaps between rings, both rounded to whole numbers. */
+/* Makes a sphere with steps and rings nearest to step_udeg (0.01 to 90 deg). A turn has 360 / step steps, and from
+ * pole to pole there are 180 / step gaps between rings, both rounded to whole numbers. */
 void emitter_set_sphere(struct emitter *emitter, int64_t step_udeg);
-/* Steps of a ring, with that step. */
+/* Returns the steps of a ring with that step. */
 static inline uint32_t emitter_sphere_steps(int64_t step_udeg)
 {
     return (uint32_t)((360000000 + step_udeg / 2) / step_udeg);
 }
-/* Whether the step of a sphere divides both, so that nothing was rounded. */
+/* Whether a sphere's step divides a turn and half a turn, so that nothing was rounded. */
 int emitter_sphere_is_exact(const struct emitter *emitter);
 /* Limits a sphere to the rings from start to stop, elevations of -90 to 90 deg, start <= stop. A ring within
  * a micro-degree of a limit counts as inside. Where both limits are the same, it is a circle: one ring, at
  * exactly that elevation. SH_EINPUT: no ring lies there; the text names the nearest ones. */
 int emitter_set_rings(struct emitter *emitter, int64_t start_udeg, int64_t stop_udeg, struct sh_err *err);
-/* Elevation of ring i (0 .. rings - 1) of a sphere, in turns. */
+/* Returns the elevation of ring i (0 .. rings - 1) of a sphere, in turns. */
 double emitter_ring_turn(const struct emitter *emitter, uint64_t ring);
 /* Whether all steps of that ring look along one line. */
 int emitter_ring_is_pole(const struct emitter *emitter, uint64_t ring);
-/* A list, which stays the owner's. */
+/* Makes a head with a list of directions, which stays the owner's. */
 void emitter_set_directions(struct emitter *emitter, const struct emitter_firing *direction, uint32_t n);
 
 /* Reads such a list, a row each: "x y z" in the head's frame (of any length), or "azimuth elevation" in degrees, all
  * rows alike. The rest of a line after a # is left out. *direction: [*n], the caller's to free. SH_EINPUT names file
  * and line. */
 int emitter_read_directions(const char *path, struct emitter_firing **direction, uint32_t *n, struct sh_err *err);
-/* "planar, steps 0..1080 of 1440 a turn, ..."; empty for a line head. */
+/* Writes a text such as "planar, steps 0..1080 of 1440 a turn, ..."; for a line head it is empty. */
 void emitter_describe(const struct emitter *emitter, char *buf, size_t len);
 
-/* Pulses of a line where that is fixed, so that the pulse rate is that many times the line rate; else 0. */
+/* Returns the pulses of a line where that is fixed, so that the pulse rate is that many times the line rate; else 0. */
 static inline uint32_t emitter_line_pulses(const struct emitter *emitter)
 {
     return emitter->steps;
 }
-/* Beams: pulses per second, in micro-hertz, rounded. */
+/* Returns the pulse rate of a head of beams in micro-hertz, rounded. */
 int64_t emitter_rate_uhz(const struct emitter *emitter);
-/* The line angle of a planar head's step, rounded. It counts from the front, in the direction of the steps. */
+/* Returns the line angle of a planar head's step, rounded. It counts from the front, in the direction of the steps. */
 int64_t emitter_step_udeg(const struct emitter *emitter, int64_t step);
 
 #endif

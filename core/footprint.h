@@ -11,9 +11,9 @@
  *
  * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit
  * plane, with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a
- * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc;
- * parts of the disc with equal energy have equal energy in every footprint. The range of a sub-ray counts along
- * itself from the exit plane.
+ * straight line from its own point of the exit plane, at (x, y) = rho (cos phi, sin phi) of the unit disc. A part
+ * of the disc has the same share of the energy in every footprint. A sub-ray's range counts along itself from the
+ * exit plane.
  * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same
  * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the
  * irradiance: (1 - exp(-2 rho^2)) / (1 - exp(-2)).)
@@ -22,17 +22,17 @@
  * than the range resolution (c tau / 2 of the pulse width tau) begins a new echo. An echo's range is the
  * energy-weighted mean of its returns: the centroid of equal pulses that overlap, whatever their shape. Two
  * surfaces closer than the resolution make a mixed pixel. An echo's energy is the sum of its returns'; its
- * surface is the one that sends most of it back. Less than 1 % of the footprint's energy is no echo. Where
+ * surface is the one that sends most of it back. Returns of less than 1 % of the footprint's energy make no echo. Where
  * there are more echoes than the head can report, the weakest are left out, and counted. Where surfaces are
  * modelled (core/surface.h), the weight of a return is the power that comes back: energy times the surface's
  * return, times the share that glass and mirrors before it let through. The 1 % is still of the footprint's
- * energy. Where nothing comes back of any return, energy is the weight.
+ * energy. Where no return sends anything back, energy is the weight.
  *
  * Width. An echo's width adds two widths as squares: that of the pulse, resolution_m, and 2.355 sigma of its
  * ranges (full widths at half maximum of Gaussians). A return may stand for a part of the footprint, or for
- * the area around a sub-ray. The spread of ranges within it counts as well, to first order on its plane. That
- * makes the standard deviation too small by a share of (s tan i)^2 / 2, s = theta / 2. Where lines cross in the
- * footprint it is too small by a few percent more, since the parts are then known by sample places only.
+ * the area around a sub-ray. The ranges within it count as well, to first order on its plane: the standard
+ * deviation comes out too small, by a share of (s tan i)^2 / 2, with s = theta / 2. Where lines cross in the footprint
+ * it is a few percent smaller still, since the parts are then made of sample places.
  *
  * One ray for the whole footprint. Where the footprint lies on one plane at incidence i, its mean range is
  * not that of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho
@@ -52,7 +52,7 @@
 
 enum beam_mode { BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE, BEAM_AUTO };
 
-/* How a diameter or a divergence is defined. Where the irradiance above has fallen to a share q of its peak,
+/* Definitions of a diameter or a divergence. Where the irradiance above has fallen to a share q of its peak,
  * r = w sqrt(ln(1/q) / 2). So a full width times beam_widening() is the full width at 1/e^2 (q = exp(-2)):
  *   1/e     q = exp(-1)   r = w / sqrt(2)          sqrt(2)         = 1.4142
  *   FWHM    q = 1/2       r = w sqrt(ln(2) / 2)    sqrt(2 / ln(2)) = 1.6986
@@ -84,31 +84,31 @@ struct beam {
     double along[BEAM_HALF_STEPS + 2], across[BEAM_HALF_STEPS + 2];
 };
 
-/* Lengths and angles as above; the pulse width in seconds. */
+/* Sets a beam's figures. exit_m is D and divergence_rad is theta, both full widths at 1/e^2. */
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
-/* Replaces the range at a footprint's centre by the mean of the footprint's ranges. It lies on one plane, with steep =
- * 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. At grazing incidence, where
- * s / cos i is more than 1/2, x is taken as if it were 1/2. */
+/* Replaces the range at a footprint's centre by the mean of the footprint's ranges. The footprint lies on one plane,
+ * with steep = 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. Beyond
+ * s / cos i = 1/2, where the plane is nearly along the beam, x stays as it is there. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
-/* The widths of the echoes of such footprints, for pulses of beam->resolution_m. */
+/* Sets the widths of the echoes of such footprints, for pulses of beam->resolution_m. */
 void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
-/* The width of an echo whose ranges have that variance. pulse_m is the pulse's own width, c tau / 2. */
+/* Returns the width of an echo whose ranges have this variance. pulse_m is the pulse's own width, c tau / 2. */
 double beam_echo_width(double pulse_m, double variance_m2);
 
-/* The part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
+/* Gives the part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
  * times the distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
-/* The second moments of that part, along n and along the line. */
+/* Gives its second moments, along n and along the line. */
 void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
 struct beam_pattern {
     uint32_t n;
-    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* 0 from n on, up to a multiple of 64 */
-    double rest; /* variance of x (and of y) within the area of a place: the footprint's minus that of the places */
+    float x[BEAM_SUBRAY_ROOM], y[BEAM_SUBRAY_ROOM]; /* 0 from n on; the room is a multiple of 64 */
+    double rest; /* variance of x (and of y) around a place: that of the footprint minus that of the places */
 };
-/* rings: 0 (the centre alone) to BEAM_MAX_RINGS. */
+/* Makes a pattern of 0 (the centre alone) to BEAM_MAX_RINGS rings. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
 /* Where a plane ends within a footprint, the sub-rays that hit it stand for the part of the footprint on it. The error
@@ -117,7 +117,7 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern);
  * better, since each has 1/n of the energy or nothing. Outlines (below) cut exactly. */
 double beam_end_error(uint32_t rings);
 
-/* Two axes across a beam's direction. */
+/* Chooses two axes across a beam's direction. */
 void beam_axes(const double dir[3], double e1[3], double e2[3]);
 struct beam_sight {
     double dir[3], e1[3], e2[3];
@@ -141,7 +141,7 @@ struct beam_echo {
     uint8_t number; /* among the pulse's echoes, from 0, left-out ones included; keys random numbers */
 };
 
-/* How returns are merged into echoes. */
+/* This says how returns are merged into echoes. */
 struct beam_merging {
     double gap_m;        /* a larger one begins a new echo */
     double pulse_m;      /* width of the pulse, c tau / 2 */
@@ -149,7 +149,7 @@ struct beam_merging {
     int by_surface;      /* 1: an echo's surface is the one that returns most; 0: that of its strongest return */
     uint32_t most;       /* echoes of a pulse; the weakest are left out */
 };
-/* For a footprint, as defined above. */
+/* Sets how the returns of a footprint are merged, as defined above. */
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);
 /* Sorts returns by range, in place. */
 void beam_sort(struct beam_return *returns, uint32_t n);
@@ -165,7 +165,7 @@ struct beam_alike {
     double energy;         /* of a return */
     const double *range_m; /* NaN: the sub-ray hits nothing */
     const uint32_t *label;
-    const double *rho; /* the share of the energy that comes back; NULL: all of it */
+    const double *rho; /* the share of the energy that comes back; NULL: all */
 };
 enum { BEAM_ALIKE = 16 };
 /* Merges the pulses whose returns all lie on one surface without a gap, as most do, several at a time. The echoes are
@@ -173,7 +173,7 @@ enum { BEAM_ALIKE = 16 };
  * an element for each pulse. */
 uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alike *alike, struct beam_echo *echo);
 
-/* ---- outlines: edges beyond which a footprint may reach another surface than the one in its centre */
+/* ---- outlines: other surfaces that a footprint may reach */
 
 /* The outlines of a scene as seen from one place: edges with the surface on one side only. A footprint
  * without an outline lies on the surface that its centre hits: one ray is enough. An edge with a triangle on
@@ -182,8 +182,7 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
  * reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
-/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they
- * meet. */
+/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they hit. */
 struct beam_probe {
     void (*cast)(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind);
     void *ctx;
@@ -203,8 +202,8 @@ struct beam_outlines_spec {
  * apart. A stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to
  * BEAM_LEAST_STEP_M (a wall that stands on a floor; parts of a wall): it can't make another echo. Like any
  * fold between triangles, an outline that is left out may move a range by a sixth of the footprint's radius
- * times the change of slope. The edge of the exit may see what is hidden from the station: a strip of at
- * most the exit's radius. */
+ * times the change of slope. From the edge of the exit a strip that the station can't see may be visible. It is at
+ * most as wide as the exit's radius. */
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
@@ -213,7 +212,7 @@ enum { BEAM_NEAR_MOST = 1024 };
 /* A pulse whose footprint may reach outlines first .. end. */
 struct beam_near {
     uint32_t pulse, first, end;
-    double next_m; /* beam_find_lines */
+    double next_m; /* set by beam_find_lines */
 };
 /* Finds such pulses, at any range, among n <= BEAM_NEAR_MOST unit directions. Returns how many. */
 uint32_t beam_near_outlines(const struct beam_outlines *outlines, const struct beam *beam,
@@ -225,29 +224,29 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* The outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
+/* Finds the outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
  * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: the range from
  * which there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
                          const struct beam_sight *sight, double limit_m, struct beam_line *line);
 
-/* A part of the footprint: its energy, the centre of that, and how it spreads about it: variances and
- * covariance of x and y, where they are asked for. */
+/* A part of the footprint: its energy, the centre of its energy, and the spread about that centre. The spread is the
+ * variances and the covariance of x and y, where they are asked for. */
 struct beam_part {
     double energy, x, y, xx, xy, yy;
 };
-/* The parts that lines cut the footprint into. Each lies on one surface; convex, so that its centre of energy
+/* The parts that lines cut the footprint into. Each lies on one surface, and is convex, so that its centre of energy
  * is in it. */
 struct beam_parts {
     uint32_t n, centre; /* the part with the centre of the disc */
     struct beam_part part[BEAM_MAX_PARTS];
 };
-/* fine: the pattern of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than BEAM_MAX_PARTS. Parts of
- * less than 0.05 % of the energy are left out. */
+/* Cuts a footprint by n lines. fine: the pattern of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than
+ * BEAM_MAX_PARTS. Parts of less than 0.05 % of the energy are left out. */
 int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const struct beam_line *line, uint32_t n,
              int spreads, struct beam_parts *parts);
 
-/* Standard deviation of the ranges within a part that lies on the plane with normal n, range_m away in its
+/* Returns the standard deviation of the ranges within a part that lies on the plane with normal n, range_m away in its
  * centre. */
 float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
                       const struct beam_part *part);

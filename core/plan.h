@@ -26,7 +26,7 @@ struct plan_tolerance {
 struct plan_option {
     char method[32];
     double error_m;    /* bound; NaN: not known */
-    double echo_share; /* bound, likewise */
+    double echo_share; /* bound; NaN: not known */
     double cost_ns;    /* per pulse, beyond a single ray, less than 0 where it saves; NaN: depends on the scene */
     char why_not[96];  /* why it is not possible; empty: it is */
 };
@@ -35,7 +35,7 @@ enum { PLAN_MAX_OPTIONS = 12 };
 
 struct plan_row {
     char stage[16], method[32];
-    double error_m, echo_share, cost_ns; /* as above */
+    double error_m, echo_share, cost_ns; /* as in struct plan_option */
     char why[192];
     int forced; /* the configuration says so, not the plan */
     uint32_t n_left;
@@ -45,10 +45,10 @@ struct plan_row {
 /* A choice to be made. */
 struct plan_choice {
     const char *stage;
-    const struct plan_option *option; /* [n], from rough to exact */
+    const struct plan_option *option; /* [n], the most exact one last */
     uint32_t n;
     int forced;      /* number of the option that the configuration names; -1: none */
-    const char *key; /* the configuration's key that names it */
+    const char *key; /* the configuration's key for this choice */
     struct plan_tolerance tolerance;
 };
 
@@ -66,11 +66,10 @@ struct plan_georef_need {
     enum georef_method forced; /* GEOREF_AUTO: the cheapest one whose bound meets the tolerance, else exact */
 };
 
-/* Chooses the method and fills row. SH_EINPUT: the forced method has no bound here. The georef is not
- * changed. */
+/* Chooses the method and fills row. SH_EINPUT: the forced method has no bound here. The georef is not changed. */
 int plan_georef(const struct georef *georef, const struct plan_georef_need *need, enum georef_method *method,
                 struct plan_row *row, struct sh_err *err);
-/* Georeferencing where points leave as range and angles. */
+/* Fills the row where points are sent as range and angles. */
 void plan_georef_polar(struct plan_row *row);
 
 /* ---- sampling */
@@ -78,9 +77,9 @@ void plan_georef_polar(struct plan_row *row);
 /* A place that the head fires from, with its setup and the pulses of a scan there. */
 struct plan_place {
     struct cast_setup setup; /* as the run's */
-    struct cast_beam *beam;  /* its footprint; NULL: none. Mode and pattern are changed. outlines NULL: not adaptive */
+    struct cast_beam *beam;  /* its footprint; NULL: none. Sampling leaves another mode and pattern in it. */
     struct schedule_segment segment;
-    uint64_t pulses; /* to draw from, those outside the field of view included */
+    uint64_t pulses; /* the number to draw from; it includes pulses outside the field of view */
     /* Sets the poses of head and bodies at a time of the scan; NULL: nothing moves. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
@@ -93,22 +92,22 @@ struct plan_places {
 
 struct plan_sample;
 
-/* Draws equally many pulses of all places. 61 sub-rays of each show which pulses hit one smooth surface. Such pulses
- * are many and alike, so only some of them are cast with the reference. The places must outlive the sample.
+/* Draws equally many pulses of all places. 61 sub-rays show which footprints lie on one smooth surface. These are
+ * many and alike: only some of them are cast with the reference. The places must outlive the sample.
  * Where report asks to stop, sampling ends at once, and its figures mean nothing. */
 int plan_sample_create(const struct plan_places *places, const struct sh_report *report, struct plan_sample **out,
                        struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
-/* The error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
+/* Finds the error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
  * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures are upper
  * limits: error_m is three standard errors above the mean square. echo_share is the 95 % limit of Poisson's
- * distribution for the pulses that do not meet one smooth surface; the others count as they are found. The
+ * distribution for footprints that do not lie on one smooth surface; the others count as they are found. The
  * first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
-/* The error of following pulses through only `depth` surfaces of glass or mirrors; the reference is CAST_MAX_DEPTH. A
- * pulse whose way is longer than the reference counts as wrong, too: the rest of its way is not known. */
+/* Finds the error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
+ * pulse whose way is longer than that counts as wrong, too: the rest of its way is not known. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
 /* ---- sight */
@@ -116,16 +115,17 @@ void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_
 /* The figures that decide whether a map of the directions from a station (core/sight.h) pays. */
 struct plan_sight_need {
     double pulses;         /* cast from a station in a scan */
-    double share;          /* of all directions that the map shows */
+    double share;          /* the part of all directions that the map shows, 0..1 */
     double n_triangles;    /* of the scene */
     uint32_t packet;       /* rays per Embree call */
     uint64_t memory_bytes; /* that a map may take */
-    int forced;            /* by cast.sight, 1: a map; 0: none; -1: not forced */
-    const char *why_not;   /* no map is possible; NULL: it is */
+    int forced;            /* cast.sight asks for a map: 1; for none: 0; for neither: -1 */
+    const char *why_not;   /* why no map is possible; NULL: one is */
 };
 
 /* Shares of the pulses, by the cell of the map that they lie in. The cell shows one triangle, nothing, a few triangles,
- * or many (ask). small: so few rays hit its triangles that the map leaves them to the BVH. */
+ * or more than a few: then the BVH is asked (ask). small: so few rays hit the cell's triangles that the map leaves them
+ * to the BVH. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */
@@ -137,7 +137,7 @@ struct plan_sight_found {
 int plan_sight(const struct plan_sight_need *need, const struct plan_places *places, const struct sh_report *report,
                int *map, struct plan_row *row, struct sh_err *err);
 
-/* The steps of plan_sight. The first one returns 0 where a map costs more than it saves, whatever the pulses hit. */
+/* The steps of plan_sight. This returns 0 where so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
 /* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as of struct sight_spec. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
@@ -157,9 +157,9 @@ struct plan_methods {
 /* Sets a beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
-/* The row of the mesh: the error of its vertices, see struct scene. */
+/* Fills the row of the mesh: the error of its vertices, see struct scene. */
 void plan_mesh(double error_m, struct plan_row *row);
-/* The row of the cast: what is always done. packet: rays per Embree call. */
+/* Fills the row of the cast, which leaves no choice. packet: rays per Embree call. */
 void plan_cast(uint32_t packet, struct plan_row *row);
 
 /* The settings of the head that the remaining rows depend on. */
@@ -178,10 +178,10 @@ enum { PLAN_HEAD_ROWS = 6 };
 
 /* Stages that are left out have the method "none" and say why. Returns how many rows. */
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS]);
-/* Processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and the rest of
- * the work for each pulse. Rows have the cost of methods beyond that. */
+/* Returns the processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and
+ * the rest of the work for each pulse. Rows have the cost of methods beyond that. */
 double plan_pulse_ns(double n_triangles, uint32_t packet);
-/* Fills the row of a stage that has no choice of methods. */
+/* Fills a row with these figures. */
 void plan_say(struct plan_row *row, const char *stage, const char *method, double error_m, double cost_ns,
               const char *why);
 

@@ -19,16 +19,16 @@
 
 #include "core/emitter.h"
 
-enum { SCHEDULE_PACKET = 16 }; /* pulses are cut at multiples of this from the line's first pulse */
+enum { SCHEDULE_PACKET = 16 }; /* pulses of a packet; packets are counted from the line's first pulse */
 
 struct schedule_spec {
-    int64_t prr_uhz, lines_uhz, pan_udeg_s;  /* micro-hertz, micro-degrees per second; lines <= pulses */
+    int64_t prr_uhz, lines_uhz, pan_udeg_s;  /* micro-hertz, lines_uhz <= prr_uhz; micro-degrees per second */
     int64_t fov_min_udeg, sweep_udeg;        /* line angle at phase 0, and how far the whole sweep goes */
-    int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included; of a sphere also across azimuth 0 */
+    int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included; a sphere's may cross azimuth 0 */
     int64_t pan_start_udeg, pan_stop_udeg;
     uint32_t frames; /* 0: without end */
-    /* NULL: a line head. Else the pan keeps still; prr_uhz is steps * lines_uhz where the emitter has steps, and
-     * only for display where it has a table; line angles count from azimuth 0 on (planar: emitter_step_udeg) */
+    /* NULL: a line head. With an emitter the pan stands still, and line angles count from azimuth 0, those of a
+     * planar head as emitter_step_udeg counts. prr_uhz is then steps * lines_uhz; for beams it has no effect. */
     const struct emitter *emitter;
 };
 
@@ -66,11 +66,11 @@ struct schedule_run {
     double pan0_turn, pan_step_turn; /* pan = pan0 + (in_line + j) * step, of the line's first pulse */
     uint64_t ns_acc, ns_rem, ns_den; /* dt(j) = j*ns_quot + floor((ns_acc + j*ns_rem) / ns_den) */
     int64_t ns_quot;
-    /* Where angles or times come from a table, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings.
-     * It fires d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick
-     * ticks after the first one; in the formula of dt above, d(j) stands for j. (Directions: one pulse a tick,
-     * sequence_ticks is 0, and dt as it stands.) mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r +
-     * firing[i].pan_turn */
+    /* The table of beams or directions, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings:
+     * mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r + firing[i].pan_turn.
+     * A head of beams fires pulse j d ticks after the run's first one, so d replaces j in dt above:
+     * d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick.
+     * A list of directions has a pulse each tick: its sequence_ticks is 0, and dt holds as it stands. */
     const struct emitter_firing *firing;
     uint32_t n_firings, firing_at;
     uint64_t sequence_ticks;
@@ -88,42 +88,44 @@ struct schedule_line {
     int last_of_frame;
 };
 
-/* First segment of a scan: pulse 0 at time 0, line 0, phase 0. The spec must have been checked. */
+/* Makes the first segment of a scan: pulse 0 at time 0, line 0, phase 0. The spec must have been checked. */
 void schedule_start(struct schedule_segment *seg, const struct schedule_spec *spec);
 
-/* The segment that begins with pulse k of the one before, with a new spec: the pulse keeps its time, the
- * mirror its phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees); the frame goes on to the
- * first end of a line at or beyond the new pan stop. No pulse is lost or doubled. seg may be `before`. */
+/* Makes the segment that follows `before` from pulse k on, with a new spec. The pulse keeps its time, the mirror
+ * its phase (to 1/den of a line), the pan its angle (to 2^-24 micro-degrees). The frame ends with the first line
+ * whose end is at or beyond the new pan stop. No pulse is lost or doubled. seg may be `before`. */
 void schedule_change(struct schedule_segment *seg, const struct schedule_segment *before,
                      const struct schedule_spec *spec, uint64_t k);
 
-/* Time of pulse k since the scan's start; k >= seg->k0. */
+/* Returns the time of pulse k since the scan's start; k >= seg->k0. */
 int64_t schedule_time_ns(const struct schedule_segment *seg, uint64_t k);
-/* num/den: how many nanoseconds a firing sequence lasts, or a pulse where there is no sequence. */
+/* Sets num/den to the nanoseconds of a firing sequence, or of a pulse where there is no sequence. */
 void schedule_sequence_ns(const struct schedule_segment *seg, uint64_t *num, uint64_t *den);
-/* First pulse that fires at or after t_ns; at least seg->k0. */
+/* Returns the first pulse that fires at or after t_ns; at least seg->k0. */
 uint64_t schedule_pulse_at(const struct schedule_segment *seg, int64_t t_ns);
-/* Line of pulse k. */
+/* Returns the line of pulse k. */
 uint64_t schedule_line_of(const struct schedule_segment *seg, uint64_t k);
-/* Everything about line n of the segment (n >= line0). */
+/* Fills `line` for line n of the segment, n >= line0. */
 void schedule_get_line(const struct schedule_segment *seg, uint64_t n, struct schedule_line *line);
 
-/* A cut at or before pulse k where packets end: a multiple of SCHEDULE_PACKET from the line's first pulse. */
+/* Returns the last pulse up to k where a packet may begin: a multiple of SCHEDULE_PACKET from the line's first
+ * pulse. */
 uint64_t schedule_cut(const struct schedule_segment *seg, uint64_t k);
 
-/* The run of pulses k .. k+n-1, all of `line`. */
+/* Fills the run of pulses k .. k+n-1, all of `line`. */
 void schedule_get_run(const struct schedule_segment *seg, const struct schedule_line *line, uint64_t k, uint32_t n,
                       struct schedule_run *run);
 
-/* The angle at pulse k of the axis that sweeps a line, in turns: a line head's mirror, the rotor of a head of beams. */
+/* Returns the angle at pulse k of the axis that sweeps a line, in turns: a line head's mirror, the rotor of a head
+ * of beams. */
 double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k);
 /* Changes a run of a line head, or of a head of beams: that axis stands still at sweep_turn. Lines go on by time. */
 void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, struct schedule_run *run);
 
-/* The number of pulses that fire within max_ns, at least one. */
+/* Returns the number of pulses that fire within max_ns, at least one. */
 uint64_t schedule_longest_run(const struct schedule_segment *seg, int64_t max_ns);
 
-/* Pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one
+/* These return pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one
  * turn. */
 double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k);
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k);

@@ -38,10 +38,8 @@ struct sight_spec {
 };
 
 struct sight_info {
-    uint32_t cells;                /* along an edge of the cube's faces */
-    double one, nothing, few, ask; /* shares of the directions: one triangle, nothing, a candidate list, ask the BVH */
-    uint64_t lists, records;       /* candidate lists; triangles in them, each counted once a region */
-    uint64_t bytes, peak_bytes;    /* memory now, and the most while it was made */
+    uint32_t cells;             /* along an edge of the cube's faces */
+    uint64_t bytes, peak_bytes; /* memory now, and the most while it was made */
     double build_s;
 };
 

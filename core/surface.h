@@ -78,7 +78,7 @@ int surface_table_by_vertex(struct surface_table *table, uint32_t label, struct 
 /* Labels of hits hold the surface in their low 16 bits. Where a texture holds the reflectance, the
  * high ones are 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
-/* The same for a hit on colours of vertices; rgb is the colour there, sRGB. */
+/* The same for a hit with that colour, sRGB, in place of a texel. */
 uint32_t surface_texel_of(uint32_t label, const uint8_t rgb[3]);
 static inline uint32_t surface_of_label(uint32_t label)
 {
@@ -96,24 +96,24 @@ struct surface_colours {
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
 void surface_colours_free(struct surface_colours *colours);
-/* Sets an entry from the mesh's own colours. It is called once for each entry, before surface_colours_texture. */
+/* Sets an entry. This comes before its image. */
 void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named);
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
                             struct sh_err *err);
-/* The colour of a hit. uv is finite, or NULL where it is not known; rgb is the colour between the vertices, or NULL
- * where there is none. Labels beyond the entries are grey. */
+/* Returns the colour of a hit. uv is finite, or NULL where it is not known; rgb is the colour between the vertices,
+ * or NULL where there is none. Labels beyond the entries are grey. */
 uint32_t surface_colour(const struct surface_colours *colours, uint32_t label, const double uv[2],
                         const uint8_t rgb[3]);
 
-/* The surface of a label, entry n for one beyond the table. */
+/* Returns the surface of a label, and entry n for one beyond the table. */
 static inline const struct surface *surface_at(const struct surface_table *table, uint32_t label)
 {
     label = surface_of_label(label);
     return &table->surface[label < table->n ? label : table->n];
 }
 
-/* rho(i) of n hits; label beyond the table: 0. */
+/* Computes rho(i) of n hits; it is 0 for a label beyond the table. */
 void surface_return(const struct surface_table *table, uint32_t n, const uint32_t *label, const double *cos_incidence,
                     double *rho);
 

@@ -44,9 +44,9 @@ struct waveform_spec {
     double saturation;      /* the receiver gives no more than this signal, in thresholds; 0: no limit */
     double dead_s;          /* after a saturated sample the receiver gives nothing for so long; 0: none */
     double noise;           /* sigma, in thresholds: 1/k of detect.h */
-    /* Windows. A window is kept around all returns whose signal reaches `keep` thresholds, from before_s ahead of it to
-     * after_s behind it; windows that touch are one. Where near_m < far_m, one window from near_m to far_m is kept in
-     * place of these, whatever comes back. */
+    /* Windows. A window is kept around all samples whose signal reaches `keep` thresholds, from before_s before the
+     * first to after_s after the last; windows that touch are one. Where near_m < far_m, one window from near_m to
+     * far_m is kept in place of these, whatever comes back. */
     double keep, before_s, after_s;
     double near_m, far_m;
     uint64_t seed;
@@ -58,7 +58,7 @@ struct waveform;
 int waveform_create(const struct waveform_spec *spec, struct waveform **out, struct sh_err *err);
 void waveform_free(struct waveform *waveform);
 
-/* How the energy of a return spreads over range. */
+/* This says how the energy of a return spreads over range. */
 enum waveform_spread {
     WAVEFORM_POINT, /* not at all: a sub-ray */
     WAVEFORM_DISC, /* a whole footprint on one plane: the irradiance's marginal over -extent .. extent (footprint.h: the
@@ -87,14 +87,14 @@ struct waveform_record {
     uint32_t n_left_out; /* samples that found no room here, or windows too many: they count as lost */
 };
 
-/* Samples of one pulse. scan_key: rng_scan; pulse: its number in the scan. */
+/* Makes the samples of one pulse. scan_key: rng_scan; pulse: its number in the scan. */
 void waveform_sample(const struct waveform *waveform, uint64_t scan_key, uint64_t pulse,
                      const struct waveform_return *returns, uint32_t n, struct waveform_record *record);
-/* P at range r_m without noise and digits, for tests and closed forms. */
+/* Returns P at range r_m without noise and digits, for tests and closed forms. */
 double waveform_signal(const struct waveform *waveform, const struct waveform_return *returns, uint32_t n, double r_m);
-/* The integral of h over time, s. */
+/* Returns the integral of h over time, s. */
 double waveform_pulse_area_s(const struct waveform *waveform);
-/* The spec, and what follows from it. */
+/* Returns the spec. */
 const struct waveform_spec *waveform_spec_of(const struct waveform *waveform);
 
 /* ---- detection: echoes from the samples of one pulse, as the head's firmware finds them */
@@ -117,13 +117,13 @@ struct waveform_echo {
 /* SH_EINPUT, without the file's name: echoes are not found with this pulse, since a long and weak part of it keeps its
  * centroid away from its peak. Samples of such a pulse are as good as others. */
 int waveform_check_detection(const struct waveform *waveform, struct sh_err *err);
-/* The largest value of h, of a pulse with which echoes are found. */
+/* Returns the largest value of h, of a pulse with which echoes are found. */
 double waveform_pulse_peak(const struct waveform *waveform);
 
-/* Finds at most `most` echoes in the order of range. level: the amplitude, in thresholds, below which nothing is an
- * echo (1: as in detect.h). Returns how many, and adds to *n_crowded those that found no room: the weakest are left
- * out. It finds none where waveform_check_detection fails. Pure. */
-uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
+/* Finds at most `most` echoes of an amplitude of 1 or more, in the order of range. Returns how many, and adds to
+ * *n_crowded those that found no room: the weakest are left out. It finds none where waveform_check_detection fails.
+ * Pure. */
+uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded);
 

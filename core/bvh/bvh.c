@@ -1,18 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Makes a BVH: the leaves, Embree's tree of them, the planes. */
-#include "core/bvh/bvh_inside.h"
-
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/monotonic.h"
-
-#include "core/bvh/copies.h"
-#include "core/bvh/leaves.h"
 #include "core/bvh/meet.h"
-#include "core/bvh/planes.h"
+#include "core/monotonic.h"
 
 /* tests/check/tsan.supp has the names of this function and of the two others that Embree's threads
  * call. */
@@ -37,7 +31,7 @@ static int check_device(RTCDevice device, struct sh_err *err)
     enum RTCError code = rtcGetDeviceError(device);
     if (code == RTC_ERROR_NONE) return SH_OK;
     if (code == RTC_ERROR_CANCELLED) return sh_fail_stopped(err);
-    return embree_fail(code, "bvh", err);
+    return embree_fail(code, err);
 }
 
 static void attach(struct bvh *bvh, uint32_t n, RTCBoundsFunction bounds, RTCIntersectFunctionN meet)
@@ -107,7 +101,7 @@ int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, co
     bvh->device = rtcNewDevice(config);
     if (bvh->device == NULL) {
         free(bvh);
-        return embree_fail(rtcGetDeviceError(NULL), "bvh", err);
+        return embree_fail(rtcGetDeviceError(NULL), err);
     }
     rtcSetDeviceMemoryMonitorFunction(bvh->device, embree_counts_bytes, bvh);
     if (scene->n_triangles > 1000000) sh_progress(report, "building the BVH", -1.0);

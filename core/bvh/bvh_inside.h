@@ -48,6 +48,8 @@ struct bvh_copy {
 
 struct bvh_leaf;
 
+enum { BVH_LEAVES }; /* the leaves' geometry in Embree's scene, before that of copies */
+
 struct bvh {
     RTCDevice device;
     RTCScene rtc;
@@ -72,5 +74,24 @@ struct bvh {
 /* bvh.c: as bvh_create; in_one: rays have any length (copies.c). */
 int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, const struct sh_report *report,
                      struct bvh **out, struct sh_err *err);
+
+/* ---- planes.c: planes of triangles, in double; labels and steepness of rays */
+void bvh_set_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane);
+/* Notes where the leaves have the plane of each triangle: at_plane. */
+int bvh_find_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
+/* Fills labels and steepness of all rays; those that hit nothing get the values of a miss. */
+void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays);
+
+/* ---- copies.c: copies of meshes, each of which has a BVH of its own */
+/* Makes the BVHs of meshes that have copies. */
+int bvh_make_copies(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err);
+void bvh_free_copies(struct bvh *bvh);
+/* Embree calls these: for the box of a copy, and where a packet reaches a copy. */
+void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args);
+void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args);
+/* Steepness and cosines where there are copies. */
+void bvh_steepness_copies(const struct bvh *bvh, const struct bvh_rays *rays);
+void bvh_cosines_copies(const struct bvh *bvh, const uint32_t *triangle, const struct vec3_in *dir, uint32_t n,
+                        double *cosine);
 
 #endif

@@ -1,12 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Copies of meshes in a BVH: a packet that reaches one is cast in the mesh's own frame. bvh_inside.h says why that is
  * exact. */
-#include "core/bvh/copies.h"
-
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/bvh/bvh_inside.h"
 #include "core/bvh/leaves.h"
 #include "core/bvh/nearest.h"
 #include "core/bvh/packet.h"
@@ -55,7 +52,7 @@ void embree_asks_copy_bounds(const struct RTCBoundsFunctionArguments *args)
     bvh_pad_box(bvh, lo, hi, vec3_length(far), args->bounds_o);
 }
 
-/* ---- the way in and out */
+/* ---- into a mesh's frame, and back */
 
 /* Turns the directions into the mesh's frame, in double. */
 VEC_CLONES
@@ -155,7 +152,7 @@ static int enter(const struct bvh_query *query, const struct bvh_copy *copy, con
     in->width = query->width;
     in->has_own = query->has_own;
     in->at_origin_m = query->at_origin_m / copy->at->scale;
-    in->decided = in->leaves = 0;
+    in->counters = (struct bvh_counters){0};
     for (int j = 0; j < 3; j++) {
         in->dir[j] = in->room[j];
         in->org[j] = in->room[3 + j];
@@ -188,9 +185,9 @@ static void leave(struct bvh_query *query, const struct bvh_copy *copy, float *t
         bvh_take_hit(query, tfar + i, i, copy->first + in->triangle[i], in->hit_m[i] * scale, first_m);
     }
     query->unsure |= in->unsure;
-    query->leaves += in->leaves;
-    query->decided += in->decided;
-    for (uint32_t i = 0; in->decided != 0 && i < query->width; i++) {
+    query->counters.leaves += in->counters.leaves;
+    query->counters.decided += in->counters.decided;
+    for (uint32_t i = 0; in->counters.decided != 0 && i < query->width; i++) {
         const uint32_t triangle = copy->first + in->near[i];
         const double range_m = in->near_m[i] * scale;
         if (!nested->valid[i] || in->near[i] == BVH_NO_TRIANGLE || range_m > query->near_m[i]) continue;
@@ -212,7 +209,7 @@ void bvh_meet_copy(const struct RTCIntersectFunctionNArguments *args)
     leave(query, copy, tfar, nested);
 }
 
-/* ---- what was met */
+/* ---- planes, cosines and steepness of hits */
 
 void bvh_get_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane)
 {
@@ -252,12 +249,9 @@ void bvh_cosines_copies(const struct bvh *bvh, const uint32_t *triangle, const s
     }
 }
 
-void bvh_refine_copies(const struct bvh *bvh, const struct bvh_rays *rays)
+void bvh_steepness_copies(const struct bvh *bvh, const struct bvh_rays *rays)
 {
     for (uint32_t i = 0; i < rays->n; i++) {
-        const int is_hit = rays->triangle[i] != BVH_NO_TRIANGLE;
-        if (rays->label != NULL) rays->label[i] = is_hit ? scene_label(bvh->scene, rays->triangle[i]) : BVH_NO_LABEL;
-        if (rays->steep == NULL) continue;
         const double c = cosine_of(bvh, rays->triangle[i], &rays->dir, i);
         rays->steep[i] = (float)(1.0 / (c * c));
     }

@@ -1,31 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Distance to the scene by Embree's point query.
+/* Finds the distance to a scene by Embree's point query, among the leaves of its BVH.
  *
- * Rounding. Embree sees v' = float(v - c) and q' = float(q - c), c the centre of the bounds. With h the
- * largest |v - c| and g the largest |q - c| over the axes, a triangle's points and the query move by at most
- * sqrt(3) 2^-24 (h + g), so a triangle within r of q is, for Embree, within r + sqrt(3) 2^-24 (h + g). Its
- * box test works on squares with a few roundings, below 8 * 2^-24 of the distance. Both go onto every radius.
- */
+ * Rounding. Embree sees q' = float(q - c), c being the BVH's origin. With g the largest |q - c| over the axes, that
+ * moves the query by at most sqrt(3) 2^-24 g. The boxes of leaves are rounded outward (leaves.c). So a triangle within
+ * r of q is in a box within r + sqrt(3) 2^-24 g of q'. Embree's test of a box works on squares with a few roundings,
+ * below 8 * 2^-24 of the distance. Both go onto every radius. */
 #include "core/distance.h"
 
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "core/embree.h"
+#include "core/bvh/leaves.h"
 #include "core/vec3.h"
 
-struct distance {
-    const struct scene *scene;
-    RTCDevice device;
-    RTCScene bvh;
-    double centre_m[3];
-    double half_m; /* the largest |vertex - centre| along an axis */
-};
-
 struct search {
-    const struct distance *index;
+    const struct bvh *bvh;
     const double *p;
     double slack_m; /* of the float frame, for this point */
     double best_m;
@@ -96,131 +86,65 @@ static float query_radius(double radius_m, double slack_m)
     return wide < FLT_MAX ? nextafterf((float)wide, INFINITY) : INFINITY;
 }
 
-static bool visit_triangle(struct RTCPointQueryFunctionArguments *args)
+static void visit_triangle(struct search *s, uint32_t triangle)
 {
-    struct search *s = args->userPtr;
-    const struct scene *scene = s->index->scene;
+    const struct scene *scene = s->bvh->scene;
     double corner[3][3], nearest[3] = {0}; /* squares of the largest numbers are infinite: no edge is nearer then */
     for (int i = 0; i < 3; i++)
-        vec3_sub(scene->vertex_m[scene->triangle[args->primID][i]], s->p, corner[i]);
-    double d = nearest_on_triangle(corner, nearest);
+        vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], s->p, corner[i]);
+    const double d = nearest_on_triangle(corner, nearest);
     /* The lower number of two that are as near: an answer that doesn't depend on Embree's order. */
-    if (d > s->best_m || (s->found && d == s->best_m && args->primID > s->hit->triangle)) return false;
-    bool nearer = d < s->best_m;
+    if (d > s->best_m || (s->found && d == s->best_m && triangle > s->hit->triangle)) return;
     s->found = 1;
-    s->best_m = d;
-    s->hit->distance_m = d;
-    s->hit->triangle = args->primID;
+    s->best_m = s->hit->distance_m = d;
+    s->hit->triangle = triangle;
     vec3_add(s->p, nearest, s->hit->point_m);
-    float radius = query_radius(d, s->slack_m);
-    if (!nearer || !(radius < args->query->radius)) return false;
-    args->query->radius = radius;
-    return true;
 }
 
-static double farthest_from(const double centre[3], const double p[3])
+/* Embree asks for the triangles of a leaf. Returns whether the radius has become smaller. */
+static bool embree_asks_distance(struct RTCPointQueryFunctionArguments *args)
 {
-    double g = 0;
-    for (int k = 0; k < 3; k++)
-        g = fmax(g, fabs(p[k] - centre[k]));
-    return g;
+    struct search *s = args->userPtr;
+    if (args->geomID != BVH_LEAVES) return false;
+    const struct bvh_leaf *leaf = &s->bvh->leaf[args->primID];
+    visit_triangle(s, leaf->triangle);
+    if (bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0) visit_triangle(s, bvh_leaf_triangle(leaf, 1));
+    const float radius = query_radius(s->best_m, s->slack_m);
+    if (!(radius < args->query->radius)) return false;
+    args->query->radius = radius;
+    return true;
 }
 
 /* Farther out a float can't hold the square of a distance. */
 static const double FARTHEST_M = 1e18;
 
-/* Whether the whole box of the scene is farther than max_m along one axis. */
-static int is_out_of_reach(const struct distance *index, double reach_m, double max_m)
+int distance_query(const struct bvh *bvh, const double p_prcs[3], double max_m, struct distance_hit *hit)
 {
-    return !(reach_m <= FARTHEST_M) || reach_m * (1 - 1e-12) - index->half_m > max_m;
-}
-
-int distance_query(const struct distance *index, const double p_prcs[3], double max_m, struct distance_hit *hit)
-{
+    double o[3], reach_m = 0.0;
     if (!isfinite(p_prcs[0]) || !isfinite(p_prcs[1]) || !isfinite(p_prcs[2]) || !(max_m >= 0)) return 0;
-    double reach = farthest_from(index->centre_m, p_prcs);
-    if (is_out_of_reach(index, reach, max_m)) return 0;
+    vec3_sub(p_prcs, bvh->origin_m, o);
+    for (int k = 0; k < 3; k++)
+        reach_m = fmax(reach_m, fabs(o[k]));
+    if (!(reach_m <= FARTHEST_M) || reach_m * (1 - 1e-12) - bvh->radius_m > max_m) return 0;
     struct search search = {
-        .index = index,
-        .p = p_prcs,
-        .best_m = max_m,
-        .hit = hit,
-        .slack_m = 1.7321 * 0x1p-24 * (index->half_m + reach) * (1 + 1e-6),
-    };
+        .bvh = bvh, .p = p_prcs, .best_m = max_m, .hit = hit, .slack_m = 1.7321 * 0x1p-24 * reach_m * (1 + 1e-6)};
     struct RTCPointQuery query = {
-        .x = (float)(p_prcs[0] - index->centre_m[0]),
-        .y = (float)(p_prcs[1] - index->centre_m[1]),
-        .z = (float)(p_prcs[2] - index->centre_m[2]),
-        .radius = query_radius(max_m, search.slack_m),
-    };
+        .x = (float)o[0], .y = (float)o[1], .z = (float)o[2], .radius = query_radius(max_m, search.slack_m)};
     struct RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
-    rtcPointQuery(index->bvh, &query, &context, visit_triangle, &search);
+    rtcPointQuery(bvh->rtc, &query, &context, embree_asks_distance, &search);
     return search.found;
 }
 
-static int embree_failed(RTCDevice device, struct sh_err *err)
+int distance_reaches(const struct bvh *bvh, const double p_prcs[3], double max_m)
 {
-    enum RTCError code = rtcGetDeviceError(device);
-    return code == RTC_ERROR_NONE ? SH_OK : embree_fail(code, "the index for distances", err);
-}
-
-/* Vertices that no triangle uses may lie anywhere, so they go to the centre. */
-static void fill_vertices(struct distance *d, float (*out)[3])
-{
-    const struct scene *s = d->scene;
-    memset(out, 0, s->n_vertices * sizeof *out);
-    for (uint32_t i = 0; i < s->n_triangles; i++) {
-        for (int c = 0; c < 3; c++) {
-            const double *v = s->vertex_m[s->triangle[i][c]];
-            for (int k = 0; k < 3; k++)
-                out[s->triangle[i][c]][k] = (float)(v[k] - d->centre_m[k]);
-        }
+    struct distance_hit hit;
+    double in_mesh[3];
+    int found = distance_query(bvh, p_prcs, max_m, &hit);
+    for (uint32_t i = 0; i < bvh->scene->n_copies && !found; i++) {
+        const struct bvh_copy *copy = &bvh->copy[i];
+        scene_copy_put_back(copy->at, p_prcs, in_mesh);
+        found = distance_query(copy->mesh, in_mesh, max_m / copy->at->scale, &hit);
     }
-}
-
-static int build_bvh(struct distance *d, struct sh_err *err)
-{
-    d->device = rtcNewDevice(NULL);
-    if (d->device == NULL) return embree_failed(NULL, err);
-    d->bvh = rtcNewScene(d->device);
-    RTCGeometry mesh = rtcNewGeometry(d->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    float(*vertex)[3] = rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof *vertex,
-                                                d->scene->n_vertices);
-    rtcSetSharedGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, d->scene->triangle, 0,
-                               sizeof *d->scene->triangle, d->scene->n_triangles);
-    if (vertex != NULL) {
-        fill_vertices(d, vertex);
-        rtcCommitGeometry(mesh);
-        rtcAttachGeometry(d->bvh, mesh);
-        rtcSetSceneFlags(d->bvh, RTC_SCENE_FLAG_ROBUST);
-        rtcCommitScene(d->bvh);
-    }
-    rtcReleaseGeometry(mesh);
-    return embree_failed(d->device, err);
-}
-
-int distance_create(const struct scene *scene, struct distance **out, struct sh_err *err)
-{
-    *out = NULL;
-    struct distance *d = calloc(1, sizeof *d);
-    if (d == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the distance index");
-    d->scene = scene;
-    for (int k = 0; k < 3; k++)
-        d->centre_m[k] = scene->min_m[k] + (scene->max_m[k] - scene->min_m[k]) / 2;
-    d->half_m = fmax(farthest_from(d->centre_m, scene->min_m), farthest_from(d->centre_m, scene->max_m));
-    int rc = build_bvh(d, err);
-    if (rc == SH_OK)
-        *out = d;
-    else
-        distance_free(d);
-    return rc;
-}
-
-void distance_free(struct distance *index)
-{
-    if (index == NULL) return;
-    if (index->bvh != NULL) rtcReleaseScene(index->bvh);
-    if (index->device != NULL) rtcReleaseDevice(index->device);
-    free(index);
+    return found;
 }

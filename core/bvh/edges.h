@@ -15,9 +15,9 @@ static inline int before(const double a[3], const double b[3])
     return 0;
 }
 
-/* On which side of the edge a-b the ray passes, as the distance across the ray times the edge's length;
- * corners relative to the ray's origin. The corners are taken in one order, whichever triangle asks. So the
- * two triangles of an edge get the same number with opposite signs. */
+/* Returns on which side of the edge a-b the ray passes: the distance across the ray times the edge's length, with its
+ * sign. The corners are taken in one order, whichever triangle asks. So the two triangles of an edge get the same
+ * number with opposite signs. */
 static inline double edge_side(const double a[3], const double b[3], const double dir[3])
 {
     int swap = before(b, a);
@@ -28,7 +28,7 @@ static inline double edge_side(const double a[3], const double b[3], const doubl
     return swap ? -side : side;
 }
 
-/* Range along the ray of the point where it comes nearest to the segment. */
+/* Returns the range of the ray's point that is nearest to the segment. */
 static inline double edge_range(const double a[3], const double b[3], const double dir[3])
 {
     double e[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
@@ -40,7 +40,7 @@ static inline double edge_range(const double a[3], const double b[3], const doub
     return (ad + s * ed) / dd;
 }
 
-/* Distance of the point at range t on the ray from the segment. */
+/* Returns the distance of the point at range t on the ray from the segment. */
 static inline double edge_gap(const double a[3], const double b[3], const double dir[3], double t)
 {
     double e[3], w[3];
@@ -60,7 +60,7 @@ static inline int is_inside(const double side[3])
     return (side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0) || (side[0] <= 0.0 && side[1] <= 0.0 && side[2] <= 0.0);
 }
 
-/* The resolution of an edge's side in double precision. */
+/* Returns the resolution of an edge's side in double precision. */
 static inline double blur(const double a[3], const double b[3])
 {
     return 8.0 * 0x1p-53 * sqrt(fmax(vec3_dot(a, a), vec3_dot(b, b))) * vec3_distance(a, b);

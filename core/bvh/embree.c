@@ -6,13 +6,13 @@
 #include "core/bvh.h"
 #include "core/bvh/meet.h"
 
-int embree_fail(enum RTCError code, const char *what, struct sh_err *err)
+int embree_fail(enum RTCError code, struct sh_err *err)
 {
     if (code == RTC_ERROR_OUT_OF_MEMORY)
-        return sh_fail(err, SH_ENOMEM, "%s: no memory; mesh and BVH take 120 to 300 bytes for each triangle", what);
+        return sh_fail(err, SH_ENOMEM, "bvh: no memory; mesh and BVH take 120 to 300 bytes for each triangle");
     if (code == RTC_ERROR_UNSUPPORTED_CPU)
-        return sh_fail(err, SH_EIO, "%s: this build of Embree doesn't support this processor", what);
-    return sh_fail(err, SH_EIO, "%s: Embree failed (RTCError %d)", what, (int)code);
+        return sh_fail(err, SH_EIO, "bvh: this build of Embree doesn't support this processor");
+    return sh_fail(err, SH_EIO, "bvh: Embree failed (RTCError %d)", (int)code);
 }
 
 int embree_has_packet(RTCDevice device, uint32_t rays)
@@ -30,7 +30,7 @@ uint32_t embree_packet(RTCDevice device)
     return 1;
 }
 
-/* In the steps in which Embree chooses its kernels. */
+/* These are the steps in which Embree chooses its kernels. */
 static const char *instructions(void)
 {
 #if defined(__x86_64__)

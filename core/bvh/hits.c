@@ -6,7 +6,6 @@
 
 #include "core/bvh/bvh_inside.h"
 #include "core/bvh/packet.h"
-#include "core/bvh/planes.h"
 #include "core/vecmath.h"
 
 enum { ROOM = BVH_CHUNK + 48 }; /* arrays of a power of two would collide in a cache */
@@ -21,7 +20,6 @@ struct bvh_work {
         double x[ROOM], y[ROOM], z[ROOM];
     } own; /* origins, local frame */
     double start_m[ROOM];
-    struct bvh_counters counters;
     struct bvh_profile *profile;
 };
 
@@ -46,7 +44,7 @@ void bvh_work_set_profile(struct bvh_work *work, struct bvh_profile *profile)
 
 const struct bvh_counters *bvh_work_counters(const struct bvh_work *work)
 {
-    return &work->counters;
+    return &work->query.counters;
 }
 
 struct vec3_floats bvh_work_directions(const struct bvh_work *w)
@@ -66,14 +64,10 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
 
 enum { LANES = 16 };
 
-/* In lanes: the largest squared distances so far, from the BVH's origin and from the chunk's first ray. */
-struct most {
-    double far2[LANES], apart2[LANES];
-};
-
-/* Takes n <= LANES origins of rays into the local frame, from ray `at` on. */
+/* Takes n <= LANES origins of rays into the local frame, from ray `at` on. apart2: in lanes, the largest squared
+ * distances so far from the chunk's first ray. */
 VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const double origin_m[3],
-                           const double first_m[3], uint32_t at, uint32_t n, struct most *most)
+                           const double first_m[3], uint32_t at, uint32_t n, double apart2[LANES])
 {
     const double *px = p->x + at, *py = p->y + at, *pz = p->z + at;
     double *x = w->own.x + at, *y = w->own.y + at, *z = w->own.z + at;
@@ -83,55 +77,45 @@ VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const do
     VEC_LOOP
     for (uint32_t k = 0; k < n; k++) {
         const double lx = px[k] - ox, ly = py[k] - oy, lz = pz[k] - oz, dx = lx - ax, dy = ly - ay, dz = lz - az;
-        const double far2 = lx * lx + ly * ly + lz * lz, apart2 = dx * dx + dy * dy + dz * dz;
+        const double d2 = dx * dx + dy * dy + dz * dz;
         x[k] = lx;
         y[k] = ly;
         z[k] = lz;
         fx[k] = (float)lx;
         fy[k] = (float)ly;
         fz[k] = (float)lz;
-        most->far2[k] = far2 > most->far2[k] ? far2 : most->far2[k];
-        most->apart2[k] = apart2 > most->apart2[k] ? apart2 : most->apart2[k];
+        apart2[k] = d2 > apart2[k] ? d2 : apart2[k];
     }
 }
 
-static double length_of_most(const double most2[LANES])
-{
-    double all2 = 0.0;
-    for (int k = 0; k < LANES; k++)
-        all2 = most2[k] > all2 ? most2[k] : all2;
-    return sqrt(all2);
-}
-
-/* Takes the rays' own origins into the local frame, also as Embree gets them, and finds how far they lie from its
- * origin, and from each other. */
+/* Takes the rays' own origins into the local frame, also as Embree gets them. Returns a bound of their distances from
+ * its origin, and bounds those from each other: both by how far they are from the first one. */
 VEC_CLONES
-static void take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
+static double take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     const struct vec3_in p = rays->from.own;
     const double at[3] = VEC3_AT(p, 0);
-    double first_m[3];
-    struct most most = {.far2 = {0.0}};
+    double first_m[3], apart2[LANES] = {0.0}, most2 = 0.0;
     uint32_t i = 0;
     vec3_sub(at, bvh->origin_m, first_m);
     for (; i + LANES <= rays->n; i += LANES)
-        take_lanes(w, &p, bvh->origin_m, first_m, i, LANES, &most);
-    take_lanes(w, &p, bvh->origin_m, first_m, i, rays->n - i, &most);
-    batch->local = VEC3_IN(w->own, 0);
+        take_lanes(w, &p, bvh->origin_m, first_m, i, LANES, apart2);
+    take_lanes(w, &p, bvh->origin_m, first_m, i, rays->n - i, apart2);
+    for (int k = 0; k < LANES; k++)
+        most2 = apart2[k] > most2 ? apart2[k] : most2;
+    batch->local.own = VEC3_IN(w->own, 0);
     batch->org = (struct vec3_floats){w->org.x, w->org.y, w->org.z};
-    batch->far_m = length_of_most(most.far2);
-    batch->apart_m = 2.0 * length_of_most(most.apart2);
+    batch->apart_m = 2.0 * sqrt(most2);
+    return vec3_length(first_m) + sqrt(most2);
 }
 
 /* Rays that begin outside of the scene's radius enter it before they hit anything: the float ray begins there. */
 static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
-    struct bvh_origins from = {.own = batch->local};
-    memcpy(from.at_m, batch->at_local, sizeof from.at_m);
     for (uint32_t i = 0; i < rays->n; i++) {
         const double dir[3] = VEC3_AT(rays->dir, i);
         double o[3];
-        bvh_origin_of(&from, i, o);
+        bvh_origin_of(&batch->local, i, o);
         w->start_m[i] = fmax(0.0, vec3_length(o) - bvh->radius_m);
         w->org.x[i] = (float)(o[0] + w->start_m[i] * dir[0]);
         w->org.y[i] = (float)(o[1] + w->start_m[i] * dir[1]);
@@ -141,13 +125,12 @@ static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct b
     batch->start_m = w->start_m;
 }
 
-/* Where rays begin, as Embree and the leaves get it. */
+/* Sets where rays begin, for Embree and for the leaves. */
 static void set_origins(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
-    vec3_sub(rays->from.at_m, bvh->origin_m, batch->at_local);
-    batch->far_m = vec3_length(batch->at_local);
-    if (rays->from.own.x != NULL) take_own(w, bvh, rays, batch);
-    if (batch->far_m > bvh->radius_m) take_along(w, bvh, rays, batch);
+    vec3_sub(rays->from.at_m, bvh->origin_m, batch->local.at_m);
+    const double far_m = rays->from.own.x != NULL ? take_own(w, bvh, rays, batch) : vec3_length(batch->local.at_m);
+    if (far_m > bvh->radius_m) take_along(w, bvh, rays, batch);
 }
 
 /* Ray i of a chunk has hit nothing in its first stretch: casts the next ones, until the ray has left the
@@ -156,7 +139,6 @@ static void cast_further(struct bvh_work *w, const struct bvh *bvh, const struct
 {
     const struct bvh_rays *rays = batch->rays;
     const double dir[3] = VEC3_AT(rays->dir, i);
-    struct bvh_origins from = {.own = batch->local};
     struct bvh_rays one = {.n = 1,
                            .from = rays->from,
                            .dir = VEC3_IN(rays->dir, i),
@@ -166,11 +148,10 @@ static void cast_further(struct bvh_work *w, const struct bvh *bvh, const struct
     float at[3];
     double o[3], start_m = batch->start_m != NULL ? batch->start_m[i] : 0.0;
     struct bvh_batch next = *batch;
-    memcpy(from.at_m, batch->at_local, sizeof from.at_m);
-    bvh_origin_of(&from, i, o);
+    bvh_origin_of(&batch->local, i, o);
     if (rays->from.own.x != NULL) {
         one.from.own = VEC3_IN(rays->from.own, i);
-        next.local = VEC3_IN(batch->local, i);
+        next.local.own = VEC3_IN(batch->local.own, i);
     }
     next.rays = &one;
     next.dir = (struct vec3_floats){batch->dir.x + i, batch->dir.y + i, batch->dir.z + i};
@@ -190,8 +171,7 @@ static void cast_chunk(struct bvh_work *w, const struct bvh *bvh, const struct b
     struct bvh_batch batch = {.rays = rays,
                               .dir = bvh_work_directions(w),
                               .t_max = (float)(in_stretches ? bvh->stretch_m : rays->range_max_m * 1.001),
-                              .most_m = in_stretches ? bvh->stretch_m : INFINITY,
-                              .counters = &w->counters};
+                              .most_m = in_stretches ? bvh->stretch_m : INFINITY};
     bvh_to_float(&rays->dir, rays->n, w->dir.x, w->dir.y, w->dir.z);
     set_origins(w, bvh, rays, &batch);
     bvh_stage_ends(w->profile, BVH_STAGE_PREPARE);

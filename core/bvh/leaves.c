@@ -6,8 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "core/bvh/bvh_inside.h"
-#include "core/bvh/planes.h"
 #include "core/huge_pages.h"
 
 /* The corner of a triangle that is not on its common edge with another one; 3: they share no edge. */
@@ -22,7 +20,7 @@ static int odd_corner(const uint32_t a[3], const uint32_t b[3])
     return n == 1 ? odd : 3;
 }
 
-/* fmax would be a call. */
+/* A call of fmax would cost more. */
 static double larger(double x, double y)
 {
     return y > x ? y : x;
@@ -89,7 +87,7 @@ static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, st
     bvh_set_plane(bvh, first + ahead, &leaf->plane[1]);
 }
 
-/* The radius of the scene about the origin. */
+/* Returns the radius of the scene about the BVH's origin. */
 static double radius_of(const struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;
@@ -179,7 +177,7 @@ struct place {
     uint64_t key;
     uint32_t first, second; /* triangles */
 };
-enum { KEY_BITS = 16, DIGIT_BITS = 8, DIGITS = 1 << DIGIT_BITS };
+enum { KEY_BITS = 16 };
 
 /* Returns the bits of x with two zeros between each two of them. */
 static uint64_t spread_bits(uint64_t x)
@@ -202,26 +200,12 @@ static uint64_t key_of(const struct scene *scene, uint32_t triangle, double per_
     return key;
 }
 
-/* Sorts by the digits of the keys, from the lowest digit on. The result is in `at` again. */
-static void sort_places(struct place *at, struct place *other, uint32_t n)
+/* Places with the same key keep the order of the scene's list. */
+static int compare_places(const void *a, const void *b)
 {
-    for (int shift = 0; shift < 3 * KEY_BITS; shift += DIGIT_BITS) {
-        uint32_t to[DIGITS] = {0}, sum = 0;
-        for (uint32_t i = 0; i < n; i++)
-            to[at[i].key >> shift & (DIGITS - 1)]++;
-        for (int d = 0; d < DIGITS; d++) {
-            const uint32_t count = to[d];
-            to[d] = sum;
-            sum += count;
-        }
-        for (uint32_t i = 0; i < n; i++)
-            other[to[at[i].key >> shift & (DIGITS - 1)]++] = at[i];
-        struct place *swap = at;
-        at = other;
-        other = swap;
-    }
+    const struct place *p = a, *q = b;
+    return p->key != q->key ? (p->key > q->key) - (p->key < q->key) : (p->first > q->first) - (p->first < q->first);
 }
-_Static_assert(3 * KEY_BITS / DIGIT_BITS % 2 == 0, "back where it began");
 
 /* Finds the leaves, and sets n_leaves. */
 static int find_places(struct bvh *bvh, uint64_t *taken, struct place *place, const struct sh_report *report,
@@ -247,11 +231,11 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
     const struct scene *scene = bvh->scene;
     const size_t n = scene->n_triangles;
     measure(bvh);
-    struct place *place = malloc((2 * n + 1) * sizeof *place);
+    struct place *place = malloc((n + 1) * sizeof *place);
     uint64_t *taken = calloc(n / 64 + 1, sizeof *taken);
     int rc = place != NULL && taken != NULL ? find_places(bvh, taken, place, report, err) : SH_ENOMEM;
     if (rc == SH_OK) {
-        sort_places(place, place + bvh->n_leaves, bvh->n_leaves);
+        qsort(place, bvh->n_leaves, sizeof *place, compare_places);
         bvh->leaf = huge_pages_alloc((bvh->n_leaves + 1) * sizeof *bvh->leaf);
         if (bvh->leaf == NULL) rc = SH_ENOMEM;
     }

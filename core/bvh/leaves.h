@@ -6,8 +6,7 @@
 
 #include <string.h>
 
-#include "core/bvh.h"
-#include "core/embree.h"
+#include "core/bvh/bvh_inside.h"
 
 /* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. A leaf of one triangle has corner 0 in place
  * of corner 3.
@@ -16,8 +15,8 @@
  * together. The first has the corners in single precision, counted from a point near them: they judge rays. The second
  * has the planes in double, for rays that hit. The scene has the corners in double. */
 struct bvh_leaf {
-    /* The point that corners count from, itself counted from the BVH's origin. It is exact as it stands. Its lowest
-     * bits hold the figures of bvh_leaf_rest. */
+    /* Corners count from this point, which counts from the BVH's origin. Its lowest bits hold the figures of
+     * bvh_leaf_rest. They are part of the point: corners count from the number with these bits. */
     float base_m[3];
     float corner_m[3][4]; /* x, y, z of the corners, from base_m */
     uint32_t triangle;    /* number of triangle 0 */
@@ -67,7 +66,7 @@ static inline uint32_t bvh_leaf_triangle(const struct bvh_leaf *leaf, int which)
 int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
 /* Embree asks for the box of a leaf. */
 void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args);
-/* The box around lo .. hi, from the BVH's origin, made larger for what Embree rounds. */
+/* Sets the box around lo .. hi, from the BVH's origin, made larger for what Embree rounds. */
 void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[3], double far_m,
                  struct RTCBounds *box);
 

@@ -136,7 +136,7 @@ VEC_CLONES
 static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, struct lanes *found)
 {
     struct bvh_edges edges;
-    query->leaves++;
+    query->counters.leaves++;
     bvh_find_edges(query, leaf, &edges);
     if (query->has_own)
         judge_packet(query, &edges, 1, found);

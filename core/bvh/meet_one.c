@@ -1,15 +1,23 @@
 /* SPDX-License-Identifier: MIT */
-/* One ray at one triangle, in double and without vectors: where a packet was in doubt, where a hit is as near as another
- * one, or where there may be a hole. */
+/* One ray at one triangle, in double and without vectors: where a packet was in doubt, where a hit is as near as
+ * another one, or where there may be a hole. */
 #include <math.h>
 
-#include "core/bvh/bvh_inside.h"
 #include "core/bvh/edges.h"
-#include "core/bvh/leaves.h"
 #include "core/bvh/meet.h"
 #include "core/bvh/nearest.h"
 #include "core/bvh/packet.h"
 #include "core/vec3.h"
+
+/* Sets v to the corners, from the ray's origin. */
+static void find_corners(const struct bvh_query *query, uint32_t lane, uint32_t triangle, double v[3][3])
+{
+    const struct scene *scene = query->bvh->scene;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            v[i][j] = scene->vertex_m[scene->triangle[triangle][i]][j] -
+                      (query->has_own ? query->org[j][lane] : query->at[j]);
+}
 
 /* Whether the triangle has a hole where the ray is at that range. */
 static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
@@ -19,10 +27,7 @@ static int is_hole(const struct bvh_query *query, uint32_t lane, uint32_t triang
     double v[3][3], p[3], uv[2];
     for (int j = 0; j < 3; j++)
         p[j] = range_m * query->dir[j][lane];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            v[i][j] = scene->vertex_m[scene->triangle[triangle][i]][j] -
-                      (query->has_own ? query->org[j][lane] : query->at[j]);
+    find_corners(query, lane, triangle, v);
     const double *const corner[3] = {v[0], v[1], v[2]};
     scene_uv_at(scene, triangle, corner, p, uv);
     return texture_is_hole(scene_cutout(scene, triangle), uv);
@@ -67,30 +72,27 @@ void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const stru
 {
     const uint32_t triangle = bvh_leaf_triangle(leaf, which);
     const struct bvh_plane *plane = &leaf->plane[which];
-    const struct scene *scene = query->bvh->scene;
-    const uint32_t *corner = scene->triangle[triangle];
     double v[3][3], dir[3], o[3], side[3];
     for (int j = 0; j < 3; j++) {
         dir[j] = query->dir[j][lane];
         o[j] = query->has_own ? query->local[j][lane] : query->at_local[j];
-        for (int i = 0; i < 3; i++)
-            v[i][j] = scene->vertex_m[corner[i]][j] - (query->has_own ? query->org[j][lane] : query->at[j]);
     }
+    find_corners(query, lane, triangle, v);
     int near = 0;
     for (int i = 0; i < 3; i++) {
         const double *a = v[i], *b = v[(i + 1) % 3];
         side[i] = edge_side(a, b, dir);
         near |= fabs(side[i]) <= 4.0 * blur(a, b);
     }
-    query->decided += (uint64_t)near;
-    const int met = is_inside(side);
-    if (!met && !near) return;
-    if (is_edge_on(v, side) || vec3_is_any_zero(v) || (!met && !is_near_miss(v, side, dir))) return;
+    query->counters.decided += (uint64_t)near;
+    const int hits = is_inside(side);
+    if (!hits && !near) return;
+    if (is_edge_on(v, side) || vec3_is_any_zero(v) || (!hits && !is_near_miss(v, side, dir))) return;
     const double along = vec3_dot(plane->n, dir);
     double range_m = (plane->d - vec3_dot(plane->n, o)) / along;
     if (!(along * along > BVH_FLAT * BVH_FLAT * vec3_dot(plane->n, plane->n))) range_m = held_range(v, dir, range_m);
     const double nearest_m = query->range_m[lane];
-    if (!met)
+    if (!hits)
         note_miss(query, lane, triangle, range_m);
     else if (range_m > query->at_origin_m && range_m <= nearest_m + BVH_SAME * nearest_m)
         bvh_note_hit(query, tfar, lane, triangle, range_m);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A packet of 16 at a leaf, with AVX-512. It finds what meet.c finds, with rays as bits of masks: what compilers make of
- * such loops takes 1.4 times as long. */
+/* A packet of 16 at a leaf, with AVX-512. It finds what meet.c finds, with rays as bits of masks. The loops of meet.c
+ * take 1.4 times as long, as compilers translate them. */
 #include "core/bvh/meet.h"
 
 #if defined(__x86_64__) && !defined(VEC_ONE) /* measuring one instruction set: core/vecmath.h */
@@ -66,8 +66,8 @@ struct plane {
     uint32_t triangle;
 };
 
-/* Takes the triangle as the hit of those rays for which it is the nearest so far, among the eight from `at` on; `in` are
- * inside of it for certain. Returns those to which it is as near as another one. */
+/* Takes the triangle as the hit of those rays for which it is the nearest so far, among the eight from `at` on; `in`
+ * are inside of it for certain. Returns those to which it is as near as another one. */
 WIDE __mmask8 take_8(struct bvh_query *query, float *tfar, const struct plane *p, int at, __mmask8 in,
                      double range_m[8], int own)
 {
@@ -158,22 +158,14 @@ WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf
         meet_triangle(query, tfar, leaf, 1, second, own);
 }
 
-__attribute__((target("avx512f,avx512vl"))) static void meet_own(struct bvh_query *query, float *tfar,
-                                                                 const struct bvh_leaf *leaf, const int *valid)
+__attribute__((target("avx512f,avx512vl"))) void bvh_meet_wide(struct bvh_query *query, float *tfar,
+                                                               const struct bvh_leaf *leaf, const int *valid)
 {
-    meet(query, tfar, leaf, valid, 1);
-}
-
-__attribute__((target("avx512f,avx512vl"))) static void meet_one(struct bvh_query *query, float *tfar,
-                                                                 const struct bvh_leaf *leaf, const int *valid)
-{
-    meet(query, tfar, leaf, valid, 0);
-}
-
-void bvh_meet_wide(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid)
-{
-    query->leaves++;
-    (query->has_own ? meet_own : meet_one)(query, tfar, leaf, valid);
+    query->counters.leaves++;
+    if (query->has_own)
+        meet(query, tfar, leaf, valid, 1);
+    else
+        meet(query, tfar, leaf, valid, 0);
 }
 
 int bvh_has_wide(void)

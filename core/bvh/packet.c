@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays into Embree, in packets of 4, 8 or 16, or one by one. */
+/* Hands rays to Embree, in packets of 4, 8 or 16, or one by one. */
 #include "core/bvh/packet.h"
 
 #include <math.h>
@@ -63,7 +63,7 @@ static void begin_packet(struct packet *packet, const struct bvh_batch *batch, u
     memset(&packet->at, 0, sizeof packet->at);
     memset(bvh_field(&packet->at, width, mask), 0xff, width * sizeof(uint32_t));
     for (uint32_t i = 0; i < 3 * width; i++)
-        org[i] = (float)batch->at_local[i / width];
+        org[i] = (float)batch->local.at_m[i / width];
 }
 
 /* Rays `first` to first + n; lanes without a ray have that of the first, and no hit. */
@@ -101,7 +101,7 @@ VEC_INLINE void set_doubles(struct bvh_query *query, const struct bvh_batch *bat
     const struct bvh_rays *rays = batch->rays;
     const double *const dir[3] = {rays->dir.x, rays->dir.y, rays->dir.z};
     const double *const own[3] = {rays->from.own.x, rays->from.own.y, rays->from.own.z};
-    const double *const local[3] = {batch->local.x, batch->local.y, batch->local.z};
+    const double *const local[3] = {batch->local.own.x, batch->local.own.y, batch->local.own.z};
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
         query->range_m[i] = query->most_m;
         query->hit_m[i] = NAN;
@@ -151,7 +151,7 @@ static void packet_settle(struct bvh_query *query, struct packet *packet, uint32
 VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const struct bvh_batch *batch, uint32_t first,
                          uint32_t n, uint32_t width)
 {
-    const uint64_t decided = query->decided;
+    const uint64_t decided = query->counters.decided;
     set_floats(packet, batch, first, n, width);
     set_doubles(query, batch, first, n);
     query->width = width;
@@ -159,7 +159,7 @@ VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const s
     if (query->has_own) bvh_turn_origins(query);
     bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
     if (query->unsure != 0) packet_settle(query, packet, width);
-    if (query->decided != decided) take_near(query, n);
+    if (query->counters.decided != decided) take_near(query, n);
     memcpy(batch->rays->range_m + first, query->hit_m, n * sizeof *query->hit_m);
     memcpy(batch->rays->triangle + first, query->triangle, n * sizeof *query->triangle);
 }
@@ -186,13 +186,10 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     query->has_own = rays->from.own.x != NULL;
     query->most_m = batch->most_m;
     query->apart_m = batch->apart_m;
-    query->decided = query->leaves = 0;
     memcpy(query->at, rays->from.at_m, sizeof query->at);
-    memcpy(query->at_local, batch->at_local, sizeof query->at_local);
+    memcpy(query->at_local, batch->local.at_m, sizeof query->at_local);
     memset(query->start_m, 0, sizeof query->start_m);
     bvh_forget_near(query);
     for (uint32_t at = 0; at < rays->n; at += width)
         cast(query, &packet, batch, at, rays->n - at < width ? rays->n - at : width, width);
-    batch->counters->decided += query->decided;
-    batch->counters->leaves += query->leaves;
 }

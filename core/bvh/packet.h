@@ -50,7 +50,7 @@ struct bvh_query {
     uint32_t unsure;               /* a bit for each ray that may have another hit of lower number */
     double near_m[BVH_PACKET];     /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
     uint32_t near[BVH_PACKET];
-    uint64_t decided, leaves; /* struct bvh_counters */
+    struct bvh_counters counters; /* counted up from packet to packet */
 } __attribute__((aligned(64)));
 
 /* A packet within a copy. */
@@ -101,15 +101,12 @@ VEC_INLINE void bvh_turn_origins(struct bvh_query *query)
 /* Casts n <= BVH_CHUNK rays, whose float directions and origins are given. */
 struct bvh_batch {
     const struct bvh_rays *rays;
-    struct vec3_floats dir, org; /* org.x NULL: all at at_local */
+    struct vec3_floats dir, org; /* org.x NULL: all at local.at_m */
     const double *start_m;       /* NULL: 0 */
-    struct vec3_in local;        /* origins from the BVH's origin; x NULL: all at at_local */
-    double at_local[3];
-    double far_m;   /* no ray begins further from the BVH's origin */
-    double apart_m; /* no two rays begin further from each other; 0: all at one point */
+    struct bvh_origins local;    /* from the BVH's origin */
+    double apart_m;              /* no two rays begin further from each other; 0: all at one point */
     float t_max;
-    double most_m;                 /* greatest length of a float ray; INFINITY: hits beyond t_max may be missed */
-    struct bvh_counters *counters; /* counted up */
+    double most_m; /* greatest length of a float ray; INFINITY: hits beyond t_max may be missed */
 };
 void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_batch *batch);
 

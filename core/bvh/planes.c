@@ -1,12 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Planes of triangles in double: ranges and steepness from them; labels of rays. Loops over arrays that compilers turn
  * into vectors. */
-#include "core/bvh/planes.h"
-
 #include <math.h>
 
-#include "core/bvh/bvh_inside.h"
-#include "core/bvh/copies.h"
 #include "core/bvh/leaves.h"
 #include "core/huge_pages.h"
 #include "core/vec3.h"
@@ -82,15 +78,15 @@ void bvh_to_float(const struct vec3_in *dir, uint32_t n, float *restrict x, floa
     }
 }
 
-static uint32_t label_of(const struct bvh *bvh, uint32_t triangle)
-{
-    return triangle < bvh->scene->n_triangles ? bvh->scene->label[triangle] : BVH_NO_LABEL;
-}
-
 static void find_labels(const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    for (uint32_t i = 0; i < rays->n; i++)
-        rays->label[i] = label_of(bvh, rays->triangle[i]);
+    const struct scene *scene = bvh->scene;
+    for (uint32_t i = 0; i < rays->n; i++) {
+        const uint32_t t = rays->triangle[i];
+        rays->label[i] = t < scene->n_triangles ? scene->label[t]
+                         : t < scene->n_all     ? scene_label(scene, t)
+                                                : BVH_NO_LABEL;
+    }
 }
 
 /* A miss has the highest number there is and reads the plane after the last leaf, which is all NaN. */
@@ -112,12 +108,12 @@ static void find_steepness(const struct bvh *bvh, const struct bvh_rays *rays)
 
 void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays)
 {
-    if (bvh->scene->n_copies > 0) {
-        bvh_refine_copies(bvh, rays);
-        return;
-    }
     if (rays->label != NULL) find_labels(bvh, rays);
-    if (rays->steep != NULL) find_steepness(bvh, rays);
+    if (rays->steep == NULL) return;
+    if (bvh->scene->n_copies > 0)
+        bvh_steepness_copies(bvh, rays);
+    else
+        find_steepness(bvh, rays);
 }
 
 enum { LANES = 8 };

@@ -6,14 +6,13 @@
 #include <string.h>
 
 #include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/cast/kernels_aim.h"
 #include "core/cast/kernels_moving.h"
 #include "core/cast/kernels_sweep.h"
 #include "core/cast/disturbance.h"
 #include "core/mat3.h"
 
-/* The rotation from socs to the frame of positions: to the CRS where that is a rotation, else to prcs.
+/* Sets to_crs to the rotation from socs to the frame of positions: the CRS where that is a rotation, else prcs.
  * Returns 1 in the first case. */
 static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
@@ -24,13 +23,14 @@ static int reading_rotation(const struct cast_setup *s, double to_crs[9])
     return linear;
 }
 
-/* Vectors of socs -> prcs, and the places of the head, each by the pose of its own time. */
+/* Vectors d and r are turned from socs to prcs, each by the pose of its pulse's time. `place` gets the head's place. */
 struct move {
     struct vec3_in d, r; /* r.x NULL: only d */
     struct vec3_out to_d, to_r, place;
 };
 
-/* Finds the leg of pulse i, and returns the first of the n pulses after it; times don't fall. */
+/* Finds the leg that pulse i lies in, which is the way between two poses. Returns the first of the n pulses beyond it;
+ * pulses are in order of time. */
 static uint32_t find_leg(const struct cast_setup *s, const struct chunk *k, const uint32_t *dt_ns, uint32_t i,
                          uint32_t n, struct kernel_leg *leg)
 {
@@ -59,7 +59,7 @@ static void move(const struct cast_setup *s, const struct chunk *k, const uint32
     }
 }
 
-/* The rotation for the true beams where the pan has slipped; the encoders don't see the slip. */
+/* Returns the rotation of the true beams where the pan has slipped; the encoders don't see the slip. */
 static const double *slipped_rotation(const struct cast_setup *s, const double rotation[9], double out[9])
 {
     double slip[9];
@@ -69,14 +69,14 @@ static const double *slipped_rotation(const struct cast_setup *s, const double r
     return out;
 }
 
-/* For an ideal head: its beams go where its encoders say, except for the encoders' steps. */
+/* Aims the beams of an ideal head, which go where its encoders say, except for the encoders' steps. */
 static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_turns *turns)
 {
     const struct cast_setup *s = k->s;
     const int geo = s->layout == LINE_GEO, moves = s->n_knots != 0;
     const int wobbles = s->disturbance != NULL && s->disturbance->n_wobbles != 0;
     struct kernel_leg leg;
-    /* Where the head does not turn on its way, one rotation holds for the chunk, as for a head that stands. */
+    /* Where the head moves without turning, one rotation holds for the chunk, as for a head that stands. */
     const int straight = moves && find_leg(s, k, k->dt_ns, 0, k->n, &leg) == k->n && leg.turn == 0.0 &&
                          (s->disturbance == NULL || s->disturbance->slip_turn == 0.0);
     const int turns_later = moves && !straight;
@@ -101,7 +101,7 @@ static void aim_ideal(struct caster *c, struct chunk *k, const struct kernel_tur
     move(s, k, k->dt_ns, k->n, &m);
 }
 
-/* As slipped_rotation, for directions and origins in socs: turns them by the slip. */
+/* Turns directions and origins in socs by the slip, as slipped_rotation turns a rotation. */
 static void slip_bent(struct caster *c, const struct chunk *k, int offset)
 {
     double slip[9], back[9];
@@ -112,7 +112,7 @@ static void slip_bent(struct caster *c, const struct chunk *k, int offset)
     if (offset) kernel_turn_back(&VEC3_IN(c->read, 0), back, k->n, &VEC3_OUT(c->read, 0));
 }
 
-/* For a head with errors of mechanics and encoders: the turns become the encoders' readings. */
+/* Aims the beams of a head with errors of mechanics and encoders. The turns become the encoders' readings. */
 static void aim_bent(struct caster *c, struct chunk *k, const struct instrument *instrument)
 {
     const struct cast_setup *s = k->s;

@@ -6,7 +6,7 @@
 #include "core/cast/kernels_aim.h"
 #include "core/vecmath.h"
 
-/* A matrix as values of its own, which no store to an array can change. */
+/* A matrix in local values, so that the compiler need not read it again after each store to an array. */
 struct aim_matrix {
     double xx, xy, xz, yx, yy, yz, zx, zy, zz;
 };
@@ -20,7 +20,7 @@ struct aim_axes {
     double sm, cm, sp, cp;
 };
 
-/* m times (sin p cos m, cos p cos m, sin m). */
+/* Sets d to m times (sin p cos m, cos p cos m, sin m). */
 VEC_INLINE void aim_direction(struct aim_matrix m, struct aim_axes a, struct vec3_out d, uint32_t i)
 {
     const double x = a.sp * a.cm, y = a.cp * a.cm;
@@ -59,7 +59,7 @@ VEC_INLINE void aim_read(struct aim_encoder e, double turn, double *sine, double
     *cosine = c * h - s * d;
 }
 
-/* The direction that the encoders read at these angles, whose sines and cosines are a. */
+/* Sets e to the direction that the encoders read at these angles, whose sines and cosines are a. */
 VEC_INLINE void aim_direction_read(struct aim_reading r, double mirror_turn, double pan_turn, struct aim_axes a,
                                    struct vec3_out e, uint32_t i)
 {

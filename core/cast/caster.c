@@ -2,21 +2,21 @@
 /* The way of a pulse, from its place in the schedule to a point. cast_chunk has the stages in their order:
  *
  *     aim        aim.c            angles -> where the beam goes and begins, and what the encoders read of it
- *     nearest    nearest.c        the first surface that the beam's centre meets: what stands still, and
- *                                 bodies that move; exact (core/bvh.h)
- *     tripod     tripod.c         what is hidden below the head
- *     optics     optics.c         where that is glass or a mirror: what is seen there (caster_follow)
+ *     nearest    nearest.c        the first surface that the beam's centre hits, of the scene and of bodies that
+ *                                 move; exact (core/bvh.h)
+ *     tripod     tripod.c         pulses that the tripod below the head hides
+ *     optics     optics.c         where that is glass or a mirror: the surfaces seen in it (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
  *     waves      waves.c          the light of a pulse over time, and echoes found in it, where the setup has
  *                                 waveforms; within echoes
- *     disturb    disturbance.c    where the head has a fault: wobbles and a slipped pan within aim, a dark laser
- *                                 after it, a soiled window within echoes
+ *     disturb    disturbance.c    where the head has a disturbance: wobbles and a slipped pan within aim, a dark
+ *                                 laser after it, a soiled window within echoes
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent
  *     points     points.c         positions, and entries of the block
  *
  * A stage that a setup does not need costs nothing. kernels_*.c hold the arithmetic of the stages, texels.c
- * looks up textures, colours.c has what else colours may show. For setting up: outlines.c. */
+ * looks up textures, colours.c computes other colours. outlines.c finds outlines before a scan. */
 #include "core/cast.h"
 
 #include <stdlib.h>
@@ -24,7 +24,6 @@
 
 #include "core/cast/aim.h"
 #include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/cast/kernels_times.h"
 #include "core/cast/points.h"
 #include "core/cast/sub_rays.h"
@@ -101,23 +100,23 @@ static void begin_echoes(struct echo_list *l, const struct chunk *k)
         l->width_m[i] = (float)k->s->pulse_m;
 }
 
-/* The rays of the pulses' centres, and the places for their hits. */
-static struct met centres(struct caster *c, const struct chunk *k)
+/* Returns the rays of the pulses' centres, and the places for their hits. */
+static struct ray_hits centres(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     const int surfaces = s->detect != NULL && s->detect->surfaces != NULL && s->beam == NULL;
     const int bodies = surfaces || (k->texels && caster_has_bodies(s)); /* texels need the body that was hit */
-    return (struct met){.rays = {.n = k->n,
-                                 .from = k->from,
-                                 .dir = VEC3_IN(c->d, 0),
-                                 .range_max_m = s->range_max_m,
-                                 .range_m = c->list.range_m,
-                                 .triangle = c->hit,
-                                 .label = c->list.label,
-                                 .steep = s->beam != NULL ? c->sub_rays->steep : NULL},
-                        .cosine = bodies ? c->list.cosine : NULL,
-                        .body = bodies ? c->body : NULL,
-                        .colour = k->texels ? c->list.colour : NULL};
+    return (struct ray_hits){.rays = {.n = k->n,
+                                      .from = k->from,
+                                      .dir = VEC3_IN(c->d, 0),
+                                      .range_max_m = s->range_max_m,
+                                      .range_m = c->list.range_m,
+                                      .triangle = c->hit,
+                                      .label = c->list.label,
+                                      .steep = s->beam != NULL ? c->sub_rays->steep : NULL},
+                             .cosine = bodies ? c->list.cosine : NULL,
+                             .body = bodies ? c->body : NULL,
+                             .colour = k->texels ? c->list.colour : NULL};
 }
 
 static void hide(struct caster *c, const struct chunk *k)
@@ -125,49 +124,32 @@ static void hide(struct caster *c, const struct chunk *k)
     c->counters.hidden += caster_hide(k->s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
 }
 
-/* Returns NULL where there are no waveforms: the caster or the setup has none, or they are neither sent nor searched
- * for echoes. */
-static const struct wave_chunk *begin_waves(struct caster *c, const struct chunk *k, struct wave_chunk *waves)
+/* Returns whether there are waveforms that are sent or searched for echoes. */
+static int has_waves(const struct caster *c, const struct chunk *k)
 {
-    if (c->waves == NULL || k->s->waves == NULL) return NULL;
-    if (k->block->waves == NULL && !k->s->waves->finds) return NULL;
-    *waves = (struct wave_chunk){.s = k->s,
-                                 .how = k->s->waves,
-                                 .work = c->waves,
-                                 .list = &c->list,
-                                 .counters = &c->counters,
-                                 .block = k->block,
-                                 .d = VEC3_IN(c->d, 0),
-                                 .dt_ns = k->dt_ns,
-                                 .pulse0 = k->pulse0,
-                                 .first = k->first,
-                                 .n = k->n,
-                                 .linear = k->linear,
-                                 .texels = k->texels};
-    waves_begin(waves);
-    return waves;
+    return c->waves != NULL && k->s->waves != NULL && (k->block->waves != NULL || k->s->waves->finds);
 }
 
 /* Returns the number of echoes. */
 static uint32_t cast_chunk(struct caster *c, struct chunk *k)
 {
     const struct cast_setup *s = k->s;
-    struct wave_chunk waves;
     const int central = s->beam == NULL || s->beam->mode == BEAM_ADAPTIVE; /* rings have no ray for the centre */
     if (c->profile != NULL) c->profile->last = c->profile->now();
     caster_aim(c, k);
     begin_echoes(&c->list, k);
-    k->waves = begin_waves(c, k, &waves);
-    k->spreads = k->attributes || k->waves != NULL;
+    k->waves = has_waves(c, k);
+    if (k->waves) waves_begin(c, k);
+    k->spreads = k->attributes || k->waves;
     if (s->disturbance != NULL && s->disturbance->dark) {
         caster_darken(&c->list);
         caster_report(c, k);
         return caster_points(c, k);
     }
-    const struct met met = centres(c, k);
-    if (central) caster_nearest(&c->nearest, s, &met);
+    const struct ray_hits hits = centres(c, k);
+    if (central) caster_nearest(&c->nearest, s, &hits);
     if (s->tripod != NULL && s->beam == NULL) hide(c, k);
-    if (met.body != NULL && s->detect != NULL && s->detect->depth > 0) caster_follow(&c->nearest, s, &met, &c->paths);
+    if (hits.body != NULL && s->detect != NULL && s->detect->depth > 0) caster_follow(&c->nearest, s, &hits, &c->paths);
     if (s->beam != NULL) caster_sub_rays(c, k);
     if (s->tripod != NULL && s->beam != NULL) hide(c, k);
     caster_echoes(c, k);

@@ -4,6 +4,7 @@
 #ifndef CORE_CAST_CASTER_H
 #define CORE_CAST_CASTER_H
 
+#include "core/cast/chunk.h"
 #include "core/cast/echoes.h"
 #include "core/cast/kernels_sweep.h"
 #include "core/cast/nearest.h"
@@ -24,10 +25,10 @@ struct caster {
     uint8_t body[CHUNK];
     struct echo_list list;
     /* touched only where the head moves, or is not ideal: */
-    struct chunk_vectors socs, read; /* socs: of the beams; as the encoders read them, or beams' origins */
+    struct chunk_vectors socs, read; /* in socs: the beams; the same as encoders read them, or the beams' origins */
     struct chunk_vectors origin;     /* of beams that don't begin where the head is, prcs */
     struct path_rays paths;          /* touched only where there is glass or a mirror */
-    uint32_t secondary_a[CAST_LIST], secondary_b[CAST_LIST], secondary_c[CAST_LIST]; /* on their way into the block */
+    uint32_t secondary_a[CAST_LIST], secondary_b[CAST_LIST], secondary_c[CAST_LIST]; /* echoes for the block */
 };
 
 #endif

@@ -5,8 +5,6 @@
 
 #include "core/cast.h"
 
-struct wave_chunk;
-
 /* A chunk: consecutive pulses of a run, and where they go in the block. */
 struct chunk {
     const struct cast_setup *s;
@@ -17,12 +15,12 @@ struct chunk {
     uint32_t first, n;     /* pulses first .. first + n of the run */
     uint32_t at;           /* the block's entry that comes next */
     struct bvh_origins from;
-    int linear;                     /* the directions that the encoders read are turned into the CRS already */
-    int attributes;                 /* the block has room for them */
-    int colours;                    /* likewise */
-    int texels;                     /* colours are those of textures: hits carry them */
-    const struct wave_chunk *waves; /* NULL: no waveforms */
-    int spreads;                    /* returns say how their ranges spread: for widths, or for waveforms */
+    int linear;     /* the directions that the encoders read are turned into the CRS already */
+    int attributes; /* the block has room for them */
+    int colours;    /* the setup asks for them, and the block has room */
+    int texels;     /* colours are those of textures: hits carry them */
+    int waves;      /* waveforms are sent, or searched for echoes */
+    int spreads;    /* returns say how their ranges spread: for widths, or for waveforms */
 };
 
 #endif

@@ -8,7 +8,7 @@
 #include "core/cast/echoes.h"
 #include "core/colour.h"
 
-/* Frame scalar of a moving head when a pulse of the chunk fires; straight between two knots. */
+/* Returns the frame scalar when a pulse of the chunk fires. Between two knots it changes evenly. */
 static double frame_at(const struct chunk *k, uint32_t pulse)
 {
     const struct cast_setup *s = k->s;
@@ -41,7 +41,7 @@ static uint32_t colour_of_label(struct coloured *c, uint32_t label)
     return c->kept_colour[at] = colour_packed(rgb);
 }
 
-/* Height of echo i, along the true beam of its pulse. */
+/* Returns the height of echo i, along the true beam of its pulse. */
 static double height_of(const struct coloured *c, uint32_t i, uint32_t pulse)
 {
     double from[3];
@@ -49,7 +49,7 @@ static double height_of(const struct coloured *c, uint32_t i, uint32_t pulse)
     return from[2] + c->list->range_m[i] * c->d_z[pulse];
 }
 
-/* Colour of echo i, which belongs to this pulse. */
+/* Returns the colour of echo i, which belongs to this pulse. */
 static uint32_t colour_of(struct coloured *c, uint32_t i, uint32_t pulse)
 {
     const struct chunk *k = c->k;

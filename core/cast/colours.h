@@ -6,7 +6,7 @@
 struct chunk;
 struct echo_list;
 
-/* d_z: of the directions of the pulses, prcs. */
+/* Sets the colours of the list's echoes. d_z: z of the directions of the pulses, prcs. */
 void caster_colours(const struct chunk *k, const double *d_z, struct echo_list *l);
 
 #endif

@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* From the hits of a chunk's pulses to the echoes that the head reports: which are detected, how they merge,
- * their noise, and which a pulse sends. One list, for single rays, footprints, and what glass and mirrors
- * show. */
+/* Turns the hits of a chunk's pulses into the echoes that the head reports. It decides which are detected, how they
+ * merge, their noise, and which a pulse sends. There is one list for single rays, footprints, and hits in glass and
+ * mirrors. */
 #include "core/cast/echoes.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/cast/kernels_points.h"
 #include "core/cast/disturbance.h"
 #include "core/cast/waves.h"
@@ -47,7 +46,7 @@ static void list_paths(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Index of a pulse's echo j: its first one is in the pulse's place. */
+/* Returns the index of a pulse's echo j: its first one is in the pulse's place. */
 static uint32_t echoes_place_of(const struct secondary *f, uint32_t j)
 {
     return j == 0 ? f->pulse : f->at + j - 1;
@@ -69,8 +68,8 @@ static void take_echo(struct echo_list *l, uint32_t at, uint8_t number, const st
     l->number[at] = number;
 }
 
-/* Returns of a pulse that are nearer to each other than the range resolution make one echo. A return without
- * power stays apart, and keeps its number. */
+/* Returns of a pulse that are nearer to each other than the range resolution make one echo. A return without power
+ * stays apart, and is counted in the echoes' numbers. */
 static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how, const struct secondary *f, int texels)
 {
     const uint32_t n = f->n + 1;
@@ -104,7 +103,7 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
     return to - 1;
 }
 
-/* How much comes back of single rays' returns, and which of them merge. */
+/* Finds how much comes back of single rays' returns, and merges near ones. */
 static void weigh_returns(struct caster *c, const struct chunk *k)
 {
     const struct cast_detect *d = k->s->detect;
@@ -123,7 +122,7 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
         if (caster_is_bare(k->s, l->label[i], l->rho[i])) l->range_m[i] = (double)NAN;
     for (uint32_t i = k->n; i < l->n; i++)
         l->label[i] += l->ghost[i] ? d->ghost_label : 0;
-    if (k->waves != NULL) waves_take_paths(k->waves);
+    if (k->waves) waves_take_paths(c, k);
     for (uint32_t g = 0; g < l->n_secondary && d->separation_m > 0.0; g++)
         l->secondary[g].n = merge_pulse(l, &how, &l->secondary[g], k->texels);
 }
@@ -131,10 +130,10 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
 /* Returns whether echoes are found in waveforms. Such echoes are detected already, and have their noise. */
 static int finds_echoes(const struct chunk *k)
 {
-    return k->waves != NULL && k->waves->how->finds;
+    return k->waves && k->s->waves->finds;
 }
 
-/* Ranges of what is not detected become NaN. */
+/* Ranges of echoes that are not detected become NaN. */
 static void detect(struct caster *c, const struct chunk *k)
 {
     const struct cast_detect *d = k->s->detect;
@@ -159,8 +158,7 @@ static void detect(struct caster *c, const struct chunk *k)
     c->counters.faint += before - kernel_count_echoes(l->range_m, l->n);
 }
 
-/* Where there is a signal model, and yet this noise is used, the user asked for fixed noise: a soiled window does not
- * change it. */
+/* A user who sets fixed noise together with a signal model wants it fixed: a soiled window does not change it then. */
 static double fixed_sigma_m(const struct cast_setup *s)
 {
     const int is_modelled = s->detect != NULL && s->detect->signal != NULL;
@@ -193,7 +191,7 @@ static void make_keys(struct echo_list *l, const struct chunk *k)
 }
 
 /* An echo of the current pulse. */
-struct heard {
+struct pulse_echo {
     double range_m, strength;
     uint64_t key;
     uint32_t label;
@@ -203,30 +201,32 @@ struct heard {
     uint32_t colour;
 };
 
-static uint32_t hear(const struct echo_list *l, const double *strength, const struct secondary *f, struct heard *h)
+static uint32_t take_echoes(const struct echo_list *l, const double *strength, const struct secondary *f,
+                            struct pulse_echo *h)
 {
     uint32_t n = 0;
     for (uint32_t j = 0; j <= f->n; j++) {
         uint32_t i = echoes_place_of(f, j);
         if (!isnan(l->range_m[i]))
-            h[n++] = (struct heard){l->range_m[i],       strength[i],     l->key[i],     l->label[i], l->refl_cdb[i],
+            h[n++] =
+                (struct pulse_echo){l->range_m[i],       strength[i],     l->key[i],     l->label[i], l->refl_cdb[i],
                                     l->amplitude_cdb[i], l->deviation[i], l->width_m[i], l->colour[i]};
     }
     return n;
 }
 
 /* Sorts by the range that is sent: folding may have changed the order. */
-static void sort_heard(struct heard *h, uint32_t n)
+static void sort_echoes(struct pulse_echo *h, uint32_t n)
 {
     for (uint32_t i = 1; i < n; i++)
         for (uint32_t k = i; k > 0 && h[k].range_m < h[k - 1].range_m; k--) {
-            struct heard swap = h[k];
+            struct pulse_echo swap = h[k];
             h[k] = h[k - 1];
             h[k - 1] = swap;
         }
 }
 
-static uint32_t drop_weakest(struct heard *h, uint32_t n)
+static uint32_t drop_weakest(struct pulse_echo *h, uint32_t n)
 {
     uint32_t weakest = 0;
     for (uint32_t i = 1; i < n; i++)
@@ -236,7 +236,7 @@ static uint32_t drop_weakest(struct heard *h, uint32_t n)
 }
 
 /* Keeps only the echo that is asked for. */
-static uint32_t choose(struct heard *h, uint32_t n, enum beam_select select)
+static uint32_t choose(struct pulse_echo *h, uint32_t n, enum beam_select select)
 {
     uint32_t best = select == BEAM_LAST ? n - 1 : 0;
     if (select == BEAM_ALL || n < 2) return n;
@@ -261,12 +261,12 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
     const uint32_t most = caster_max_echoes(s);
     uint32_t end = k->n;
     for (uint32_t g = 0; g < l->n_secondary; g++) {
-        struct heard h[LINE_MAX_ECHOES];
+        struct pulse_echo h[LINE_MAX_ECHOES];
         struct secondary *f = &l->secondary[g];
-        uint32_t n = hear(l, strength, f, h);
+        uint32_t n = take_echoes(l, strength, f, h);
         for (; n > most && n > 1; c->counters.crowded++)
             n = drop_weakest(h, n);
-        if (s->detect != NULL && s->detect->ambiguity == DETECT_FOLDED) sort_heard(h, n);
+        if (s->detect != NULL && s->detect->ambiguity == DETECT_FOLDED) sort_echoes(h, n);
         n = choose(h, n, s->echoes);
         *f = (struct secondary){f->pulse, end, n > 1 ? n - 1 : 0};
         end += f->n;
@@ -312,7 +312,7 @@ void caster_report(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     struct echo_list *l = &c->list;
-    if (k->waves != NULL) caster_waves(k->waves);
+    if (k->waves) caster_waves(c, k);
     if (s->detect != NULL || s->noise_on) make_keys(l, k);
     if (s->detect != NULL) detect(c, k);
     bvh_stage_ends(c->profile, CAST_DETECT);

@@ -10,12 +10,11 @@ struct secondary {
     uint32_t pulse, at, n;
 };
 
-/* The echoes of a chunk. Entry i < pulses is the first of pulse i, or says that it has none (range NaN):
- * single rays are in their places without being moved. Further ones follow, those of a pulse together, by
- * range. */
+/* The echoes of a chunk. Entry i is the first echo of pulse i, or has range NaN where the pulse has none: so hits of
+ * single rays need not be moved. After the pulses' entries come secondary echoes, each pulse's together, by range. */
 struct echo_list {
     uint32_t n;
-    uint32_t n_secondary; /* pulses with further echoes, in order */
+    uint32_t n_secondary; /* pulses with secondary echoes, in order */
     struct secondary secondary[CHUNK];
     double range_m[CAST_LIST]; /* NaN: no echo */
     uint32_t label[CAST_LIST];
@@ -27,7 +26,7 @@ struct echo_list {
     uint64_t key[CAST_LIST];   /* for random numbers */
     double cosine[CAST_LIST];
     double energy[CAST_LIST]; /* share of the pulse's energy that took this way */
-    double rho[CAST_LIST];    /* what comes back of it; the energy itself where surfaces are not modelled */
+    double rho[CAST_LIST];    /* the part of it that comes back; the energy itself where surfaces are not modelled */
     uint8_t ghost[CAST_LIST];
     double amplitude[CAST_LIST];
     int16_t refl_cdb[CAST_LIST], amplitude_cdb[CAST_LIST];
@@ -39,14 +38,14 @@ struct echo_list {
 struct caster;
 struct chunk;
 
-/* Further echoes of a pulse: room for n at the end of the list. Returns the first. */
+/* Makes room for n secondary echoes of a pulse at the end of the list. Returns the first. */
 uint32_t echoes_secondary(struct echo_list *list, uint32_t pulse, uint32_t n);
 /* Turns the hits in the list, which has a place for each pulse, into the echoes that are sent. */
 void caster_echoes(struct caster *c, const struct chunk *k);
-/* The second half of caster_echoes: which returns are detected, their noise, and which of them are sent. It is called
+/* The second half of caster_echoes decides which returns are detected, their noise, and which are sent. It is called
  * by itself for a list without returns, since noise in waveforms may still make echoes. */
 void caster_report(struct caster *c, const struct chunk *k);
-/* How many echoes a pulse may send. */
+/* Returns how many echoes a pulse may send. */
 uint32_t caster_max_echoes(const struct cast_setup *s);
 
 #endif

@@ -32,7 +32,7 @@ void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_
     }
 }
 
-/* reading is NULL or not as a constant, so that there is a loop of its own for each. */
+/* Callers pass a pointer or the constant NULL, so that the compiler makes a loop for each case. */
 VEC_INLINE void directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *out,
                            const struct kernel_reading *reading)
 {

@@ -6,7 +6,7 @@
 
 #include "core/cast.h"
 
-/* Mirror and pan angle of n pulses of a run, from its pulse `first` on. */
+/* Computes mirror and pan angle of n pulses of a run, from its pulse `first` on. */
 void kernel_angles(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn, double *pan_turn);
 /* The same for a run with a table. */
 void kernel_angles_table(const struct schedule_run *run, uint32_t first, uint32_t n, double *mirror_turn,
@@ -23,7 +23,8 @@ struct kernel_reading {
     const double *rotation;         /* to the frame of positions */
     struct vec3_out e;
 };
-/* Directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). reading NULL: only those of the beams. */
+/* Computes directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). reading NULL: only those of the
+ * beams. */
 void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d,
                        const struct kernel_reading *reading);
 

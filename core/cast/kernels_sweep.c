@@ -47,8 +47,8 @@ struct middles {
     double sine[ROOM], sine1[ROOM], cosine[ROOM], cosine1[ROOM];
 };
 
-/* At zero + (count + b * more) * unit. The counts are whole numbers below 2^53, so that a block's middle doesn't
- * depend on which block comes first. */
+/* Finds them at the turns zero + (count + b * more) * unit. The counts are whole numbers below 2^53, so that a block's
+ * middle doesn't depend on which block comes first. */
 VEC_INLINE void find_middles(double zero, double count, double more, double unit, uint32_t blocks, struct middles *m)
 {
     for (uint32_t b = 0; b < blocks; b++) {
@@ -88,7 +88,7 @@ VEC_INLINE void turn_on(const struct middles *m, uint32_t b, double s, double c1
     *cosine = m->cosine[b] + (m->cosine1[b] + (m->cosine[b] * c1 - m->sine[b] * s));
 }
 
-/* reading is NULL or not as a constant, so that there is a loop of its own for each. */
+/* Callers pass a pointer or the constant NULL, so that the compiler makes a loop for each case. */
 VEC_INLINE void sweep_blocks(const struct kernel_steps *steps, const struct kernel_pulses *sweep,
                              const double rotation[9], const struct vec3_out *out, const struct kernel_reading *reading)
 {

@@ -3,7 +3,7 @@
 
 #include "core/vecmath.h"
 
-/* Times of the pulses of a run with a table: they fire at the ticks of the sequence. */
+/* Computes times in a run with a table, whose pulses fire at ticks of the sequence. */
 static void times_of_table(const struct schedule_run *run, uint32_t *dt_ns)
 {
     const uint64_t begin = run->firing[run->firing_at].tick;
@@ -50,7 +50,7 @@ static void add_times(const struct times *t, uint32_t begin_ns, int64_t begin_pa
         dt_ns[i] = begin_ns + ns[i] + (begin_part + part[i] >= den);
 }
 
-/* Block by block. */
+/* Each block of TIMES pulses adds its begin to one table of times. */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns)
 {
     const int64_t den = (int64_t)run->ns_den; /* below 2^62, as pulse rates are */

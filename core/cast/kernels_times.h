@@ -5,7 +5,7 @@
 
 #include "core/schedule.h"
 
-/* Firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
+/* Computes firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns);
 
 #endif

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Hits of pulses, with their triangles: the first stages of a pulse (caster.c). Of the echoes it only decides
- * whether there is one. */
+/* Hits of pulses, with their triangles: the first stages of a pulse (caster.c). After these it only decides whether a
+ * hit makes an echo. */
 #include <math.h>
 
 #include "core/cast/aim.h"
 #include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/cast/tripod.h"
 #include "core/surface.h"
 #include "core/vec3.h"
@@ -28,13 +27,9 @@ struct seen {
 
 static int is_front(const struct cast_setup *s, const struct seen *seen, const double dir[3])
 {
-    const struct cast_mover *m = seen->body != 0 ? caster_body(s, seen->body) : NULL;
-    struct bvh_plane plane;
-    double along = 0.0;
-    bvh_get_plane(m != NULL ? m->bvh : s->bvh, seen->triangle, &plane);
-    for (int i = 0; i < 3; i++)
-        along += dir[i] * (m == NULL ? plane.n[i] : vec3_dot(m->rotation + 3 * i, plane.n));
-    return along < 0.0;
+    double n[3];
+    caster_normal(s, seen->body, seen->triangle, n);
+    return vec3_dot(dir, n) < 0.0;
 }
 
 /* Decides as caster_echoes does, for a single echo without noise. */
@@ -57,12 +52,12 @@ static int is_reported(const struct meeting *m, const struct seen *seen)
 }
 
 /* Glass does not refract: hits beyond it are on the same line. */
-static void meet_take(struct meeting *m, const struct met *met, const struct seen *seen)
+static void meet_take(struct meeting *m, const struct ray_hits *hits, const struct seen *seen)
 {
-    const double dir[3] = VEC3_AT(met->rays.dir, seen->pulse);
+    const double dir[3] = VEC3_AT(hits->rays.dir, seen->pulse);
     struct cast_hit *hit = &m->hit[m->n];
     if (!is_reported(m, seen)) return;
-    bvh_origin_of(&met->rays.from, seen->pulse, hit->p_m);
+    bvh_origin_of(&hits->rays.from, seen->pulse, hit->p_m);
     for (int i = 0; i < 3; i++)
         hit->p_m[i] += seen->range_m * dir[i];
     hit->range_m = seen->range_m;
@@ -74,38 +69,38 @@ static void meet_take(struct meeting *m, const struct met *met, const struct see
     m->n++;
 }
 
-static void take_paths(struct meeting *m, const struct met *met, const struct path_rays *paths, uint32_t i)
+static void take_paths(struct meeting *m, const struct ray_hits *hits, const struct path_rays *paths, uint32_t i)
 {
     for (uint32_t j = paths->first[i]; j != CAST_NO_PATH; j = paths->found[j].next) {
         const struct path_hit *p = &paths->found[j];
         if (p->ghost) continue;
-        meet_take(m, met, &(struct seen){i, p->label, p->triangle, p->body, p->range_m, p->cosine, p->energy});
+        meet_take(m, hits, &(struct seen){i, p->label, p->triangle, p->body, p->range_m, p->cosine, p->energy});
     }
 }
 
 static void meet_chunk(struct caster *c, const struct chunk *k, struct meeting *m)
 {
     const struct cast_setup *s = k->s;
-    const struct met met = {.rays = {.n = k->n,
-                                     .from = k->from,
-                                     .dir = VEC3_IN(c->d, 0),
-                                     .range_max_m = s->range_max_m,
-                                     .range_m = c->list.range_m,
-                                     .triangle = c->hit,
-                                     .label = c->list.label},
-                            .cosine = c->list.cosine,
-                            .body = c->body};
+    const struct ray_hits hits = {.rays = {.n = k->n,
+                                           .from = k->from,
+                                           .dir = VEC3_IN(c->d, 0),
+                                           .range_max_m = s->range_max_m,
+                                           .range_m = c->list.range_m,
+                                           .triangle = c->hit,
+                                           .label = c->list.label},
+                                  .cosine = c->list.cosine,
+                                  .body = c->body};
     const int follows = s->detect != NULL && s->detect->surfaces != NULL && s->detect->depth > 0;
-    caster_nearest(&c->nearest, s, &met);
+    caster_nearest(&c->nearest, s, &hits);
     if (s->tripod != NULL) c->counters.hidden += caster_hide(s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
-    if (follows) caster_follow(&c->nearest, s, &met, &c->paths);
+    if (follows) caster_follow(&c->nearest, s, &hits, &c->paths);
     m->k = k;
     for (uint32_t i = 0; i < k->n; i++) {
-        if (isnan(met.rays.range_m[i])) continue;
-        meet_take(m, &met,
-                  &(struct seen){i, met.rays.label[i], met.rays.triangle[i], met.body[i], met.rays.range_m[i],
-                                 met.cosine[i], 1.0});
-        if (follows) take_paths(m, &met, &c->paths, i);
+        if (isnan(hits.rays.range_m[i])) continue;
+        meet_take(m, &hits,
+                  &(struct seen){i, hits.rays.label[i], hits.rays.triangle[i], hits.body[i], hits.rays.range_m[i],
+                                 hits.cosine[i], 1.0});
+        if (follows) take_paths(m, &hits, &c->paths, i);
     }
 }
 

@@ -7,7 +7,7 @@
 #include "core/cast/chunk_arrays.h"
 
 /* Rays, and their first hits among scene and bodies. */
-struct met {
+struct ray_hits {
     struct bvh_rays rays; /* a triangle's number is that in the body that was hit */
     /* only where surfaces are modelled or bodies move, else NULL: */
     double *cosine; /* of the incidence */
@@ -25,11 +25,11 @@ struct nearest {
     double mover_range_m[CHUNK];
     uint32_t mover_hit[CHUNK], mover_label[CHUNK];
 };
-void caster_nearest(struct nearest *w, const struct cast_setup *s, const struct met *met);
+void caster_nearest(struct nearest *w, const struct cast_setup *s, const struct ray_hits *hits);
 
-/* Number of the tripod's legs among the bodies, as in struct met. */
+/* Number of the tripod's legs among the bodies, as in struct ray_hits. */
 enum { CAST_LEGS = CAST_MAX_MOVERS + 1 };
-/* Body k > 0 of those that a ray may meet. */
+/* Returns body k > 0 of those that a ray may hit. */
 static inline const struct cast_mover *caster_body(const struct cast_setup *s, uint8_t body)
 {
     return body == CAST_LEGS ? &s->tripod->legs : &s->mover[body - 1];

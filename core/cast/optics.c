@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Through glass and off mirrors: only rays that meet such a surface are cast again, together. */
+/* Follows rays through glass and off mirrors: only rays that hit such a surface are cast again, together. */
 #include "core/cast/optics.h"
 
 #include <math.h>
@@ -19,8 +19,7 @@ int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho)
     return rho == 0.0 && s->detect->depth > 0 && caster_goes_on(s, label);
 }
 
-/* Unit normal of a triangle, prcs. */
-static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, double n[3])
+void caster_normal(const struct cast_setup *s, uint8_t body, uint32_t hit, double n[3])
 {
     const struct cast_mover *m = body != 0 ? caster_body(s, body) : NULL;
     struct bvh_plane at_rest;
@@ -34,7 +33,7 @@ static void normal_of(const struct cast_setup *s, uint8_t body, uint32_t hit, do
  * double precision is less than a tenth of it, up to 1e8 m from the scene's zero. */
 static const double STEP_M = 1e-6;
 
-/* Ray k starts from its hit. */
+/* Makes ray k go on from its hit. */
 static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
 {
     const struct surface *surface = surface_at(s->detect->surfaces, p->label[k]);
@@ -44,7 +43,7 @@ static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
     double step = STEP_M / fmax(p->cosine[k], 1e-3), share = surface->glass;
     uint8_t ghost = p->ghost[k];
     if (surface->mirror > 0.0) {
-        normal_of(s, p->body[k], p->hit[k], n);
+        caster_normal(s, p->body[k], p->hit[k], n);
         double along = 2.0 * vec3_dot(n, dir);
         for (int a = 0; a < 3; a++)
             dir[a] -= along * n[a];
@@ -77,9 +76,9 @@ static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
 }
 
 /* Begins the paths of rays whose first hit lets them go on. */
-static void optics_begin(const struct cast_setup *s, const struct met *met, struct path_rays *p)
+static void optics_begin(const struct cast_setup *s, const struct ray_hits *hits, struct path_rays *p)
 {
-    const struct bvh_rays *rays = &met->rays;
+    const struct bvh_rays *rays = &hits->rays;
     p->n = p->n_found = 0;
     for (uint32_t i = 0; i < rays->n; i++) {
         double at[3];
@@ -94,10 +93,10 @@ static void optics_begin(const struct cast_setup *s, const struct met *met, stru
         p->energy[k] = 1.0;
         p->ghost[k] = 0;
         p->range_m[k] = rays->range_m[i];
-        p->cosine[k] = met->cosine[i];
+        p->cosine[k] = hits->cosine[i];
         p->label[k] = rays->label[i];
         p->hit[k] = rays->triangle[i];
-        p->body[k] = met->body[i];
+        p->body[k] = hits->body[i];
     }
 }
 
@@ -121,25 +120,25 @@ static void optics_keep(struct path_rays *p, uint32_t k)
     p->last[ray] = at;
 }
 
-void caster_follow(struct nearest *w, const struct cast_setup *s, const struct met *first, struct path_rays *p)
+void caster_follow(struct nearest *w, const struct cast_setup *s, const struct ray_hits *first, struct path_rays *p)
 {
     optics_begin(s, first, p);
     for (uint32_t depth = 0; depth < s->detect->depth && p->n > 0; depth++) {
         uint32_t on = 0;
         for (uint32_t k = 0; k < p->n; k++)
             set_out(s, p, k);
-        const struct met met = {.rays = {.n = p->n,
-                                         .from.own = VEC3_IN(p->p, 0),
-                                         .dir = VEC3_IN(p->d, 0),
-                                         .range_max_m = s->range_max_m,
-                                         .scattered = first->rays.scattered,
-                                         .range_m = p->range_m,
-                                         .triangle = p->hit,
-                                         .label = p->label},
-                                .cosine = p->cosine,
-                                .body = p->body,
-                                .colour = first->colour != NULL ? p->colour : NULL};
-        caster_nearest(w, s, &met);
+        const struct ray_hits hits = {.rays = {.n = p->n,
+                                               .from.own = VEC3_IN(p->p, 0),
+                                               .dir = VEC3_IN(p->d, 0),
+                                               .range_max_m = s->range_max_m,
+                                               .scattered = first->rays.scattered,
+                                               .range_m = p->range_m,
+                                               .triangle = p->hit,
+                                               .label = p->label},
+                                      .cosine = p->cosine,
+                                      .body = p->body,
+                                      .colour = first->colour != NULL ? p->colour : NULL};
+        caster_nearest(w, s, &hits);
         for (uint32_t k = 0; k < p->n; k++) {
             if (!(p->length_m[k] + p->range_m[k] <= s->range_max_m)) continue;
             optics_keep(p, k);

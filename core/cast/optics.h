@@ -33,13 +33,15 @@ struct path_rays {
 };
 
 struct nearest;
-struct met;
+struct ray_hits;
 
-/* True for glass and mirrors, where detection has a depth. */
+/* Returns 1 for glass and mirrors. Detection must have a depth. */
 int caster_goes_on(const struct cast_setup *s, uint32_t label);
-/* A bare pane or mirror sends nothing back: no echo, whether there is a signal model or not. */
+/* Sets n to the unit normal of a triangle of the scene (body 0) or of a body, prcs. */
+void caster_normal(const struct cast_setup *s, uint8_t body, uint32_t triangle, double n[3]);
+/* Returns 1 for a bare pane or mirror, which sends nothing back: it has no echo, with or without a signal model. */
 int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho);
 /* Follows up to CHUNK rays through glass and off mirrors. Their hits are chains in p. */
-void caster_follow(struct nearest *w, const struct cast_setup *s, const struct met *first, struct path_rays *p);
+void caster_follow(struct nearest *w, const struct cast_setup *s, const struct ray_hits *first, struct path_rays *p);
 
 #endif

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* Outlines, probed by casting rays. */
+/* Casts the rays that outlines are probed with. */
 
 #include "core/cast.h"
 
-struct look {
+struct prober {
     struct caster *caster;
     const struct bvh *bvh;
     const struct beam_outlines_spec *spec;
     uint32_t triangle[2048];
 };
 
-static void outlines_look(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
+static void outlines_probe(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
 {
-    struct look *l = ctx;
-    const struct beam_outlines_spec *spec = l->spec;
-    const uint32_t most = sizeof l->triangle / sizeof l->triangle[0];
+    struct prober *prober = ctx;
+    const struct beam_outlines_spec *spec = prober->spec;
+    const uint32_t most = sizeof prober->triangle / sizeof prober->triangle[0];
     for (uint32_t at = 0, part; at < n; at += part) {
         part = n - at < most ? n - at : most;
         const struct bvh_rays rays = {.n = part,
@@ -22,11 +22,11 @@ static void outlines_look(void *ctx, uint32_t n, const struct vec3_in *dir, doub
                                       .dir = VEC3_IN(*dir, at),
                                       .range_max_m = spec->range_max_m,
                                       .range_m = range_m + at,
-                                      .triangle = l->triangle};
-        caster_hits(l->caster, l->bvh, &rays);
+                                      .triangle = prober->triangle};
+        caster_hits(prober->caster, prober->bvh, &rays);
         for (uint32_t i = 0; i < part; i++)
-            kind[at + i] = spec->kind != NULL && l->triangle[i] != BVH_NO_TRIANGLE
-                               ? spec->kind[spec->scene->label[l->triangle[i]]]
+            kind[at + i] = spec->kind != NULL && prober->triangle[i] != BVH_NO_TRIANGLE
+                               ? spec->kind[spec->scene->label[prober->triangle[i]]]
                                : 0;
     }
 }
@@ -34,11 +34,11 @@ static void outlines_look(void *ctx, uint32_t n, const struct vec3_in *dir, doub
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
                   struct sh_err *err)
 {
-    struct look l = {.bvh = bvh, .spec = spec};
-    const struct beam_probe probe = {outlines_look, &l};
-    int rc = caster_create(&l.caster, err);
+    struct prober prober = {.bvh = bvh, .spec = spec};
+    const struct beam_probe probe = {outlines_probe, &prober};
+    int rc = caster_create(&prober.caster, err);
     if (rc != SH_OK) return rc;
     rc = beam_outlines_create(spec, &probe, out, err);
-    caster_free(l.caster);
+    caster_free(prober.caster);
     return rc;
 }

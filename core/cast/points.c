@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Echoes -> points, as entries of the block: the one writer, for single rays and for pulses of several
- * echoes. */
+/* Echoes -> points, as entries of the block. Single rays and pulses of several echoes share this one writer. */
 #include "core/cast/points.h"
 
 #include <math.h>
@@ -8,14 +7,13 @@
 
 #include "core/cast/aim.h"
 #include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/cast/colours.h"
 #include "core/cast/kernels_aim.h"
 #include "core/cast/kernels_moving.h"
 #include "core/cast/kernels_points.h"
 #include "core/colour.h"
 
-/* Copies to further echoes what they share with the pulse's first one. */
+/* Copies to secondary echoes what they share with the pulse's first one. */
 static void follow_pulse(struct caster *c, const struct chunk *k)
 {
     struct echo_list *l = &c->list;
@@ -31,7 +29,7 @@ static void follow_pulse(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Positions as a head computes them, from ranges and what its encoders read: writes the three numbers of
+/* Computes positions as a head does, from ranges and what its encoders read, and writes the three numbers of
  * echoes at .. at + n of the list. Returns 0 where all fit; numbers that don't are LINE_XYZ_NONE. */
 static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const struct kernel_wire *out)
 {
@@ -122,7 +120,7 @@ static void write_secondary(struct caster *c, const struct chunk *k, uint32_t to
     if (b->deviation != NULL) b->deviation[to] = l->deviation[i];
 }
 
-/* Inserts further echoes after the first ones of their pulses, beginning with the last, which moves
+/* Inserts secondary echoes after the first ones of their pulses, beginning with the last pulse, which moves
  * furthest. */
 static void insert_secondary(struct caster *c, const struct chunk *k)
 {
@@ -160,7 +158,7 @@ static void write_times(const struct echo_list *l, const struct chunk *k)
     if (to != k->dt_ns + from) memmove(to, k->dt_ns + from, (k->n - from) * sizeof *to);
 }
 
-/* Moves entry `from`, which has no echo where it does not fit. */
+/* Moves entry `from`. If its position does not fit, it becomes a shot without echo. */
 static void keep_entry(struct line_block *b, uint32_t to, uint32_t from, int fits)
 {
     b->a[to] = b->a[from];

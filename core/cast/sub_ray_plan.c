@@ -1,12 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Which sub-rays a pulse gets, and where in its footprint. */
+/* Chooses the sub-rays that a pulse gets, and where in its footprint they lie. */
 #include "core/cast/sub_rays.h"
 
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/vecmath.h"
 
 enum { LANES = 8 }; /* the pool has room for that many beyond the last sub-ray */
@@ -32,7 +30,7 @@ VEC_INLINE struct sub_ray sub_ray(const struct beam *beam, const struct beam_sig
                              (dir[2] + slope * (x * e2[2] - y * e1[2])) * over}};
 }
 
-/* A ray for a part. */
+/* Adds a ray for a part of the footprint. */
 static void add_ray(struct caster *c, const struct chunk *k, struct job *job, const struct beam_part *part)
 {
     struct pool *pool = &c->sub_rays->pool;
@@ -100,7 +98,7 @@ void plan_whole(struct caster *c, const struct chunk *k, struct job *job)
 }
 
 /* The part with the centre lies on the surface that the centre hits: its range at (x, y) needs no ray.
- * Returns 0 where it does need one: at a small angle the plane's range is useless. */
+ * Returns 0 where it does need one: beyond 88.9 degrees of incidence (1 / cos^2 of 2500) that range is useless. */
 static int known_centre(const struct caster *c, const struct chunk *k, struct job *job, const struct beam_part *part)
 {
     const uint32_t p = job->pulse;
@@ -125,8 +123,8 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
 
 /* Whether the centre is certainly on its side of the lines. Where the outlines' floats and the ray's hit
  * might disagree, the centre's hit says nothing about its part. Floats from the station have an error of
- * 2^-24 of the range. That is 1e-3 of the radius of a beam of 0.12 mrad, 6e-5 of the range, and less of wider ones. The
- * limit is twice that. */
+ * 2^-24 of the range. That is 1e-3 of the footprint's radius for a divergence of 0.12 mrad, and less for wider beams.
+ * The limit is twice that. */
 static int is_centre_clear(const struct beam_line *line, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++)

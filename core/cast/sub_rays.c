@@ -4,8 +4,6 @@
 
 #include <math.h>
 
-#include "core/cast/caster.h"
-#include "core/cast/chunk.h"
 #include "core/cast/kernels_points.h"
 #include "core/cast/waves.h"
 #include "core/surface.h"
@@ -21,12 +19,12 @@ static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t fi
 }
 
 /* Follows rays of the pool from `at` on beyond their first hits. */
-static void look_through(struct caster *c, const struct cast_setup *s, const struct met *met, uint32_t at)
+static void look_through(struct caster *c, const struct cast_setup *s, const struct ray_hits *hits, uint32_t at)
 {
     const struct path_rays *p = &c->paths;
     struct beyond *b = &c->sub_rays->beyond;
-    caster_follow(&c->nearest, s, met, &c->paths);
-    for (uint32_t i = 0; i < met->rays.n; i++) {
+    caster_follow(&c->nearest, s, hits, &c->paths);
+    for (uint32_t i = 0; i < hits->rays.n; i++) {
         b->first[at + i] = b->n;
         for (uint32_t k = p->first[i]; k != CAST_NO_PATH; k = p->found[k].next) {
             uint32_t to = b->n++;
@@ -34,7 +32,7 @@ static void look_through(struct caster *c, const struct cast_setup *s, const str
             b->cosine[to] = p->found[k].cosine;
             b->share[to] = p->found[k].energy;
             b->label[to] = p->found[k].label;
-            if (met->colour != NULL) b->colour[to] = p->found[k].colour;
+            if (hits->colour != NULL) b->colour[to] = p->found[k].colour;
             b->ghost[to] = p->found[k].ghost;
         }
         b->count[at + i] = b->n - b->first[at + i];
@@ -51,20 +49,20 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
     c->counters.sub_rays += p->n - first;
     for (uint32_t at = first, n; at < p->n; at += n) {
         n = p->n - at < CHUNK ? p->n - at : CHUNK;
-        struct met met = {.rays = {.n = n,
-                                   .from.own = VEC3_IN(p->p, at),
-                                   .dir = VEC3_IN(p->d, at),
-                                   .range_max_m = s->range_max_m,
-                                   .range_m = p->range_m + at,
-                                   .triangle = p->triangle + at,
-                                   .label = p->label + at},
-                          .cosine = plain ? NULL : p->cosine + at,
-                          .body = plain ? NULL : p->body + at,
-                          .colour = k->texels ? p->colour + at : NULL};
-        caster_nearest(&c->nearest, s, &met);
-        kernel_limit(met.rays.range_m, 0.0, s->range_max_m, n); /* hits beyond may or may not have been reported */
-        met.rays.scattered = c->sub_rays->scattered;
-        if (through) look_through(c, s, &met, at);
+        struct ray_hits hits = {.rays = {.n = n,
+                                         .from.own = VEC3_IN(p->p, at),
+                                         .dir = VEC3_IN(p->d, at),
+                                         .range_max_m = s->range_max_m,
+                                         .range_m = p->range_m + at,
+                                         .triangle = p->triangle + at,
+                                         .label = p->label + at},
+                                .cosine = plain ? NULL : p->cosine + at,
+                                .body = plain ? NULL : p->body + at,
+                                .colour = k->texels ? p->colour + at : NULL};
+        caster_nearest(&c->nearest, s, &hits);
+        kernel_limit(hits.rays.range_m, 0.0, s->range_max_m, n); /* hits beyond may or may not have been reported */
+        hits.rays.scattered = c->sub_rays->scattered;
+        if (through) look_through(c, s, &hits, at);
         for (uint32_t i = at; i < at + n && caster_has_bodies(s); i++)
             if (p->body[i] != 0) p->triangle[i] = BVH_NO_TRIANGLE; /* not of the scene */
     }
@@ -89,7 +87,7 @@ static void look_secondary(struct caster *c, const struct chunk *k)
     if (w->pool.n != first) cast_pool(c, k, first);
 }
 
-/* A return, with rho of its surface. */
+/* Adds a return; rho is that of its surface. */
 static void add_return(struct caster *c, const struct cast_setup *s, const struct beam_return *r, double share,
                        double rho)
 {
@@ -115,8 +113,8 @@ static void add_centre(struct caster *c, const struct cast_setup *s, const struc
     add_return(c, s, &job->centre, 1.0, rho);
 }
 
-/* Sigma of the ranges within the part that sub-ray i of a job stands for. */
-static float met_sigma(const struct caster *c, const struct cast_setup *s, const struct job *job, uint32_t i)
+/* Returns sigma of the ranges within the part that sub-ray i of a job stands for. */
+static float hit_sigma(const struct caster *c, const struct cast_setup *s, const struct job *job, uint32_t i)
 {
     const struct pool *p = &c->sub_rays->pool;
     const struct beam *beam = &s->beam->beam;
@@ -129,7 +127,7 @@ static float met_sigma(const struct caster *c, const struct cast_setup *s, const
 }
 
 /* Adds the hits of sub-ray i of a job. */
-static void add_met(struct caster *c, const struct chunk *k, const struct job *job, uint32_t i)
+static void add_hits(struct caster *c, const struct chunk *k, const struct job *job, uint32_t i)
 {
     const struct cast_setup *s = k->s;
     const struct pool *p = &c->sub_rays->pool;
@@ -137,7 +135,7 @@ static void add_met(struct caster *c, const struct chunk *k, const struct job *j
     struct beam_return r = {.range_m = p->range_m[i], .energy = p->energy[i], .label = p->label[i]};
     if (isnan(p->range_m[i])) return;
     if (k->texels) r.colour = p->colour[i];
-    if (k->spreads) r.sigma_m = met_sigma(c, s, job, i);
+    if (k->spreads) r.sigma_m = hit_sigma(c, s, job, i);
     add_return(c, s, &r, 1.0, p->rho[i]);
     if (s->detect == NULL || s->detect->depth == 0) return;
     for (uint32_t j = b->first[i]; j < b->first[i] + b->count[i]; j++) {
@@ -162,7 +160,7 @@ static int sees_through(const struct caster *c, const struct cast_setup *s, cons
     return 0;
 }
 
-/* The returns of a job as echoes. */
+/* Merges the returns of a job into echoes. */
 static void finish_job(struct caster *c, const struct chunk *k, const struct job *job)
 {
     struct sub_ray_work *w = c->sub_rays;
@@ -175,12 +173,12 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     w->is_silenced = 0;
     if (job->centre.energy > 0.0) add_centre(c, k->s, job);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
-        add_met(c, k, job, i);
+        add_hits(c, k, job, i);
     /* Detection decides which of many are left out. */
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;
-    if (k->waves != NULL) waves_take_returns(k->waves, job->pulse, w->returns, w->n_returns);
+    if (k->waves) waves_take_returns(c, k, job->pulse, w->returns, w->n_returns);
     w->echoes_of[job->pulse].first = w->n_echoes;
     w->echoes_of[job->pulse].n = n;
     w->n_echoes += n;
@@ -191,7 +189,7 @@ static int are_alike(const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     return s->beam->mode != BEAM_ADAPTIVE && s->silent == NULL && (s->detect == NULL || s->detect->depth == 0) &&
-           k->waves == NULL && !k->texels && !k->spreads;
+           !k->waves && !k->texels && !k->spreads;
 }
 
 /* Finishes BEAM_ALIKE jobs over whole footprints, from `first` on. */
@@ -240,19 +238,18 @@ static void run_jobs(struct caster *c, const struct chunk *k)
 static int is_full(const struct sub_ray_work *w, uint32_t most)
 {
     _Static_assert(MAX_PASSES * BEAM_MAX_PARTS + BEAM_MAX_SUBRAYS <= POOL, "room for a pulse");
-    const uint32_t near = 8 * CHUNK,
-                   room = 32 * most > near ? POOL : near; /* what fits into a cache, where that is enough */
+    const uint32_t near = 8 * CHUNK, room = 32 * most > near ? POOL : near; /* `near` fits into a cache */
     return w->n_jobs == MAX_JOBS || (w->n_jobs + 1) * most > room;
 }
 
-/* The centre of an adaptive beam meets glass or a mirror. */
+/* Returns whether the centre of an adaptive beam hits glass or a mirror. */
 static int sees_glass(const struct caster *c, const struct cast_setup *s, uint32_t pulse)
 {
     const struct echo_list *l = &c->list;
     return s->detect != NULL && s->detect->depth > 0 && !isnan(l->range_m[pulse]) && caster_goes_on(s, l->label[pulse]);
 }
 
-/* Pulses of an adaptive beam for which one ray may not be enough. */
+/* Finds the pulses of an adaptive beam for which one ray may not be enough. */
 static uint32_t find_candidates(struct caster *c, const struct chunk *k)
 {
     struct sub_ray_work *w = c->sub_rays;
@@ -286,7 +283,7 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
     if (w->n_jobs > 0) run_jobs(c, k);
 }
 
-/* The range up to which outlines may cut a footprint. Its centre hits a surface at range_m, and steep is 1
+/* Returns the range up to which outlines may cut a footprint. Its centre hits a surface at range_m, and steep is 1
  * / cos^2 of the incidence. The limit lies 4 radii of the footprint beyond the hit, and 3 more
  * times 1 / cos, since the surface may bend away: a footprint on a plane reaches tan(incidence) radii beyond. */
 static double limit_m(const struct beam *beam, double range_m, float steep)
@@ -295,7 +292,7 @@ static double limit_m(const struct beam *beam, double range_m, float steep)
     return isnan(range_m) ? (double)INFINITY : range_m + beam_radius(beam, range_m) * (4.0 + 3.0 * sqrt(s));
 }
 
-/* Candidates of an adaptive beam: rays for the parts of their footprints. */
+/* Casts rays for the parts of the candidates' footprints. */
 static void cast_parts(struct caster *c, const struct chunk *k, uint32_t candidates)
 {
     struct sub_ray_work *w = c->sub_rays;
@@ -339,14 +336,14 @@ static void list_echoes(struct caster *c, const struct chunk *k)
             l->range_m[at] = e[j].range_m;
             l->label[at] = e[j].label;
             l->number[at] = e[j].number;
-            l->rho[at] = (double)(float)e[j].back; /* as fine as beam_merge compares them */
+            l->rho[at] = (double)(float)e[j].back; /* beam_merge compares them as floats, too */
             if (k->attributes) l->width_m[at] = e[j].width_m;
             if (k->texels) l->colour[at] = e[j].colour;
         }
     }
 }
 
-/* Finds what comes back of pulses whose central ray stands for the whole footprint. */
+/* Finds how much comes back of pulses whose central ray stands for the whole footprint. */
 static void weigh_central(struct caster *c, const struct chunk *k)
 {
     struct echo_list *l = &c->list;

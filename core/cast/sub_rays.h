@@ -3,7 +3,7 @@
 #ifndef CORE_CAST_SUB_RAYS_H
 #define CORE_CAST_SUB_RAYS_H
 
-#include "core/cast/chunk_arrays.h"
+#include "core/cast/caster.h"
 
 enum {
     POOL = 24 * CHUNK,     /* sub-rays worked on at a time */
@@ -62,7 +62,7 @@ struct sub_ray_work {
     struct pool pool;
     struct beam_return returns[(BEAM_MAX_SUBRAYS + 1) * (1 + CAST_MAX_DEPTH)];
     uint32_t n_returns;
-    int is_silenced; /* the job at hand met a surface that gives no echo */
+    int is_silenced; /* the job at hand hit a surface that gives no echo */
     struct {
         uint32_t first, n;
     } echoes_of[CHUNK]; /* by pulse */
@@ -71,17 +71,14 @@ struct sub_ray_work {
     struct beyond beyond;
 };
 
-struct caster;
-struct chunk;
-
-/* ---- sub_rays.c: the pulses of a chunk as footprints -> the list, with rho where something asks for it. */
+/* ---- sub_rays.c: puts the echoes of a chunk's footprints into the list, with rho where something asks for it. */
 void caster_sub_rays(struct caster *c, const struct chunk *k);
 
 /* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
-/* Sub-rays over the whole footprint. */
+/* Adds sub-rays over the whole footprint. */
 void plan_whole(struct caster *c, const struct chunk *k, struct job *job);
-/* The rays that a pulse needs, given the outlines up to limit_m. Returns 0 where there are as many as `known`, so that
- * the rays at hand are enough (known 0: the central ray). */
+/* Adds the rays that a pulse needs, given the outlines up to limit_m. Returns 0 where these are as many as `known`: the
+ * rays that were cast are then enough (known 0: the central ray). */
 int plan_parts(struct caster *c, const struct chunk *k, struct job *job, double limit_m, uint32_t known);
 
 #endif

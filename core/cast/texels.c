@@ -3,8 +3,10 @@
 #include "core/cast/texels.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "core/cast/nearest.h"
+#include "core/mat3.h"
 #include "core/surface.h"
 
 /* The place of ray i's hit in a mesh, at rest. */
@@ -15,10 +17,10 @@ struct place {
     double p[3];
 };
 
-static void find_place(const struct cast_setup *s, const struct met *met, uint32_t i, struct place *place)
+static void find_place(const struct cast_setup *s, const struct ray_hits *hits, uint32_t i, struct place *place)
 {
-    const struct bvh_rays *rays = &met->rays;
-    const struct cast_mover *m = met->body != NULL && met->body[i] != 0 ? caster_body(s, met->body[i]) : NULL;
+    const struct bvh_rays *rays = &hits->rays;
+    const struct cast_mover *m = hits->body != NULL && hits->body[i] != 0 ? caster_body(s, hits->body[i]) : NULL;
     struct scene_part part;
     scene_find_part(bvh_scene(m != NULL ? m->bvh : s->bvh), rays->triangle[i], &part);
     place->scene = part.scene;
@@ -29,16 +31,17 @@ static void find_place(const struct cast_setup *s, const struct met *met, uint32
     bvh_origin_of(&rays->from, i, at);
     for (int k = 0; k < 3; k++)
         at[k] += rays->range_m[i] * d[k];
-    for (int k = 0; k < 3; k++) /* where that was at rest */
-        p[k] = m == NULL ? at[k]
-                         : m->rotation[k] * (at[0] - m->shift_m[0]) + m->rotation[3 + k] * (at[1] - m->shift_m[1]) +
-                               m->rotation[6 + k] * (at[2] - m->shift_m[2]);
+    memcpy(p, at, sizeof at);
+    if (m != NULL) { /* the place on the body at rest */
+        vec3_sub(at, m->shift_m, at);
+        mat3_apply_transposed(m->rotation, at, p);
+    }
     if (part.copy != NULL) scene_copy_put_back(part.copy, ((const double[3]){p[0], p[1], p[2]}), p);
     for (int c = 0; c < 3; c++)
         place->corner[c] = part.scene->vertex_m[part.scene->triangle[part.triangle][c]];
 }
 
-/* 0: there are none. */
+/* Returns 0 where the mesh has none. */
 static int uv_of(const struct place *place, double uv[2])
 {
     if (place->scene->uv == NULL) return 0;
@@ -51,9 +54,9 @@ static int rgb_of(const struct place *place, uint8_t rgb[3])
     return place->scene->rgb != NULL && scene_rgb_at(place->scene, place->triangle, place->corner, place->p, rgb);
 }
 
-static void set_reflectances(const struct cast_setup *s, const struct met *met, const struct surface_table *table)
+static void set_reflectances(const struct cast_setup *s, const struct ray_hits *hits, const struct surface_table *table)
 {
-    const struct bvh_rays *rays = &met->rays;
+    const struct bvh_rays *rays = &hits->rays;
     struct place place;
     double uv[2];
     uint8_t rgb[3];
@@ -63,15 +66,15 @@ static void set_reflectances(const struct cast_setup *s, const struct met *met, 
         const int has_image = table->texture != NULL && table->texture[label] != NULL;
         const int by_vertex = table->by_vertex != NULL && table->by_vertex[label];
         if (!has_image && !by_vertex) continue;
-        find_place(s, met, i, &place);
+        find_place(s, hits, i, &place);
         if (has_image && uv_of(&place, uv)) rays->label[i] = surface_texel(table, label, uv);
         if (by_vertex && rays->label[i] == label && rgb_of(&place, rgb)) rays->label[i] = surface_texel_of(label, rgb);
     }
 }
 
-static void set_colours(const struct cast_setup *s, const struct met *met, const struct surface_colours *colours)
+static void set_colours(const struct cast_setup *s, const struct ray_hits *hits, const struct surface_colours *colours)
 {
-    const struct bvh_rays *rays = &met->rays;
+    const struct bvh_rays *rays = &hits->rays;
     struct place place;
     double uv[2];
     uint8_t rgb[3];
@@ -80,15 +83,15 @@ static void set_colours(const struct cast_setup *s, const struct met *met, const
         if (isnan(rays->range_m[i])) continue;
         const int has_image = label < colours->n && colours->image[label] != NULL;
         const int by_vertex = label < colours->n && colours->by_vertex[label];
-        if (has_image || by_vertex) find_place(s, met, i, &place);
-        met->colour[i] = surface_colour(colours, label, has_image && uv_of(&place, uv) ? uv : NULL,
-                                        by_vertex && rgb_of(&place, rgb) ? rgb : NULL);
+        if (has_image || by_vertex) find_place(s, hits, i, &place);
+        hits->colour[i] = surface_colour(colours, label, has_image && uv_of(&place, uv) ? uv : NULL,
+                                         by_vertex && rgb_of(&place, rgb) ? rgb : NULL);
     }
 }
 
-void caster_texels(const struct cast_setup *s, const struct met *met)
+void caster_texels(const struct cast_setup *s, const struct ray_hits *hits)
 {
     const struct surface_table *table = s->detect != NULL ? s->detect->surfaces : NULL;
-    if (table != NULL && (table->texture != NULL || table->by_vertex != NULL)) set_reflectances(s, met, table);
-    if (met->colour != NULL) set_colours(s, met, s->colour->surfaces);
+    if (table != NULL && (table->texture != NULL || table->by_vertex != NULL)) set_reflectances(s, hits, table);
+    if (hits->colour != NULL) set_colours(s, hits, s->colour->surfaces);
 }

@@ -5,10 +5,10 @@
 
 #include "core/cast.h"
 
-struct met;
+struct ray_hits;
 
-/* Labels of hits get the reflectance there, as surface_texel has it, and met->colour gets the colour. Does nothing
+/* Labels of hits get the reflectance there, as surface_texel has it, and hits->colour gets the colour. Does nothing
  * where surfaces have no textures and no colours are asked for. */
-void caster_texels(const struct cast_setup *s, const struct met *met);
+void caster_texels(const struct cast_setup *s, const struct ray_hits *hits);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* This stage samples the light of each pulse that comes back, over time. It takes a pulse's returns before merging:
+/* This stage samples the light that comes back of each pulse, over time. It takes a pulse's returns before merging:
  *
  *     one ray for the whole footprint    a disc on the plane that it hits: the closed form
  *     parts of a footprint that is cut   a bell each, as wide as the part is deep
@@ -11,13 +11,14 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/cast/caster.h"
 #include "core/cast/kernels_points.h"
 #include "core/cast/tripod.h"
 #include "core/light.h"
 
-void waves_begin(const struct wave_chunk *k)
+void waves_begin(struct caster *c, const struct chunk *k)
 {
-    struct wave_work *w = k->work;
+    struct wave_work *w = c->waves;
     w->n_parts = 0;
     for (uint32_t i = 0; i < k->n; i++)
         w->of[i].own = 0;
@@ -51,7 +52,7 @@ static void parts_end(struct wave_work *w, uint32_t pulse, uint32_t n)
     w->n_parts += n;
 }
 
-/* One part for returns that lie close together. It keeps their power, mean and variance. */
+/* Returns one part for returns that lie close together. It keeps their power, mean and variance. */
 static struct wave_part join_returns(const struct beam_return *r, uint32_t n)
 {
     double back = 0.0, first = 0.0, second = 0.0;
@@ -86,11 +87,12 @@ static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apar
     return found;
 }
 
-/* Up to so many returns stay as they are. */
+/* With this many returns or fewer, none are joined. */
 enum { FEW = 16 };
 
 /* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. With d a fifteenth of a
- * pulse's width the signal changes by 1e-4 of its peak: less than half a count of 12 bits. */
+ * pulse's width, which is a sixteenth of its area, the signal changes by 1e-4 of its peak: less than half a count of
+ * 12 bits. */
 static double least_apart_m(const struct cast_waves *waves)
 {
     return 0.5 * LIGHT_SPEED_M_S * waveform_pulse_area_s(waves->waveform) / 16.0;
@@ -104,42 +106,42 @@ static uint32_t keep_visible(const struct cast_setup *s, struct beam_return *r, 
     return to;
 }
 
-void waves_take_returns(const struct wave_chunk *k, uint32_t pulse, struct beam_return *r, uint32_t n)
+void waves_take_returns(struct caster *c, const struct chunk *k, uint32_t pulse, struct beam_return *r, uint32_t n)
 {
-    struct wave_work *w = k->work;
+    struct wave_work *w = c->waves;
     struct wave_part *part = &w->part[parts_begin(w, pulse)];
-    double apart_m = least_apart_m(k->how);
+    double apart_m = least_apart_m(k->s->waves);
     n = keep_visible(k->s, r, n);
     if (n > FEW) beam_sort(r, n);
     uint32_t found = n > FEW ? WAVES_PARTS + 1 : join_groups(r, n, -(double)INFINITY, part);
-    for (; found > WAVES_PARTS; apart_m *= 2.0) /* a deep mess of branches: coarser, but no power is lost */
+    for (; found > WAVES_PARTS; apart_m *= 2.0) /* too many, as among branches: coarser groups keep all power */
         found = join_groups(r, n, apart_m, part);
     parts_end(w, pulse, found);
 }
 
 /* Takes entry i of the list as a return. Returns whether any light comes back. */
-static int take_entry(const struct wave_chunk *k, uint32_t i, struct wave_part *part)
+static int take_entry(const struct caster *c, const struct chunk *k, uint32_t i, struct wave_part *part)
 {
-    const struct echo_list *l = k->list;
+    const struct echo_list *l = &c->list;
     if (!is_in_range(k->s, l->range_m[i]) || !(l->rho[i] > 0.0)) return 0;
     *part = (struct wave_part){.range_m = l->range_m[i],
                                .back = l->rho[i],
-                               .extent_m = disc_extent(k->how, l->range_m[i], l->cosine[i]),
+                               .extent_m = disc_extent(k->s->waves, l->range_m[i], l->cosine[i]),
                                .label = l->label[i],
                                .colour = k->texels ? l->colour[i] : 0,
                                .spread = WAVEFORM_DISC};
     return 1;
 }
 
-void waves_take_paths(const struct wave_chunk *k)
+void waves_take_paths(struct caster *c, const struct chunk *k)
 {
-    struct wave_work *w = k->work;
-    for (uint32_t g = 0; g < k->list->n_secondary; g++) {
-        const struct secondary *f = &k->list->secondary[g];
+    struct wave_work *w = c->waves;
+    for (uint32_t g = 0; g < c->list.n_secondary; g++) {
+        const struct secondary *f = &c->list.secondary[g];
         struct wave_part *part = &w->part[parts_begin(w, f->pulse)];
-        uint32_t n = (uint32_t)take_entry(k, f->pulse, part);
+        uint32_t n = (uint32_t)take_entry(c, k, f->pulse, part);
         for (uint32_t i = f->at; i < f->at + f->n; i++)
-            n += (uint32_t)take_entry(k, i, part + n);
+            n += (uint32_t)take_entry(c, k, i, part + n);
         parts_end(w, f->pulse, n);
     }
 }
@@ -154,23 +156,23 @@ struct wave_pulse {
     struct wave_part one; /* of a pulse without returns of its own */
 };
 
-static void find_parts(const struct wave_chunk *k, uint32_t i, struct wave_pulse *p)
+static void find_parts(const struct caster *c, const struct chunk *k, uint32_t i, struct wave_pulse *p)
 {
-    const struct wave_work *w = k->work;
+    const struct wave_work *w = c->waves;
     const struct cast_tripod *tripod = k->s->tripod;
     p->number = i;
     p->part = w->of[i].own ? &w->part[w->of[i].first] : &p->one;
-    p->n = w->of[i].own ? w->of[i].n : (uint32_t)take_entry(k, i, &p->one);
-    if (tripod != NULL && caster_is_hidden(tripod, &k->d, i)) p->n = 0;
+    p->n = w->of[i].own ? w->of[i].n : (uint32_t)take_entry(c, k, i, &p->one);
+    if (tripod != NULL && caster_is_hidden(tripod, &VEC3_IN(c->d, 0), i)) p->n = 0;
 }
 
 /* Samples have the range errors of the instrument, since the digitiser's clock is that of the points. */
-static void sample_pulse(const struct wave_chunk *k, const struct wave_pulse *p)
+static void sample_pulse(struct caster *c, const struct chunk *k, const struct wave_pulse *p)
 {
     const struct cast_setup *s = k->s;
-    const struct waveform_spec *spec = waveform_spec_of(k->how->waveform);
+    const struct waveform_spec *spec = waveform_spec_of(k->s->waves->waveform);
     const double share = s->disturbance != NULL ? s->disturbance->share : 1.0;
-    struct wave_work *w = k->work;
+    struct wave_work *w = c->waves;
     w->record.sample = w->sample;
     w->record.capacity = WAVES_ROOM;
     w->record.n_windows = w->record.n_samples = w->record.n_left_out = 0;
@@ -182,21 +184,21 @@ static void sample_pulse(const struct wave_chunk *k, const struct wave_pulse *p)
         if (s->detect->instrument != NULL) instrument_range(s->detect->instrument, 1, &range_m);
         w->returns[i] = (struct waveform_return){range_m, amplitude, part->extent_m, part->spread};
     }
-    waveform_sample(k->how->waveform, s->scan_key, k->pulse0 + p->number, w->returns, p->n, &w->record);
-    k->counters->lost_samples += w->record.n_left_out;
+    waveform_sample(k->s->waves->waveform, s->scan_key, k->pulse0 + p->number, w->returns, p->n, &w->record);
+    c->counters.lost_samples += w->record.n_left_out;
 }
 
 /* Copies the windows of the pulse at hand into the block. Whole windows that find no room are counted. */
-static void keep_windows(const struct wave_chunk *k, uint32_t pulse)
+static void keep_windows(struct caster *c, const struct chunk *k, uint32_t pulse)
 {
-    const struct waveform_record *from = &k->work->record;
+    const struct waveform_record *from = &c->waves->record;
     struct line_waves *to = k->block->waves;
     to->n_left_out += from->n_left_out;
     for (uint32_t i = 0; i < from->n_windows; i++) {
         const struct waveform_window *window = &from->window[i];
         if (to->n == to->capacity || window->n > to->sample_capacity - to->n_samples) {
             to->n_left_out += window->n;
-            k->counters->lost_samples += window->n;
+            c->counters.lost_samples += window->n;
             continue;
         }
         to->wave[to->n++] = (struct line_wave){.pulse = k->first + pulse,
@@ -221,12 +223,12 @@ static uint32_t float_bits(double x)
 
 enum { BEAMS = 128 }; /* windows at a time */
 
-/* Directions in the CRS where it is no rotation of the scene: from positions a metre apart. */
-static void bend_beams(const struct wave_chunk *k, struct line_wave *wave, uint32_t n)
+/* Computes directions in a CRS that is no rotation of the scene, from two positions a metre apart. */
+static void bend_beams(const struct caster *c, const struct chunk *k, struct line_wave *wave, uint32_t n)
 {
     const struct cast_setup *s = k->s;
-    const struct echo_list *l = k->list;
-    const double step_m = 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(k->how->waveform)->sample_s;
+    const struct echo_list *l = &c->list;
+    const double step_m = 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(k->s->waves->waveform)->sample_s;
     double at[3][2 * BEAMS];
     for (uint32_t i = 0; i < 2 * n; i++) {
         const uint32_t pulse = wave[i % n].pulse - k->first;
@@ -246,14 +248,14 @@ static void bend_beams(const struct wave_chunk *k, struct line_wave *wave, uint3
 }
 
 /* Sets the beams of the block's windows from `first` on, as its points have them. */
-static void set_beams(const struct wave_chunk *k, uint32_t first)
+static void set_beams(const struct caster *c, const struct chunk *k, uint32_t first)
 {
     const struct cast_setup *s = k->s;
-    const struct echo_list *l = k->list;
+    const struct echo_list *l = &c->list;
     struct line_waves *waves = k->block->waves;
     for (uint32_t i = first, n; i < waves->n && s->layout == LINE_GEO && !k->linear; i += n) {
         n = waves->n - i < BEAMS ? waves->n - i : BEAMS;
-        bend_beams(k, waves->wave + i, n);
+        bend_beams(c, k, waves->wave + i, n);
     }
     if (s->layout == LINE_GEO && !k->linear) return;
     for (uint32_t i = first; i < waves->n; i++) {
@@ -273,10 +275,10 @@ static void set_beams(const struct wave_chunk *k, uint32_t first)
 /* ---- echoes that are found in the samples */
 
 /* The list's echoes are counted and taken away; each pulse keeps its place. */
-static void clear_list(const struct wave_chunk *k)
+static void clear_list(struct caster *c, const struct chunk *k)
 {
-    struct echo_list *l = k->list;
-    uint8_t *merged = k->work->merged;
+    struct echo_list *l = &c->list;
+    uint8_t *merged = c->waves->merged;
     for (uint32_t i = 0; i < k->n; i++)
         merged[i] = (uint8_t)!isnan(l->range_m[i]);
     for (uint32_t g = 0; g < l->n_secondary; g++)
@@ -288,10 +290,10 @@ static void clear_list(const struct wave_chunk *k)
 
 /* Returns the part with the most light within half an echo's width of it; if there is none, the nearest part within
  * two widths. NULL: the echo is noise. */
-static const struct wave_part *part_of(const struct wave_chunk *k, const struct wave_pulse *p,
+static const struct wave_part *part_of(const struct caster *c, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {
-    const struct waveform_return *r = k->work->returns;
+    const struct waveform_return *r = c->waves->returns;
     const double half_m = 0.25 * LIGHT_SPEED_M_S * echo->width_s;
     uint32_t best = p->n, nearest = 0;
     for (uint32_t i = 0; i < p->n; i++) {
@@ -308,10 +310,10 @@ static int16_t as_cdb(double ratio)
     return (int16_t)lrint(fmin(32767.0, fmax(-32767.0, 1000.0 * log10(ratio))));
 }
 
-static void put_echo(const struct wave_chunk *k, uint32_t at, const struct waveform_echo *echo,
+static void put_echo(struct caster *c, const struct chunk *k, uint32_t at, const struct waveform_echo *echo,
                      const struct wave_part *part)
 {
-    struct echo_list *l = k->list;
+    struct echo_list *l = &c->list;
     const double deviation = 1000.0 * echo->deviation;
     l->range_m[at] = echo->range_m;
     l->label[at] = part != NULL ? part->label : (uint32_t)LINE_LABEL_NONE;
@@ -332,39 +334,39 @@ static uint32_t keep_ranges(const struct cast_setup *s, struct waveform_echo *ec
     return kept;
 }
 
-static void find_echoes(const struct wave_chunk *k, const struct wave_pulse *p)
+static void find_echoes(struct caster *c, const struct chunk *k, const struct wave_pulse *p)
 {
-    struct echo_list *l = k->list;
+    struct echo_list *l = &c->list;
     const uint32_t i = p->number;
     struct waveform_echo echo[LINE_MAX_ECHOES];
     uint32_t crowded = 0;
-    /* Those beyond the head's max_echoes go later, so that one out of range does not take the place of another. */
-    const uint32_t found =
-        waveform_detect(k->how->waveform, k->how->detector, 1.0, &k->work->record, echo, LINE_MAX_ECHOES, &crowded);
+    /* Echoes beyond the head's max_echoes are dropped later: so one out of range does not take another's place. */
+    const uint32_t found = waveform_detect(k->s->waves->waveform, k->s->waves->detector, &c->waves->record, echo,
+                                           LINE_MAX_ECHOES, &crowded);
     const uint32_t n = keep_ranges(k->s, echo, found);
     const uint32_t rest = n > 1 ? echoes_secondary(l, i, n - 1) : 0, all = n + crowded;
-    k->counters->crowded += crowded;
-    const uint32_t missed = k->work->merged[i] > all ? k->work->merged[i] - all : 0, outside = found - n;
-    k->counters->faint += missed > outside ? missed : outside; /* a hit that was found outside counts once */
+    c->counters.crowded += crowded;
+    const uint32_t missed = c->waves->merged[i] > all ? c->waves->merged[i] - all : 0, outside = found - n;
+    c->counters.faint += missed > outside ? missed : outside; /* one out of range is among the missed: once */
     if (n == 0) l->range_m[i] = (double)NAN;
     for (uint32_t j = 0; j < n; j++) {
         const uint32_t at = j == 0 ? i : rest + j - 1;
-        put_echo(k, at, &echo[j], part_of(k, p, &echo[j]));
+        put_echo(c, k, at, &echo[j], part_of(c, p, &echo[j]));
         l->number[at] = (uint8_t)j;
     }
 }
 
-void caster_waves(const struct wave_chunk *k)
+void caster_waves(struct caster *c, const struct chunk *k)
 {
-    const int sends = k->block->waves != NULL, finds = k->how->finds;
+    const int sends = k->block->waves != NULL, finds = k->s->waves->finds;
     const uint32_t first = sends ? k->block->waves->n : 0;
-    if (finds) clear_list(k);
+    if (finds) clear_list(c, k);
     for (uint32_t i = 0; i < k->n; i++) {
         struct wave_pulse pulse;
-        find_parts(k, i, &pulse);
-        sample_pulse(k, &pulse);
-        if (sends) keep_windows(k, i);
-        if (finds) find_echoes(k, &pulse);
+        find_parts(c, k, i, &pulse);
+        sample_pulse(c, k, &pulse);
+        if (sends) keep_windows(c, k, i);
+        if (finds) find_echoes(c, k, &pulse);
     }
-    if (sends) set_beams(k, first);
+    if (sends) set_beams(c, k, first);
 }

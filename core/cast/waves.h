@@ -36,29 +36,18 @@ struct wave_work {
     uint16_t sample[WAVES_ROOM];
 };
 
-/* This is a chunk, as far as this stage needs it. */
-struct wave_chunk {
-    const struct cast_setup *s;
-    const struct cast_waves *how;
-    struct wave_work *work;
-    struct echo_list *list;
-    struct cast_counters *counters;
-    struct line_block *block;
-    struct vec3_in d; /* directions of the beams, prcs */
-    const uint32_t *dt_ns;
-    uint64_t pulse0;
-    uint32_t first, n;
-    int linear, texels; /* as in struct chunk */
-};
+struct caster;
+struct chunk;
 
-/* The caller begins with this, before returns are taken. */
-void waves_begin(const struct wave_chunk *k);
+/* Begins a chunk, before its returns are taken. */
+void waves_begin(struct caster *c, const struct chunk *k);
 /* Takes the returns of a pulse with sub-rays, in any order; they may change places. */
-void waves_take_returns(const struct wave_chunk *k, uint32_t pulse, struct beam_return *returns, uint32_t n);
+void waves_take_returns(struct caster *c, const struct chunk *k, uint32_t pulse, struct beam_return *returns,
+                        uint32_t n);
 /* Takes the returns of single rays through glass and off mirrors, before the list merges them. */
-void waves_take_paths(const struct wave_chunk *k);
+void waves_take_paths(struct caster *c, const struct chunk *k);
 /* Puts the samples into the block, if it has room for waveforms. Echoes that are found in them replace those of the
  * list. */
-void caster_waves(const struct wave_chunk *k);
+void caster_waves(struct caster *c, const struct chunk *k);
 
 #endif

@@ -3,6 +3,7 @@
 
 #include "core/detect.h"
 #include "core/light.h"
+#include "core/mat3.h"
 #include "core/rng.h"
 #include "core/vecmath.h"
 
@@ -59,8 +60,8 @@ void detect_ball_keys(struct detect_ball *ball, uint64_t seed)
     ball->radius_key = rng_key(seed, RNG_BALL_RADIUS);
 }
 
-/* Uniform in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes), the cube
- * root of a uniform number the distance. */
+/* Draws a place uniformly in the unit ball: a height uniform in -1..1 and an angle give a direction (Archimedes),
+ * the cube root of a uniform number the distance. */
 static void in_unit_ball(const struct detect_ball *ball, uint64_t scan_key, uint64_t key, double u[3])
 {
     uint64_t bits = rng_u64(ball->direction_key ^ scan_key, key);
@@ -105,11 +106,12 @@ void detect_move_in_ball(const struct detect_ball *ball, const double m[9], cons
             v[1] = c * u[0] - s * u[2];
             v[2] = s * u[0] + c * u[2];
         } else {
-            double x = m[0] * u[0] + m[3] * u[1] + m[6] * u[2], y = m[1] * u[0] + m[4] * u[1] + m[7] * u[2];
+            double w[3];
+            mat3_apply_transposed(m, u, w);
             vec_sincos_turn(p->pan_turn[i], &s, &c);
-            v[0] = c * x - s * y; /* the pan counts clockwise: ahead is (sin, cos), right (cos, -sin) */
-            v[1] = s * x + c * y;
-            v[2] = m[2] * u[0] + m[5] * u[1] + m[8] * u[2];
+            v[0] = c * w[0] - s * w[1]; /* the pan counts clockwise: ahead is (sin, cos), right (cos, -sin) */
+            v[1] = s * w[0] + c * w[1];
+            v[2] = w[2];
         }
         move_point(v, &p->range_m[i], &p->mirror_turn[i], &p->pan_turn[i]);
     }

@@ -14,7 +14,7 @@ static int by_range(const void *a, const void *b)
     return (x->range_m > y->range_m) - (x->range_m < y->range_m);
 }
 
-/* g through the reaches: slopes between them, and how much each is more than the one before. */
+/* Fits g through the reaches. more_1_m is the difference between a slope and the previous one. */
 static int fit_reaches(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err)
 {
     struct detect_reach reach[DETECT_MAX_REACHES];
@@ -28,8 +28,8 @@ static int fit_reaches(const struct detect_signal_spec *spec, struct detect_sign
         const struct detect_reach *a = &reach[i], *b = &reach[i + 1];
         double slope =
             (log(b->reflectance / a->reflectance) - 2.0 * log(b->range_m / a->range_m)) / (b->range_m - a->range_m);
-        /* A data sheet rounds its figures to a few percent: a deviation from R^2 of less than 10 % is no
-         * claim of it. */
+        /* A data sheet rounds its figures to a few percent, so a deviation from R^2 of less than 10 % is taken for
+         * rounding. */
         if (!(b->range_m > a->range_m) || slope * (b->range_m - a->range_m) < -0.1)
             return sh_fail(
                 err, SH_EINPUT,
@@ -62,7 +62,7 @@ int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_si
     return SH_OK;
 }
 
-/* log rho_min. */
+/* Returns log rho_min. */
 VEC_INLINE double log_least(const struct detect_signal *s, double range_m)
 {
     double g = s->g0 + s->more_1_m[0] * (range_m - s->at_m[0]);
@@ -152,11 +152,11 @@ void detect_amplitudes(const struct detect_signal *signal, const struct detect_e
     const uint32_t n = e->n;
     VEC_LOOP
     for (uint32_t i = 0; i < n; i++) {
-        double seen = amplitude[i] + per_snr * rng_normal(signal_key, key[i]); /* as above */
+        double seen = amplitude[i] + per_snr * rng_normal(signal_key, key[i]); /* the noise of detect() */
         int detected = range_m[i] == range_m[i];
         double cdb = 1000.0 / 2.302585092994045684 * vec_log(detected && seen > 1.0 ? seen : 1.0);
         uint64_t bits;
-        cdb = cdb > 32767.0 ? 32767.0 : cdb; /* likewise */
+        cdb = cdb > 32767.0 ? 32767.0 : cdb; /* as in detect() */
         vec_round(cdb, &bits);
         out[i] = (int16_t)(detected ? bits : (uint64_t)(uint16_t)LINE_AMPLITUDE_NONE);
     }

@@ -9,7 +9,8 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-/* t = rho^2 over the footprint: density proportional to exp(-2 t) on 0 .. 1. Means of t and t^2, by parts. */
+/* t = rho^2 over the footprint has a density proportional to exp(-2 t) on 0 .. 1. Its means, and those of t^2 and t^3,
+ * follow by integration by parts. */
 static double mean_t(void)
 {
     return 0.5 - exp(-2.0) / (1.0 - exp(-2.0));
@@ -20,41 +21,42 @@ static double mean_t2(void)
     return mean_t() - exp(-2.0) / (1.0 - exp(-2.0));
 }
 
-/* The Gaussian, cut off at the disc's edge, per distance of a line from the centre. */
-struct across {
-    double energy, along, across; /* energy; its second moments, by the distance and along the line */
+/* A strip of the disc between two distances from the centre, or the chord at one distance, per distance. The irradiance
+ * is a Gaussian that is cut off at the disc's edge. */
+struct strip {
+    double energy, along, across; /* energy; its second moments, by the distance and along the chord */
 };
 
-static struct across across(double x)
+static struct strip chord_at(double x)
 {
     const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
     double y2 = 1.0 - x * x, g = scale * exp(-2.0 * x * x), whole;
-    if (y2 <= 0.0) return (struct across){0.0, 0.0, 0.0};
+    if (y2 <= 0.0) return (struct strip){0.0, 0.0, 0.0};
     whole = g * sqrt(0.5 * M_PI) * erf(sqrt(2.0 * y2));
-    return (struct across){whole, whole * x * x, 0.25 * whole - 0.5 * g * sqrt(y2) * exp(-2.0 * y2)};
+    return (struct strip){whole, whole * x * x, 0.25 * whole - 0.5 * g * sqrt(y2) * exp(-2.0 * y2)};
 }
 
-/* Simpson's rule. With x = -cos a the integrand is smooth at the disc's edge as well. */
-static struct across between(double from, double to)
+/* Sums a strip by Simpson's rule. With x = -cos a the integrand is smooth at the disc's edge as well. */
+static struct strip between(double from, double to)
 {
     enum { STEPS = 8 };
     double a = acos(-fmax(-1.0, from)), b = acos(-fmin(1.0, to)), step = (b - a) / STEPS;
-    struct across sum = {0.0, 0.0, 0.0};
+    struct strip sum = {0.0, 0.0, 0.0};
     for (int i = 0; i <= STEPS; i++) {
         double at = a + i * step, weight = i == 0 || i == STEPS ? 1.0 : i % 2 == 1 ? 4.0 : 2.0;
-        struct across here = across(-cos(at));
+        struct strip here = chord_at(-cos(at));
         sum.energy += weight * here.energy * sin(at);
         sum.along += weight * here.along * sin(at);
         sum.across += weight * here.across * sin(at);
     }
-    return (struct across){sum.energy * step / 3.0, sum.along * step / 3.0, sum.across * step / 3.0};
+    return (struct strip){sum.energy * step / 3.0, sum.along * step / 3.0, sum.across * step / 3.0};
 }
 
 /* By Gauss's theorem: x exp(-2 r^2) is minus a quarter of the derivative of exp(-2 r^2) by x. */
 static double moment_beyond(double h)
 {
     const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
-    return 0.25 * (across(h).energy - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
+    return 0.25 * (chord_at(h).energy - scale * exp(-2.0) * 2.0 * sqrt(fmax(0.0, 1.0 - h * h)));
 }
 
 double beam_widening(enum beam_definition definition)
@@ -80,7 +82,7 @@ void beam_init(struct beam *beam, double exit_m, double divergence_rad, double p
     beam->resolution_m = 0.5 * LIGHT_SPEED_M_S * pulse_width_s;
     for (int i = BEAM_HALF_STEPS - 1; i >= 0; i--) {
         double h = 2.0 * i / BEAM_HALF_STEPS - 1.0;
-        struct across strip = between(h, h + 2.0 / BEAM_HALF_STEPS);
+        struct strip strip = between(h, h + 2.0 / BEAM_HALF_STEPS);
         beam->half[i] = beam->half[i + 1] + strip.energy;
         beam->along[i] = beam->along[i + 1] + strip.along;
         beam->across[i] = beam->across[i + 1] + strip.across;
@@ -140,8 +142,8 @@ void beam_plane_widths(const struct beam *beam, const float *restrict steep, con
     }
 }
 
-/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1): how the range changes
- * with x and y, to first order. */
+/* The sub-ray at (x, y) begins at exit_radius (x e1 + y e2), with slope (x e2 - y e1). by_x and by_y are how its range
+ * changes with x and y, to first order. */
 float beam_part_sigma(const struct beam *beam, const struct beam_sight *sight, const double n[3], double range_m,
                       const struct beam_part *part)
 {
@@ -163,7 +165,7 @@ double beam_echo_width(double pulse_m, double variance_m2)
     return variance_m2 == 0.0 ? pulse_m : sqrt(pulse_m * pulse_m + 8.0 * M_LN2 * variance_m2);
 }
 
-/* Where h lies in the tables. */
+/* Returns the row of the tables for h, and the part of the way from there to the next row. */
 static uint32_t look_up(double h, double *part)
 {
     double at = (h + 1.0) * (0.5 * BEAM_HALF_STEPS);

@@ -7,7 +7,7 @@
 
 #define SAME_LINE 1e-3 /* of the footprint's radius, and of a radian */
 
-/* An edge in the beam's frame: across, and along. */
+/* The ends of an edge along the beam's axes: e1, e2, and its direction. */
 struct local_edge {
     double a[3], b[3];
 };
@@ -20,8 +20,8 @@ static void turn_in(const float p[3], const struct beam_sight *sight, double out
     out[2] = vec3_dot(at, sight->dir);
 }
 
-/* Where the segment is within w(z) of the axis: a quadratic inequality, for w^2 is quadratic too. Returns 0
- * where it never is. */
+/* Cuts an edge to where it lies within w(z) of the beam's axis. That is a quadratic inequality, since w^2 is quadratic
+ * in z. Returns 0 where it never does. */
 static int clip_to_beam(const struct beam *beam, struct local_edge *e)
 {
     double d[3] = {e->b[0] - e->a[0], e->b[1] - e->a[1], e->b[2] - e->a[2]}, s2 = beam->slope * beam->slope;
@@ -52,7 +52,7 @@ static int clip_to_beam(const struct beam *beam, struct local_edge *e)
     return 1;
 }
 
-/* The sub-ray through a point is (x, y) of the unit disc: (l1 + i l2) / (w0 + i s z) as complex numbers. */
+/* Finds the sub-ray (x, y) through p. In complex numbers, x + i y = (p0 + i p1) / (exit_radius + i slope p2). */
 static void to_disc(const struct beam *beam, const double p[3], double u[2])
 {
     double re = beam->exit_radius_m, im = beam->slope * p[2], over = 1.0 / (re * re + im * im);
@@ -108,7 +108,7 @@ uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam,
         turn_in(edge->a, sight, e.a);
         turn_in(edge->b, sight, e.b);
         if (!clip_to_beam(beam, &e)) continue;
-        if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* it is nearer elsewhere */
+        if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* only other parts of the edge are nearer */
         if (!make_line(beam, &e, &one) || is_known(line, n, &one)) continue;
         if (n == BEAM_MAX_LINES) return n + 1;
         line[n++] = one;

@@ -29,7 +29,7 @@ static void cut_add_part(struct beam_parts *parts, const struct beam_part *p, in
     if (centre) parts->centre = i;
 }
 
-/* The portion beyond a line; with second moments only where they are asked for. */
+/* Returns the portion beyond a line; its second moments only where they are asked for. */
 static struct beam_part cap_of(const struct beam *beam, const struct beam_line *line, int squares)
 {
     struct beam_part p = {.xx = 0.0};
@@ -45,8 +45,8 @@ static struct beam_part cap_of(const struct beam *beam, const struct beam_line *
     return p;
 }
 
-/* The parts that one or two lines cut off, in closed form. All h >= 0: the caps lie beyond. Returns 0 where
- * the lines meet in the disc. */
+/* Adds the parts that one or two lines cut off, in closed form. All h are >= 0, so that no cap has the centre in it.
+ * Returns 0 where the lines cross in the disc. */
 static int cut_caps(const struct beam *beam, const struct beam_line *line, uint32_t n, int spreads,
                     struct beam_parts *parts)
 {
@@ -77,8 +77,8 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
     return 1;
 }
 
-/* Places of the fine pattern as sets of bits: place 16 r + i is bit r of lane i, so that one comparison of
- * vectors makes a bit of all lanes. */
+/* Sets of places of the fine pattern, as bits: place 16 r + i is bit r of lane i. So one comparison of vectors makes a
+ * bit of all lanes. */
 enum { LANES = 16, MAX_ROWS = 32 };
 _Static_assert(1 + 3 * BEAM_FINE_RINGS * (BEAM_FINE_RINGS + 1) <= LANES * MAX_ROWS, "a bit for each place");
 typedef float lanes_f __attribute__((vector_size(4 * LANES)));
@@ -88,7 +88,7 @@ struct sums {
     lanes_f x, y;
 };
 
-/* The places beyond a line. */
+/* Finds the places beyond a line. */
 VEC_INLINE void beyond_line(const struct beam_pattern *fine, int rows, const struct beam_line *line, lanes_i *set)
 {
     const float nx = (float)line->n[0], ny = (float)line->n[1], h = (float)line->h;
@@ -151,7 +151,7 @@ static uint32_t cut_places(const struct beam_pattern *fine, const struct beam_li
     return n_parts;
 }
 
-/* Sums of squares over the places of a set and around each, place by place: asked for only with spreads. */
+/* Adds the squares of a set's places, and the spread around each place. */
 static void sum_squares(const struct beam_pattern *fine, const lanes_i *set, struct beam_part *p)
 {
     for (uint32_t k = 0; k < fine->n; k++) {

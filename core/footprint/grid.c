@@ -9,8 +9,8 @@
 #include "core/vec3.h"
 
 enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
-#define NEAREST_M 0.02 /* nearer than this, all directions are near each other */
-#define PIECE     0.1  /* the longest piece of an edge, by its distance */
+#define NEAREST_M 0.02 /* nearer pieces of edges are left out: they are near to most directions */
+#define PIECE     0.1  /* length of the longest piece of an edge, as a share of its distance */
 
 /* Count into first[c + 1]; write at first[c]++; mark in around. */
 enum draw_what { COUNT, FILL, AROUND };
@@ -30,7 +30,7 @@ struct stretches {
     size_t n, room;
 };
 
-static void grid_put(struct draw *d, uint32_t cell, float range_m)
+static void add_to_cell(struct draw *d, uint32_t cell, float range_m)
 {
     struct beam_outlines *o = d->o;
     if (d->what == AROUND) {
@@ -46,11 +46,11 @@ static void grid_put(struct draw *d, uint32_t cell, float range_m)
     o->any[cell / 32] |= 1U << cell % 32;
 }
 
-static void put_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
+static void draw_row(struct draw *d, uint32_t face, int32_t row, double from, double to, float range_m)
 {
     int32_t i0 = (int32_t)floor(fmax(from, 0.0)), i1 = (int32_t)floor(fmin(to, OUTLINE_CELLS - 1));
     for (int32_t i = i0; i <= i1; i++)
-        grid_put(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
+        add_to_cell(d, outline_place(face, (uint32_t)i, (uint32_t)row), range_m);
 }
 
 /* Draws a piece from p to q (in cells), and all cells within `wide` of it, row by row. */
@@ -70,7 +70,7 @@ static void draw_on_face(struct draw *d, uint32_t face, const double p[2], const
         }
         if (t0 > t1) continue;
         double x0 = p[0] + t0 * (q[0] - p[0]), x1 = p[0] + t1 * (q[0] - p[0]);
-        put_row(d, face, j, fmin(x0, x1) - wide, fmax(x0, x1) + wide, range_m);
+        draw_row(d, face, j, fmin(x0, x1) - wide, fmax(x0, x1) + wide, range_m);
     }
 }
 

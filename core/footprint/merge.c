@@ -37,7 +37,8 @@ static double weight_of(const struct beam_return *r, int by_back)
     return by_back ? r->back : r->energy;
 }
 
-/* A return of the surface that most power comes back from: many weak returns may be of one surface. */
+/* Returns the index of a return of the surface that most power comes back from. Many weak returns may be of one
+ * surface. */
 static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
 {
     uint32_t best = 0;
@@ -86,7 +87,7 @@ static struct average average(const struct beam_merging *how, const struct beam_
     return a;
 }
 
-/* One echo from returns without a gap between them. Returns 0 where they are too weak for one. */
+/* Makes one echo from returns without a gap between them. Returns 0 where they are too weak for one. */
 static int make_echo(const struct beam_merging *how, const struct beam_return *r, uint32_t n, struct beam_echo *echo)
 {
     double energy = 0.0, back = 0.0;
@@ -116,7 +117,7 @@ static void drop_weakest(struct beam_echo *e, uint32_t n)
     memmove(e + weakest, e + weakest + 1, (n - weakest - 1) * sizeof *e);
 }
 
-/* From so many returns on it is faster to look for gaps before sorting. */
+/* With this many returns or more it is faster to look for gaps before sorting. */
 enum { MANY = 7 };
 
 /* Most footprints lie on one surface: there is no gap between their returns, whatever their order. The

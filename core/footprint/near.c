@@ -16,7 +16,7 @@ static float longest_step2(const struct vec3_floats *dir, uint32_t n)
     uint32_t most = 0;
     for (uint32_t i = 0; i + 1 < n; i++) {
         float x = dx[i + 1] - dx[i], y = dy[i + 1] - dy[i], z = dz[i + 1] - dz[i], step2 = x * x + y * y + z * z;
-        uint32_t bits; /* in the order of the numbers, which are not negative */
+        uint32_t bits; /* they have the order of the floats, since none is negative */
         memcpy(&bits, &step2, sizeof bits);
         most = bits > most ? bits : most;
     }
@@ -35,16 +35,16 @@ static void cells_of(const struct vec3_floats *dir, uint32_t n, uint32_t *restri
 }
 
 /* Directions looked up together. */
-struct few {
+struct gathered {
     float x[BEAM_NEAR_MOST], y[BEAM_NEAR_MOST], z[BEAM_NEAR_MOST];
     uint32_t cell[BEAM_NEAR_MOST];
 };
 
-static void take_direction(struct few *few, uint32_t to, const struct vec3_floats *dir, uint32_t from)
+static void take_direction(struct gathered *all, uint32_t to, const struct vec3_floats *dir, uint32_t from)
 {
-    few->x[to] = dir->x[from];
-    few->y[to] = dir->y[from];
-    few->z[to] = dir->z[from];
+    all->x[to] = dir->x[from];
+    all->y[to] = dir->y[from];
+    all->z[to] = dir->z[from];
 }
 
 static int is_set(const uint32_t *bits, uint32_t cell)
@@ -52,10 +52,10 @@ static int is_set(const uint32_t *bits, uint32_t cell)
     return bits[cell / 32] >> cell % 32 & 1;
 }
 
-/* Lists pulses with outlines somewhere around them: of up to TOGETHER pulses on either side, only the
- * middle one is looked up. */
-static uint32_t list_around(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n, struct few *few,
-                            uint32_t *pulse)
+/* Lists pulses that may have outlines near them. Only the middle one of a group is looked up; the group has up to
+ * TOGETHER pulses on either side of it. */
+static uint32_t list_around(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n,
+                            struct gathered *all, uint32_t *pulse)
 {
     const float reach = (float)OUTLINE_AROUND_RAD, step = sqrtf(longest_step2(dir, n)) + 1e-6f;
     const uint32_t half = step * TOGETHER > reach ? (uint32_t)(reach / step) : TOGETHER, group = 2 * half + 1;
@@ -63,31 +63,31 @@ static uint32_t list_around(const struct beam_outlines *o, const struct vec3_flo
     if (n == 0) return 0;
     do {
         uint32_t middle = base + half < n ? base + half : n - 1;
-        take_direction(few, groups++, dir, middle);
+        take_direction(all, groups++, dir, middle);
         base += group;
     } while (base < n);
-    cells_of(&(struct vec3_floats){few->x, few->y, few->z}, groups, few->cell);
+    cells_of(&(struct vec3_floats){all->x, all->y, all->z}, groups, all->cell);
     for (uint32_t k = 0; k < groups; k++) {
         uint32_t end = (k + 1) * group < n ? (k + 1) * group : n;
-        for (uint32_t i = k * group; i < end && is_set(o->around, few->cell[k]); i++)
+        for (uint32_t i = k * group; i < end && is_set(o->around, all->cell[k]); i++)
             pulse[found++] = i;
     }
     return found;
 }
 
-/* Pulses in cells that lead to edges; near->first: the cell. */
+/* Finds the pulses whose cells list edges; near->first: the cell. */
 static uint32_t in_cells(const struct beam_outlines *o, const struct vec3_floats *dir, uint32_t n,
                          struct beam_near *near)
 {
-    struct few few;
-    uint32_t pulse[BEAM_NEAR_MOST], around = list_around(o, dir, n, &few, pulse), found = 0;
+    struct gathered all;
+    uint32_t pulse[BEAM_NEAR_MOST], around = list_around(o, dir, n, &all, pulse), found = 0;
     for (uint32_t k = 0; k < around; k++)
-        take_direction(&few, k, dir, pulse[k]);
-    cells_of(&(struct vec3_floats){few.x, few.y, few.z}, around, few.cell);
+        take_direction(&all, k, dir, pulse[k]);
+    cells_of(&(struct vec3_floats){all.x, all.y, all.z}, around, all.cell);
     for (uint32_t k = 0; k < around; k++) {
         near[found].pulse = pulse[k];
-        near[found].first = few.cell[k];
-        found += (uint32_t)is_set(o->any, few.cell[k]);
+        near[found].first = all.cell[k];
+        found += (uint32_t)is_set(o->any, all.cell[k]);
     }
     return found;
 }
@@ -105,8 +105,8 @@ static void look_up(const struct beam_outlines *o, struct beam_near *near, uint3
     }
 }
 
-/* Most cells lead to no edge, and most of the others are wider than the footprint. Ranges are compared
- * later. */
+/* Most cells list no edge, and most others are wider than the footprint. So each edge's plane is compared with the
+ * beam; its range is compared later. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const struct vec3_floats *dir,
                             uint32_t n, struct beam_near *near)
 {

@@ -29,8 +29,8 @@ struct beam_outlines {
     uint32_t n_edges;
     struct outline_edge *edge;
     uint32_t *first;             /* entries of cell c: first[c] .. first[c + 1] */
-    uint32_t *any;               /* a bit for each cell: it leads to some edges */
-    uint32_t *around;            /* likewise: some cell within OUTLINE_AROUND_RAD of a direction in it does */
+    uint32_t *any;               /* a bit for each cell: it has entries */
+    uint32_t *around;            /* a bit for each cell: some cell within OUTLINE_AROUND_RAD of it has entries */
     struct outline_entry *entry; /* by range */
     uint64_t n_entries;
 };
@@ -83,8 +83,8 @@ static inline __attribute__((always_inline)) uint32_t outline_cell(float dx, flo
     return outline_place(face, (uint32_t)i, (uint32_t)j);
 }
 
-/* The beam passes clear of the plane through the station and the edge: most do. The footprint is widest, as
- * an angle, where the edge is nearest. */
+/* Whether the footprint is clear of the plane through the station and the edge, as most are. The footprint is widest,
+ * as an angle, where the edge is nearest. */
 static inline int outline_is_clear(const struct beam *beam, const struct outline_entry *entry, const float d[3])
 {
     const float exit = 1.01f * (float)beam->exit_radius_m, slope = 1.01f * (float)beam->slope, range = entry->range_m;

@@ -5,13 +5,12 @@
 #include "core/footprint/outlines.h"
 #include "core/vec3.h"
 
-/* Rays pass beside the edge by this share of the footprint's radius: anything thinner could not make an
- * echo. */
+/* Rays pass the edge at this share of the footprint's radius: a thinner part of the scene could not make an echo. */
 #define BESIDE 2e-3
 /* Steeper surfaces than this look like a step, and count as one. */
 #define SLOPE 20.0
 
-static void put_pair(struct outline_prober *prober, uint32_t i, const double at[3], const double normal[3],
+static void aim_pair(struct outline_prober *prober, uint32_t i, const double at[3], const double normal[3],
                      double beside_m)
 {
     for (uint32_t side = 0; side < 2; side++) {
@@ -51,7 +50,7 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
     for (uint32_t i = 0; i < n; i++) {
         for (int k = 0; k < 3; k++)
             at[k] = p[k] + e[k] * (i + 0.5) / n;
-        put_pair(prober, i, at, normal, beside_m);
+        aim_pair(prober, i, at, normal, beside_m);
     }
     prober->probe->cast(prober->probe->ctx, 2 * n, &VEC3_IN(prober->dir, 0), prober->range_m, prober->kind);
     for (uint32_t i = 0; i < n; i++) {
@@ -60,7 +59,7 @@ uint32_t outline_probe(struct outline_prober *prober, const double p[3], const d
         int same = prober->kind[2 * i] == prober->kind[2 * i + 1];
         seen[i] = is_step(prober->range_m[2 * i], prober->range_m[2 * i + 1], same, sqrt(vec3_dot(at, at)), beside_m);
     }
-    for (uint32_t i = 0; i < n; i++) /* and a part on either side */
+    for (uint32_t i = 0; i < n; i++) /* parts next to a step count, too */
         prober->counts[i] = (uint8_t)(seen[i] | (i > 0 ? seen[i - 1] : 0) | (i + 1 < n ? seen[i + 1] : 0));
     return n;
 }

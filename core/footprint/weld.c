@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which edges of a mesh are outlines, seen from a station.
+/* Finds the edges of a mesh that are outlines, seen from a station.
  *
  * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the
  * edge, without a step in range; with triangles on one side only, it ends there. Where triangles on both
@@ -24,7 +24,7 @@ struct weld {
     const struct sh_report *report;
     uint32_t *same; /* [n_vertices] the first vertex at the same place */
     struct slot *slot;
-    uint8_t *sides; /* of a slot: 1 and 2; 4: of two kinds */
+    uint8_t *sides; /* of a slot, bits: 1 and 2: a triangle on that side; 4: triangles of two kinds */
     const uint16_t *kind;
     uint16_t *of; /* of a slot: kind of its first triangle; NULL: not asked for */
     uint64_t mask;
@@ -52,7 +52,7 @@ static void from_station(const struct weld *w, uint32_t vertex, double p[3])
     vec3_sub(w->scene->vertex_m[vertex], w->station_m, p);
 }
 
-/* 1 or 2; 0: the triangle is seen edge-on, and covers nothing. */
+/* Returns the side of the edge that the triangle lies on, 1 or 2. 0: it is seen edge-on, and covers nothing. */
 static uint8_t side_of(const struct weld *w, uint32_t low, uint32_t high, uint32_t third)
 {
     double p[3], q[3], r[3], n[3];

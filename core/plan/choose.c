@@ -11,7 +11,7 @@ int plan_holds(const struct plan_option *option, const struct plan_tolerance *to
            option->echo_share <= tolerance->echo_share;
 }
 
-/* How far an option misses the tolerance; an unknown bound is worst. */
+/* Returns how far an option misses the tolerance; an unknown bound is worst. */
 static double excess(const struct plan_option *option, const struct plan_tolerance *tolerance)
 {
     if (option->why_not[0] != '\0') return (double)INFINITY;

@@ -11,42 +11,42 @@
 #define PLAN_COST_PULSE    40.0   /* all stages but the cast's (build/bench) */
 #define PLAN_COST_SUB_RAY  70.0   /* a ray of a ring, or beyond glass */
 #define PLAN_COST_OUTLINES 8.0    /* adaptive: asking whether an outline is near, for each pulse */
-#define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that one cuts */
+#define PLAN_COST_CUT      1000.0 /* adaptive: a pulse that an outline cuts */
 
 /* ---- waveforms (make bench-waveform, build/tests/bench/waveform_detect): of pulses with one return */
 
-#define PLAN_COST_WAVE        160.0 /* its window, */
-#define PLAN_COST_WAVE_SAMPLE 2.5   /* and each sample, with noise */
-#define PLAN_COST_FLANK       300.0 /* the echo, found by a threshold or a fraction of its peak, */
-#define PLAN_COST_GAUSSIANS   520.0 /* or by Gaussian decomposition */
+#define PLAN_COST_WAVE        160.0 /* a window, without its samples */
+#define PLAN_COST_WAVE_SAMPLE 2.5   /* a sample, with noise */
+#define PLAN_COST_FLANK       300.0 /* finding an echo by a threshold or by a fraction of its peak */
+#define PLAN_COST_GAUSSIANS   520.0 /* finding an echo by Gaussian decomposition */
 
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 
 /* Costs of the BVH, by how many rays Embree takes at once: for a hit, for a miss, and extra near a border, since rays
- * of a packet then go to more leaves. They are from `without` of house, garden and terrain, 1 to 22.5 million pulses:
- * met and out where borders are few, border from the growth with their share. Those for packets of 8 and 4 follow the
- * ratios of Embree's packets in the chart. */
+ * of a packet then go to more leaves. They come from the bench's column `without` (no map) of house, garden and
+ * terrain, 1 to 22.5 million pulses. Hit and miss are costs where borders are rare; border is how much the cost grows
+ * with their share. For packets of 8 and 4 they follow the ratios of Embree's packets in the chart. */
 struct plan_ray_cost {
     uint32_t packet;
-    double met, out, border;
+    double hit, miss, border;
 };
 static const struct plan_ray_cost plan_ray_costs[] = {
     {16, 12.0, 8.0, 35.0}, {8, 19.0, 13.0, 57.0}, {4, 34.0, 23.0, 100.0}};
 
-#define PLAN_COST_SIGHT_ONE   2.0   /* looked up: one triangle or nothing there, */
-#define PLAN_COST_SIGHT_FEW   35.0  /* one of a few, */
-#define PLAN_COST_SIGHT_ASK   150.0 /* the BVH is asked after all, ray by ray: these have nothing in common */
+#define PLAN_COST_SIGHT_ONE   2.0   /* a look-up where there is one triangle, or nothing */
+#define PLAN_COST_SIGHT_FEW   35.0  /* a look-up among a few triangles */
+#define PLAN_COST_SIGHT_ASK   150.0 /* the BVH is asked ray by ray, since such rays go to different leaves */
 #define PLAN_COST_SIGHT_SMALL 12.0  /* the BVH is asked for small triangles, neighbours together */
 /* Extra in a scene of a million triangles, whose planes fit into no cache; it grows with the root of their
  * number. */
 #define PLAN_COST_MILLION 10.0
-/* Cost of making the map: a fixed part, and a part per triangle. Triangles that are examined one by one cost more,
- * whether they are seen or hidden. So do cells that show more than one; their memory follows. */
+/* Costs of making the map: a fixed part, a part per triangle, more for a triangle that is examined by itself, and a
+ * part per cell that shows more than one. The last two lines are the memory of such cells. */
 #define PLAN_COST_SIGHT          2.2e6
 #define PLAN_COST_SIGHT_TRIANGLE 28.0
 #define PLAN_COST_SIGHT_EXAMINED 440.0
 #define PLAN_COST_SIGHT_CELL     60.0
 #define PLAN_SIGHT_CELL_BYTES    25.0
-#define PLAN_SIGHT_RECORD_BYTES  128.0 /* of a triangle in such cells, per region; as many again are hidden */
+#define PLAN_SIGHT_RECORD_BYTES  128.0 /* of a triangle in such cells, per region, and of a hidden one for each */
 
 #endif

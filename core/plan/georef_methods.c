@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How points get into the CRS. */
+/* Chooses how points get into the CRS. */
 #include "core/plan.h"
 
 #include <math.h>
@@ -18,7 +18,7 @@ static double cost_ns(const struct georef *georef, enum georef_method method)
     return georef_crs(georef) == GEOREF_UTM ? 600.0 : 250.0;
 }
 
-/* Local and ecef: the head's rotation and the CRS's are one matrix. */
+/* Fills the row for local and ecef, where the head's rotation and the CRS's are one matrix. */
 static void say_linear(const struct georef *georef, struct plan_row *row, double error_m)
 {
     int local = georef_crs(georef) == GEOREF_LOCAL;

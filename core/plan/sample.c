@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Pulses of the head, drawn by chance, cast with a method and with the reference. */
+/* Draws pulses of the head by chance, and casts them with a method and with the reference. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,16 +17,16 @@ static const double SMOOTH_M = 5e-5;
 
 enum {
     MAX_DRAWN = 32768,  /* pulses */
-    MIXED_LOOKS = 1024, /* the most that are cast with the reference: of those that meet several smooth surfaces, */
-    PLAIN_LOOKS = 1024, /* and of the others, */
-    PLAIN_EVERY = 8,    /* of which one in so many is taken */
+    MIXED_LOOKS = 1024, /* the most pulses with several smooth surfaces that are cast with the reference */
+    PLAIN_LOOKS = 1024, /* the most other pulses that are cast with it */
+    PLAIN_EVERY = 8,    /* one of this many other pulses is taken */
     PROBE_RINGS = 4,
     OPTICS_DRAWN = 8192,
-    TRIES = 1 << 23, /* in all, a second or two: where the field of view is narrow, most are not cast */
+    TRIES = 1 << 23, /* of drawing, a second or two in all: with a narrow field of view most are not cast */
     ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
     SIGHT_DRAWN = 1024,
     SIGHT_RAYS = 5, /* to the middle of a cell, and to its corners */
-    SIGHT_FEW = 3,  /* up to so many triangles among them are a few */
+    SIGHT_FEW = 3,  /* the most triangles of a cell that count as a few */
 };
 
 struct echoes {
@@ -47,7 +47,7 @@ struct plan_sample {
     const struct sh_report *report;
     struct caster *caster;
     struct line_block block;
-    uint64_t key, tries, found; /* of the tries: within the field of view */
+    uint64_t key, tries, found; /* found: the tries within the field of view */
     int tries_ended;
     struct look *look; /* of the beam */
     uint32_t n_looks;
@@ -114,7 +114,7 @@ static int draw(struct plan_sample *s, struct look *look)
     return 0;
 }
 
-/* One pulse by itself, as it is set up. */
+/* Casts one pulse with this setup. */
 static void cast_look(struct plan_sample *s, struct cast_setup *setup, const struct look *look, struct echoes *out)
 {
     const struct plan_place *p = &s->places.place[look->place];
@@ -210,7 +210,7 @@ static void prepare_beam(struct plan_sample *s)
 
 /* The sums over the sample. Each mixed pulse stands for itself, each other one for many. */
 struct tally {
-    double echoes, further;          /* further: beyond the first of a pulse */
+    double echoes, secondary;        /* secondary: beyond the first of a pulse */
     double sum2, sum4;               /* of range errors, squared, and to the fourth power */
     double wrong_mixed, wrong_plain; /* pulses with another number of echoes */
 };
@@ -218,7 +218,7 @@ struct tally {
 static void sample_compare(struct tally *t, const struct echoes *got, const struct echoes *want, double weight,
                            int mixed)
 {
-    t->further += got->n > 1 ? weight * (got->n - 1) : 0.0;
+    t->secondary += got->n > 1 ? weight * (got->n - 1) : 0.0;
     if (got->n != want->n) *(mixed ? &t->wrong_mixed : &t->wrong_plain) += weight;
     for (uint32_t i = 0; got->n == want->n && i < got->n; i++) {
         double error = got->range_m[i] - want->range_m[i], error2 = error * error;
@@ -272,7 +272,7 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
 
 /* ---- glass and mirrors */
 
-/* apart: every surface on the way is an echo. */
+/* apart: each surface on the way is an echo of its own. */
 static void cast_way(struct plan_sample *s, const struct look *look, uint32_t depth, int apart, struct echoes *out)
 {
     struct exact e;
@@ -287,6 +287,7 @@ static void cast_way(struct plan_sample *s, const struct look *look, uint32_t de
     cast_look(s, &e.setup, look, out);
 }
 
+/* Whether light goes on beyond the last echo: its surface, seen directly or as a ghost, is glass or a mirror. */
 static int leads_on(const struct plan_sample *s, const struct echoes *e)
 {
     const struct cast_detect *d = s->places.place[0].setup.detect;
@@ -314,12 +315,12 @@ void plan_sample_optics(struct plan_sample *s, uint32_t depth, struct plan_optio
         if (got.n == way->reference.n && way->mixed) tally.wrong_mixed += 1.0;
     }
     conclude(&tally, s->n_ways, option);
-    option->cost_ns = depth == 0 ? 0.0 : PLAN_COST_SUB_RAY * tally.further / s->n_ways;
+    option->cost_ns = depth == 0 ? 0.0 : PLAN_COST_SUB_RAY * tally.secondary / s->n_ways;
 }
 
 /* ---- sight */
 
-/* Unit vectors to a pulse's direction, and to the corners of a square around it. */
+/* Makes unit vectors to a pulse's direction, and to the corners of a square around it. */
 static void square_around(const struct plan_place *p, uint64_t pulse, double across_rad, double d[3][SIGHT_RAYS])
 {
     const double pan = 2.0 * M_PI * schedule_pan_turn(&p->segment, pulse), half = 0.5 * across_rad;
@@ -350,7 +351,7 @@ static uint32_t count_different(const uint32_t *triangle)
     return n;
 }
 
-/* Returns how many of `rays` rays in all directions meet the triangle, unless it is hidden. */
+/* Returns how many of `rays` rays in all directions hit the middle ray's triangle, unless it is hidden. */
 static double rays_on(const struct bvh *bvh, const struct bvh_rays *cast, double rays)
 {
     struct bvh_plane plane;
@@ -364,12 +365,12 @@ static double rays_on(const struct bvh *bvh, const struct bvh_rays *cast, double
 static void count_cell(const struct bvh *bvh, const struct bvh_rays *cast, double rays, struct plan_sight_found *found)
 {
     const uint32_t kinds = count_different(cast->triangle);
-    const double met_by = cast->triangle[0] != BVH_NO_TRIANGLE ? rays_on(bvh, cast, rays) : INFINITY;
-    if (met_by < SIGHT_GROUP_RAYS) {
+    const double hit_by = cast->triangle[0] != BVH_NO_TRIANGLE ? rays_on(bvh, cast, rays) : INFINITY;
+    if (hit_by < SIGHT_GROUP_RAYS) {
         found->small += 1.0;
         return;
     }
-    found->per_pulse += 1.0 / met_by;
+    found->per_pulse += 1.0 / hit_by;
     *(kinds > SIGHT_FEW                      ? &found->ask
       : kinds > 1                            ? &found->few
       : cast->triangle[0] == BVH_NO_TRIANGLE ? &found->nothing
@@ -403,7 +404,7 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, double all_rays, 
         caster_hits(s->caster, p->setup.bvh, &rays);
         count_cell(p->setup.bvh, &rays, all_rays, found);
     }
-    if (n == 0) found->ask = n = 1;
+    if (n == 0) found->ask = n = 1; /* without a sample the map must not seem to pay */
     found->few += 0.5 * found->ask; /* about half of the cells that seem to ask are decided by lists */
     found->ask *= 0.5;
     *found = (struct plan_sight_found){found->one / n,   found->nothing / n,   found->few / n,       found->ask / n,

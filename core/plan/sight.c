@@ -21,7 +21,7 @@ static const struct plan_ray_cost *ray_cost(uint32_t packet)
     return cost;
 }
 
-/* Cost of reading a triangle's plane, which both ways need. */
+/* Returns the cost of reading a triangle's plane, which both ways need. */
 static double plane_ns(double n_triangles)
 {
     return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * n_triangles));
@@ -29,17 +29,17 @@ static double plane_ns(double n_triangles)
 
 double plan_pulse_ns(double n_triangles, uint32_t packet)
 {
-    return PLAN_COST_PULSE + ray_cost(packet)->met + plane_ns(n_triangles);
+    return PLAN_COST_PULSE + ray_cost(packet)->hit + plane_ns(n_triangles);
 }
 
-/* Cells of the whole cube, as sight_cells chooses them for that many pulses. */
+/* Returns the cells of the whole cube, as sight_cells chooses them for that many pulses. */
 static double cells(const struct plan_sight_need *need)
 {
     const double edge = sight_cells(need->pulses / need->share, need->memory_bytes);
     return 6.0 * edge * edge;
 }
 
-/* The least cost of making a map, whatever it shows. */
+/* Returns the least cost of making a map, whatever it shows. */
 static double least_build_ns(const struct plan_sight_need *need)
 {
     return PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * need->n_triangles;
@@ -56,7 +56,7 @@ struct costs {
     double bvh, map, build;
 };
 
-/* The share of the cells with more than one triangle that the memory holds. */
+/* Returns the share of the cells with more than one triangle that the memory holds. */
 static double fitting(const struct plan_sight_need *need, const struct plan_sight_found *f, double mixed)
 {
     const double bytes = PLAN_SIGHT_CELL_BYTES * (mixed + 1.0) +
@@ -92,11 +92,11 @@ static void estimate(const struct plan_sight_need *need, const struct plan_sight
         c->build += triangles_build_ns(need, f) + PLAN_COST_SIGHT_CELL * fits * mixed;
     }
     const double few = fits * f->few, ask = f->ask + f->few - few;
-    c->bvh = found->nothing * cost->out + (1.0 - found->nothing) * (cost->met + plane_ns(need->n_triangles)) +
+    c->bvh = found->nothing * cost->miss + (1.0 - found->nothing) * (cost->hit + plane_ns(need->n_triangles)) +
              (found->few + found->ask + found->small) * cost->border;
     c->map = (f->one + f->nothing) * PLAN_COST_SIGHT_ONE + f->one * plane_ns(need->n_triangles) +
              few * PLAN_COST_SIGHT_FEW + ask * (c->bvh + PLAN_COST_SIGHT_ASK) +
-             f->small * (cost->met + plane_ns(need->n_triangles) + cost->border + PLAN_COST_SIGHT_SMALL);
+             f->small * (cost->hit + plane_ns(need->n_triangles) + cost->border + PLAN_COST_SIGHT_SMALL);
 }
 
 static int pays(const struct plan_sight_need *need, const struct costs *c)
@@ -106,7 +106,7 @@ static int pays(const struct plan_sight_need *need, const struct costs *c)
 
 int plan_sight_may_pay(const struct plan_sight_need *need)
 {
-    const double saved_ns = ray_cost(need->packet)->met + ray_cost(need->packet)->border - PLAN_COST_SIGHT_ONE;
+    const double saved_ns = ray_cost(need->packet)->hit + ray_cost(need->packet)->border - PLAN_COST_SIGHT_ONE;
     return (1.0 - LEAST_LEFT) * saved_ns * need->pulses > least_build_ns(need);
 }
 
@@ -145,7 +145,7 @@ int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sigh
     else
         snprintf(option[MAP].why_not, sizeof option[MAP].why_not, "%s", need->why_not);
     if (!can) option[MAP].cost_ns = (double)NAN;
-    if (!it_pays && option[MAP].cost_ns < 0.0) option[MAP].cost_ns = 0.0; /* not beyond doubt */
+    if (!it_pays && option[MAP].cost_ns < 0.0) option[MAP].cost_ns = 0.0; /* LEAST_LEFT: too little to be sure of */
     const struct plan_choice ask = {"sight", option, OPTIONS, need->forced, "cast.sight", any};
     const int map = plan_choose(&ask, row) == MAP;
     say_why(need, found, &c, it_pays, row);
@@ -155,9 +155,9 @@ int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sigh
 int plan_sight(const struct plan_sight_need *need, const struct plan_places *places, const struct sh_report *report,
                int *map, struct plan_row *row, struct sh_err *err)
 {
-    const int looks = need->why_not == NULL && need->forced != 0 && plan_sight_may_pay(need);
+    const int samples = need->why_not == NULL && need->forced != 0 && plan_sight_may_pay(need);
     struct plan_sight_found found;
-    if (looks) {
+    if (samples) {
         struct plan_sample *sample;
         int rc = plan_sample_create(places, report, &sample, err);
         if (rc != SH_OK) return rc;
@@ -166,6 +166,6 @@ int plan_sight(const struct plan_sight_need *need, const struct plan_places *pla
         rc = sh_check_stop(report, err);
         if (rc != SH_OK) return rc;
     }
-    *map = plan_sight_choose(need, looks ? &found : NULL, row);
+    *map = plan_sight_choose(need, samples ? &found : NULL, row);
     return SH_OK;
 }

@@ -38,7 +38,7 @@ void body_add_triangle(struct body_sum *s, const double corner[3][3])
     s->volume_m3 += vec3_dot(p, n) / 6.0;
 }
 
-/* The integral of field j from a to b. */
+/* Returns the integral of field j from a to b. */
 static double along(int j, double wave, const double a[3], const double b[3])
 {
     const double *w = field[j], *n = field[j] + 3;

@@ -280,7 +280,7 @@ static int keep_uv(struct scene_build *b, const float uv[3][2], struct sh_err *e
     return SH_OK;
 }
 
-/* Likewise for colours. */
+/* Keeps colours likewise. */
 static int keep_rgb(struct scene_build *b, const uint8_t rgb[3][4], struct sh_err *err)
 {
     struct scene *s = b->scene;

@@ -83,7 +83,7 @@ void build_forget_surfaces(struct scene_build *b)
     b->surface_tree = NULL;
 }
 
-/* It makes room for one more surface. The tree points into the array, so it is made again where the array has moved. */
+/* Makes room for one more surface. The tree points into the array, so it is made again where the array has moved. */
 static bool has_room(struct scene_build *b)
 {
     struct scene *s = b->scene;
@@ -138,7 +138,7 @@ void build_note_colours(struct scene *s)
     }
 }
 
-/* The path of the image; where there is none, the path that errors name. */
+/* Returns the path of the image; where there is no such file, the path that errors name. */
 static char *find_image(const struct scene_build *b, const struct build_image *image)
 {
     const struct text_span folder[2] = {image->folder, build_folder_of(b->spec->file)};

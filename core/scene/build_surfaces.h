@@ -23,7 +23,7 @@ struct build_image {
     uint32_t raw_width, raw_height; /* struct texture_source */
     enum texture_wrap wrap[2];
 };
-/* Its number, from 1. *number stays where there is no memory. */
+/* Sets the texture's number, from 1. After an error *number is as it was. */
 int build_texture(struct scene_build *b, const struct build_image *image, uint16_t *number, struct sh_err *err);
 
 /* The names are not searched any more: the scene is done, or given up. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* These functions make copies of meshes, and keep part of them. */
+/* Makes copies of meshes, and leaves some of their surfaces out. */
 #ifndef CORE_SCENE_COPIES_H
 #define CORE_SCENE_COPIES_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Holes that textures cut out of surfaces, and texture coordinates and colours at a point. */
+/* Finds the holes that textures cut out of surfaces, and texture coordinates and colours at a point. */
 #include "core/scene/cutouts.h"
 
 #include <math.h>
@@ -20,8 +20,8 @@ int scene_read_texture(const struct scene_texture *texture, int alpha_only, stru
     return texture_read(&source, image, err);
 }
 
-/* Barycentric coordinates of p, on the triangle's plane, by the areas seen along the largest axis of its
- * normal. */
+/* Sets w to the barycentric coordinates of p, which is on the triangle's plane: by the areas seen along the largest
+ * axis of its normal. */
 static void weights(const double *const corner[3], const double p[3], double w[3])
 {
     double u[3], v[3], n[3];
@@ -63,7 +63,7 @@ int scene_rgb_at(const struct scene *scene, uint32_t triangle, const double *con
     return 1;
 }
 
-/* Which image cuts holes into a surface, from 1; 0: none. */
+/* Returns which image cuts holes into a surface, from 1; 0: none does. */
 static uint32_t image_of(const struct scene_surface *s)
 {
     return !(s->solid > 0.0f) ? 0 : s->opacity != 0 ? s->opacity : s->texture;
@@ -93,7 +93,7 @@ static int add_mask(struct scene *s, uint32_t i, const struct texture_image *ima
     return SH_OK;
 }
 
-/* Masks of all surfaces that an image cuts holes into. */
+/* Makes the masks of all surfaces that an image cuts holes into. */
 static int cut_out(struct scene *s, uint32_t number, const struct texture_image *image, struct sh_err *err)
 {
     const struct scene_surface *last = NULL;
@@ -106,7 +106,7 @@ static int cut_out(struct scene *s, uint32_t number, const struct texture_image 
     return rc;
 }
 
-/* How a texture's image cuts holes: bit 0 by alpha, bit 1 as an opacity map; 0: no surface uses it to cut. */
+/* Returns how a texture's image cuts holes: bit 0: by alpha; bit 1: as an opacity map; 0: it cuts none. */
 static int cuts_how(const struct scene *s, uint32_t number)
 {
     int how = 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Duplicate faces of a mesh. */
+/* Finds duplicate faces of a mesh. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -7,10 +7,10 @@
 #include "core/text.h"
 
 struct text_span build_folder_of(const char *path);
-/* The path, with / for \\, to be freed; NULL: no memory. */
+/* Returns the path, with / for \\. It is to be freed; NULL: there is no memory. */
 char *build_join(struct text_span folder, struct text_span name);
-/* The file of that name: in one of the folders, then by its last part there; then both without regard to case. To be
- * freed; NULL: it is nowhere. */
+/* Finds the file of that name in one of the folders; else by the name's last part there; else both without regard to
+ * case. The path is to be freed; NULL: the file is nowhere. */
 char *build_find_file(const struct text_span *folder, size_t n, struct text_span name);
 
 #endif

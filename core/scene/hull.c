@@ -6,8 +6,6 @@
 #include "core/scene/hull.h"
 #include "core/vec3.h"
 
-enum { WAYS = 8 };
-
 /* Twice the area of the triangle a, b, c: above 0 where it turns left. */
 static double turns(const double a[2], const double b[2], const double c[2])
 {
@@ -21,36 +19,7 @@ static int hull_compare(const void *a, const void *b)
     return (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* Leaves out points strictly within the octagon of the farthest points in eight directions: they can't be
- * on the outline. */
-static uint32_t leave_out_inner(double (*point)[2], uint32_t n)
-{
-    static const int way[WAYS][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
-    double far[WAYS][2];
-    uint32_t left = 0;
-    for (int w = 0; w < WAYS; w++) {
-        double most = -INFINITY;
-        for (uint32_t i = 0; i < n; i++) {
-            const double here = way[w][0] * point[i][0] + way[w][1] * point[i][1];
-            if (here <= most) continue;
-            most = here;
-            memcpy(far[w], point[i], sizeof far[w]);
-        }
-    }
-    for (uint32_t i = 0; i < n; i++) {
-        int inside = 1, edges = 0;
-        for (int w = 0; w < WAYS && inside; w++) {
-            const double *a = far[w], *b = far[(w + 1) % WAYS];
-            if (a[0] == b[0] && a[1] == b[1]) continue;
-            inside = turns(a, b, point[i]) > 0.0;
-            edges++;
-        }
-        if (!inside || edges == 0) memmove(point[left++], point[i], sizeof point[i]);
-    }
-    return left;
-}
-
-/* The chain from the left to the right end, or back, by A. M. Andrew. */
+/* Adds a point to the chain from the left to the right end, or back (A. M. Andrew, 1979). */
 static uint32_t add_chain(double (*hull)[2], uint32_t n, uint32_t least, const double p[2])
 {
     while (n >= least + 2 && turns(hull[n - 2], hull[n - 1], p) <= 0.0)
@@ -72,7 +41,6 @@ int scene_find_hull(const struct scene *scene, struct scene_hull *out, struct sh
         if (used[i]) memcpy(point[n++], scene->vertex_m[i], sizeof *point);
     const int is_short = point == NULL || used == NULL;
     free(used);
-    if (n > 0) n = leave_out_inner(point, n);
     out->point = malloc((2 * (size_t)n + 2) * sizeof *out->point);
     if (is_short || out->point == NULL) {
         free(point);

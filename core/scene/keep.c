@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A scene without some of its surfaces. */
+/* Leaves some surfaces out of a scene. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,7 +7,7 @@
 #include "core/scene/copies.h"
 #include "core/vec3.h"
 
-/* Triangles of surfaces that are kept, with the new labels; their vertices get numbers in the old order. */
+/* Keeps the triangles of surfaces that are kept, with the new labels. Their vertices get numbers in the old order. */
 static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t *label, uint32_t *vertex)
 {
     uint32_t n = 0;

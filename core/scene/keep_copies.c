@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Copies without some of their surfaces. */
+/* Leaves some surfaces out of copies. */
 #include <stdlib.h>
 #include <string.h>
 

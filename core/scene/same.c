@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Vertices at the same place. */
+/* Finds vertices at the same place. */
 #include <stdlib.h>
 #include <string.h>
 

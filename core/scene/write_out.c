@@ -7,7 +7,7 @@
 #include "core/grow.h"
 #include "core/scene_copies.h"
 
-/* Texture coordinates of triangles that had none. */
+/* Says of triangles that they have no texture coordinates. */
 static void fill_uv(struct scene *scene, uint32_t from, uint32_t to)
 {
     for (uint32_t i = from; i < to; i++)

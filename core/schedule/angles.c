@@ -27,7 +27,7 @@ static void set_sweep(const struct schedule_segment *seg, const struct schedule_
     run->pan_step_turn = (double)seg->spec.pan_udeg_s * 1e6 / (double)(uint64_t)seg->spec.prr_uhz / (double)TURN_UDEG;
 }
 
-/* One elevation; the pan goes step by step. */
+/* A ring has one elevation, and the pan goes step by step. */
 static void set_ring(const struct schedule_segment *seg, const struct schedule_line *line, struct schedule_run *run)
 {
     const struct emitter *e = seg->spec.emitter;
@@ -37,7 +37,7 @@ static void set_ring(const struct schedule_segment *seg, const struct schedule_l
     run->pan_step_turn = (double)e->turn / (double)e->steps;
 }
 
-/* A table: directions one by one, or beams on a pan that turns with the ticks. */
+/* The table has directions one by one, or beams on a pan that turns with the ticks. */
 static void set_table(const struct schedule_segment *seg, struct schedule_run *run)
 {
     const struct emitter *e = seg->spec.emitter;
@@ -104,7 +104,7 @@ static void angles_of(const struct schedule_segment *seg, uint64_t k, double *mi
     struct schedule_run run;
     schedule_get_line(seg, schedule_line_of(seg, k), &line);
     schedule_get_run(seg, &line, k, 1, &run);
-    *mirror_turn = run.mirror0_turn;
+    *mirror_turn = run.mirror0_turn + (double)run.r * run.mirror_turn_per_r;
     *pan_turn = run.pan0_turn + (double)run.in_line * run.pan_step_turn;
     if (run.firing == NULL) return;
     *mirror_turn = run.firing[run.firing_at].mirror_turn;
@@ -126,13 +126,8 @@ double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k)
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k)
 {
     double mirror_turn, pan_turn;
-    if (kind_of(seg) != EMITTER_LINE) {
-        angles_of(seg, k, &mirror_turn, &pan_turn);
-        return mirror_turn;
-    }
-    uint64_t r = place_in_sweep(seg, k, schedule_line_of(seg, k));
-    return (double)seg->spec.fov_min_udeg / (double)TURN_UDEG +
-           (double)r * ((double)seg->spec.sweep_udeg / (double)TURN_UDEG / (double)seg->den);
+    angles_of(seg, k, &mirror_turn, &pan_turn);
+    return mirror_turn;
 }
 
 double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k)

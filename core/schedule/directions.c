@@ -17,7 +17,7 @@ struct list {
     int columns; /* of the first row; 0: none yet */
 };
 
-/* The numbers of the row at hand: how many there are, or a negative error. */
+/* Reads the numbers of the row at hand. Returns how many there are, or a negative error. */
 static int read_numbers(struct text *t, double v[3], struct sh_err *err)
 {
     int n = 0;

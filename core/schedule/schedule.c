@@ -6,7 +6,7 @@
 static const uint64_t NS_TIMES_UHZ = 1000000000000000; /* ns per second x micro-hertz per hertz */
 static const uint64_t FINE_DEN = 1ull << 40;
 
-/* How many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. The first of them begins at
+/* Returns how many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. The first of them begins at
  * r0/den. */
 static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
 {
@@ -23,7 +23,7 @@ static int pan_is_still(const struct schedule_spec *spec)
     return spec->emitter != NULL || spec->pan_udeg_s <= 0 || spec->pan_stop_udeg <= spec->pan_start_udeg;
 }
 
-/* num/den: lines a tick. */
+/* Sets num/den, lines a tick. */
 static void set_rates(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     const int table = spec->emitter != NULL && spec->emitter->kind == EMITTER_BEAMS;
@@ -56,8 +56,8 @@ static void set_sector(struct schedule_segment *seg, const struct schedule_spec 
     seg->r_last = ahead + last < n ? ahead + last : n - 1;
 }
 
-/* Steps of a planar head or a sphere lie at line angles that need not be whole micro-degrees: those within one of a
- * limit count as inside. */
+/* Steps of a planar head or a sphere need not lie at whole micro-degrees. A step within a micro-degree of a limit
+ * counts as inside. */
 static void set_window(struct schedule_segment *seg, const struct schedule_spec *spec)
 {
     const struct emitter *e = spec->emitter;
@@ -89,7 +89,7 @@ static void set_spec(struct schedule_segment *seg, const struct schedule_spec *s
     if (kind_of(seg) == EMITTER_SPHERE) seg->frame_lines = spec->emitter->rings;
 }
 
-/* More pulses than 64 bits can count are without end. */
+/* A scan of more pulses than 64 bits can count has no end. */
 static void set_end(struct schedule_segment *seg)
 {
     if (seg->spec.frames == 0) {
@@ -171,7 +171,7 @@ uint64_t schedule_line_of(const struct schedule_segment *seg, uint64_t k)
     return seg->line0 + (uint64_t)(((u128)seg->r0 + (u128)firing_ticks(seg, k) * seg->num) / seg->den);
 }
 
-/* Where all steps of a ring look along one line. */
+/* All steps of a ring at a pole look along one line. */
 static int is_pole(const struct schedule_segment *seg, uint64_t n)
 {
     const struct emitter *e = seg->spec.emitter;

@@ -40,14 +40,14 @@ static inline uint64_t firing_tau(const struct emitter *emitter, uint64_t k)
     return k / emitter->n_beams * emitter->sequence_ticks + emitter->firing[k % emitter->n_beams].tick;
 }
 
-/* Ticks from the segment's first pulse to pulse k. */
+/* Returns the ticks from the segment's first pulse to pulse k. */
 static inline uint64_t firing_ticks(const struct schedule_segment *seg, uint64_t k)
 {
     if (kind_of(seg) != EMITTER_BEAMS) return k - seg->k0;
     return firing_tau(seg->spec.emitter, k) - firing_tau(seg->spec.emitter, seg->k0);
 }
 
-/* First pulse that fires so many ticks after the segment's first, or later. */
+/* Returns the first pulse that fires at `ticks` after the segment's first, or later. */
 static inline uint64_t firing_after(const struct schedule_segment *seg, uint64_t ticks)
 {
     if (kind_of(seg) != EMITTER_BEAMS) return seg->k0 + ticks;
@@ -59,7 +59,7 @@ static inline uint64_t firing_after(const struct schedule_segment *seg, uint64_t
     return tau / e->sequence_ticks * e->n_beams + i;
 }
 
-/* First pulse of line n in the scan: the first at or after r0 + ticks*num = (n - line0)*den. */
+/* Returns the first pulse of line n in the scan: the first at or after r0 + ticks*num = (n - line0)*den. */
 static inline uint64_t line_first_pulse(const struct schedule_segment *seg, uint64_t n)
 {
     if (n <= seg->line0) return seg->k0;
@@ -67,7 +67,7 @@ static inline uint64_t line_first_pulse(const struct schedule_segment *seg, uint
     return firing_after(seg, ceil_div(need, seg->num));
 }
 
-/* Place of pulse k in the sweep of its line n, in 1/den of a line. */
+/* Returns the place of pulse k in the sweep of its line n, in 1/den of a line. */
 static inline uint64_t place_in_sweep(const struct schedule_segment *seg, uint64_t k, uint64_t n)
 {
     return (uint64_t)((u128)seg->r0 + (u128)firing_ticks(seg, k) * seg->num - (u128)(n - seg->line0) * seg->den);
@@ -84,9 +84,8 @@ static inline uint32_t frame_of_line(const struct schedule_segment *seg, uint64_
     return seg->frame0 + 1 + (uint32_t)f;
 }
 
-/* angles.c: pan at pulse k, which belongs to the frame that begins with first_line: whole micro-degrees and
- * 2^-24 parts. It is rounded up, so that a frame that a change cuts in two never needs another line because
- * of rounding. */
+/* angles.c: the pan at pulse k in 2^-24 micro-degrees. first_line is the first line of the pulse's frame. The pan is
+ * rounded up, so that rounding never adds a line to a frame that a change cuts in two. */
 int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line);
 
 #endif

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Decides rays among a few triangles, by the rules of sight_inside.h: four rays of a list at a time. */
-#include <math.h>
 #include <string.h>
 
 #include "core/sight/hits_inside.h"
@@ -8,24 +7,23 @@
 
 enum { LANES = QUAD_LANES };
 
-/* Results of rays against the records of a list, lane by lane. */
+/* Four rays, and what the records of a list say of them. */
 struct looks {
     quad x, y, z;
-    quad q[SIGHT_MAX_LIST];                             /* of the records: 1 / range */
-    quad_mask met[SIGHT_MAX_LIST], may[SIGHT_MAX_LIST]; /* the ray passes inside for certain; may do so */
-    quad first_q;
-    quad_mask first, any; /* the record that comes first; something may be hit */
-    quad_mask open, asks; /* not decided; nor to be decided in double */
+    quad_mask first; /* the record that comes first; negative: none is certainly hit */
+    quad_mask any;   /* something may be hit */
+    quad_mask open;  /* the records can't decide */
 };
 
 /* Finds for each record on which side of its edges the rays pass, and where they hit its plane. Then it finds the
  * first of the triangles that are certainly hit. Another one may come before that, where it is or may be hit and its
- * plane is not certainly behind. */
+ * plane is not certainly behind. Such rays are left to the BVH, also those of planes that coincide: to compare their
+ * ranges here takes longer. */
 VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct looks *w)
 {
     const quad x = w->x, y = w->y, z = w->z;
-    quad first_q = {0.0, 0.0, 0.0, 0.0}, slack = first_q;
-    quad_mask first = {-1, -1, -1, -1}, any = {0, 0, 0, 0}, asks = any, open = any;
+    quad first_q = {0.0, 0.0, 0.0, 0.0}, slack = first_q, its_q[SIGHT_MAX_LIST];
+    quad_mask first = {-1, -1, -1, -1}, any = {0, 0, 0, 0}, open = any, its_may[SIGHT_MAX_LIST];
     const uint32_t n = list[0];
     for (uint32_t k = 0; k < n; k++) {
         const struct sight_record *r = &s->record[list[1 + k]];
@@ -35,15 +33,14 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
         const quad q = r->plane[0] * x + r->plane[1] * y + r->plane[2] * z;
         const quad_mask may = ~((quad_mask)(a <= -1.0) | (quad_mask)(b <= -1.0) | (quad_mask)(c <= -1.0));
         const quad_mask sure = (quad_mask)(q >= r->graze) & (quad_mask)(q <= SIGHT_NEAR);
-        const quad_mask met = (quad_mask)(a >= 1.0) & (quad_mask)(b >= 1.0) & (quad_mask)(c >= 1.0);
-        const quad_mask better = met & (quad_mask)(q > first_q);
+        const quad_mask inside = (quad_mask)(a >= 1.0) & (quad_mask)(b >= 1.0) & (quad_mask)(c >= 1.0);
+        const quad_mask better = inside & (quad_mask)(q > first_q);
         const quad its_slack = {r->slack, r->slack, r->slack, r->slack};
         const quad_mask number = {k, k, k, k};
-        w->met[k] = met;
-        w->may[k] = may;
-        w->q[k] = q;
+        its_may[k] = may;
+        its_q[k] = q;
         any |= may;
-        asks |= may & ~sure;
+        open |= may & ~sure;
         first = (number & better) | (first & ~better);
         quad_choose(&better, &q, &first_q);
         quad_choose(&better, &its_slack, &slack);
@@ -51,47 +48,12 @@ VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct look
     for (uint32_t k = 0; k < n; k++) {
         const struct sight_record *r = &s->record[list[1 + k]];
         const quad_mask number = {k, k, k, k};
-        const quad_mask behind = (quad_mask)(first_q - w->q[k] > slack + r->slack + SIGHT_SAME * first_q);
-        open |= ~behind & w->may[k] & (quad_mask)(number != first);
+        const quad_mask behind = (quad_mask)(first_q - its_q[k] > slack + r->slack + SIGHT_SAME * first_q);
+        open |= ~behind & its_may[k] & (quad_mask)(number != first);
     }
-    w->first_q = first_q;
     w->first = first;
     w->any = any;
-    w->asks = asks;
-    w->open = open | asks | (any & (first >> 63));
-}
-
-/* Decides rays that hit several planes at the same place, all within the borders: by the rule of core/bvh, and
- * by its ranges. */
-static uint32_t decide_tie(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list,
-                           const struct looks *w, int i)
-{
-    const double dir[3] = {w->x[i], w->y[i], w->z[i]};
-    const struct sight_record *first = &s->record[list[1 + w->first[i]]];
-    double range_m[SIGHT_MAX_LIST], first_m = INFINITY;
-    uint32_t lowest = FEW_OPEN;
-    for (uint32_t k = 0; k < list[0]; k++) {
-        const struct sight_record *r = &s->record[list[1 + k]];
-        const double q = w->q[k][i];
-        range_m[k] = INFINITY;
-        if (!w->may[k][i]) continue;
-        if (w->first_q[i] - q > first->slack + r->slack + SIGHT_SAME * w->first_q[i]) continue;
-        if (!w->met[k][i]) return FEW_OPEN;
-        range_m[k] = bvh_range_of(s->bvh, r->triangle, rays->from.at_m, dir);
-        first_m = fmin(first_m, range_m[k]);
-    }
-    for (uint32_t k = 0; k < list[0]; k++)
-        if (range_m[k] <= first_m + 1e-12 * first_m && s->record[list[1 + k]].triangle < lowest)
-            lowest = s->record[list[1 + k]].triangle;
-    return lowest;
-}
-
-static uint32_t of_lane(const struct sight *s, const struct bvh_rays *rays, const uint32_t *list, const struct looks *w,
-                        int i)
-{
-    if (!w->any[i]) return BVH_NO_TRIANGLE;
-    if (!w->open[i]) return s->record[list[1 + w->first[i]]].triangle;
-    return w->first[i] >= 0 && !w->asks[i] ? decide_tie(s, rays, list, w, i) : (uint32_t)FEW_OPEN;
+    w->open = open | (any & (first >> 63));
 }
 
 VEC_INLINE void take(struct looks *w, const struct vec3_in *dir, uint32_t at, uint32_t n)
@@ -125,9 +87,10 @@ int candidate_list_decide(const struct sight *s, const struct bvh_rays *rays, co
         take(&w, &rays->dir, at, rays->n - at);
         look_at(s, list, &w);
         for (uint32_t i = 0; i < n; i++) {
-            const uint32_t it = of_lane(s, rays, list, &w, (int)i);
-            triangle[at - from + i] = it;
-            open |= it == FEW_OPEN;
+            triangle[at - from + i] = !w.any[i]   ? (uint32_t)BVH_NO_TRIANGLE
+                                      : w.open[i] ? (uint32_t)FEW_OPEN
+                                                  : s->record[list[1 + w.first[i]]].triangle;
+            open |= triangle[at - from + i] == FEW_OPEN;
         }
     }
     return open != 0;

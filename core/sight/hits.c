@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays looked up in the map, a chunk at a time. */
+/* Looks rays up in the map, a chunk at a time. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,7 +14,7 @@ struct sight_work {
     uint8_t asks[HITS_ROOM]; /* 1: of the chunk's */
     uint32_t ray[HITS_ROOM]; /* which ones they are */
     double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
-    uint32_t met[HITS_ROOM], label[HITS_ROOM];
+    uint32_t hit[HITS_ROOM], label[HITS_ROOM];
     float steep[HITS_ROOM];
 };
 
@@ -117,14 +117,14 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
                              .dir = VEC3_IN(*w, 0),
                              .range_max_m = rays->range_max_m,
                              .range_m = w->range_m,
-                             .triangle = w->met,
+                             .triangle = w->hit,
                              .label = w->label,
                              .steep = rays->steep != NULL ? w->steep : NULL};
     bvh_hits(bvh_work, s->bvh, &asked);
     for (uint32_t k = 0; k < asked.n; k++) {
         const uint32_t i = w->ray[k];
         rays->range_m[i] = w->range_m[k];
-        rays->triangle[i] = w->met[k];
+        rays->triangle[i] = w->hit[k];
         if (rays->label != NULL) rays->label[i] = w->label[k];
         if (rays->steep != NULL) rays->steep[i] = w->steep[k];
     }

@@ -23,8 +23,8 @@ uint32_t sight_find_runs(const struct sight *sight, const struct vec3_in *dir, u
                          struct sight_run *run);
 
 /* ---- candidate_list.c */
-/* Decides rays from .. to - 1, which have that list, into triangle[0 ..]: BVH_NO_TRIANGLE for nothing,
- * FEW_OPEN where the records can't decide. Returns whether any of them has that. */
+/* Decides rays from .. to - 1, which have that list. It sets triangle[0 ..], to BVH_NO_TRIANGLE where a ray hits
+ * nothing, and to FEW_OPEN where the records can't decide. Returns whether any ray has FEW_OPEN. */
 enum { FEW_OPEN = 0xfffffffe };
 int candidate_list_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from,
                           uint32_t to, uint32_t *triangle);

@@ -50,7 +50,7 @@ static void find_changes(const int32_t *restrict tile, uint32_t n, uint8_t *rest
         changes[i] = 1;
 }
 
-/* The next change from `at` on. */
+/* Returns the next change from `at` on. */
 static inline uint32_t next_change(const uint8_t *changes, uint32_t at)
 {
     uint64_t eight;

@@ -10,7 +10,7 @@ enum { QUAD_LANES = 4 };
 typedef double quad __attribute__((vector_size(32)));
 typedef int64_t quad_mask __attribute__((vector_size(32)));
 
-/* no becomes yes in the lanes that are set. */
+/* Replaces *no by *yes in the lanes that `which` sets. */
 VEC_INLINE void quad_choose(const quad_mask *which, const quad *yes, quad *no)
 {
     *no = (quad)(((quad_mask)*yes & *which) | ((quad_mask)*no & ~*which));

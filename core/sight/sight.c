@@ -72,8 +72,8 @@ static int take_arrays(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* Coarser cells everywhere are better than fine ones in some places, unless they have to be much
- * coarser. */
+/* Where the memory is full, rays of all further regions would ask the BVH. Cells of twice the width everywhere are
+ * better than that. */
 static int is_too_fine(const struct build_shared *b)
 {
     return b->may_coarsen && atomic_load_explicit(&b->full, memory_order_relaxed);
@@ -91,7 +91,6 @@ static void build_some(void *shared, int reports)
         const int rc = sh_stopped(b->report) ? SH_ESTOPPED : build_region(b, &w, region);
         if (rc != SH_OK) atomic_store(&b->failed, rc);
     }
-    atomic_fetch_add(&b->given_back, w.taken);
     build_work_free(&w);
 }
 
@@ -120,40 +119,23 @@ static int keep_records(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-static void sight_finish(struct build_shared *b)
-{
-    struct sight *s = b->sight;
-    struct sight_info *info = &s->info;
-    double all = 0.0;
-    /* Where an array can't shrink, it stays. */
-    resize(&s->leaf, b->leaf.used, sizeof *s->leaf);
-    resize(&s->list, b->list.used, sizeof *s->list);
-    for (int i = 0; i < 4; i++)
-        all += (double)b->cells[i];
-    all = all > 0.0 ? all : 1.0;
-    *info = (struct sight_info){.cells = s->cells,
-                                .one = (double)b->cells[0] / all,
-                                .nothing = (double)b->cells[1] / all,
-                                .few = (double)b->cells[2] / all,
-                                .ask = (double)b->cells[3] / all,
-                                .lists = b->list.used,
-                                .records = b->record.used,
-                                .bytes = b->bytes - b->given_back,
-                                .peak_bytes = b->bytes};
-}
-
 static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
 {
+    struct sight *s = b->sight;
     int rc = take_arrays(b, err);
     if (rc == SH_OK) rc = build_groups(b, err);
     if (rc == SH_OK) rc = build_bins(b, err);
-    if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
     if (rc == SH_OK && !is_too_fine(b)) rc = keep_records(b, err);
-    if (rc == SH_OK) sight_finish(b);
+    if (rc == SH_OK) { /* where an array can't shrink, it stays */
+        resize(&s->leaf, b->leaf.used, sizeof *s->leaf);
+        resize(&s->list, b->list.used, sizeof *s->list);
+        s->info = (struct sight_info){.cells = s->cells,
+                                      .bytes = tiles_of(s->cells) * sizeof *s->tile + b->leaf.used * sizeof *s->leaf +
+                                               b->list.used * sizeof *s->list + b->record.used * sizeof *s->record,
+                                      .peak_bytes = b->bytes};
+    }
     free(b->seen);
-    free(b->figures);
-    free(b->kept);
     free(b->bin);
     free(b->binned);
     free(b->group);

@@ -20,8 +20,8 @@
  * one of three ways:
  * - Beside it (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the square,
  *   pad included. It is linear, so it is below that everywhere in the square: all rays miss the triangle, by more
- *   than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side of the
- *   region's pyramid, which is wider than the region by some pads.
+ *   than core/bvh takes for a near miss. Regions hold every triangle whose box may be seen in them, with a margin of
+ *   some pads (groups.c).
  * - Behind (region.c): another one covers the square (all sides above their doubts at all corners, so every ray
  *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes
  *   to it first, in whatever way its ranges are rounded. An edge that is nearly hit lies in its triangle's plane,

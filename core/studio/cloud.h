@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A recorded point cloud, and its distance from the scene. In: a PLY or LAS file, the scene's index of
- * distances, the stations' georeferences. Out: points; per point a distance in metres and a triangle;
- * statistics and coverage of them.
+/* A recorded point cloud, and its distance from the scene. In: a PLY or LAS file, the scene's BVH, the
+ * stations' georeferences. Out: points; per point a distance in metres and a triangle; statistics and coverage of
+ * them.
  *
  * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
  * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
@@ -18,7 +18,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "core/distance.h"
+#include "core/bvh.h"
 #include "core/err.h"
 #include "core/georef.h"
 
@@ -34,8 +34,8 @@ struct cloud {
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
-    /* The step to which the file rounds coordinates, on the ground: the scale of LAS; 1e-6 m of a PLY as text, as our
-     * recorder writes it; two units in the last place of single precision; 0: it rounds nothing. */
+    /* The step that the file rounds coordinates to, in metres, also where they are degrees: the scale of LAS, 1e-6 m of
+     * a PLY as text (as our recorder writes it), or two units in the last place of single precision. 0: none. */
     double count_m;
     int is_single;      /* 1: in single precision */
     int is_text;        /* 1: the file holds coordinates as decimal numbers */
@@ -50,7 +50,7 @@ struct cloud {
     int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
 };
 
-/* Two units in the last place of v in single precision. */
+/* Returns two units in the last place of v in single precision. */
 static inline double cloud_single_unit(double v)
 {
     return 1.2e-7 * v;
@@ -64,34 +64,35 @@ enum cloud_column {
     CLOUD_RGB = 16,
     CLOUD_AMPLITUDE = 32
 };
-/* Reads positions, stations, echoes and labels, and these columns. Errors (SH_EINPUT, naming file and line, or byte):
- * missing or unreadable, not a PLY or LAS file, x, y or z missing, a count the file can't hold, truncated, infinite
- * coordinates, or only some of the three NaN, a station, echo or label that is not a whole number in its range. Warns
- * of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
+/* Reads positions, stations, echoes and labels, and these columns. SH_EINPUT names the file, and the line or byte:
+ *   the file is missing, unreadable, truncated, or not PLY or LAS; it lacks x, y or z, or counts more than it can hold;
+ *   a coordinate is infinite, or only some of the three are NaN;
+ *   a station, echo or label is not a whole number in its range.
+ * Warns of other elements and of bytes after the last one. SH_ESTOPPED where report asks to stop. */
 int cloud_read_columns(const char *path, unsigned columns, const struct sh_report *report, struct cloud *out,
                        struct sh_err *err);
-/* Positions alone, of software that is not ours: PLY and LAS as above; PCD (text, binary, compressed); and text, a line
- * a point, with blanks, commas or semicolons between numbers. There a line of names that has x, y and z says where they
- * stand; else they come first. Lines that are no points are left out, with a warning of more than one. */
+/* Reads positions alone, from files of any software: PLY and LAS; PCD (text, binary, compressed); and text, a
+ * line a point, with blanks, commas or semicolons between numbers. In text a line of names may say which columns are x,
+ * y and z; else they are the first three. Other lines are left out; more than one of them gives a warning. */
 int cloud_read_positions(const char *path, const struct sh_report *report, struct cloud *out, struct sh_err *err);
 void cloud_free(struct cloud *cloud);
 
-/* How cloud_compare maps a point to the scene. */
+/* This says how cloud_compare maps a point to the scene. */
 struct cloud_site {
-    const struct distance *index;
-    const struct georef *const
-        *georef; /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
+    const struct bvh *bvh;
+    /* [n_stations], by station - 1; NULL: the cloud is in the scene frame already */
+    const struct georef *const *georef;
     uint32_t n_stations;
     double max_m; /* reach of the search */
-    /* Bodies that do not stand in the scene; NULL: there are none. Takes a point of such a body's label from
-     * the scene to the body's own frame and gives the body's index; NULL: the point is of the scene. From any
-     * thread. */
-    const struct distance *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
+    /* For bodies that move, which are not in the scene's BVH; NULL: there are none. Turns a point with such a body's
+     * label into the body's own frame, and returns the body's BVH. Returns NULL for a point of the scene. Called from
+     * any thread. */
+    const struct bvh *(*body)(void *ctx, unsigned station, uint16_t label, double p_prcs[3]);
     void *body_ctx;
     unsigned threads; /* at least 1; the result does not depend on it */
 };
 
-/* Per point: its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
+/* Sets for each point its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing
  * within max_m) and that triangle's number, or CLOUD_TRIANGLE_NONE, also for a body's. Points without a
  * station are of the first one. SH_EINPUT: a point's station is not among n_stations. SH_ESTOPPED. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
@@ -105,7 +106,7 @@ struct cloud_compared {
     const uint32_t *triangle; /* [cloud->n] */
 };
 
-/* The station of point i, from 1, and its place in the scene. */
+/* These return the station of point i, from 1, and its place in the scene. */
 static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
 {
     return cloud->station != NULL ? cloud->station[i] : 1;
@@ -119,12 +120,12 @@ struct cloud_coverage {
     uint32_t surfaces_hit, triangles_hit;
 };
 
-/* The surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
+/* Returns the surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
  * there is no such triangle. */
 uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 
-/* How many of the n_surfaces, the scene's and then those of bodies, and of the scene's triangles have points
- * (far ones have no triangle). SH_EINPUT: a label of n_surfaces or more. */
+/* Counts the surfaces and the triangles that have points. n_surfaces: those of the scene and then those of bodies;
+ * triangles: of the scene, and far points have none. SH_EINPUT: a label of n_surfaces or more. */
 int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
                 struct cloud_coverage *out, struct sh_err *err);
 

@@ -16,16 +16,16 @@ enum { CLOUD_PICTURE_PX = 800, CLOUD_PICTURE_LEAST_PX = 160 };
 
 struct cloud_picture_spec {
     size_t n;
-    /* Point i: its place and figure (infinite or NaN: none). 0: it is left out. */
+    /* Sets the place and the figure of point i (infinite or NaN: none). Returns 0 where the point is left out. */
     int (*point)(void *ctx, size_t i, double place_m[2], double *figure);
     void *ctx;
     double most;            /* figure that is red; > 0 */
-    double include_m[2][2]; /* least and largest x and y that the area holds in any case; NaN: of the points alone */
+    double include_m[2][2]; /* least and largest x and y that the area must hold; NaN: the points alone decide */
 };
 
 struct cloud_picture {
     struct picture image;      /* rgb NULL: there was no point, and no area */
-    double min_m[2], max_m[2]; /* the area: of the outer borders of the pixels */
+    double min_m[2], max_m[2]; /* the area, up to the outer borders of the pixels */
 };
 
 /* The image is freed by picture_free. */

@@ -52,20 +52,20 @@ struct coverage_scan {
     /* Poses of what moves at a time of the scan; NULL: nothing does. From any thread, each with a setup of its own. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
-    /* Gets the scan's hits as well, also those on bodies, from the threads that cast. NULL: nobody wants them. */
+    /* Gets the scan's hits as well, also those on bodies, from the threads that cast. NULL: they are not wanted. */
     void (*take)(void *take_ctx, const struct cast_hit *hit, uint32_t n);
     void *take_ctx;
 };
 
 struct coverage_pulses {
-    uint64_t cast, met;   /* with at least one hit that counts, on the scene that stands still */
-    uint64_t hits, front; /* of these hits, on the front of a triangle */
+    uint64_t cast, met;   /* pulses; those with a hit that counts, on the scene that stands still */
+    uint64_t hits, front; /* such hits; those on the front of a triangle */
 };
 
 /* Casts a scan. Its result waits until it is kept or dropped. Reports progress after a second. */
 int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, const char *what,
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
-/* Figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
+/* Gives figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
 void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *gain_m2);
 /* Makes the waiting scan that of the next station, counted from 1 in this order. */
 void coverage_keep(struct coverage *coverage);
@@ -89,21 +89,21 @@ struct coverage_sums {
     uint32_t stations, cells;
     uint64_t pieces, triangles;
     double area_m2, duplicate_m2, silent_m2; /* of all cells; of duplicate faces, and faces without echo: left out */
-    double none_m2, one_m2, several_m2;      /* by how many stations see it */
+    double none_m2, one_m2, several_m2;      /* area that no, one, or several stations see */
     struct coverage_spread density_1_m2;     /* pulses per area, of all stations; over the area that is seen */
-    struct coverage_spread incidence_rad;    /* the smallest of each cell, likewise */
-    struct coverage_spread range_m;          /* the smallest of each cell, likewise */
+    struct coverage_spread incidence_rad;    /* the smallest of each cell, over the area that is seen */
+    struct coverage_spread range_m;          /* the smallest of each cell, over the area that is seen */
 };
 int coverage_sum(const struct coverage *coverage, struct coverage_sums *sums, struct sh_err *err);
 
-/* alone_m2[n], n the number of stations that were kept: what only this one sees. */
+/* Sets alone_m2[n], n the number of stations that were kept, to the area that only that station sees. */
 void coverage_alone(const struct coverage *coverage, double *alone_m2);
 
 struct coverage_of_label {
     double area_m2, seen_m2, several_m2;
     uint64_t pulses;
 };
-/* label[n_surfaces] of the scene. */
+/* Sets label[n_surfaces], by label of the scene. */
 void coverage_by_label(const struct coverage *coverage, struct coverage_of_label *label);
 
 /* One cell, for tests and pictures. */
@@ -150,12 +150,12 @@ struct coverage_directions {
  * such a cell stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where that is less than the
  * cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where it is more, the ray stands
  * for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is hit count as a whole.
- * The estimate lacks cells of which only corners are seen, between rays. It adds cells that lie between a scan's own
- * points, and ray areas that reach beyond an outline: on average half of one along all outlines. Glass counts as a
- * wall, and what moves as nothing. */
+ * The estimate misses cells that lie between rays, if only a corner of them is seen. It counts cells too many that a
+ * scan's points miss, and the parts of ray areas beyond outlines: on average half a ray's area along all outlines.
+ * Glass counts as a wall, and moving bodies as nothing. */
 struct coverage_gain {
     double gain_m2;
-    double front; /* of what the rays meet, the share met from the front; NaN: nothing is met */
+    double front; /* share of the rays' hits that are on the front of a triangle; NaN: no ray hits */
 };
 /* Places of a head, prcs. */
 struct coverage_places {
@@ -163,7 +163,7 @@ struct coverage_places {
     const double (*place_m)[3]; /* [n] */
     _Atomic uint64_t *cells;    /* gets a bit for each cell that a ray hits, seen before or not; NULL: not asked for */
 };
-/* gain: [places->n] */
+/* Sets gain[places->n]. */
 int coverage_gains(const struct coverage *coverage, const struct coverage_directions *directions,
                    const struct coverage_places *places, const struct sh_report *report, struct coverage_gain *gain,
                    struct sh_err *err);

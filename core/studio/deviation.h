@@ -3,25 +3,25 @@
  * deviations. In: a cloud (core/studio/cloud.h) with its distances, and each station's head. Out: per point the
  * deviation along the beam, its expected sigma, range and incidence, in metres and as cosines.
  *
- * Along the beam: the line from the station through the point is followed to the scene. measured - exact range
- * is positive where the point lies beyond the surface. Exact is the range of the BVH's first hit. Where the point
- * belongs to another surface (a later echo, what lies beyond glass), it is that of the nearest triangle, if the
- * line crosses that one.
+ * Along the beam: the line from the station through the point is followed to the scene. The deviation is the measured
+ * minus the exact range, so it is positive where the point lies beyond the surface. The exact range is that of the
+ * BVH's first hit. Where the point belongs to another surface (a later echo, a point beyond glass), it is that of the
+ * nearest triangle, if the line crosses that one.
  *
  * On a smooth face: the point's distance from the nearest triangle is the deviation times the cosine of the
- * incidence, to 1 % and 2 um. So the surface that the beam meets is also the nearest one, and no edge or corner is
+ * incidence, to 1 % and 2 um. So the surface that the beam hits is also the nearest one, and no edge or corner is
  * between. With a footprint, twelve rays along its border have to hit the same plane, too. Only such points have a
  * deviation along the beam: at an edge it may be any number, however good the point.
  *
  * A point is judged where noise alone causes its deviation: on a smooth face with no other surface near. Two balls of
- * DEVIATION_CLEAR sigma touch the face where the beam meets it, in front and behind; nothing else reaches into them.
+ * DEVIATION_CLEAR sigma touch the face where the beam hits it, in front and behind; nothing else reaches into them.
  * Otherwise large deviations would be taken for small ones of the other surface. Up to about DEVIATION_SAMPLE points
  * of a cloud are judged, evenly taken.
  *
  * Expected sigma of that deviation, to first order. u: the beam, n: the face's normal, i: the incidence, R: the
  * range; with cos i = |n u| a move of the point by m changes the deviation by (n m) / (n u):
  *     range noise      sigma0 + sigma1 R, or by the signal (core/detect.h)
- *     angle noise      R sigma |n e| / cos i, e: where the angle moves the beam, at right angles to it
+ *     angle noise      R sigma |n e| / cos i, e: the direction in which the angle moves the beam
  *     ball             f_k |n_k| radius / sqrt(5) / cos i over its axes: a ball's uniform points have r^2/5 an axis
  * The steps of counts add to that. They are summed separately, since they are no noise:
  *     of encoders      as angle noise of sigma = step / sqrt(12)
@@ -31,9 +31,12 @@
  * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
  * instrument.
  *
- * The bound of the distance, where the only random effect is a ball. It adds: errors of cast and georeferencing
- * from the plan, half a count an axis (sqrt(3)/2 counts of a position; a polar point's range and angles, at right
- * angles to each other), half an encoder count an axis times R, the ball's radius. */
+ * The distance has a bound where the only random effect is a ball. The bound is the sum of:
+ *   the plan's errors of cast and georeferencing;
+ *   half a count an axis: sqrt(3)/2 counts of a position, or a polar point's range and angles at right angles to each
+ *   other;
+ *   half an encoder count an axis, times R;
+ *   the ball's radius. */
 #ifndef CORE_STUDIO_DEVIATION_H
 #define CORE_STUDIO_DEVIATION_H
 
@@ -57,25 +60,25 @@ struct deviation_points {
     float *along_m;  /* measured minus exact; NaN: not on a smooth face, far, a shot without echo, of a body */
     float *sigma_m;  /* expected; NaN: not known, the point isn't judged, or along_m is NaN */
     float *counts_m; /* the counts' part of it; NaN where sigma_m is */
-    float *cosine;   /* of the incidence on what the beam meets; NaN: nothing, or the station moves */
+    float *cosine;   /* of the incidence where the beam hits; NaN: it hits nothing, or the station moves */
     float *range_m;  /* from the station; NaN: a shot without echo */
-    uint32_t *met;   /* the triangle that the beam meets there, as the BVH has it, or else the nearest one;
+    uint32_t *met;   /* the triangle that the beam hits there, as the BVH has it, or else the nearest one;
                       * CLOUD_TRIANGLE_NONE: neither. NULL: not asked for (deviation_points_create) */
 };
 int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err);
 void deviation_points_free(struct deviation_points *points);
 
-/* head: [compared->site->n_stations]. Labels from n_surfaces on are of
+/* Fills `out`. head: [compared->site->n_stations]. Labels from n_surfaces on are of
  * bodies that move: they get ranges alone. All threads; the result doesn't depend on them. SH_ESTOPPED. */
 int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
                     const struct sh_report *report, const struct deviation_points *out, struct sh_err *err);
 
-/* Where a beam meets a face. */
+/* The hit of a beam on a face. */
 struct deviation_hit {
     double range_m, beam[3], normal[3]; /* unit vectors, prcs */
-    int32_t label;                      /* of the surface; -1: what comes back of it is not known */
+    int32_t label;                      /* of the surface; -1: the power that comes back is not known */
 };
-/* The expected sigma there, by noise; and what counts add, as if every place within a count were as likely. */
+/* Returns the expected sigma there, by noise. *counts_m: the part of counts, if all places within one are as likely. */
 double deviation_sigma_m(const struct deviation_head *head, const struct deviation_hit *hit, double *counts_m);
 
 /* These figures give a client the same sigma. Amplitudes count in units of the threshold. */
@@ -90,7 +93,7 @@ struct deviation_terms {
 /* Returns 0 where no error is expected, since the instrument has errors of its own. */
 int deviation_terms_of(const struct deviation_head *head, struct deviation_terms *out);
 
-/* INFINITY: there is no bound, as for Gaussian noise. */
+/* Returns the bound of the distance at a range. INFINITY: there is none, as for Gaussian noise. */
 double deviation_bound_m(const struct deviation_head *head, double range_m);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Figures of a compared cloud, for tables and pictures: by groups, as histograms, how dense its points lie, when they
- * came. In: distances (core/studio/cloud.h) and deviations (core/studio/deviation.h), metres. Out: statistics. Values
+/* Figures of a compared cloud, for tables and pictures: by groups, as histograms, the density of its points, and their
+ * times. In: distances (core/studio/cloud.h) and deviations (core/studio/deviation.h), metres. Out: statistics. Values
  * that are NaN take no part. Pure. */
 #ifndef CORE_STUDIO_FIGURES_H
 #define CORE_STUDIO_FIGURES_H
@@ -11,7 +11,7 @@
 /* Figures of one group of points. Distances are to the nearest triangle and never negative; `along` is signed
  * (measured minus exact range, on smooth faces). Figures without a point are NaN. */
 struct figures {
-    size_t points, far;                            /* with coordinates; of these, farther than everything */
+    size_t points, far;                            /* with coordinates; of these, too far from any surface */
     double mean_m, rms_m, p95_m, max_m;            /* of the distances that are not far; nearest rank */
     size_t along;                                  /* on smooth faces, at an incidence up to FIGURES_STEEPEST */
     double along_mean_m, along_rms_m, along_max_m; /* the last: the largest without its sign */
@@ -35,8 +35,8 @@ struct figures_in {
 
 enum { FIGURES_NO_GROUP = 0xffffffff };
 
-/* group(ctx, i): of point i, below n_groups or FIGURES_NO_GROUP; NULL: all points are one group. It takes 8 bytes a
- * point while it works. */
+/* group(ctx, i) returns the group of point i, below n_groups or FIGURES_NO_GROUP; NULL: all points are one group. Takes
+ * 8 bytes a point while it works. */
 int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)(void *ctx, size_t i), void *ctx,
                struct figures *out, struct sh_err *err);
 
@@ -52,14 +52,14 @@ struct figures_histogram {
  * value: 0 bins. */
 void figures_histogram_of(const double *value, size_t n, double share, struct figures_histogram *out);
 void figures_histogram_of_signed(const float *value, size_t n, double share, struct figures_histogram *out);
-/* The smallest of 1, 2, 5 times a power of ten that is v or more; v > 0. */
+/* Returns the smallest of 1, 2, 5 times a power of ten that is v or more; v > 0. */
 double figures_nice(double v);
 
 /* The density of one station's points on the surfaces. The scene is cut into cells: each triangle's plane is projected
  * along the axis that it faces most, and divided into squares of cell_m there. A cell is such a square of one plane,
  * by one station; its area is cell_m^2 / |n|, n the normal's part along that axis. Its density is points / area. Cells
- * at a border count as whole ones, so theirs is a lower limit. A percentile p is the density that p of the points do
- * not exceed, as nearest rank: half of the points lie where it is p50 or more. */
+ * at a border count as whole ones, so theirs is a lower limit. Percentiles are over points, by nearest rank: half of
+ * the points lie where the density is p50 or more. */
 struct figures_cell {
     uint64_t key;
     uint32_t n;
@@ -80,16 +80,16 @@ struct figures_on_scene {
     const struct scene *scene;
     const float *range_m; /* [cloud->n] as deviation_points has it */
 };
-/* Points without a triangle take no part. Up to 3 million cells, in 96 MiB. */
+/* Counts the points in their cells. Points without a triangle take no part. Up to 3 million cells, in 96 MiB. */
 int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
                        struct figures_density *out, struct sh_err *err);
-/* The same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly, and up to
- * 50 m. all: the figures of all its cells. */
+/* Does the same with a cell chosen here: first_m, doubled until half of the points lie in cells of 16, or nearly,
+ * and up to 50 m. all: the figures of all its cells. */
 int figures_density_fit(const struct figures_on_scene *in, double first_m, const struct sh_report *report,
                         struct figures_density *out, struct figures_density_row *all, struct sh_err *err);
 void figures_density_free(struct figures_density *density);
-/* Figures of the cells of one station (from 1; 0: of all) whose mean range is at least from_m and below to_m. NaN:
- * no cell. */
+/* Sets row to the figures of the cells of one station (from 1; 0: of all) whose mean range is at least from_m and below
+ * to_m. NaN: no cell. */
 void figures_density_within(const struct figures_density *density, unsigned station, double from_m, double to_m,
                             struct figures_density_row *row);
 
@@ -100,10 +100,11 @@ struct figures_times {
     size_t gaps;                    /* longer than the station's gap_s, between points that follow each other */
     double longest_s, longest_at_s; /* where it begins */
 };
-/* cloud->time_s is there; gap_s and out: [n_stations]. */
+/* Fills out[n_stations]. Needs cloud->time_s, and gap_s[n_stations]. */
 void figures_times_of(const struct cloud *cloud, uint32_t n_stations, const double *gap_s, struct figures_times *out);
 
-/* Shots by their number of echoes, from echo and echo_count, which are there; 0 only where the file keeps them. */
+/* Counts shots by their number of echoes. Needs cloud->echo and echo_count. Shots without echo are counted where the
+ * file has them. */
 enum { FIGURES_MAX_ECHOES = 15 };
 void figures_echoes_of(const struct cloud *cloud, uint64_t shots[FIGURES_MAX_ECHOES + 1]);
 

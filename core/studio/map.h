@@ -7,7 +7,7 @@
  *   lightness  shows structure: a pixel with points on many levels (a wall) is dark, one with floor and
  *              ceiling only is light, one without points is white. It does not depend on the density of
  *              points, so far walls stand out like near ones. Each point is drawn three pixels wide.
- *   hue        shows the height of the lowest point above the lowest of the map
+ *   hue        shows the height of the pixel's lowest point above the map's lowest
  * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow. Each station has a
  * red triangle, a tick where its heading points, and its name and height beside it. A label stands near its
  * station where it covers neither another label nor a station, and as little of walls as possible. Without such a
@@ -48,14 +48,14 @@ struct map;
 int map_create(const struct map_spec *spec, struct map **out, struct sh_err *err);
 void map_free(struct map *map);
 
-/* n points in prcs. A point with a coordinate that is not finite is a shot without echo: it is left out. */
+/* Adds n points in prcs. A point with a coordinate that is not finite is a shot without echo: it is left out. */
 void map_add_points(struct map *map, size_t n, const double *x_m, const double *y_m, const double *z_m);
 
 struct map_station {
     double x_m, y_m;
     double heading_rad;        /* clockwise from y; NaN: no tick */
     char name[MAP_NAME_LEN];   /* UTF-8; empty: none */
-    char height[MAP_NAME_LEN]; /* as it is to be read, under the name; empty: none */
+    char height[MAP_NAME_LEN]; /* text under the name; empty: none */
 };
 
 /* SH_EINPUT outside the area or beyond MAP_MAX_STATIONS. */
@@ -94,8 +94,8 @@ struct map_label {
 /* Chooses places for the labels of all stations; out has room for all. Returns how many were left out. */
 uint32_t map_place_labels(const struct map *map, struct map_label *out);
 
-/* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. A map
- * without points is drawn as well. Errors name the path. */
+/* Writes the image to path.part, which is renamed once it is complete: path never has a part of an image. A map without
+ * points is drawn as well. Errors name the path. */
 int map_write_png(const struct map *map, const char *path, struct sh_err *err);
 int map_write_svg(const struct map *map, const char *path, struct sh_err *err);
 

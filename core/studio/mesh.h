@@ -4,8 +4,8 @@
  *
  * Units and frames: metres, z up, right-handed. In the formats:
  *   .ply   binary, little-endian: coordinates as double. As text: to the nanometre.
- *   .obj   coordinates to the nanometre; z up (the format has neither unit nor axes). With a material (a texture, or
- *          parts): NAME.mtl beside it.
+ *   .obj   coordinates to the nanometre; z up (the format has neither unit nor axes). Where the mesh or a part of it
+ *          has a texture, NAME.mtl is written, too.
  *   .gltf, .glb  float; metres and y up, as the format demands: (x, y, z) is written as (x, z, -y). Colours are linear
  *          there, and left out where a texture is. .gltf has its numbers in NAME.bin beside it, .glb all it
  *          needs within.
@@ -58,8 +58,8 @@ struct mesh {
     const float (*normal)[3]; /* [n_vertices] unit vectors; NULL: none */
     const uint8_t (*rgb)[3];  /* [n_vertices] sRGB; NULL: none */
     const float (*uv)[2]; /* [n_vertices] 0, 0 is the image's lower left corner; in .ply they are s, t; NULL: none */
-    const uint32_t (
-        *face)[3]; /* [n_faces] indices of vertices, counter-clockwise seen from outside; NULL: points alone */
+    /* [n_faces] indices of vertices, counter-clockwise seen from outside; NULL: points alone */
+    const uint32_t (*face)[3];
     const uint8_t (*face_rgb)[3];     /* [n_faces] of .ply alone; NULL: none */
     const struct mesh_scalar *scalar; /* [n_scalars] */
     uint32_t n_scalars;
@@ -67,17 +67,17 @@ struct mesh {
     uint32_t n_comments;
     const char *texture;          /* name of the image that uv are of, as the file's reader finds it; NULL: none */
     const struct mesh_part *part; /* [n_parts] one after the other, all vertices and all faces; then texture is NULL */
-    uint32_t n_parts;             /* 0: one, named as the file */
+    uint32_t n_parts;             /* 0: one, named as the file, or "mesh" in .gltf, .glb and .fbx */
     int ascii;                    /* .ply as text */
 };
 
-/* 1: the ending is that of a format that this module writes. */
+/* Returns 1 where the ending is that of a format that this module writes. */
 int mesh_has_format(const char *path);
 
-/* 1: the ending is that of a format for points without faces: .ply and .obj. */
+/* Returns 1 where the ending is that of a format for points without faces: .ply and .obj. */
 int mesh_takes_points(const char *path);
 
-/* 1: the ending is that of a format whose coordinates are float. */
+/* Returns 1 where the ending is that of a format whose coordinates are float. */
 int mesh_is_float(const char *path);
 
 /* SH_EINPUT where the ending is of a format of floats and they can't hold coordinates between low and high, with the

@@ -28,7 +28,7 @@ void picture_free(struct picture *picture);
  * colour. */
 void picture_blend(struct picture *picture, long column, long row, const uint8_t rgb[3], double coverage);
 void picture_fill(struct picture *picture, long column, long row, long width, long height, const uint8_t rgb[3]);
-/* With round ends; from and to may be the same place: a disc. */
+/* Draws a line with round ends; where from and to are the same place it is a disc. */
 void picture_line(struct picture *picture, const double from[2], const double to[2], double width,
                   const uint8_t rgb[3]);
 void picture_triangle(struct picture *picture, const double corner[3][2], const uint8_t rgb[3]);
@@ -40,12 +40,12 @@ struct picture_type {
     int bold;
     double halo_px; /* > 0: so much white around the strokes */
 };
-/* UTF-8; at: x of the left end, middle or right end, y of the baseline. */
+/* Draws a text (UTF-8). at: x of its left end, middle or right end, y of its baseline. */
 void picture_text(struct picture *picture, const double at[2], enum picture_anchor anchor,
                   const struct picture_type *type, const uint8_t rgb[3], const char *text);
 double picture_text_width(const struct picture_type *type, const char *text);
 
-/* A rectangle on it, its right and lower borders not included. */
+/* A rectangle of a picture, without its right and lower borders. */
 struct picture_box {
     double left, top, right, bottom;
 };
@@ -54,7 +54,7 @@ static inline int picture_box_overlaps(const struct picture_box *a, const struct
     return a->left < b->right && b->left < a->right && a->top < b->bottom && b->top < a->bottom;
 }
 
-/* CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; colours outside the gamut are moved to its border. */
+/* Converts CIE 1976 L*a*b* (white D65), L* 0..100, to sRGB; colours outside the gamut are moved to its border. */
 void picture_lab(double l, double a, double b, uint8_t rgb[3]);
 
 struct picture_part {
@@ -63,7 +63,7 @@ struct picture_part {
     const uint8_t *clear; /* this colour is transparent; NULL: none is */
 };
 
-/* Writes the image: to path.part beside it first, then renamed, so that path is whole or as it was. Errors begin
+/* Writes the image to path.part, which is renamed once it is complete: path never has a part of an image. Errors begin
  * with `what` and name the path. */
 int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err);
 
@@ -94,7 +94,7 @@ struct pen picture_pen(struct picture *picture);
 struct svg;
 int svg_begin(uint32_t width, uint32_t height, const char *title, struct svg **out, struct sh_err *err);
 struct pen svg_pen(struct svg *svg);
-/* Part of an image, as PNG data, at the same place. */
+/* Adds part of an image, as PNG data, at the same place. */
 int svg_image(struct svg *svg, const struct picture_part *part, struct sh_err *err);
 /* Writes as picture_write_png does. */
 int svg_write(struct svg *svg, const char *what, const char *path, struct sh_err *err);

@@ -11,7 +11,8 @@
  * The long-edge filter leaves out each triangle with an edge that is longer than `long_edge` times the mean edge. The
  * mean is over all edges of the mesh before the filter, each counted once: along columns, along rows, and diagonals.
  *
- * Ownership: what is given stays the caller's and is not changed, unless said. Pure but for progress; any thread. */
+ * Ownership: inputs stay the caller's and are not changed, except where a function says so. Pure but for progress; any
+ * thread. */
 #ifndef CORE_STUDIO_SCAN_MESH_H
 #define CORE_STUDIO_SCAN_MESH_H
 
@@ -34,7 +35,7 @@ struct scan_grid {
     const struct scan_column *column; /* [n_columns] lines rising */
     double head_m[3];                 /* where the head stood */
     const float (*to_head_m)[3];      /* [n_points] head minus point; NULL: head_m */
-    uint32_t rows_per_turn;           /* from 3 on: the row before that borders on row 0 */
+    uint32_t rows_per_turn;           /* from 3 on: the last row of a turn borders on row 0; less: none does */
     int closes;                       /* the last column borders on the first; needs three columns */
     double long_edge;                 /* 0: no filter */
 };
@@ -47,14 +48,14 @@ struct scan_faces {
     double mean_edge_m;
 };
 
-/* SH_ENOMEM; SH_ESTOPPED where report asks to stop. scan_faces_free is due in any case. Takes 25 bytes a point while it
- * works, and gives 12 a triangle. */
+/* Makes the triangles. SH_ENOMEM; SH_ESTOPPED where report asks to stop. scan_faces_free is due in any case. Takes
+ * 25 bytes a point while it works, and gives 12 a triangle. */
 int scan_faces_make(const struct scan_grid *grid, struct scan_faces *faces, const struct sh_report *report,
                     struct sh_err *err);
 void scan_faces_free(struct scan_faces *faces);
 
-/* Unit normals of points: the sum of the normals of their triangles, weighed by area. 0 0 0: no triangle, or the sum is
- * nothing. normal: [n_points] */
+/* Sets unit normals of points: the sum of the normals of their triangles, weighed by area. 0 0 0: no triangle, or
+ * the sum is nothing. normal: [n_points] */
 void scan_normals(const double (*xyz_m)[3], uint32_t n_points, const uint32_t (*face)[3], uint32_t n_faces,
                   float (*normal)[3]);
 
@@ -71,14 +72,14 @@ struct scan_sampler {
     double *sum_m2; /* [n_faces] area of faces 0 to i */
     double area_m2;
 };
-/* A key that differs for each scan of each station, both counted from 1. */
+/* Returns a key that differs for each scan of each station, both counted from 1. */
 uint64_t scan_sampler_key(uint64_t seed, uint32_t station, uint32_t scan);
-/* SH_ENOMEM. scan_sampler_free is due in any case. */
+/* Sums the areas. SH_ENOMEM. scan_sampler_free is due in any case. */
 int scan_sampler_start(struct scan_sampler *sampler, const double (*xyz_m)[3], const uint32_t (*face)[3],
                        uint32_t n_faces, uint64_t key, struct sh_err *err);
-/* The number of points for a density per square metre: area times density, rounded. */
+/* Returns the number of points for a density per square metre: area times density, rounded. */
 double scan_sampler_count(const struct scan_sampler *sampler, double per_m2);
-/* Point k < 2^56: in face *face, corner i weighed by weight[i] (the sum is 1). */
+/* Gives point k < 2^56: it lies in face *face, with corner i weighed by weight[i] (the sum is 1). */
 void scan_sampler_point(const struct scan_sampler *sampler, uint64_t k, uint32_t *face, double weight[3]);
 void scan_sampler_free(struct scan_sampler *sampler);
 

@@ -51,8 +51,8 @@ struct view;
 int view_create(const struct view_spec *spec, struct view **out, struct sh_err *err);
 void view_free(struct view *view);
 
-/* n points in prcs. Each has a colour (rgb, may be NULL) or else a figure (value; NaN: not known). Points that are not
- * finite are shots without echo and left out. */
+/* Adds n points in prcs. Each has a colour (rgb, may be NULL) or else a figure (value; NaN: not known). Points that
+ * are not finite are shots without echo and left out. */
 void view_add_points(struct view *view, size_t n, const double (*xyz_m)[3], const float *value,
                      const uint8_t (*rgb)[3]);
 
@@ -63,12 +63,12 @@ struct view_counts {
 };
 void view_get_counts(const struct view *view, struct view_counts *counts);
 
-/* The position of a place in the image, and its depth_m ahead of the eye. 0: it is not in front of the
- * eye. */
+/* Finds where a place of the scene is in the image, and its depth_m ahead of the eye. Returns 0 where it is not in
+ * front of the eye. */
 int view_project(const struct view *view, const double p_m[3], double place_px[2], double *depth_m);
 
-/* The smallest and largest visible figure, without the lowest and highest half percent of the places; 0: none is
- * visible. */
+/* Gives the smallest and largest visible figure, without the lowest and highest half percent of the places. Returns
+ * 0 where none is visible. */
 int view_range(const struct view *view, double *low, double *high);
 
 /* Colours of figures. */
@@ -80,12 +80,13 @@ struct view_colours {
     const struct sh_report *report; /* of the work, line by line; NULL: none */
 };
 
-/* The image; the caller frees it with picture_free. SH_ESTOPPED where report asks to stop; there is no image then. */
+/* Makes the image, which the caller frees with picture_free. SH_ESTOPPED where report asks to stop; there is no
+ * image then. */
 int view_draw(const struct view *view, const struct view_colours *colours, struct picture *out, struct sh_err *err);
 
 /* ---- marks and legends */
 
-/* Even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): like the map's heights, but stronger.
+/* Gives even steps of CIE L*a*b* from blue (0) over green and yellow to red (1): like the map's heights, but stronger.
  * NaN: colour_unknown. */
 void view_ramp(double part, uint8_t rgb[3]);
 
@@ -98,7 +99,7 @@ struct view_station {
 uint32_t view_draw_stations(const struct view *view, struct picture *picture, const struct view_station *station,
                             uint32_t n);
 
-/* Below on the left: colours from low to high with round figures beside them. title has the unit. */
+/* Draws a scale below on the left: colours from low to high, and round figures under them. title has the unit. */
 void view_draw_scale(struct picture *picture, const char *title, double low, double high,
                      const struct view_colours *colours);
 
@@ -107,8 +108,8 @@ struct view_entry {
     char name[64];
 };
 enum { VIEW_MAX_NAMES = 12 };
-/* The same for n things with names, of which the first VIEW_MAX_NAMES are needed. Draws as many as there is room for,
- * and the number of the others. */
+/* Draws a legend there of n things with names; entry has the first VIEW_MAX_NAMES of them. Where there is no room for
+ * all, it ends with the number of the others. */
 void view_draw_names(struct picture *picture, const char *title, const struct view_entry *entry, uint32_t n);
 
 /* ---- where to look from */

@@ -30,7 +30,7 @@ struct viewpoint {
     enum viewpoint_kind kind;
     double position_m[3]; /* of the head's origin */
     double floor_m;       /* height above the floor; NaN: outside */
-    double seen;          /* share of the directions looked at that meet something within the ranges */
+    double seen;          /* share of the rays cast that hit something within the ranges */
     /* The part of the view to scan. Inside and on the ground: all of it, heading 0. Outside: the part that holds the
      * scene. */
     double heading_rad;          /* of pan 0, clockwise from y */
@@ -49,7 +49,7 @@ int viewpoint_find(const struct scene *scene, const struct viewpoint_view *view,
 struct viewpoint_grid {
     double step_m;             /* of the grid along x and y; it lies in the middle of its area */
     double height_m;           /* of the head's origin above the floor */
-    double min_m[3], max_m[3]; /* prcs; of z: the floors' own */
+    double min_m[3], max_m[3]; /* prcs; floors count whose z lies between these */
 };
 
 struct viewpoint_place {
@@ -62,7 +62,7 @@ enum { VIEWPOINT_MAX_PLACES = 1000000 };
 /* Places where a tripod can stand: on a surface at most 20 degrees steep, with 0.2 m of room above the head; of 8
  * spots 0.3 m around at least 6 on the same level within 0.15 m; nothing within 0.3 m of the head on its level.
  * Which side of the surface is up does not matter: some of the places may lie within closed bodies. In order of x,
- * then y, then z downward. The BVH reaches all of the scene above and within the grid. The caller frees *out.
+ * then y, then z downward. The BVH is that of the whole scene. The caller frees *out.
  * SH_EINPUT: more columns than VIEWPOINT_MAX_PLACES. */
 int viewpoint_places(const struct bvh *bvh, const struct viewpoint_grid *grid, const struct sh_report *report,
                      struct viewpoint_place **out, uint32_t *n, struct sh_err *err);

@@ -7,7 +7,7 @@
 #include "core/colour.h"
 #include "core/surface.h"
 
-/* Rows from the top. Shared by labels of the same image. */
+/* Its rows go from the top down. Labels with the same image share it. */
 struct surface_image {
     struct texture_frame frame;
     uint32_t users;

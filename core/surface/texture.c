@@ -7,8 +7,8 @@
 
 #include "core/colour.h"
 
-/* Rows from the top; each texel as in the high bits of a label. Shared by labels of the same image and
- * colour. */
+/* Its rows go from the top down, and a texel is as in the high bits of a label. Labels with the same image and colour
+ * share it. */
 struct surface_texture {
     struct texture_frame frame;
     uint32_t users;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/surface: images that hold the reflectance. In: sRGB values 0 to 1, a table with textures.
- * Out: linear values; the textures freed. */
+/* Private to core/surface. surface_luminance: sRGB values, 0 to 1, -> linear luminance. surface_textures_free: frees a
+ * table's images and flags of vertex colours. */
 #ifndef CORE_SURFACE_TEXTURE_H
 #define CORE_SURFACE_TEXTURE_H
 

@@ -9,7 +9,7 @@
 #include "core/light.h"
 #include "core/waveform/waveform_inside.h"
 
-/* Signals of a window's samples. Returns the largest. */
+/* Computes the signals of a window's samples. Returns the largest. */
 static double detect_signals(const struct finder *finder, double baseline, const uint16_t *sample, uint32_t n,
                              double *y)
 {
@@ -22,7 +22,8 @@ static double detect_signals(const struct finder *finder, double baseline, const
 }
 
 /* Marks samples that are limited, and those in which the receiver is blind. *until: number on the pulse's grid of the
- * first sample that is not blind any more; it goes on from window to window. */
+ * first sample that is not blind any more; it goes on from window to window. If a receiver has not saturated, it shows
+ * a signal right after the last limited sample: then only the digits were limited, and it is not blind. */
 static void detect_mark(const struct finder *finder, const struct waveform_window *window, double *y, uint8_t *mark,
                         uint32_t *until)
 {
@@ -31,6 +32,8 @@ static void detect_mark(const struct finder *finder, const struct waveform_windo
         if (y[i] >= finder->limit) {
             mark[i] = FINDER_LIMITED;
             *until = window->first + i + 1 + finder->blind;
+        } else if (i > 0 && mark[i - 1] == FINDER_LIMITED && y[i] > 5.0 * finder->noise) {
+            *until = 0;
         } else if (window->first + i < *until) {
             mark[i] = FINDER_BLIND;
             if (i > 0) y[i] = y[i - 1];
@@ -45,7 +48,7 @@ static double detect_prominence(const struct finder *finder, double y)
     return fmax(6.5 * finder->noise, 0.15 * y);
 }
 
-/* Where the signal is within a sigma of nothing, an echo has ended, however weak it was, and another may begin. */
+/* Where the signal is within a sigma of zero, an echo has ended, however weak it was, and another may begin. */
 static int detect_fell(const struct finder *finder, double high, double y)
 {
     return y < fmax(high - detect_prominence(finder, high), finder->noise);
@@ -85,9 +88,9 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
     return n;
 }
 
-/* The parabola through the logarithms of three samples is exact for a Gaussian. Where pulses are short beside
- * the sampling, noise may make a neighbour zero or less: it counts as 2 % of the top. A neighbour above the top is
- * noise, too, and says nothing of a top: the parabola through it may have its top anywhere. */
+/* The parabola through the logarithms of three samples is exact for a Gaussian. Where pulses are short compared with
+ * the time between samples, noise may make a neighbour zero or less: it counts as 2 % of the top. A neighbour above the
+ * top is noise, too: then no parabola is used, since its top may be anywhere. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place)
 {
     const double y = run->y[top], least = 0.02 * y;
@@ -100,8 +103,8 @@ double finder_top(const struct finder_run *run, uint32_t top, double *place)
     return y * exp(-0.125 * slope * slope / bend);
 }
 
-/* The crossing of a level between sample a, which is below it, and its neighbour b, which is not. Near half of the peak
- * a Gaussian bends by 0.193 of its peak over sigma^2 (v^2 - 1 at v^2 = 2 ln 2, times a half). */
+/* Returns the crossing of a level between sample a, which is below it, and its neighbour b, which is not. Near half
+ * of the peak a Gaussian bends by 0.193 of its peak over sigma^2 (v^2 - 1 at v^2 = 2 ln 2, times a half). */
 static double detect_crossing(const double *y, uint32_t a, uint32_t b, double level, double bend)
 {
     double step = y[b] - y[a], u = (level - y[a]) / step;
@@ -109,7 +112,7 @@ static double detect_crossing(const double *y, uint32_t a, uint32_t b, double le
     return (double)a + u * ((double)b - (double)a);
 }
 
-/* A spike that is no echo may rise and fall within a sample. No width is below half of one. */
+/* A spike that is no echo may rise and fall within a sample. Its width counts as half a sample. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2])
 {
     const double level = 0.5 * height;
@@ -138,14 +141,13 @@ static int detect_joined(const struct finder_run *run, const struct finder_peak 
     return run->y[after->from] > fmax(3.0 * run->finder->noise, 0.02 * smaller);
 }
 
-static void detect_gaussians(const struct finder_run *run, double level, struct finder_list *list)
+static void detect_gaussians(const struct finder_run *run, struct finder_list *list)
 {
     struct finder_peak peak[FINDER_PEAKS];
     const struct finder *finder = run->finder;
     /* Noise may lower all samples of an echo that just reaches the level, and the largest lies half a sample from its
      * top. */
-    double least = level * finder->peak - 3.0 * finder->noise;
-    least = fmax(least, 0.5 * level * finder->peak);
+    const double least = fmax(finder->peak - 3.0 * finder->noise, 0.5 * finder->peak);
     uint32_t n = finder_peaks(run, least, peak, FINDER_PEAKS), end;
     if (n > FINDER_PEAKS) {
         list->crowded += n - FINDER_PEAKS;
@@ -156,14 +158,14 @@ static void detect_gaussians(const struct finder_run *run, double level, struct 
         for (end = i + 1; end < n && end - i < FINDER_MIX && detect_joined(run, &peak[end - 1], &peak[end]);)
             end++;
         if (end > i + 1 || finder_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
-            finder_decompose(run, &peak[i], end - i, level, &mix);
+            finder_decompose(run, &peak[i], end - i, 1, &mix);
         for (uint32_t j = 0; j < mix.n; j++)
-            finder_add_term(run, &mix, j, level, list);
+            finder_add_term(run, &mix, j, finder->peak, list);
     }
 }
 
 /* Keeps echoes of all detectors in the order of range. Where there is no room, the weakest is left out. */
-static void detect_put(struct finder_list *list, const struct waveform_echo *echo)
+static void detect_insert(struct finder_list *list, const struct waveform_echo *echo)
 {
     if (list->n == list->most) {
         list->crowded++;
@@ -221,21 +223,21 @@ void finder_add(const struct finder_run *run, const struct finder_found *found, 
         .deviation = detect_deviation(run, found, mix, self),
         .saturated = found->saturated,
     };
-    detect_put(list, &echo);
+    detect_insert(list, &echo);
 }
 
-void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double least,
                      struct finder_list *list)
 {
     const struct finder_term *g = &mix->g[self];
     struct finder_spread spread;
-    finder_by_sigma(run->finder, g->sigma, &spread);
+    finder_find(run->finder, FINDER_SIGMA, g->sigma, &spread);
     const struct finder_found found = {g->at - spread.lag, g->peak * spread.gain, spread.width,
                                        (int)(mix->limited >> self & 1)};
-    if (found.peak >= level * run->finder->peak) finder_add(run, &found, mix, self, list);
+    if (found.peak >= least) finder_add(run, &found, mix, self, list);
 }
 
-uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector, double level,
+uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded)
 {
@@ -253,10 +255,10 @@ uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector
             detect_mark(finder, window, y, mark, &until);
             run.mark = mark;
         }
-        if (top < 0.5 * level * finder->peak) continue;
-        if (detector == WAVEFORM_THRESHOLD) finder_threshold(&run, level, &list);
-        if (detector == WAVEFORM_FRACTION) finder_fraction(&run, level, &list);
-        if (detector == WAVEFORM_GAUSSIANS) detect_gaussians(&run, level, &list);
+        if (top < 0.5 * finder->peak) continue;
+        if (detector == WAVEFORM_THRESHOLD) finder_threshold(&run, &list);
+        if (detector == WAVEFORM_FRACTION) finder_fraction(&run, &list);
+        if (detector == WAVEFORM_GAUSSIANS) detect_gaussians(&run, &list);
     }
     *n_crowded += list.crowded;
     return list.n;

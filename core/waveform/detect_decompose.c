@@ -116,7 +116,7 @@ static double decompose_shapes(const struct finder_task *task, const struct find
     double sum = 0.0;
     for (uint32_t j = 0; j < mix->n; j++) {
         struct finder_spread spread;
-        finder_by_sigma(task->run->finder, mix->g[j].sigma, &spread);
+        finder_find(task->run->finder, FINDER_SIGMA, mix->g[j].sigma, &spread);
         double left = (1.2 * spread.misfit + FINDER_ROUGH) * mix->g[j].peak;
         sum += left * left * 2.0 * FINDER_NEAR * mix->g[j].sigma;
     }
@@ -178,7 +178,7 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
             struct finder_spread spread;
             double apart = fabs(a->at - b->at);
             if (apart < 0.35 * task->run->finder->spread[0].sigma) return 0;
-            finder_by_sigma(task->run->finder, b->sigma, &spread);
+            finder_find(task->run->finder, FINDER_SIGMA, b->sigma, &spread);
             if (apart < 5.0 * b->sigma && a->peak < (2.0 * spread.tail + FINDER_ROUGH) * b->peak) return 0;
         }
     return 1;
@@ -258,16 +258,16 @@ static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
     return 1;
 }
 
-void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
+void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, int adds,
                       struct finder_mix *mix)
 {
-    const double least = fmax(0.5 * level * run->finder->peak, 4.0 * run->finder->noise);
+    const double least = adds ? fmax(0.5 * run->finder->peak, 4.0 * run->finder->noise) : (double)INFINITY;
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     if (decompose_begin(run, peak, n, mix)) return;
     /* One term was not enough before this. Mostly two are. */
     struct finder_mix two;
-    if (n == 1 && mix->open == 0 && run->mark == NULL && least < INFINITY && decompose_two(&task, &two)) {
+    if (n == 1 && mix->open == 0 && run->mark == NULL && adds && decompose_two(&task, &two)) {
         finder_mix_fit(&task, &two);
         if (decompose_sound(&task, &two, least) && decompose_enough(&task, &two)) {
             *mix = two;
@@ -277,6 +277,6 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     finder_mix_fit(&task, mix);
     while (mix->n < FINDER_MIX && !decompose_enough(&task, mix) && decompose_more(&task, least, mix)) {
     }
-    /* The bits of open components would have to move with them. */
+    /* decompose_fewer changes the components' order, which bits of mix->open would not follow. */
     if (mix->n > n + 1 && mix->open == 0) decompose_fewer(&task, least, mix);
 }

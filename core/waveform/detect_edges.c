@@ -23,16 +23,16 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
 {
     if (!finder_limited(run, peak) && peak->top > 0 && peak->top + 1 < run->n) return 0;
     struct finder_mix mix;
-    finder_decompose(run, peak, 1, INFINITY, &mix);
+    finder_decompose(run, peak, 1, 0, &mix);
     finder_add_term(run, &mix, 0, 0.0, list);
     return 1;
 }
 
 /* Another echo may begin once the signal is 5 sigma below the level: noise on a slow tail would cross it again. Where
  * noise is above the level, the sample at the crossing may already be below `again`: the echo has at least that one. */
-void finder_threshold(const struct finder_run *run, double level, struct finder_list *list)
+void finder_threshold(const struct finder_run *run, struct finder_list *list)
 {
-    const double *y = run->y, at = level * run->finder->peak;
+    const double *y = run->y, at = run->finder->peak;
     const double again = fmax(at - 5.0 * run->finder->noise, run->finder->noise);
     for (uint32_t i = 0; i < run->n; i++) {
         if (y[i] < at) continue;
@@ -52,10 +52,10 @@ void finder_threshold(const struct finder_run *run, double level, struct finder_
     }
 }
 
-void finder_fraction(const struct finder_run *run, double level, struct finder_list *list)
+void finder_fraction(const struct finder_run *run, struct finder_list *list)
 {
     struct finder_peak peak[FINDER_PEAKS];
-    const double at = level * run->finder->peak;
+    const double at = run->finder->peak;
     uint32_t n = finder_peaks(run, 0.5 * at, peak, FINDER_PEAKS);
     if (n > FINDER_PEAKS) {
         list->crowded += n - FINDER_PEAKS;
@@ -66,7 +66,7 @@ void finder_fraction(const struct finder_run *run, double level, struct finder_l
         if (height < at || edges_hidden(run, &peak[i], list)) continue;
         (void)finder_half(run, &peak[i], height, side);
         struct finder_spread spread;
-        finder_by_width(run->finder, side[1] - side[0], &spread);
+        finder_find(run->finder, FINDER_WIDTH, side[1] - side[0], &spread);
         const struct finder_found found = {side[0] + spread.half_lead, height, side[1] - side[0], 0};
         finder_add(run, &found, NULL, 0, list);
     }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One term goes through the samples of one maximum. Nearly all echoes are found so, so it has to be cheap.
+/* One term goes through the samples of one maximum. Nearly all echoes are found in this way, so it has to be cheap.
  *
  * The half maxima give a first term. Gauss's and Newton's steps then minimise the squares of the residual within
  * FINDER_NEAR sigma of its centre. Samples further out would lower the variance of the range by 0.6 % (the part of
@@ -13,7 +13,7 @@ enum { FIT_STEPS = 24 };
 /* The fit has come to its end where another step would lower the sum of squares by this part of a sample's variance. */
 #define FIT_ENOUGH 0.01
 
-/* Sums over the samples of products of derivatives, of these and the rest, and of rest^2. */
+/* Sums over the samples: products of two derivatives (h), of a derivative and the rest (r), and rest^2. */
 struct fit_sums {
     double h[6], r[3], rest2; /* h: 00, 01, 02, 11, 12, 22 */
     uint32_t n;
@@ -102,7 +102,7 @@ double finder_fit_near(const struct finder_run *run, const struct finder_peak *p
     g->sigma = fmax((side[1] - side[0]) / FINDER_FWHM, 0.5);
     for (int i = 0; i < FIT_STEPS; i++) {
         struct fit_sums sums;
-        /* A sample at the border might go in and out for ever. */
+        /* Later steps keep their samples: one at the border might go in and out for ever. */
         if (i < 3 && !fit_samples(peak, g, &lo, &hi)) return -1.0;
         fit_sum(run, g, lo, hi, &sums);
         double gain = fit_step(&sums, g->peak, p);
@@ -157,6 +157,6 @@ int finder_fit(const struct finder_run *run, const struct finder_peak *peak, str
     struct finder_spread spread;
     double rms = finder_fit_near(run, peak, g);
     if (rms < 0.0 || g->sigma < FINDER_LEAST * finder->spread[0].sigma) return 0;
-    finder_by_sigma(finder, g->sigma, &spread);
+    finder_find(finder, FINDER_SIGMA, g->sigma, &spread);
     return rms <= fit_explained(run, g, spread.misfit) && fit_alone(run, peak, g, 1.2 * spread.tail + FINDER_ROUGH);
 }

@@ -21,7 +21,7 @@ enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
-#define FINDER_SHAPE_LAG  8.0          /* and behind it */
+#define FINDER_SHAPE_LAG  8.0          /* widths of the pulse after it */
 
 /* Fits add up terms. A term is a Gaussian, or h stretched, where h is no Gaussian. Its middle is between its half
  * maxima, and its sigma is that of a Gaussian of the same width. */
@@ -29,8 +29,8 @@ struct finder_term {
     double at, sigma, peak;
 };
 
-/* The echo of a plane of one of the tilts, without noise: its true figures beside those of the term that fits it
- * best. A real head is adjusted on such targets. */
+/* The echo of a plane of one of the tilts, without noise: its true figures, and how they differ from those of the term
+ * that fits it best. A real head is adjusted on such targets. */
 struct finder_spread {
     double sigma;     /* of that term */
     double lag;       /* from the echo's centroid to that term's middle */
@@ -55,14 +55,14 @@ struct finder {
     double lead[FINDER_LEADS];    /* by v: from h's rise through exp(-v v / 2) of its peak to its centroid */
     int gaussian;                 /* h is one */
     double middle;                /* from the centroid of h to its middle, in widths */
-    double reach[2];              /* so many sigmas before and after its middle a term ends */
+    double reach[2];              /* where a term ends, in sigmas before and after its middle */
     double area, variance, third; /* of h: its sum over the samples, and central moments */
     double shape[FINDER_SHAPE];   /* h over its peak */
-    uint32_t top;                 /* entry of the first maximum above a half in it */
-    double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* the logarithm of that, and its derivative by widths */
+    uint32_t top;                 /* entry of shape: its first maximum above a half */
+    double log_shape[FINDER_SHAPE], log_slope[FINDER_SHAPE]; /* logarithm of shape, and its derivative by widths */
 };
 
-/* Returns the value of a table of h, so many widths after its centroid. */
+/* Returns the value of a table of h at `widths` after its centroid. */
 static inline double finder_table(const double table[FINDER_SHAPE], double widths)
 {
     double place = (widths + FINDER_SHAPE_LEAD) * (1.0 / FINDER_SHAPE_STEP);
@@ -78,9 +78,9 @@ double finder_lead(const struct finder *finder, double part);
 
 /* Fills `finder` from the signals of a waveform that is otherwise complete. */
 void finder_learn(const struct waveform *waveform, struct finder *finder);
-/* Find the echo whose term has this sigma, and the echo of this width. */
-void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread);
-void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread);
+/* Interpolates the figures of the echo whose term has this sigma, or of the echo of this width. */
+enum finder_key { FINDER_SIGMA, FINDER_WIDTH };
+void finder_find(const struct finder *finder, enum finder_key key, double value, struct finder_spread *spread);
 
 enum finder_mark { FINDER_PLAIN, FINDER_LIMITED, FINDER_BLIND };
 
@@ -104,7 +104,7 @@ static inline int finder_limited(const struct finder_run *run, const struct find
 }
 /* Finds maxima of at least `least`, and keeps `most` of them. Returns their number, with those that found no room. */
 uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most);
-/* The largest signal about a top sample, and where it is. */
+/* Returns the largest signal about a top sample. *place: where it is. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place);
 /* Finds where the signal crosses half of the peak on both sides of its top, within the peak's samples. On a side
  * where it doesn't, that of the other side is mirrored. Returns how many sides were seen. */
@@ -118,12 +118,12 @@ struct finder_found {
     double at, peak, width;
     int saturated;
 };
-/* A mean of n squares of noise is larger than this once in 30,000 times. */
+/* Returns a limit that a mean of n squares of noise exceeds once in 30,000 times. */
 double finder_noise2(const struct finder *finder, double n);
 
 /* A sum of terms. `open`: bit j is set where component j is limited, or cut by the window's end. */
 struct finder_mix {
-    uint32_t n, open, limited; /* limited: the same bits, only of those that are limited */
+    uint32_t n, open, limited; /* limited: bit j is set where component j is limited */
     struct finder_term g[FINDER_MIX];
     double chi2;
 };
@@ -131,8 +131,8 @@ struct finder_mix {
 /* Adds an echo. Its deviation is about h, after the other components of its mixture have been taken away. */
 void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
                 uint32_t self, struct finder_list *list);
-/* Adds the echo that term `self` of a mixture stands for, if that reaches the level. */
-void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double level,
+/* Adds the echo that term `self` of a mixture stands for, if its peak is `least` or more. */
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double least,
                      struct finder_list *list);
 
 /* Fits one term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its
@@ -151,12 +151,12 @@ struct finder_task {
 void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
 /* Fills rest[hi - lo + 1] with the part of the samples that the components don't explain. */
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
-/* Begins with one component a peak, and adds more while the residual could have another echo of this level;
- * INFINITY: adds none. Where a top is not seen, its flanks decide. */
-void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, double level,
+/* Begins with one component a peak. adds: adds more while the residual could have another echo. Where a top is not
+ * seen, its flanks decide. */
+void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, int adds,
                       struct finder_mix *mix);
 
-void finder_threshold(const struct finder_run *run, double level, struct finder_list *list);
-void finder_fraction(const struct finder_run *run, double level, struct finder_list *list);
+void finder_threshold(const struct finder_run *run, struct finder_list *list);
+void finder_fraction(const struct finder_run *run, struct finder_list *list);
 
 #endif

@@ -23,7 +23,7 @@ struct learn_echo {
     uint32_t n, top;
 };
 
-/* The signal of an echo of amplitude 1, x samples after its centroid. */
+/* Returns the signal of an echo of amplitude 1, x samples after its centroid. */
 static double learn_signal(const struct waveform *waveform, double metre, double extent_m, double x)
 {
     const double far_m = 1e6 * metre; /* no bend of a near plane */
@@ -40,7 +40,7 @@ static void learn_sample(const struct waveform *waveform, double metre, double e
     }
 }
 
-/* Width and rising half maximum of what was sampled, in its steps. */
+/* Finds width and rising half maximum of a sampled echo, in its steps. */
 static double learn_half(const struct finder *finder, const struct learn_echo *echo, double *rise)
 {
     const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
@@ -138,7 +138,7 @@ double finder_lead(const struct finder *finder, double part)
     return finder->lead[k] + (v - k) * (finder->lead[k + 1] - finder->lead[k]);
 }
 
-/* The RMS that a term leaves near its middle. */
+/* Returns the RMS that a term leaves near its middle. */
 static double learn_rest(const struct finder *finder, const struct learn_echo *echo, const struct finder_term *g)
 {
     double sum = 0.0, n = 0.0;
@@ -207,7 +207,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 5.0 * finder->noise);
 }
 
-/* Sets `spread` between those of the tilts k and k + 1, at share u of the way. */
+/* Interpolates `spread` between the tilts k and k + 1, at share u of the way. */
 static void learn_between(const struct finder *finder, uint32_t k, double u, struct finder_spread *spread)
 {
     const struct finder_spread *a = &finder->spread[k], *b = a + 1;
@@ -231,30 +231,23 @@ static void learn_stretch(const struct finder_spread *end, double ratio, struct 
     spread->half_lead *= ratio;
 }
 
-void finder_by_sigma(const struct finder *finder, double sigma, struct finder_spread *spread)
+static double learn_key(const struct finder_spread *spread, enum finder_key key)
 {
-    const struct finder_spread *s = finder->spread, *end = &s[FINDER_SPREADS - 1];
-    uint32_t k = 0;
-    if (sigma <= s->sigma || sigma >= end->sigma) {
-        const struct finder_spread *near = sigma <= s->sigma ? s : end;
-        learn_stretch(near, sigma / near->sigma, spread);
-        return;
-    }
-    while (sigma > s[k + 1].sigma)
-        k++;
-    learn_between(finder, k, (sigma - s[k].sigma) / (s[k + 1].sigma - s[k].sigma), spread);
+    return key == FINDER_SIGMA ? spread->sigma : spread->width;
 }
 
-void finder_by_width(const struct finder *finder, double width, struct finder_spread *spread)
+void finder_find(const struct finder *finder, enum finder_key key, double value, struct finder_spread *spread)
 {
     const struct finder_spread *s = finder->spread, *end = &s[FINDER_SPREADS - 1];
+    const double least = learn_key(s, key);
     uint32_t k = 0;
-    if (width <= s->width || width >= end->width) {
-        const struct finder_spread *near = width <= s->width ? s : end;
-        learn_stretch(near, width / near->width, spread);
+    if (value <= least || value >= learn_key(end, key)) {
+        const struct finder_spread *near = value <= least ? s : end;
+        learn_stretch(near, value / learn_key(near, key), spread);
         return;
     }
-    while (width > s[k + 1].width)
+    while (value > learn_key(&s[k + 1], key))
         k++;
-    learn_between(finder, k, (width - s[k].width) / (s[k + 1].width - s[k].width), spread);
+    const double before = learn_key(&s[k], key);
+    learn_between(finder, k, (value - before) / (learn_key(&s[k + 1], key) - before), spread);
 }

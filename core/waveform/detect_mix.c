@@ -48,7 +48,7 @@ static void mix_begin(const struct finder_task *task, const struct finder_term *
     walker->change = exp(-walker->step * walker->step);
 }
 
-/* A component's values and derivatives in samples first .. first + MIX_BLOCK. */
+/* Computes a component's values and derivatives in samples first .. first + MIX_BLOCK. */
 static void mix_rows(struct mix_walker *walker, uint32_t first, double (*restrict row)[MIX_BLOCK])
 {
     struct mix_walker w = *walker;
@@ -75,7 +75,7 @@ static void mix_rows(struct mix_walker *walker, uint32_t first, double (*restric
     *walker = w;
 }
 
-/* The sum in lanes, which is the same with any width of vectors. */
+/* Sums in lanes, so that the sum is the same with any width of vectors. */
 VEC_INLINE double mix_dot(const double *restrict a, const double *restrict b)
 {
     double sum[MIX_LANES] = {0.0};
@@ -149,7 +149,7 @@ static double mix_expect(const struct finder_task *task, const struct finder_mix
     return chi2;
 }
 
-/* The sum of squares that a mixture leaves, and the normal equations for its next step. */
+/* Returns the sum of squares that a mixture leaves, and makes the normal equations for its next step. */
 static double mix_walk(const struct finder_task *task, const struct finder_mix *mix, struct mix_normal *normal)
 {
     struct mix_walker walker[FINDER_MIX];

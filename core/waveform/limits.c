@@ -9,7 +9,7 @@
 
 enum { ASYMMETRIC = 1 << WAVEFORM_ASYMMETRIC, TABLE = 1 << WAVEFORM_TABLE, ALL = 7, FORMULA = ALL & ~TABLE };
 
-/* The limits low .. high are in SI. Texts show them in `unit`; one in SI is `scale` of these. */
+/* The limits low .. high are in SI. Texts show them in `unit`, which is SI times `scale`. */
 struct limit {
     const char *what, *unit;
     size_t at;
@@ -30,7 +30,7 @@ static const struct limit limits[] = {
     {"a dead time",                 "ns",                  AT(dead_s),       0.0,   1e-3, 1e9,  ALL,        0},
     {"noise",                       "times the threshold", AT(noise),        0.0,   1e6,  1.0,  ALL,        0},
     {"time kept before an echo",    "ns",                  AT(before_s),     0.0,   1e-5, 1e9,  ALL,        0},
-    {"time kept behind an echo",    "ns",                  AT(after_s),      0.0,   1e-5, 1e9,  ALL,        0},
+    {"time kept after an echo",     "ns",                  AT(after_s),      0.0,   1e-5, 1e9,  ALL,        0},
     {"the near end of the window",  "m",                   AT(near_m),       0.0,   1e7,  1.0,  ALL,        0},
     {"the far end of the window",   "m",                   AT(far_m),        0.0,   1e7,  1.0,  ALL,        0},
 };
@@ -81,10 +81,10 @@ static int check_windows(const struct waveform_spec *spec, struct sh_err *err)
     if (!(spec->keep >= 1e-6 && spec->keep <= 1e9))
         return sh_fail(err, SH_EINPUT, "windows around a signal of %.6g times the threshold: 1e-06 to 1e+09 is allowed",
                        spec->keep);
-    /* Times in ns that add up to `most` do so in s but for rounding. */
+    /* Times that add up to `most` in ns may exceed it in s by a rounding error. */
     if (samples <= most * (1.0 + 1e-9)) return SH_OK;
     return sh_fail(err, SH_EINPUT,
-                   "%.6g ns kept before an echo and %.6g ns behind it: together at most %.6g ns, %.0f samples",
+                   "%.6g ns kept before an echo and %.6g ns after it: together at most %.6g ns, %.0f samples",
                    1e9 * spec->before_s, 1e9 * spec->after_s, digits_down(1e9 * most * spec->sample_s, 6), most);
 }
 

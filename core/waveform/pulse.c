@@ -9,7 +9,7 @@
 
 /* sigma of a Gaussian of width 1, full at half maximum */
 #define SIGMA_1 0.42466090014400953
-/* Beyond so many sigmas a Gaussian is below 1e-9 of its peak. */
+/* Beyond this many sigmas a Gaussian is below 1e-9 of its peak. */
 #define GAUSSIAN_END 6.5
 /* An asymmetric pulse ends where it has fallen to this: its tail is long. */
 #define TAIL_LEAST 1e-6
@@ -23,9 +23,9 @@ struct outgoing {
     double from_s, to_s, fine_s, pieces;
 };
 
-/* The log-normal pulse with its peak of 1 at 0: exp(-ln 2 (ln(1 + a t) / ln s)^2), a = (s - 1/s) / width. Half of the
- * peak is reached at ln(1 + a t) = -ln s and ln s, so the time from the peak to the half on the falling side is s times
- * that on the rising side, and both together are the width. With s -> 1 it is the Gaussian. */
+/* Returns the log-normal pulse with its peak of 1 at 0: exp(-ln 2 (ln(1 + a t) / ln s)^2), a = (s - 1/s) / width.
+ * Half of the peak is reached at ln(1 + a t) = -ln s and ln s, so the time from the peak to the half on the falling
+ * side is s times that on the rising side, and both together are the width. With s -> 1 it is the Gaussian. */
 static double log_normal(double t_s, double width_s, double skew)
 {
     const double s = fmax(skew, 1.0 + 1e-6), x = (s - 1.0 / s) / width_s * t_s;
@@ -69,9 +69,9 @@ static double parts_of(const struct outgoing *o, double fine_s)
     return o->pieces * ceil((o->to_s - o->from_s) / o->pieces / fine_s);
 }
 
-/* Returns sigma of the receiver's answer to an impulse. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f /
- * B)^2), to which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays
- * nothing here (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
+/* Returns sigma of the receiver's impulse response. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to
+ * which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays nothing here
+ * (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
 static double receiver_sigma_s(double bandwidth_hz)
 {
     return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;
@@ -102,9 +102,9 @@ static double scale_of(const struct outgoing *o, double sigma_s)
     return scale_s;
 }
 
-/* Fills h on n steps, the first of them at from_s. The receiver's answers to all of the pulse lie within them. The
- * pulse is taken finely enough for itself and for the answer. Answers shorter than 1/64 of a step would change h by
- * less than 1e-6. */
+/* Fills h on n steps, the first of them at from_s: the pulse convolved with the impulse response, which lies within
+ * them. The pulse is summed finely enough for both. A response shorter than 1/64 of a step would change h by less than
+ * 1e-6. */
 static void fill_steps(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
 {
     const double fine_s = fmin(o->fine_s, sigma_s), reach_s = GAUSSIAN_END * sigma_s;

@@ -25,7 +25,7 @@ struct sampling {
     double signal[WAVEFORM_MAX_SAMPLES];
 };
 
-/* These windows were found in a stretch. */
+/* The windows found in a piece of a stretch. */
 struct found {
     struct span window[WAVEFORM_MAX_WINDOWS];
     uint32_t n;
@@ -79,7 +79,7 @@ static void sum_returns(struct sampling *s, struct span piece)
                      s->signal);
 }
 
-/* ---- what is kept of it */
+/* ---- windows */
 
 static void found_add(struct sampling *s, struct found *found, struct span window)
 {
@@ -128,7 +128,7 @@ static int64_t find_gate(struct sampling *s, struct span piece, struct found *fo
     return piece.end;
 }
 
-/* ---- what the receiver and the digitiser make of it */
+/* ---- the receiver and the digitiser */
 
 /* Limits samples begin .. end of the piece. Saturated samples that follow each other are one saturation, and the dead
  * time counts from the last of them. */

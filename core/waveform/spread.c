@@ -6,7 +6,7 @@
 #include "core/vecmath.h"
 #include "core/waveform/waveform_inside.h"
 
-/* 3, 5, 12, 16, 24, 32, ... */
+/* Returns the number of nodes of a level: 3, 5, 12, 16, 24, 32, ... */
 static uint32_t nodes_of(uint32_t level)
 {
     if (level < 2) return 3 + 2 * level;
@@ -22,14 +22,14 @@ static struct waveform_node disc_node(uint32_t i, uint32_t n)
     return (struct waveform_node){x, exp(-2.0 * x * x) * erf(M_SQRT2 * y) * y};
 }
 
-/* The Gaussian at even steps. The trapezoidal rule's error falls as fast as the spectrum of what it sums. */
+/* Returns node i of n of the Gaussian, at even steps. The trapezoidal rule's error falls as fast as its spectrum. */
 static struct waveform_node bell_node(uint32_t i, uint32_t n)
 {
     const double x = WAVEFORM_BELL_END * ((2.0 * i + 1.0) / n - 1.0);
     return (struct waveform_node){x, exp(-0.5 * x * x)};
 }
 
-/* Gauss's nodes for a spread that is even in x, by its moments m: three nodes have the right moments up to the 5th,
+/* Sets Gauss's nodes of a spread that is even in x, by its moments m: three nodes have the right moments up to the 5th,
  * five nodes up to the 9th. They are the roots of the polynomials x (x^2 - a) and x (x^4 - a x^2 + b), which are
  * orthogonal to all of lower degree. */
 static void gauss_nodes(struct waveform_node three[3], struct waveform_node five[5], const double m[10])
@@ -48,8 +48,9 @@ static void gauss_nodes(struct waveform_node three[3], struct waveform_node five
     five[4] = (struct waveform_node){sqrt(far2), far};
 }
 
-/* The error is below 1e-5 of the amplitude (tests/unit/test_waveform.c). With Gauss's nodes it is the next moment
- * times the next derivative of h. With the others it is the part of h's spectrum that the nodes no longer follow. */
+/* Returns the extent, in scales of the pulse, up to which n nodes have an error below 1e-5 of the amplitude
+ * (tests/unit/test_waveform.c). With Gauss's nodes the error is the next moment times the next derivative of h. With
+ * the others it is the part of h's spectrum that the nodes no longer follow. */
 static double reach_of(enum waveform_spread spread, uint32_t n)
 {
     if (n == 3) return spread == WAVEFORM_DISC ? 0.5 : 0.2;
@@ -97,7 +98,7 @@ void waveform_rule_free(struct waveform_rule *rule)
     free(rule->node);
 }
 
-/* h between its steps, by the cubic through four of them. All samples lie at the same place between steps. */
+/* Adds h between its steps, by the cubic through four of them. All samples lie at the same place between steps. */
 VEC_CLONES
 static void add_pulse(const struct waveform_pulse *pulse, double amplitude, double centre, uint32_t n,
                       double *restrict signal)
@@ -126,7 +127,7 @@ static const struct waveform_rule *rule_of(const struct waveform *w, const struc
     return part->spread == WAVEFORM_DISC ? &w->disc : &w->bell;
 }
 
-/* Extents are in samples. Those beyond the last level count as that level. */
+/* Returns a return's extent in samples. An extent beyond the last level counts as that level's. */
 static double extent_of(const struct waveform *w, const struct waveform_return *part)
 {
     if (part->spread == WAVEFORM_POINT) return 0.0;

@@ -94,7 +94,7 @@ int waveform_check_detection(const struct waveform *w, struct sh_err *err)
     if (w->finder.seen) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "echoes are not found with this pulse: its largest power is too far from its centroid; allowed is "
-                   "%g widths before to %g behind it",
+                   "%g widths before to %g after it",
                    FINDER_SHAPE_LEAD - 1.0, FINDER_SHAPE_LAG - 1.0);
 }
 

@@ -14,11 +14,12 @@
 struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
-    double lead, lag;               /* its first and last step before and behind the centroid, in samples */
-    double scale;                   /* in samples: sigma of the Gaussian with 1e-5 in its spectrum where h has it */
+    double lead, lag;               /* from its first step to the centroid, from there to its last one; in samples */
+    double scale;                   /* in samples: sigma of the Gaussian whose spectrum falls to 1e-5 where h's does */
     double area_s;
 };
-/* For a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a failure. */
+/* Makes the pulse of a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a
+ * failure. */
 int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err);
 void waveform_pulse_free(struct waveform_pulse *pulse);
 
@@ -60,7 +61,7 @@ int waveform_check(const struct waveform_spec *spec, struct sh_err *err);
 /* Adds a return whose centroid lies `centre` samples after signal[0]. */
 void waveform_add(const struct waveform *waveform, const struct waveform_return *part, double centre, uint32_t n,
                   double *signal);
-/* How far a return reaches about its centroid beyond the pulse itself, in samples. */
+/* Returns how far a return reaches about its centroid beyond the pulse itself, in samples. */
 double waveform_reach(const struct waveform *waveform, const struct waveform_return *part);
 
 #endif

@@ -160,10 +160,10 @@ static void columns_geo(const struct scanhead *sh, const struct block *b, int n,
     if (to->y != NULL) set_places(b->b, b->tail, n, anchor[1], scale[1], to->y);
     if (to->z != NULL) set_places(b->c, b->tail, n, anchor[2], scale[2], to->z);
     if (geodetic && to->y != NULL) fold_longitudes(to->y, n);
-    if (to->range_m != NULL && geodetic)
-        set_geodetic_ranges(b, n, anchor, scale, to->range_m);
-    else if (to->range_m != NULL && sh->anchor.moving & NATIVE_MOVING)
+    if (to->range_m != NULL && sh->anchor.moving & NATIVE_MOVING)
         set_all(to->range_m, n, NAN);
+    else if (to->range_m != NULL && geodetic)
+        set_geodetic_ranges(b, n, anchor, scale, to->range_m);
     else if (to->range_m != NULL)
         set_distances(b, n, scale, to->range_m);
     if (to->mirror_rad != NULL) set_all(to->mirror_rad, n, NAN);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/anchor_geotiff.h"
+#include "firmware_sim/site/steps.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -83,14 +83,6 @@ static int find_terrain(const struct config *cfg, struct terrain *t, struct sh_e
         t->file);
 }
 
-static double distance_m(const struct georef_place *a, const struct georef_place *b)
-{
-    double p[3], q[3];
-    georef_geodetic_to_ecef(a, p);
-    georef_geodetic_to_ecef(b, q);
-    return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
-}
-
 /* The UTM zone whose coordinates these are, with its hemisphere; 0: none. */
 static int find_zone(const double grid_m[3], const struct georef_place *at, int *north)
 {
@@ -98,14 +90,15 @@ static int find_zone(const double grid_m[3], const struct georef_place *at, int 
         for (*north = 0; *north < 2; ++*north) {
             struct georef_place utm;
             struct sh_err why;
-            if (georef_locate_utm(zone, *north, grid_m, &utm, &why) == SH_OK && distance_m(&utm, at) < SAME_GRID_M)
+            if (georef_locate_utm(zone, *north, grid_m, &utm, &why) == SH_OK &&
+                placement_apart_m(&utm, at) < SAME_GRID_M)
                 return zone;
         }
     }
     return 0;
 }
 
-/* The largest distance of a corner, at the raster's height 0, from its place in the raster's own system. */
+/* Finds the largest distance of a corner, at the raster's height 0, from its place in the raster's own system. */
 static int measure_corners(const struct terrain *t, const struct geoframe *frame, double height_m, double *worst_m,
                            struct sh_err *err)
 {
@@ -118,7 +111,7 @@ static int measure_corners(const struct terrain *t, const struct geoframe *frame
         int rc = crs_locate(t->crs, e, n, height_m, &want, err);
         if (rc == SH_OK) rc = geoframe_locate(frame, p, &got, err);
         if (rc != SH_OK) return rc;
-        *worst_m = fmax(*worst_m, distance_m(&got, &want.at));
+        *worst_m = fmax(*worst_m, placement_apart_m(&got, &want.at));
     }
     return SH_OK;
 }
@@ -135,7 +128,7 @@ static void anchor_geotiff_say(const struct config *cfg, const struct sh_report 
         sh_warn(report, "%s: coordinates in %s have errors up to %.2g m on WGS 84", t->file, t->crs, at->accuracy_m);
 }
 
-/* *worst_m: how far a corner is from its place. */
+/* Sets *worst_m to the farthest that a corner is from its place. */
 static int set_tangent(const struct terrain *t, const double middle_m[2], const struct crs_place *at,
                        struct geoframe *frame, double *worst_m, struct sh_err *err)
 {

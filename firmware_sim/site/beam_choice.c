@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Beam and optics: tries methods on the head's own pulses, lets core/plan choose, and makes the beams. */
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/beam_choice.h"
-#include "firmware_sim/site/detection.h"
+#include "firmware_sim/site/steps.h"
 #include "firmware_sim/site/look.h"
-#include "firmware_sim/site/site.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -135,38 +133,45 @@ static void list_beams(const struct site *site, struct beam_choice *choice, stru
     }
 }
 
+/* The beams to choose from: all, or the one that the configuration forces. */
+struct beam_choices {
+    struct beam_choice beam[FOOTPRINT_OPTIONS];
+    struct plan_option option[FOOTPRINT_OPTIONS];
+    uint32_t n;
+};
+
 /* Measures the beams that are possible, up to those that cost more than one that holds. Finding outlines
  * takes time: the adaptive beam is measured only where single rays don't hold. *holds: one of them does. */
-static int measure_beams(struct trial *trial, const struct beam_choice *choice, struct plan_option *option,
-                         const struct sh_report *report, struct sh_err *err, int *holds)
+static int measure_beams(struct trial *trial, struct beam_choices *c, const struct sh_report *report,
+                         struct sh_err *err, int *holds)
 {
     const struct plan_tolerance *tolerance = &trial->site->cfg->plan;
     double cost_ns = (double)INFINITY;
     int rc = SH_OK;
-    for (uint32_t i = 0; i < FOOTPRINT_OPTIONS && rc == SH_OK; i++) {
-        if (option[i].why_not[0] != '\0' || option[i].cost_ns > cost_ns) continue;
-        if (choice[i].mode == BEAM_ADAPTIVE) {
+    for (uint32_t i = 0; i < c->n && rc == SH_OK; i++) {
+        struct plan_option *option = &c->option[i];
+        if (option->why_not[0] != '\0' || option->cost_ns > cost_ns) continue;
+        if (c->beam[i].mode == BEAM_ADAPTIVE) {
             if (*holds) continue;
             rc = make_beams(trial, 1, report, err);
             if (rc != SH_OK) return rc;
         }
-        plan_sample_beam(trial->sample, choice[i].mode, choice[i].rings, &option[i]);
+        plan_sample_beam(trial->sample, c->beam[i].mode, c->beam[i].rings, option);
         rc = sh_check_stop(report, err);
-        if (!plan_holds(&option[i], tolerance)) continue;
+        if (!plan_holds(option, tolerance)) continue;
         *holds = 1;
-        cost_ns = option[i].cost_ns;
+        cost_ns = option->cost_ns;
     }
     return rc;
 }
 
-static int try_beams(struct site *site, const struct beam_choice *choice, struct plan_option *option,
-                     const struct sh_report *report, struct sh_err *err)
+static int try_beams(struct site *site, struct beam_choices *c, const struct sh_report *report, struct sh_err *err)
 {
     struct trial trial = {0};
     int holds = 0, rc = open_trial(&trial, site, report, err);
     if (rc == SH_OK) rc = make_beams(&trial, 0, report, err);
-    if (rc == SH_OK) rc = measure_beams(&trial, choice, option, report, err, &holds);
-    if (rc == SH_OK && !holds)
+    if (rc == SH_OK) rc = measure_beams(&trial, c, report, err, &holds);
+    if (rc == SH_OK && !holds && site->cfg->beam.mode == BEAM_AUTO)
         sh_warn(report, "%s: beam.mode: auto: no mode keeps plan.tolerance_m and plan.echo_tolerance here",
                 site->cfg->file);
     plan_sample_free(trial.sample);
@@ -183,43 +188,30 @@ static void say_end_error(const struct plan_methods *methods, struct plan_row *r
              beam_end_error(methods->rings));
 }
 
+/* A beam that the configuration forces is measured only for `plan`. */
 static int choose_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    struct plan_option option[FOOTPRINT_OPTIONS];
-    struct beam_choice choice[FOOTPRINT_OPTIONS];
-    list_beams(site, choice, option);
-    int rc = config_has_footprint(site->cfg) ? try_beams(site, choice, option, report, err) : SH_OK;
-    if (rc != SH_OK) return rc;
-    const struct plan_choice ask = {"beam", option, FOOTPRINT_OPTIONS, -1, "", site->cfg->plan};
-    uint32_t chosen = plan_choose(&ask, &site->plan.beam);
-    site->plan.methods.beam = choice[chosen].mode;
-    site->plan.methods.rings = choice[chosen].rings;
-    say_end_error(&site->plan.methods, &site->plan.beam);
-    return SH_OK;
-}
-
-/* Takes the beam that the configuration forces. For `plan` its error is measured, too. */
-static int force_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
-{
     const struct config *cfg = site->cfg;
-    struct plan_option option;
-    struct trial trial = {0};
+    const int forced = cfg->beam.mode != BEAM_AUTO;
+    struct beam_choices c = {.n = FOOTPRINT_OPTIONS};
     const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_no_outlines(site) : NULL;
     if (why != NULL)
         return sh_fail(err, SH_EINPUT, "%s: beam.mode: adaptive: %s; allowed here are single, rings and auto",
                        cfg->file, why);
-    plan_beam_option(cfg->beam.mode, cfg->beam.rings, &option);
-    if (site->measures && config_has_footprint(cfg)) {
-        int rc = open_trial(&trial, site, report, err);
-        if (rc == SH_OK) rc = make_beams(&trial, cfg->beam.mode == BEAM_ADAPTIVE, report, err);
-        if (rc == SH_OK) plan_sample_beam(trial.sample, cfg->beam.mode, cfg->beam.rings, &option);
-        plan_sample_free(trial.sample);
-        if (rc == SH_OK) rc = sh_check_stop(report, err);
-        if (rc != SH_OK) return rc;
+    if (forced) {
+        c.n = 1;
+        c.beam[0] = (struct beam_choice){cfg->beam.mode, cfg->beam.rings};
+        plan_beam_option(cfg->beam.mode, cfg->beam.rings, &c.option[0]);
+    } else {
+        list_beams(site, c.beam, c.option);
     }
-    site->plan.methods.beam = cfg->beam.mode;
-    site->plan.methods.rings = cfg->beam.rings;
-    plan_choose(&(struct plan_choice){"beam", &option, 1, 0, "beam.mode", cfg->plan}, &site->plan.beam);
+    const int tries = config_has_footprint(cfg) && (!forced || site->measures);
+    int rc = tries ? try_beams(site, &c, report, err) : SH_OK;
+    if (rc != SH_OK) return rc;
+    const struct plan_choice ask = {"beam", c.option, c.n, forced ? 0 : -1, forced ? "beam.mode" : "", cfg->plan};
+    const uint32_t chosen = plan_choose(&ask, &site->plan.beam);
+    site->plan.methods.beam = c.beam[chosen].mode;
+    site->plan.methods.rings = c.beam[chosen].rings;
     say_end_error(&site->plan.methods, &site->plan.beam);
     return SH_OK;
 }
@@ -277,6 +269,6 @@ int site_choose_methods(struct site *site, const struct sh_report *report, struc
     int rc = choose_optics(site, report, err);
     if (rc == SH_OK && chooses) rc = choose_beam(site, report, err);
     if (rc == SH_OK) site_set_depth(site, site->plan.methods.depth);
-    if (rc == SH_OK && !chooses) rc = force_beam(site, report, err);
+    if (rc == SH_OK && !chooses) rc = choose_beam(site, report, err);
     return rc == SH_OK ? apply_beam(site, report, err) : rc;
 }

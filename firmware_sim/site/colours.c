@@ -3,8 +3,7 @@
 #include <math.h>
 
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/colours.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 /* Warns of textures that can't be read, and of a scene without colours. */
 static int load_textures(struct site *site, const struct sh_report *report, struct sh_err *err)

@@ -7,7 +7,7 @@
 #include "core/grow.h"
 #include "core/scene.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/copies.h"
+#include "firmware_sim/site/steps.h"
 
 enum { X, Y, Z, TURN, SCALE };
 static const char *const columns[] = {"x_m", "y_m", "z_m", "turn_deg", "scale", NULL};

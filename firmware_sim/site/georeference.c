@@ -2,24 +2,22 @@
 /* Georeferencing of a site: heights, method, counts. */
 #include "core/digits.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/georeference.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* The largest distance of points from the place that they are relative to: a station, or the middle of a leg. */
+/* Returns the largest distance of points from the place that they are relative to: a station, or a leg's middle. */
 static double reach_m(const struct site *site, const struct site_stretch *stretch)
 {
     double way_m = stretch != NULL ? stretch->reach_m : site->live_reach_m;
     return (site->cfg->profile.range_max_m + way_m) * SITE_MARGIN;
 }
 
-/* The extent of points around that place: within the scene, and within the head's range; with a margin of a hundredth,
- * and ten sigma for noise. */
+/* Sets the extent of points around that place. They are within the scene and within the head's range, with a margin of
+ * a hundredth, and of ten sigma for noise. */
 static void extent_from(const struct site *site, const double centre_m[3], double reach, struct plan_georef_need *need)
 {
     double far[3], noise_m = site_noise_m(site);
@@ -186,7 +184,7 @@ static double count_m(const struct site *site, const struct site_station *s)
     return most_m;
 }
 
-/* Metres per count, and the CRS's units per count for each station. */
+/* Sets metres per count, and the CRS's units per count for each station. */
 static int scale_all(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = choose_scale(site, err);
@@ -209,10 +207,12 @@ static int add_georef(struct site *site, struct site_station *s, const struct sh
     const struct config *cfg = site->cfg;
     struct georef_spec spec = {.crs = cfg->output.crs, .geoid = site->geoid};
     site_grid(site, &spec.utm_zone, &spec.side);
+    struct sh_err why = {0};
     int rc = sh_check_stop(report, err);
     if (rc == SH_OK) rc = placement_georef(&s->at, &site->anchor, &spec, err);
-    if (rc == SH_OK) rc = georef_create(&spec, &s->georef, err);
     if (rc != SH_OK) return rc;
+    rc = georef_create(&spec, &s->georef, &why);
+    if (rc != SH_OK) return sh_fail(err, rc, "%s: station %s: %.300s", cfg->file, s->station->name, why.text);
     int epsg = georef_epsg(s->georef), first = georef_epsg(site->station[0].georef);
     if (epsg != first)
         sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points have no common system", cfg->file,

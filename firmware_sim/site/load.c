@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Loading a site: `load` at the end of this file has the steps in their order. */
+/* Loading a site: take_steps near its end has the steps in their order. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,22 +7,9 @@
 #include "core/scene_copies.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/site/beam_choice.h"
-#include "firmware_sim/site/bvhs.h"
-#include "firmware_sim/site/colours.h"
-#include "firmware_sim/site/copies.h"
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/plausibility.h"
-#include "firmware_sim/site/georeference.h"
+#include "firmware_sim/site/steps.h"
 #include "firmware_sim/site/plan_rows.h"
-#include "firmware_sim/site/platform.h"
-#include "firmware_sim/site/warnings.h"
-#include "firmware_sim/site/sights.h"
-#include "firmware_sim/site/site.h"
-#include "firmware_sim/site/target.h"
-#include "firmware_sim/site/tripod.h"
 #include "firmware_sim/site/waves.h"
-#include "firmware_sim/site/world.h"
 
 static struct scene_mesh_spec mesh_spec(const struct config *cfg, const struct config_mesh *mesh)
 {
@@ -47,31 +34,26 @@ static int add_mover(struct site *site, uint32_t number, const struct scene_mesh
         return sh_fail(err, SH_EINPUT, "%s: scene.meshes: too many meshes move; allowed are %d", cfg->file,
                        CAST_MAX_MOVERS);
     struct site_mover *m = &site->mover[site->n_movers++];
-    m->mesh = &cfg->scene.mesh[number];
     m->number = number;
     int rc = scene_load(spec, 1, cfg->scene.tolerance_m, report, &m->scene, err);
     if (rc != SH_OK) return rc;
     if (site->n_surfaces + m->scene->n_surfaces > SCENE_MAX_SURFACES)
-        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", m->mesh->file, SCENE_MAX_SURFACES);
+        return sh_fail(err, SH_EINPUT, "%s: too many surfaces; at most %d", spec->file, SCENE_MAX_SURFACES);
     site->n_surfaces += m->scene->n_surfaces;
     return SH_OK;
 }
 
-/* Sets the sphere around a body, and its labels, which follow those given before. */
-static void place_mover(struct site_mover *m, uint32_t label)
-{
-    for (uint32_t i = 0; i < m->scene->n_triangles; i++)
-        m->scene->label[i] = (uint16_t)(m->scene->label[i] + label);
-    m->scene->label0 = label;
-    m->radius_m = site_enclose(m->scene, m->centre_m);
-}
-
+/* Sets the sphere around each body, and its labels, which follow those given before. */
 static void place_movers(struct site *site)
 {
     uint32_t label = site->scene->n_surfaces;
-    for (uint32_t i = 0; i < site->n_movers; i++) {
-        place_mover(&site->mover[i], label);
-        label += site->mover[i].scene->n_surfaces;
+    for (uint32_t k = 0; k < site->n_movers; k++) {
+        struct site_mover *m = &site->mover[k];
+        for (uint32_t i = 0; i < m->scene->n_triangles; i++)
+            m->scene->label[i] = (uint16_t)(m->scene->label[i] + label);
+        m->scene->label0 = label;
+        m->radius_m = site_enclose(m->scene, m->centre_m);
+        label += m->scene->n_surfaces;
     }
 }
 
@@ -127,11 +109,23 @@ static int load_world(struct site *site, const struct sh_report *report, struct 
     struct site_world *world = site->world;
     if (world->scene != NULL) return SH_OK;
     int rc = load_scene(site, report, err);
-    world->n_loads++;
     world->scene = site->scene; /* the world owns it, also after an error */
     world->n_movers = site->n_movers;
     world->n_surfaces = site->n_surfaces;
-    memcpy(world->mover, site->mover, sizeof world->mover);
+    return rc;
+}
+
+/* The sites of a world share the BVHs: the first site builds them. */
+static int build_bvhs(struct site *site, const struct sh_report *report, struct sh_err *err)
+{
+    const unsigned threads = site->cfg->loop.threads;
+    struct site_world *world = site->world;
+    int rc = world->bvh != NULL ? SH_OK : bvh_create(site->scene, threads, report, &world->bvh, err);
+    for (uint32_t i = 0; i < site->n_movers && rc == SH_OK; i++) {
+        struct site_mover *m = &site->mover[i];
+        if (m->bvh == NULL) rc = bvh_create(m->scene, threads, report, &m->bvh, err);
+    }
+    site->bvh = world->bvh;
     return rc;
 }
 
@@ -169,7 +163,7 @@ static int load_emitter(struct site *site, struct sh_err *err)
 
 /* The anchor comes before the scene. So an error in an IFC file's site is reported, not a later error that it
  * causes. */
-static int load_load(struct site *site, const struct sh_report *report, struct sh_err *err)
+static int take_steps(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     int rc = load_emitter(site, err);
     if (rc == SH_OK) rc = placement_find_anchor(site->cfg, report, &site->anchor, err);
@@ -178,7 +172,7 @@ static int load_load(struct site *site, const struct sh_report *report, struct s
     if (rc == SH_OK) rc = site_set_up_detect(site, report, err);
     if (rc == SH_OK) rc = site_set_up_waves(site, report, err);
     if (rc == SH_OK) rc = site_set_up_silent(site, err);
-    if (rc == SH_OK) rc = site_build_bvhs(site, site->cfg->loop.threads, report, err);
+    if (rc == SH_OK) rc = build_bvhs(site, report, err);
     if (rc == SH_OK) rc = place_stations(site, report, err);
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
@@ -204,7 +198,7 @@ int site_load_for(const struct config *cfg, enum site_purpose purpose, const str
     site->moving = config_head_moves(&cfg->platform);
     int rc = site_enter_world(site, other, err);
     if (rc == SH_OK && purpose == SITE_WRITTEN_OUT) site->world->written_out = 1;
-    if (rc == SH_OK) rc = load_load(site, &heard.report, err);
+    if (rc == SH_OK) rc = take_steps(site, &heard.report, err);
     if (rc == SH_OK && site->measures) rc = site_open_sights(site, 0, site->n_stations, report, err);
     if (rc == SH_OK && site->measures) rc = site_plan_rows(site, err);
     if (rc == SH_OK) return SH_OK;

@@ -5,8 +5,7 @@
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/site/sights.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 void site_get_place(const struct site *site, uint32_t station, struct site_place *out)
 {

@@ -13,10 +13,18 @@
 #include "core/mat3.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/site/anchor_geotiff.h"
+#include "firmware_sim/site/steps.h"
 
 /* A floor at the place that was given, or this little above it, is still found. */
 #define FLOOR_ABOVE_M 0.01
+
+double placement_apart_m(const struct georef_place *a, const struct georef_place *b)
+{
+    double p[3], q[3];
+    georef_geodetic_to_ecef(a, p);
+    georef_geodetic_to_ecef(b, q);
+    return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+}
 
 static int is_ifc(const struct config_mesh *mesh)
 {
@@ -69,11 +77,9 @@ static double ifc_height(const struct config *cfg, const struct sh_report *repor
 static void compare_site(const struct sh_report *report, const char *file, const struct ifc_site *site,
                          const struct crs_place *map)
 {
-    double a[3], b[3];
     if (!site->has_place) return;
-    georef_geodetic_to_ecef(&(struct georef_place){site->lat_deg, site->lon_deg, 0.0}, a);
-    georef_geodetic_to_ecef(&(struct georef_place){map->at.lat_deg, map->at.lon_deg, 0.0}, b);
-    const double apart_m = hypot(hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+    const double apart_m = placement_apart_m(&(struct georef_place){site->lat_deg, site->lon_deg, 0.0},
+                                             &(struct georef_place){map->at.lat_deg, map->at.lon_deg, 0.0});
     if (apart_m > SITE_FROM_MAP_M)
         sh_warn(report,
                 "%s: its IFCSITE is %.0f km from the place that its IFCMAPCONVERSION gives; the map conversion is used",
@@ -140,7 +146,7 @@ int placement_find_anchor(const struct config *cfg, const struct sh_report *repo
     return SH_OK;
 }
 
-/* The place on the Earth as the configuration gives it. */
+/* Finds the place on the Earth that the configuration gives. */
 static int given_place(const struct config_station *s, struct georef_place *at, struct sh_err *err)
 {
     int rc = SH_OK;

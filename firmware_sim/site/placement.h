@@ -30,10 +30,13 @@ struct placement {
 int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor, const struct bvh *bvh,
                    struct placement *out, struct sh_err *err);
 
+/* Returns the distance of two places on the Earth, along a straight line through it. */
+double placement_apart_m(const struct georef_place *a, const struct georef_place *b);
+
 /* Sets the columns of `level`: right, forward and up at a place, in the scene frame. Without an anchor, up is z. */
 int placement_level(const struct placement_anchor *anchor, const double at_m[3], double level[9], struct sh_err *err);
 
-/* The specification of a station's georeferencing, all but the CRS. */
+/* Fills the specification of a station's georeferencing, all but the CRS. */
 int placement_georef(const struct placement *placement, const struct placement_anchor *anchor, struct georef_spec *spec,
                      struct sh_err *err);
 

@@ -9,10 +9,8 @@
 #include "core/plan/cost.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/site/rate.h"
-#include "firmware_sim/site/site.h"
 #include "firmware_sim/site/waves.h"
-#include "firmware_sim/site/world.h"
+#include "firmware_sim/site/steps.h"
 
 static void name_row(struct plan_row *row, const char *whose)
 {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/platform.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -11,10 +11,10 @@
 #include "core/vec3.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/plausibility.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
-/* Most scenes for such a head are neither smaller nor larger: then the scale is probably wrong by a thousand. */
+/* Hardly any scene for such a head is smaller or larger than this. One that is probably has a scale that is wrong by a
+ * thousand. */
 static const double SMALL_M = 0.05, LARGE_M = 10000.0;
 
 /* A scan is called mostly empty where a smaller share of its pulses hits a surface. */
@@ -23,7 +23,7 @@ static const double EMPTY_SHARE = 0.05;
 enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
 _Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
 
-/* The program of the configured pulse rate, which has the smallest and the largest range. */
+/* Returns the program of the configured pulse rate, which has the smallest and the largest range. */
 static const struct config_program *program_of(const struct site *site)
 {
     const struct config *cfg = site->cfg;
@@ -135,74 +135,15 @@ static void check_clear(const struct site *site, const struct sh_report *report)
             cfg->file, clear.n, clear.n > 1 ? "s are" : " is", clear.rules[0] != '\0' ? clear.rules : "...", left);
 }
 
-/* A near vertex settles most cases without a search over distances. */
-static int has_near_vertex(const struct scene *scene, const double p[3], double reach_m)
-{
-    for (uint32_t v = 0; v < scene->n_vertices; v++) {
-        double d[3] = {scene->vertex_m[v][0] - p[0], scene->vertex_m[v][1] - p[1], scene->vertex_m[v][2] - p[2]};
-        if (vec3_dot(d, d) <= reach_m * reach_m) return 1;
-    }
-    return 0;
-}
-
-/* The distance of a point from the bounds of a copy. */
-static double distance_from(const struct scene_copy *copy, const double p[3])
-{
-    double off[3];
-    for (int k = 0; k < 3; k++)
-        off[k] = fmax(0.0, fmax(copy->min_m[k] - p[k], p[k] - copy->max_m[k]));
-    return vec3_length(off);
-}
-
-/* Whether the point is within reach of one of a mesh's copies: sets *reached. */
-static int is_copy_reached(const struct scene_copied *of, const double p[3], double reach_m, int *reached,
-                           struct sh_err *err)
-{
-    struct distance *index = NULL;
-    struct distance_hit hit;
-    double in[3], vertex_m[3];
-    int rc = SH_OK;
-    for (uint32_t k = 0; k < of->n && !*reached; k++) { /* a near vertex settles most cases */
-        scene_copy_put(&of->copy[k], of->mesh->vertex_m[of->mesh->triangle[0][0]], vertex_m);
-        *reached = vec3_distance(vertex_m, p) <= reach_m;
-    }
-    for (uint32_t k = 0; k < of->n && !*reached && rc == SH_OK; k++) {
-        if (distance_from(&of->copy[k], p) > reach_m) continue;
-        if (index == NULL) rc = distance_create(of->mesh, &index, err);
-        scene_copy_put_back(&of->copy[k], p, in);
-        if (rc == SH_OK) *reached = distance_query(index, in, reach_m / of->copy[k].scale, &hit);
-    }
-    distance_free(index);
-    return rc;
-}
-
-static int is_reached(const struct scene *scene, const double p[3], double reach_m, int *reached, struct sh_err *err)
-{
-    struct distance *index = NULL;
-    struct distance_hit hit;
-    int rc = SH_OK;
-    *reached = has_near_vertex(scene, p, reach_m);
-    for (int i = 0; i < 3; i++)
-        if (p[i] < scene->min_m[i] - reach_m || p[i] > scene->max_m[i] + reach_m) return SH_OK;
-    for (uint32_t i = 0; i < scene->n_copied && !*reached && rc == SH_OK; i++)
-        rc = is_copy_reached(&scene->copied[i], p, reach_m, reached, err);
-    if (*reached || scene->n_triangles == 0 || rc != SH_OK) return rc;
-    rc = distance_create(scene, &index, err);
-    if (rc == SH_OK) *reached = distance_query(index, p, reach_m, &hit);
-    distance_free(index);
-    return rc;
-}
-
-static int check_reach(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
+static void check_reach(const struct site *site, uint32_t i, const struct sh_report *report)
 {
     const double reach_m = program_of(site)->range_max_m, *p = site->station[i].at.position_m;
-    int reached, rc = is_reached(site->scene, p, reach_m, &reached, err);
-    for (uint32_t k = 0; k < site->n_movers && rc == SH_OK && !reached; k++)
-        rc = is_reached(site->mover[k].scene, p, reach_m, &reached, err);
-    if (rc == SH_OK && !reached)
-        sh_warn(report, "station %u %s at %.10g %.10g %.10g m: no surface within range_max_m, %g m", i + 1,
-                site->station[i].station->name, p[0], p[1], p[2], reach_m);
-    return rc;
+    int reached = distance_reaches(site->bvh, p, reach_m);
+    for (uint32_t k = 0; k < site->n_movers && !reached; k++)
+        reached = distance_reaches(site->mover[k].bvh, p, reach_m);
+    if (reached) return;
+    sh_warn(report, "station %u %s at %.10g %.10g %.10g m: no surface within range_max_m, %g m", i + 1,
+            site->station[i].station->name, p[0], p[1], p[2], reach_m);
 }
 
 /* ---- the view of a station */
@@ -325,8 +266,8 @@ static int check_stations(const struct site *site, const struct sh_report *repor
     int rc = look != NULL ? bvh_work_create(&work, err) : sh_fail(err, SH_ENOMEM, "no memory to look from stations");
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && !site->moving; i += step) {
         if (!config_serves(site->cfg, i)) continue;
-        rc = check_reach(site, i, report, err);
-        if (rc != SH_OK || site->n_movers > 0) continue;
+        check_reach(site, i, report);
+        if (site->n_movers > 0) continue;
         rc = check_floor(site, i, work, report, err);
         if (rc == SH_OK) check_view(site, i, work, look, report);
     }

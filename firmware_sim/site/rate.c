@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "firmware_sim/site/rate.h"
+#include "firmware_sim/site/plan_rows.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -11,7 +11,6 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/look.h"
-#include "firmware_sim/site/site.h"
 #include "firmware_sim/site/waves.h"
 
 /* Processor time for warming the caches, and for measuring. Runs are short enough that one of the most

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/look.h"
-#include "firmware_sim/site/sights.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 #include "firmware_sim/site/view.h"
 
 #include <stdatomic.h>
@@ -29,7 +28,7 @@ static const char *why_not(const struct site *site)
 
 /* ---- the plan */
 
-/* Pulses that a scan casts: those of its frames; without an end, those of an hour. */
+/* Returns how many pulses a scan casts: those of its pan sweeps; without an end, those of an hour. */
 static double pulses_of(const struct plan_place *place, uint32_t frames)
 {
     const struct schedule_segment *seg = &place->segment;
@@ -45,19 +44,22 @@ static double pulses_of(const struct plan_place *place, uint32_t frames)
     return all != 0 ? fired * (double)cast / (double)all : 0.0;
 }
 
-/* The memory of all maps together. */
+/* Returns the memory of all maps together. */
 static uint64_t memory_bytes(const struct site *site)
 {
     return (uint64_t)(site->cfg->cast.sight_mib * 0x1p20);
 }
 
-static int choose(struct site *site, const struct sh_report *report, int *map, struct sh_err *err)
+int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
     const enum config_choice asked = cfg->cast.sight;
+    const char *why = why_not(site);
     struct site_look look;
     struct site_view view;
     struct bvh_info bvh;
+    if (asked == CHOICE_ON && why != NULL)
+        return sh_fail(err, SH_EINPUT, "%s: cast.sight: on, but %s; allowed auto, off", cfg->file, why);
     bvh_get_info(site->bvh, &bvh);
     site_look_open(&look, site);
     site_view_of(site, look.at[0].station, &view);
@@ -67,17 +69,10 @@ static int choose(struct site *site, const struct sh_report *report, int *map, s
                                          .packet = bvh.packet,
                                          .memory_bytes = memory_bytes(site),
                                          .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
-                                         .why_not = why_not(site)};
+                                         .why_not = why};
     site->plan.sight_rays = need.pulses / need.share;
-    return plan_sight(&need, &(struct plan_places){look.place, look.n}, report, map, &site->plan.sight, err);
-}
-
-int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err)
-{
-    const char *why = why_not(site);
-    if (site->cfg->cast.sight == CHOICE_ON && why != NULL)
-        return sh_fail(err, SH_EINPUT, "%s: cast.sight: on, but %s; allowed auto, off", site->cfg->file, why);
-    return choose(site, report, &site->plan.methods.sight, err);
+    return plan_sight(&need, &(struct plan_places){look.place, look.n}, report, &site->plan.methods.sight,
+                      &site->plan.sight, err);
 }
 
 /* ---- making them */

@@ -67,7 +67,7 @@ uint32_t site_most_points_per_pulse(const struct site *site)
     return most < cfg->profile.max_echoes ? most : cfg->profile.max_echoes;
 }
 
-/* The mesh that a label of a real surface belongs to; *label becomes its number there. */
+/* Returns the mesh that a label of a real surface belongs to. *label becomes the surface's number there. */
 static const struct scene *find_mesh(const struct site *site, uint32_t *label)
 {
     const struct scene *scene = site->scene;
@@ -101,7 +101,7 @@ void site_move(const struct site *site, double t_s, struct cast_setup *setup)
     for (uint32_t k = 0; k < site->n_movers; k++) {
         const struct site_mover *m = &site->mover[k];
         struct cast_mover *out = &setup->mover[k];
-        const struct config_mesh *mesh = m->mesh;
+        const struct config_mesh *mesh = &site->cfg->scene.mesh[m->number];
         double t = t_s;
         if (mesh->cycle_s > 0.0) { /* back and forth */
             t = fmod(t_s, mesh->cycle_s);

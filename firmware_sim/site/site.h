@@ -57,8 +57,7 @@ struct site_station {
 };
 
 struct site_mover {
-    const struct config_mesh *mesh;
-    uint32_t number; /* of the mesh in the configuration */
+    uint32_t number; /* of the mesh in the configuration: all sites of a world have the same meshes */
     struct scene *scene;
     struct bvh *bvh;
     double centre_m[3], radius_m;
@@ -97,8 +96,7 @@ struct site_plan {
  * sites frees it. One thread loads and frees them; others may cast meanwhile. */
 struct site_world {
     uint32_t n_users;
-    uint32_t n_loads; /* how often the meshes were read: once */
-    int written_out;  /* copies are triangles of the scene */
+    int written_out; /* copies are triangles of the scene */
     struct scene *scene;
     struct site_mover mover[CAST_MAX_MOVERS];
     uint32_t n_movers, n_surfaces;
@@ -134,7 +132,7 @@ struct site {
     struct site_world *world;
     struct scene *scene; /* what stands still; of the world, as movers and BVHs are */
     struct placement_anchor anchor;
-    struct site_mover mover[CAST_MAX_MOVERS];
+    struct site_mover *mover;
     uint32_t n_movers, n_surfaces; /* surfaces of the scene, of the movers, of legs, then the ghosts of all */
     struct scene_surface *legs;    /* the surface of tripods' legs, with the label legs_label; NULL: no legs */
     uint32_t legs_label;
@@ -165,7 +163,7 @@ struct site {
 /* A path is cut into stretches whose poses are within this distance of a centre. */
 #define SITE_STRETCH_M 1000.0
 
-/* Room left beyond the head's largest range, for noise. */
+/* Extents go this much beyond the head's largest range, for noise. */
 #define SITE_MARGIN 1.01
 
 enum site_purpose {
@@ -244,7 +242,7 @@ uint32_t site_n_served(const struct site *site);
  * The hemisphere of the false northing is that in which the first station is given, if it is given in UTM. */
 void site_grid(const struct site *site, int *zone, int *side);
 
-/* The schedule of its head with some settings. */
+/* Fills the schedule of its head with these settings. */
 void site_fill_spec(const struct site *site, const struct head_settings *settings, struct schedule_spec *spec);
 
 /* Entries that a pulse may need in a block: its echoes, at most as many as the plan allows. */
@@ -276,6 +274,12 @@ void site_enter(const struct site *site, uint32_t station, size_t stretch, struc
 const struct georef *site_georef(const struct site *site, uint32_t station, size_t stretch, const double **centre_m,
                                  const double **scale);
 
+/* ---- tripod.c: the tripod under a station's head */
+/* The tripod of a station (0..) as it would be at another place, without warnings. The site stays as it is. Any thread.
+ * SH_EINPUT: the head would be too near the ground. site_free_tripod is due in any case. */
+int site_tripod_at(const struct site *site, uint32_t station, const double position_m[3], struct site_tripod *out,
+                   struct sh_err *err);
+void site_free_tripod(struct site_tripod *tripod);
 /* "top 1.6 m above the ground, opening 27.3 deg, ...", for a station with a tripod. */
 void site_describe_tripod(const struct site_station *station, char *text, size_t len);
 

@@ -7,8 +7,7 @@
 
 #include "firmware_sim/base/nearest.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/site.h"
-#include "firmware_sim/site/target.h"
+#include "firmware_sim/site/steps.h"
 
 enum { MOST_NEAR = 3, NEAR_LETTERS = 2 };
 

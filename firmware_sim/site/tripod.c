@@ -5,9 +5,7 @@
  * The ground is the first surface straight below the head's origin, without movers. The vertical is the plumb line
  * there (placement.c), however the head is tilted. A leg of length L reaches from the top, at height h above that
  * ground, down to its level: cos(opening) = h / L. */
-#include "firmware_sim/site/site.h"
-#include "firmware_sim/site/tripod.h"
-#include "firmware_sim/site/world.h"
+#include "firmware_sim/site/steps.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -22,7 +20,8 @@
 /* A prism of SIDES faces a leg, and its two ends. */
 enum { LEGS = 3, SIDES = 6, LEG_VERTICES = 2 * SIDES, LEG_TRIANGLES = 2 * SIDES + 2 * (SIDES - 2) };
 
-/* Stops are the stations of the configuration, one round after the other (platform.c). */
+/* Returns the number of the configured station that a stop is at: stops go through all stations, round after round
+ * (platform.c). */
 static uint32_t number_of(const struct site *site, uint32_t i)
 {
     return i % site->cfg->n_stations;

@@ -4,9 +4,7 @@
 #include <string.h>
 
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/detection.h"
-#include "firmware_sim/site/georeference.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 struct site_vary {
     struct site site; /* the first member: site_vary_free gets its address */
@@ -21,7 +19,8 @@ int site_varies(const struct head_settings *a, const struct head_settings *b)
            a->step_udeg != b->step_udeg;
 }
 
-/* Settings of a scan that no plan depends on stay those of power-up, as in the site itself. */
+/* Returns the settings that the new plan is made for. Settings that no plan depends on stay those of power-up, as in
+ * the site itself. */
 static struct head_settings planned_of(const struct head_settings *own, const struct head_settings *now)
 {
     struct head_settings s = *own;

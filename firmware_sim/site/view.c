@@ -9,9 +9,9 @@
 #include "core/instrument.h"
 #include "core/mat3.h"
 
-/* A margin beyond all known effects that bend or move the beam. */
+/* This margin is beyond all known effects that bend or move the beam. */
 static const double MARGIN_RAD = 2e-3;
-/* Limit of the angle noise, in sigma; rng_normal's largest value is 6.7. */
+/* Angle noise stays below so many sigma: rng_normal's largest value is 6.7. */
 static const double SIGMAS = 7.0;
 
 enum { DIRECTIONS = 2048 };

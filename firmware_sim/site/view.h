@@ -22,7 +22,7 @@ struct site_view {
 
 /* For the settings at power-up. */
 void site_view_of(const struct site *site, uint32_t station, struct site_view *view);
-/* The function for sight_spec's `sees`; ctx: the view. */
+/* This is the function `sees` of struct sight_spec; ctx is the view. */
 int site_view_sees(const void *ctx, const double dir[3], double radius_rad);
 /* The share of all directions that are within radius_rad of the view. */
 double site_view_share(const struct site_view *view, double radius_rad);

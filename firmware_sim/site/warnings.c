@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/site/warnings.h"
-#include "firmware_sim/site/site.h"
+#include "firmware_sim/site/steps.h"
 
 static int has(const struct site_warnings *given, const char *text)
 {

@@ -88,7 +88,7 @@ static void fill_spec(const struct config *cfg, const struct pulse_table *table,
                                    .seed = cfg->noise.seed};
 }
 
-/* Signal of one count, in thresholds. */
+/* Returns the signal of one count, in detection thresholds. */
 static double count_signal(const struct waveform_spec *spec)
 {
     return spec->full_scale / (ldexp(1.0, (int)spec->bits) - 1.0 - spec->baseline_counts);
@@ -105,11 +105,11 @@ static void warn_digits(const struct config *cfg, const struct waveform_spec *sp
         cfg->file, count, spec->bits, 0.1 * floor(100.0 * log10(spec->full_scale / count)));
 }
 
-/* Sigmas of noise at the level. A sample of noise alone reaches 5 of them once in 3 million times. */
+/* The least level, in sigma of the noise. A sample of noise alone reaches 5 sigma once in 3 million times. */
 #define LEAST_SNR 5.0
 
-/* The receiver's bandwidth with which the pulse's peak is `least` of the outgoing one, to 10 %; 0: none that the
- * sampling allows. */
+/* Returns the receiver's bandwidth, to 10 %, with which the pulse's peak is `least` of the outgoing one; 0: the
+ * sampling allows none. */
 static double bandwidth_of(const struct waveform_spec *spec, double least)
 {
     struct waveform_spec wide = *spec;
@@ -168,8 +168,8 @@ static const double USUAL_SIGNAL = 100.0;
 /* Queues hold 0.3 s and more of the stream, which must fit into memory. */
 static const double MOST_BYTES_S = 4e8;
 
-/* Windows and samples of a return from a surface that is hit at a right angle. Eight places between two samples are
- * tried, and the largest counts are returned. */
+/* Returns the windows and samples of a return from a surface that is hit at a right angle. Eight places between two
+ * samples are tried, and the largest counts are taken. */
 static struct site_wave_room sample_return(const struct waveform *waveform, double amplitude)
 {
     enum { PLACES = 8 };

@@ -4,19 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/vec3.h"
 #include "firmware_sim/config/config.h"
-#include "firmware_sim/site/site.h"
-#include "firmware_sim/site/world.h"
+#include "firmware_sim/site/steps.h"
 
 double site_enclose(const struct scene *mesh, double centre_m[3])
 {
-    double half2 = 0.0;
-    for (int i = 0; i < 3; i++) {
-        const double half = 0.5 * (mesh->max_m[i] - mesh->min_m[i]);
-        centre_m[i] = mesh->min_m[i] + half;
-        half2 += half * half;
-    }
-    return sqrt(half2) * (1.0 + 1e-9) + 1e-6;
+    double size[3];
+    vec3_sub(mesh->max_m, mesh->min_m, size);
+    for (int i = 0; i < 3; i++)
+        centre_m[i] = mesh->min_m[i] + 0.5 * size[i];
+    return 0.5 * vec3_length(size) * (1.0 + 1e-9) + 1e-6;
 }
 
 double site_mesh_error_m(const struct site *site)
@@ -39,30 +37,16 @@ static int is_same_scene(const struct site *site, const struct site *other)
            (config_wants_textures(other->cfg) || !config_wants_textures(site->cfg));
 }
 
-static void take_scene(struct site *site)
-{
-    const struct site_world *world = site->world;
-    const struct config_scene *scene = &site->cfg->scene;
-    site->scene = world->scene;
-    site->n_surfaces = world->n_surfaces;
-    site->n_movers = world->n_movers;
-    memcpy(site->mover, world->mover, sizeof site->mover);
-    for (uint32_t i = 0; i < site->n_movers; i++)
-        site->mover[i].mesh = &scene->mesh[site->mover[i].number];
-}
-
 int site_enter_world(struct site *site, const struct site *other, struct sh_err *err)
 {
-    if (other != NULL && is_same_scene(site, other)) {
-        site->world = other->world;
-        site->world->n_users++;
-        take_scene(site);
-        return SH_OK;
-    }
-    site->world = calloc(1, sizeof *site->world);
-    if (site->world == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    site->world->n_users = 1;
-    site->world->written_out = other != NULL && other->world->written_out;
+    struct site_world *world = other != NULL && is_same_scene(site, other) ? other->world : calloc(1, sizeof *world);
+    if (world == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    if (world->n_users++ == 0) world->written_out = other != NULL && other->world->written_out;
+    site->world = world;
+    site->scene = world->scene;
+    site->mover = world->mover;
+    site->n_movers = world->n_movers;
+    site->n_surfaces = world->n_surfaces;
     return SH_OK;
 }
 

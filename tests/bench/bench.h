@@ -26,8 +26,8 @@ struct bench_target {
 /* Returns the number of triangles that a name like 10k, 1M or 25000 stands for. Returns 0 if it is no number of 100 to
  * 100M. */
 uint32_t bench_count(const char *name);
-int bench_is_house(const char *name); /* one of the two below that need its file */
-int bench_is_made(const char *name);  /* one that is generated and is no terrain */
+int bench_is_house(const char *name); /* whether it is house or garden, which need the IFC file */
+int bench_is_made(const char *name);  /* whether it is foliage or huge, which are generated */
 /* "house" reads the IFC file and is seen from its living room, "garden" from outside. A number makes closed terrain,
  * 200 m wide and 3 m rough, seen from 4.7 m above its middle. "foliage" is three crowns of 20,000 leaves in a box.
  * "huge" is a triangle of 1,000 km below 4,000 triangles of some centimetres. */
@@ -46,9 +46,8 @@ struct bench_rays {
     double *dx, *dy, *dz; /* unit vectors, prcs */
     float *fx, *fy, *fz;  /* the same for Embree */
 };
-/* Sets a turn of so many lines, with BENCH_LINE_PULSES each, or with `pulses` each. */
-void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec);
-void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec);
+/* Sets a turn of so many lines, with `pulses` each. */
+void bench_schedule(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec);
 /* The first makes room for some lines of a turn. The second fills in the rays of the lines from first_line on. */
 int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
                     struct sh_err *err);
@@ -71,7 +70,7 @@ uint32_t bench_rays_block(const struct bench_rays *rays, uint32_t first, struct 
 struct bench_case {
     const struct bench_target *target;
     const struct bench_rays *rays;
-    struct embree_alone *embree, *fast; /* robust: the measure of all; without that flag */
+    struct embree_alone *embree, *fast; /* robust, which all is compared with; without that flag */
     struct bvh *bvh;
     double seconds; /* it measures for so long, but at least BENCH_MIN_ROUNDS */
 };
@@ -144,7 +143,7 @@ enum { BENCH_LEAK_MESHES = 4 };
 struct bench_leaks {
     const char *mesh;
     uint32_t triangles;
-    uint64_t rays, leaks, passed; /* passed: met the inside of the mesh behind the target, which is wrong as well */
+    uint64_t rays, leaks, passed; /* passed: hit the inside of the mesh behind the target, which is wrong as well */
     double ns_per_ray;            /* processor time */
     struct cast_counters counters;
     uint64_t plain_rays, plain_leaks;               /* Embree alone, robust, in packets */

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How soon Blender has a panorama's points after its scanner was moved, with the geometry nodes of blender_scan.py.
+"""This measures how soon Blender has a panorama's points after its scanner was moved, with blender_scan.py's nodes.
 
     blender -b --factory-startup -P blender_live.py -- SCENE.obj STEP_DEG RADIUS_M N X Y Z
 

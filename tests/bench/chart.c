@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* This measures speed against accuracy of the ways to cast, and prints rows of the chart's table. README.md tells how
+/* This measures speed against accuracy of the ways to cast, and prints rows of the chart's table. README.md says how
  * to read it.
  *
  * A method's name is its family and, as the last word, the value that is varied in it: "robust decided 16". */
@@ -39,8 +39,8 @@ struct chart_scene {
     int at_edges;
 };
 /* Near scenes have ranges to 100 m. The far one has flat ground to 1.5 km seen from 4.7 m above it, up to 89.9 degrees
- * of incidence. At edges, ranges are as near, but each ray goes to a corner, or to a point of an edge, of the triangle
- * that it would hit. */
+ * of incidence. The last scene is near, too, but each ray is turned to a corner, or to a point of an edge, of the
+ * triangle that it would hit. */
 static const struct chart_scene SCENES[] = {{"terrain 200 m wide", 100000, 200.0, 3.0, 0},
                                             {"terrain 3 km wide", 100000, 3000.0, 3.0, 0},
                                             {"200 m; each ray at an edge or corner", 100000, 200.0, 3.0, 1}};
@@ -268,7 +268,7 @@ static int set_up(struct chart *c, struct sh_err *err)
     c->station_m[2] = 4.7;
     int rc = generate_terrain(c->spec->triangles, c->spec->side_m, c->spec->rough_m, centre_m, 1, &c->scene, err);
     bench_scan_of(WHOLE_SCAN, 1, &c->scan);
-    bench_schedule_of(c->scan.lines, c->scan.line_pulses, 0, &spec);
+    bench_schedule(c->scan.lines, c->scan.line_pulses, 0, &spec);
     if (rc == SH_OK) rc = bench_rays_room(&spec, LINES, c->scan.line_pulses, &c->rays, err);
     if (rc == SH_OK) bench_rays_spread(&c->rays, c->scan.bundle, c->scan.lines / LINES);
     for (int robust = 0; robust < 2 && rc == SH_OK; robust++) {

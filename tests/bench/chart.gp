@@ -1,5 +1,5 @@
-# Speed against accuracy of the ways to cast, and from how many pulses on a sight pays:
-# gnuplot -e "csv='FILE.csv'; base='OUT'" chart.gp draws OUT.svg and OUT.png, six plots. README.md says how to read them.
+# gnuplot -e "csv='FILE.csv'; base='OUT'" chart.gp draws OUT.svg and OUT.png, six plots: speed against accuracy of the
+# ways to cast, and from how many pulses on a sight pays. README.md says how to read them.
 load "tests/bench/chart_style.gp"
 
 array title[4] = ["Near ground, to 100 m", "Flat ground, to 1.5 km", "Every ray at an edge or corner", \

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* This measures speed against accuracy of the ways to georeference, and prints rows of the chart's table. README.md
- * tells how to read it. Points go from the scene frame to UTM and UPS. Errors are against tests/common/geodesy.h, which
+ * says how to read it. Points go from the scene frame to UTM and UPS. Errors are against tests/common/geodesy.h, which
  * shares nothing with GeographicLib. */
 #include <math.h>
 #include <stdio.h>

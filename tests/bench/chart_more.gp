@@ -1,5 +1,5 @@
-# The chart's other stages, georeferencing and beams: gnuplot -e "csv='FILE.csv'; base='OUT'" chart_more.gp draws OUT.svg
-# and OUT.png. There, scenes have a symbol, and the method stands beside it.
+# gnuplot -e "csv='FILE.csv'; base='OUT'" chart_more.gp draws OUT.svg and OUT.png: georeferencing and beams. Here a
+# scene has a symbol, and the method stands beside it.
 load "tests/bench/chart_style.gp"
 
 radii = rows("$1 == \"georef\"", distinct("$3"))

@@ -1,5 +1,5 @@
-# Speed against accuracy where the head moves, or a body: gnuplot -e "csv='FILE.csv'; base='OUT'" chart_moving.gp draws
-# OUT.svg and OUT.png, two plots. README.md says how to read them.
+# gnuplot -e "csv='FILE.csv'; base='OUT'" chart_moving.gp draws OUT.svg and OUT.png, two plots: speed against accuracy
+# where the head moves, or a body. README.md says how to read them.
 load "tests/bench/chart_style.gp"
 
 movers = rows("$1 == \"moving\"", distinct("$3"))

@@ -1,5 +1,5 @@
-# What chart.gp and chart_more.gp share: how the table is read, and how a picture looks that is shown at half its size.
-# A method's name is its family, and as the last word what is varied in it. Errors of 0 are drawn at 1e-17 m.
+# All chart*.gp share this: how the table is read, and how a picture looks that is shown at half its size. A method's
+# name is its family and, as the last word, the value that is varied. Errors of 0 are drawn at 1e-17 m.
 set datafile separator ","
 set datafile missing "nan"
 
@@ -22,7 +22,7 @@ set format y "10^{%T}"
 set grid xtics ytics ls 20
 unset key
 
-# A picture of two columns: a legend on top, then so many rows of plots. All in pixels.
+# A picture has a legend on top, and below it n_rows rows of two plots. These sizes are pixels.
 wide = 1800.0
 head = 215.0
 high = 620.0
@@ -30,7 +30,7 @@ size_of(n_rows) = sprintf("%d, %d", wide, head + n_rows * high)
 terminal(out, n_rows) = out eq "svg" ? \
     "set terminal svg size " . size_of(n_rows) . " font \"DejaVu Sans,25\" background \"#ffffff\"" : \
     "set terminal pngcairo size " . size_of(n_rows) . " font \"DejaVu Sans,19\""
-# Where plot p of so many rows lies, 1 on the left; 0: the legend.
+# This places plot p of n_rows rows; plot 1 is on the left, and 0 is the legend.
 place(p, n_rows) = p == 0 ? \
     sprintf("set origin 0, %f; set size 1, %f", n_rows * high / (head + n_rows * high), head / (head + n_rows * high)) : \
     sprintf("set origin %f, %f; set size 0.5, %f", 0.5 * ((p - 1) % 2), \

@@ -1,5 +1,6 @@
-# Waveforms, error of the samples against cost: gnuplot -e "csv='FILE.csv'; base='OUT'" chart_waveform.gp draws OUT.svg and
-# OUT.png, two plots: shapes that have a method without sub-rays, and others. README.md says how to read them.
+# gnuplot -e "csv='FILE.csv'; base='OUT'" chart_waveform.gp draws OUT.svg and OUT.png, two plots of waveforms: the error
+# of the samples against cost, for shapes that have a method without sub-rays, and others. README.md says how to read
+# them.
 load "tests/bench/chart_style.gp"
 
 array like[6] = [1, 3, 2, 6, 7, 5]

@@ -2,7 +2,7 @@
 /* This measures what the polynomials of georeferencing cost on each vector width of this CPU. It prints rows of the
  * chart's table, but the chart does not draw them. The loops are those of the program
  * (core/georef/polynomial_kernels.h), compiled once more for each instruction set. Errors are against the exact method.
- * README.md tells how to read it. */
+ * README.md says how to read it. */
 #include <math.h>
 #include <stdio.h>
 

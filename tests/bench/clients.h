@@ -16,7 +16,7 @@ struct bench_clients {
 /* Waits until the head says on ready_fd (--ready-fd) that its links are open, and closes ready_fd. reads: 1: begins a
  * client for each pty and tcp link; 0: none. */
 void bench_clients_begin(struct bench_clients *clients, int ready_fd, int reads);
-/* Clients end with their link. Waits for them. */
+/* Waits for the clients, which end with their links. */
 void bench_clients_end(const struct bench_clients *clients);
 
 #endif

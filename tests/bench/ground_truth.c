@@ -104,15 +104,16 @@ static long double dot(const long double a[3], const long double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* This is what a ray has met so far. */
-struct met {
-    /* Range of the first triangle. Its border belongs to it, and a little around that, so that there is no gap between
-     * neighbours in long double. */
+/* These are the ranges of the triangles that a ray has hit so far. */
+struct first_hit {
+    /* The border of a triangle belongs to it, and a little around that, so that there is no gap between neighbours in
+     * long double. */
     long double range;
-    long double around[2]; /* of the first triangle that it meets or just misses, seen from its front, from its back */
+    long double around[2]; /* to the first triangle that it hits or just misses; [0] front, [1] back */
 };
 
-static void hit(const struct ground_truth *r, uint32_t prim, const long double dir[3], struct met *met)
+static void test_triangle(const struct ground_truth *r, uint32_t prim, const long double dir[3],
+                          struct first_hit *first)
 {
     const long double border = 1e-15L, around = 1e-11L;
     long double v[3][3], e1[3], e2[3], p[3], q[3], s[3];
@@ -129,8 +130,8 @@ static void hit(const struct ground_truth *r, uint32_t prim, const long double d
     long double det = dot(e1, p), a = dot(s, p) / det, b = dot(dir, q) / det, t = dot(e2, q) / det;
     long double least = fminl(fminl(a, b), 1.0L - a - b);
     if (!(least >= -around) || !(t > 0.0L)) return;
-    if (least >= -border) met->range = fminl(met->range, t);
-    met->around[det < 0.0L] = fminl(met->around[det < 0.0L], t);
+    if (least >= -border) first->range = fminl(first->range, t);
+    first->around[det < 0.0L] = fminl(first->around[det < 0.0L], t);
 }
 
 /* Gives the part of 0..reach in which the ray is within lo..hi of an axis. Returns 0 if there is none. */
@@ -150,7 +151,7 @@ long double ground_truth_range(const struct ground_truth *r, const double dir[3]
 {
     const long double d[3] = {dir[0], dir[1], dir[2]};
     const long double none = (long double)INFINITY;
-    struct met met = {none, {none, none}};
+    struct first_hit hit = {none, {none, none}};
     for (int y = 0; y < CELLS; y++) {
         double lo = r->min_m[1] + y * r->cell_m[1], t0, t1;
         if (!part_within(dir[1], lo - r->margin_m, lo + r->cell_m[1] + r->margin_m, r->reach_m, &t0, &t1)) continue;
@@ -158,10 +159,10 @@ long double ground_truth_range(const struct ground_truth *r, const double dir[3]
         cells_of(r, 0, fmin(t0 * dir[0], t1 * dir[0]), fmax(t0 * dir[0], t1 * dir[0]), &from, &to);
         for (int x = from; x <= to; x++)
             for (uint32_t i = r->first[y * CELLS + x]; i < r->first[y * CELLS + x + 1]; i++)
-                hit(r, r->list[i], d, &met);
+                test_triangle(r, r->list[i], d, &hit);
     }
-    long double first = fminl(met.around[0], met.around[1]), second = fmaxl(met.around[0], met.around[1]);
-    long double same = 1e-9L * met.range;
-    *doubtful = met.range - first > same || second - first <= same;
-    return met.range;
+    long double first = fminl(hit.around[0], hit.around[1]), second = fmaxl(hit.around[0], hit.around[1]);
+    long double same = 1e-9L * hit.range;
+    *doubtful = hit.range - first > same || second - first <= same;
+    return hit.range;
 }

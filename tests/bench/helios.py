@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Processor time a pulse beside HELIOS++, LAS written by both, in turns on one processor.
+"""This measures processor time a pulse beside HELIOS++. Both write LAS, in turns on one processor.
 
 HELIOS++ isn't part of this project: --helios names its program, --assets the folder that has its `data`. Both scan the
-same mesh with the same lines, at 100 kHz, one thread. Of each a short scan is taken from a long one, so that loading is
-in neither. The work is not the same: HELIOS++ computes a waveform of each pulse, too."""
+same mesh with the same lines, at 100 kHz, one thread. The time of a short scan is subtracted from that of a long
+one, so that loading does not count. The work is not the same: HELIOS++ computes a waveform of each pulse, too."""
 import argparse
 import os
 import shutil
@@ -40,7 +40,7 @@ LINE_PULSES = 1000
 
 
 class Window:
-    """Lines from lowest_deg to highest_deg, line_deg apart: pans of HELIOS++ in degrees, and a sweep of ours."""
+    """This has lines from lowest_deg to highest_deg, line_deg apart: pans of HELIOS++ in degrees, and a sweep of ours."""
 
     def __init__(self, lowest_deg, highest_deg, pan_deg, line_deg, short_deg, long_deg, sweep_lines, ours):
         self.lowest_deg, self.highest_deg, self.pan_deg, self.line_deg = lowest_deg, highest_deg, pan_deg, line_deg

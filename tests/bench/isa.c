@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Embree in a build of one instruction set (VEC_ONE): AVX2, with packets of 8, on a processor that has AVX-512 as well.
- * Such a build is linked with this and with -Wl,--wrap=rtcNewDevice: see make_avx2 in speed.mk. */
+/* This makes Embree use AVX2, with packets of 8, on a processor that has AVX-512 as well. A build of one instruction
+ * set (VEC_ONE) is linked with this and with -Wl,--wrap=rtcNewDevice: see make_avx2 in speed.mk. */
 #include <stddef.h>
 #include <stdio.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A stream in memory, as a head of 20 million points a second sends it, for programs that measure its readers.
+/* This makes a stream in memory, as a head of 20 million points a second sends it, for programs that measure readers.
  *
  * A tick of 1 ms is a block of 20,000 points; a line is five of them. As in a scene, no range, label or reflectance
  * follows from another. Every 50th shot has no echo. */
@@ -25,7 +25,7 @@ int made_stream_create(enum made_layout layout, uint32_t ticks, struct made_stre
 /* Writes the stream into a file in memory, and sets `source` to its name (fd:N) for scanhead_open. Returns 0, or -1. */
 int made_stream_source(const struct made_stream *stream, char *source, size_t len);
 
-/* Room for MADE_BATCH points, with all columns. */
+/* This has room for MADE_BATCH points, with all columns. */
 extern const struct scanhead_columns made_columns;
 
 #endif

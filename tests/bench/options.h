@@ -27,7 +27,7 @@ int bench_parse(struct bench_options *o, int argc, char **argv);
 
 /* Reads a number of pulses like 22.5M or 300k. Returns 0 if it is no number of 1,000 to 100M. */
 double bench_pulses(const char *name);
-/* Copies a file to standard error, where it can be read. */
+/* Copies a file to standard error if it can be opened. */
 void bench_show_file(const char *path);
 /* Copies the next name of a list with commas into name. Returns the rest of the list, or NULL at the list's end. */
 const char *bench_next_name(const char *list, char *name, size_t len);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The rays of a normal scan. */
+/* These are the rays of a normal scan. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -8,7 +8,7 @@
 
 enum { LINES_HZ = 480 };
 
-void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec)
+void bench_schedule(uint32_t lines, uint32_t pulses, uint32_t frames, struct schedule_spec *spec)
 {
     *spec = (struct schedule_spec){.lines_uhz = LINES_HZ * INT64_C(1000000),
                                    .prr_uhz = LINES_HZ * INT64_C(1000000) * pulses,
@@ -19,11 +19,6 @@ void bench_schedule_of(uint32_t lines, uint32_t pulses, uint32_t frames, struct 
                                    .line_stop_udeg = BENCH_HIGHEST_DEG * INT64_C(1000000),
                                    .pan_stop_udeg = 360000000,
                                    .frames = frames};
-}
-
-void bench_schedule(uint32_t lines, uint32_t frames, struct schedule_spec *spec)
-{
-    bench_schedule_of(lines, BENCH_LINE_PULSES, frames, spec);
 }
 
 static void fill_line(struct bench_rays *rays, uint32_t line, size_t at)
@@ -77,7 +72,7 @@ int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t l
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err)
 {
     struct schedule_spec spec;
-    bench_schedule(lines, 0, &spec);
+    bench_schedule(lines, BENCH_LINE_PULSES, 0, &spec);
     int rc = bench_rays_room(&spec, lines, BENCH_LINE_PULSES, out, err);
     if (rc == SH_OK) bench_rays_aim(out, 0);
     return rc;

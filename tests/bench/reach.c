@@ -13,8 +13,8 @@ struct group {
     double ns[BENCH_MAX_REACH][BENCH_REACH_ROUNDS];
 };
 
-/* Each line is cast for all cases before the next line. The cases take turns at who finds the caches as another case
- * left them. */
+/* Each line is cast for all cases before the next line. The cases take turns at being first, because the first one
+ * finds the caches as the line before left them. */
 static void round_of(struct group *g, uint32_t round)
 {
     double spent_s[BENCH_MAX_REACH] = {0.0};

@@ -19,7 +19,7 @@ struct slice {
     const struct embree_alone *e;
     const struct bench_result *one;
     uint32_t first, n, passes;
-    const _Atomic int *signal; /* 0: wait, 1: go, -1: never mind */
+    const _Atomic int *signal; /* 0: wait, 1: go, -1: end at once */
 };
 
 static void *slice_main(void *arg)
@@ -59,7 +59,7 @@ static double embree_rays_s(const struct bench_case *c, const struct bench_resul
 static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t threads, uint32_t frames)
 {
     struct schedule_spec spec;
-    bench_schedule(c->rays->lines, frames, &spec);
+    bench_schedule(c->rays->lines, BENCH_LINE_PULSES, frames, &spec);
     memset(cfg, 0, sizeof *cfg);
     cfg->profile =
         (struct config_profile){.name = "bench",

@@ -60,7 +60,7 @@ int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const 
                                          .layout = LINE_POLAR,
                                          .range_scale_m = BENCH_SCALE_M},
                                .pulses = scan->pulses};
-    bench_schedule_of(scan->lines, scan->line_pulses, 0, &spec);
+    bench_schedule(scan->lines, scan->line_pulses, 0, &spec);
     schedule_start(&place.segment, &spec);
     memcpy(place.setup.station_m, station_m, sizeof place.setup.station_m);
     pose_heading(0.0, place.setup.rotation);

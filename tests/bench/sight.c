@@ -41,7 +41,7 @@ static int set_up(struct rows *r, struct sh_err *err)
     const struct bench_case *c = r->c;
     const struct bench_scan *scan = &r->out->scan;
     struct schedule_spec spec;
-    bench_schedule_of(scan->lines, scan->line_pulses, 0, &spec);
+    bench_schedule(scan->lines, scan->line_pulses, 0, &spec);
     int rc = bench_rays_room(&spec, scan->bundle, scan->line_pulses, &r->bundle, err);
     if (rc == SH_OK) rc = bench_georef(c->target, &r->georef, err);
     if (rc == SH_OK) rc = caster_create(&r->caster, err);
@@ -115,7 +115,7 @@ static void add_block(struct sums *s, uint32_t n, const struct sight_counters *b
     }
 }
 
-/* Solves the normal equations. A kind that hardly occurs has no cost that could be told, and gets NaN. */
+/* Solves the normal equations. The cost of a kind that hardly occurs can't be found, and is NaN. */
 static void solve(struct sums *s, double of_kind[KINDS])
 {
     int known[KINDS];

@@ -40,7 +40,7 @@ struct bench_sight {
     double gain;               /* of the cast: its time without by that with, building included */
     int planned;               /* the plan takes a map for so many pulses */
     double plan_s, plan_ratio; /* time of the choice; the better of both by what the plan takes */
-    uint64_t different;        /* pulses of a round that met another triangle or range than without */
+    uint64_t different;        /* pulses of a round that hit another triangle or range than without */
     struct sight_info info;
 };
 

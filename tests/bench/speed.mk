@@ -4,7 +4,7 @@
 .PHONY: bench-speed bench-live
 SPEED ?=
 SPEED_PROGRAMS = scanhead $(patsubst %,tests/bench/%,panorama decode live loop_cost)
-# A build as x86 has it without AVX-512: no choice of loops at start, and Embree with packets of 8.
+# This is a build for x86 without AVX-512: loops are not chosen at start, and Embree has packets of 8.
 AVX2 = $(if $(filter x86_64-%,$(TARGET)),$(BUILD)/avx2)
 AVX2_MAKE = $(MAKE) --no-print-directory -j2 BUILD=$(AVX2) CPPFLAGS='$(CPPFLAGS) -DVEC_ONE' \
 	CFLAGS='$(CFLAGS) -march=x86-64-v3 -w' LDFLAGS='$(LDFLAGS) -Wl,--wrap=rtcNewDevice $(AVX2)/tests/bench/isa.c.o'
@@ -15,7 +15,7 @@ bench-speed: deps-build
 	@$(MAKE) --no-print-directory -j2 $(SPEED_PROGRAMS:%=$(BUILD)/%)
 	+@$(call make_avx2,$(SPEED_PROGRAMS))
 	@bash tests/bench/speed.sh $(SPEED) $(BUILD) $(AVX2)
-# The client's side alone: its decoder, and what it takes from sockets and USB.
+# This measures the client's side alone: its decoder, and how fast it reads sockets and USB.
 bench-live: deps-build
 	$(call install_missing,libcmocka-dev)
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/decode $(BUILD)/tests/bench/live

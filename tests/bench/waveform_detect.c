@@ -120,11 +120,11 @@ static void measure(const struct waveform *waveform, int scene, enum waveform_de
     for (int round = 0; round < ROUNDS; round++) {
         double from = bench_thread_s();
         for (uint32_t p = 0; p < PULSES; p++)
-            (void)waveform_detect(waveform, detector, 1.0, &pulses[p].record, echo, MOST_ECHOES, &crowded);
+            (void)waveform_detect(waveform, detector, &pulses[p].record, echo, MOST_ECHOES, &crowded);
         ns[round] = 1e9 * (bench_thread_s() - from) / PULSES;
     }
     for (uint32_t p = 0; p < PULSES; p++) {
-        uint32_t n = waveform_detect(waveform, detector, 1.0, &pulses[p].record, echo, MOST_ECHOES, &crowded);
+        uint32_t n = waveform_detect(waveform, detector, &pulses[p].record, echo, MOST_ECHOES, &crowded);
         echoes += n;
         for (uint32_t i = 0; i < n; i++)
             off[n_off++] = nearest_m(&pulses[p], echo[i].range_m);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Writes a scene of the bench into a mesh file, and prints where its station stands:
+/* This writes a scene of the bench into a mesh file, and prints where its station stands:
  *   build/tests/bench/write_mesh NAME FILE */
 #include <stdio.h>
 

@@ -44,7 +44,7 @@ int embree_alone_create(const struct scene *scene, const struct embree_alone_spe
     snprintf(threads, sizeof threads, "threads=%u", spec->threads);
     *out = (struct embree_alone){.range_max_m = spec->range_max_m};
     out->device = rtcNewDevice(threads);
-    if (out->device == NULL) return embree_fail(rtcGetDeviceError(NULL), "Embree alone", err);
+    if (out->device == NULL) return embree_fail(rtcGetDeviceError(NULL), err);
     int64_t start_ns = clock_now_ns();
     RTCGeometry geometry = rtcNewGeometry(out->device, RTC_GEOMETRY_TYPE_TRIANGLE);
     int rc = fill_geometry(geometry, scene, spec->origin_m, err);

@@ -28,7 +28,7 @@ void wave_close(struct wave_echoes *w)
 uint32_t wave_detect(struct wave_echoes *w, enum waveform_detector detector)
 {
     w->n_crowded = 0;
-    w->n = waveform_detect(w->waveform, detector, 1.0, &w->record, w->echo, w->most, &w->n_crowded);
+    w->n = waveform_detect(w->waveform, detector, &w->record, w->echo, w->most, &w->n_crowded);
     return w->n;
 }
 

@@ -3,13 +3,13 @@
 
 #include "drivers/protocol/native.h"
 
-struct t t;
+struct usb_under_test usb;
 uint8_t buf[BUFFER];
 static struct native_parser parser;
 
 int control(int type, int request, int value, int index, void *data, int len)
 {
-    return libusb_control_transfer(t.dev, (uint8_t)type, (uint8_t)request, (uint16_t)value, (uint16_t)index, data,
+    return libusb_control_transfer(usb.dev, (uint8_t)type, (uint8_t)request, (uint16_t)value, (uint16_t)index, data,
                                    (uint16_t)len, MS);
 }
 
@@ -20,13 +20,13 @@ int get_descriptor(int type, int index, int lang, void *data, int len)
 
 void session(int open)
 {
-    assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, open, t.interface.number, NULL, 0), 0);
+    assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, open, usb.interface.number, NULL, 0), 0);
 }
 
 void send_bytes(const void *data, int len)
 {
     int sent = -1;
-    assert_int_equal(libusb_bulk_transfer(t.dev, t.interface.out, (uint8_t *)(uintptr_t)data, len, &sent, MS), 0);
+    assert_int_equal(libusb_bulk_transfer(usb.dev, usb.interface.out, (uint8_t *)(uintptr_t)data, len, &sent, MS), 0);
     assert_int_equal(sent, len);
 }
 
@@ -44,7 +44,8 @@ void expect_reply(const char *begin)
         size_t room;
         int got = 0;
         uint8_t *to = native_parser_room(&parser, &room);
-        int rc = libusb_bulk_transfer(t.dev, t.interface.in, to, (int)(room < 16384 ? room : 16384) & ~1023, &got, MS);
+        int rc =
+            libusb_bulk_transfer(usb.dev, usb.interface.in, to, (int)(room < 16384 ? room : 16384) & ~1023, &got, MS);
         assert_true(rc == 0 || rc == LIBUSB_ERROR_TIMEOUT);
         native_parser_added(&parser, (size_t)got);
     }
@@ -66,24 +67,24 @@ void ask(void)
 static void find(void)
 {
     libusb_device **list;
-    assert_int_equal(libusb_init(&t.ctx), 0);
-    ssize_t n = libusb_get_device_list(t.ctx, &list);
-    for (ssize_t i = 0; i < n && t.dev == NULL; i++)
-        if (host_usb_interface(list[i], &t.interface)) assert_int_equal(libusb_open(list[i], &t.dev), 0);
+    assert_int_equal(libusb_init(&usb.ctx), 0);
+    ssize_t n = libusb_get_device_list(usb.ctx, &list);
+    for (ssize_t i = 0; i < n && usb.dev == NULL; i++)
+        if (host_usb_interface(list[i], &usb.interface)) assert_int_equal(libusb_open(list[i], &usb.dev), 0);
     libusb_free_device_list(list, 1);
-    assert_non_null(t.dev);
-    libusb_device *device = libusb_get_device(t.dev);
-    t.speed = libusb_get_device_speed(device);
-    assert_int_equal(libusb_get_device_descriptor(device, &t.descriptor), 0);
-    assert_int_equal(libusb_get_active_config_descriptor(device, &t.config), 0);
-    assert_int_equal(libusb_claim_interface(t.dev, t.interface.number), 0);
+    assert_non_null(usb.dev);
+    libusb_device *device = libusb_get_device(usb.dev);
+    usb.speed = libusb_get_device_speed(device);
+    assert_int_equal(libusb_get_device_descriptor(device, &usb.descriptor), 0);
+    assert_int_equal(libusb_get_active_config_descriptor(device, &usb.config), 0);
+    assert_int_equal(libusb_claim_interface(usb.dev, usb.interface.number), 0);
 }
 
 int setup(void **state)
 {
     (void)state;
-    memset(&t, 0, sizeof t);
-    t.has_kernel = getenv("CHAPTER9_KERNEL") != NULL;
+    memset(&usb, 0, sizeof usb);
+    usb.has_kernel = getenv("CHAPTER9_KERNEL") != NULL;
     find();
     return 0;
 }
@@ -94,9 +95,9 @@ int teardown(void **state)
     open_session();
     ask();
     session(0);
-    libusb_release_interface(t.dev, t.interface.number);
-    libusb_free_config_descriptor(t.config);
-    libusb_close(t.dev);
-    libusb_exit(t.ctx);
+    libusb_release_interface(usb.dev, usb.interface.number);
+    libusb_free_config_descriptor(usb.config);
+    libusb_close(usb.dev);
+    libusb_exit(usb.ctx);
     return 0;
 }

@@ -47,8 +47,8 @@ check() {
 }
 
 # wait_for SECONDS COMMAND...: waits until the command succeeds, and returns 1 if it never did. It allows ten times as
-# long, because a guest shares its processor with other tests, and only a hang reaches that. Each look starts two
-# processes, which are slow here, so it looks only ten times a second.
+# long, because a guest shares its processor with other tests. Only a command that never succeeds takes that long. Each
+# look starts two processes, which are slow here, so it looks only ten times a second.
 wait_for() {
     left=$(($1 * 100))
     shift

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# This runs inside the guest: it tests a head on the host that usbredir plugs into the guest. init sources it.
 . /in_usb.sh
 . /hashes.sh
 export CONSOLE=/dev/ttyACM0

@@ -210,7 +210,7 @@ guest_follow() {
         return 0
     fi
     sed 's/^/# /' "$guest_work/console.log" | tail -n 30
-    guest_quit "the guest did not get to its end within its time, or fell over (${line:-}); console: $guest_work/console.log"
+    guest_quit "the guest did not get to its end within its time, or crashed (${line:-}); console: $guest_work/console.log"
 }
 
 guest_boot() {

@@ -19,7 +19,7 @@ static void test_descriptor_lengths(void **state)
     assert_int_equal(get_descriptor(LIBUSB_DT_DEVICE, 0, 0, buf, 0), 0);
     int total = get_descriptor(LIBUSB_DT_CONFIG, 0, 0, buf, 4096);
     assert_int_equal(total, buf[2] | buf[3] << 8);
-    assert_int_equal(total, t.config->wTotalLength);
+    assert_int_equal(total, usb.config->wTotalLength);
     for (int len = 1; len <= total; len += 7)
         assert_int_equal(get_descriptor(LIBUSB_DT_CONFIG, 0, 0, buf, len), len);
 }
@@ -44,9 +44,9 @@ static void check_config(const uint8_t *p, int total)
             endpoints++;
             int packet = p[at + 4] | p[at + 5] << 8;
             if ((p[at + 3] & 3) == LIBUSB_TRANSFER_TYPE_BULK)
-                assert_int_equal(packet, t.speed >= LIBUSB_SPEED_SUPER  ? 1024
-                                         : t.speed == LIBUSB_SPEED_HIGH ? 512
-                                                                        : 64);
+                assert_int_equal(packet, usb.speed >= LIBUSB_SPEED_SUPER  ? 1024
+                                         : usb.speed == LIBUSB_SPEED_HIGH ? 512
+                                                                          : 64);
         }
     }
     assert_int_equal(at, total);
@@ -70,7 +70,7 @@ static void test_strings(void **state)
     int n = get_descriptor(LIBUSB_DT_STRING, 0, 0, buf, 255);
     assert_true(n >= 4 && buf[0] == n && buf[1] == LIBUSB_DT_STRING);
     int lang = buf[2] | buf[3] << 8;
-    const uint8_t used[] = {t.descriptor.iManufacturer, t.descriptor.iProduct, t.descriptor.iSerialNumber};
+    const uint8_t used[] = {usb.descriptor.iManufacturer, usb.descriptor.iProduct, usb.descriptor.iSerialNumber};
     for (size_t i = 0; i < sizeof used; i++) {
         assert_int_not_equal(used[i], 0);
         n = get_descriptor(LIBUSB_DT_STRING, used[i], lang, buf, 255);
@@ -85,19 +85,19 @@ static void test_strings(void **state)
 static void test_speeds(void **state)
 {
     (void)state;
-    int dual = t.speed == LIBUSB_SPEED_HIGH; /* it can then describe another speed, full speed */
+    int dual = usb.speed == LIBUSB_SPEED_HIGH; /* it can then describe another speed, full speed */
     int n = get_descriptor(6, 0, 0, buf, 64);
-    assert_int_equal(n, t.speed == LIBUSB_SPEED_FULL && n > 0 ? 10 : dual ? 10 : STALL);
+    assert_int_equal(n, usb.speed == LIBUSB_SPEED_FULL && n > 0 ? 10 : dual ? 10 : STALL);
     if (n > 0) assert_int_equal(buf[8], 1);
     n = get_descriptor(7, 0, 0, buf, 4096);
     if (dual) {
         assert_int_equal(buf[1], 7);
         assert_int_equal(n, buf[2] | buf[3] << 8);
-    } else if (t.speed >= LIBUSB_SPEED_SUPER) {
+    } else if (usb.speed >= LIBUSB_SPEED_SUPER) {
         assert_int_equal(n, STALL);
     }
     n = get_descriptor(LIBUSB_DT_BOS, 0, 0, buf, 4096);
-    if (t.descriptor.bcdUSB < 0x0201) {
+    if (usb.descriptor.bcdUSB < 0x0201) {
         assert_int_equal(n, STALL);
         return;
     }
@@ -116,11 +116,11 @@ static void test_status(void **state)
     uint8_t status[2];
     (void)state;
     assert_int_equal(control(EP0_IN, LIBUSB_REQUEST_GET_STATUS, 0, 0, status, 2), 2);
-    assert_int_equal(status[0] & 1, t.config->bmAttributes >> 6 & 1); /* self-powered */
+    assert_int_equal(status[0] & 1, usb.config->bmAttributes >> 6 & 1); /* self-powered */
     assert_int_equal(status[1], 0);
-    for (int i = 0; i < t.config->bNumInterfaces; i++) {
-        const struct libusb_interface_descriptor *d = t.config->interface[i].altsetting;
-        if (d->bInterfaceNumber != t.interface.number) continue; /* the others belong to a driver */
+    for (int i = 0; i < usb.config->bNumInterfaces; i++) {
+        const struct libusb_interface_descriptor *d = usb.config->interface[i].altsetting;
+        if (d->bInterfaceNumber != usb.interface.number) continue; /* the others belong to a driver */
         assert_int_equal(control(IF_IN, LIBUSB_REQUEST_GET_STATUS, 0, d->bInterfaceNumber, status, 2), 2);
         assert_int_equal(status[0] | status[1], 0);
         for (int e = 0; e < d->bNumEndpoints; e++) {
@@ -138,34 +138,35 @@ static void test_configurations(void **state)
     uint8_t value = 0xee;
     (void)state;
     assert_int_equal(control(EP0_IN, LIBUSB_REQUEST_GET_CONFIGURATION, 0, 0, &value, 1), 1);
-    assert_int_equal(value, t.config->bConfigurationValue);
+    assert_int_equal(value, usb.config->bConfigurationValue);
     assert_int_equal(control(DEV_OUT, LIBUSB_REQUEST_SET_CONFIGURATION, 99, 0, NULL, 0), STALL);
     assert_int_equal(control(EP0_IN, LIBUSB_REQUEST_GET_CONFIGURATION, 0, 0, &value, 1), 1);
-    assert_int_equal(value, t.config->bConfigurationValue);
+    assert_int_equal(value, usb.config->bConfigurationValue);
     /* This happens behind the host's back: an unconfigured device has no interfaces and no endpoints. */
     assert_int_equal(control(DEV_OUT, LIBUSB_REQUEST_SET_CONFIGURATION, 0, 0, NULL, 0), 0);
     assert_int_equal(control(EP0_IN, LIBUSB_REQUEST_GET_CONFIGURATION, 0, 0, &value, 1), 1);
     assert_int_equal(value, 0);
-    assert_int_equal(control(IF_IN, LIBUSB_REQUEST_GET_INTERFACE, 0, t.interface.number, &value, 1), STALL);
-    assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, 1, t.interface.number, NULL, 0), STALL);
+    assert_int_equal(control(IF_IN, LIBUSB_REQUEST_GET_INTERFACE, 0, usb.interface.number, &value, 1), STALL);
+    assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, 1, usb.interface.number, NULL, 0), STALL);
     assert_int_equal(get_descriptor(LIBUSB_DT_DEVICE, 0, 0, buf, 18), 18);
-    assert_int_equal(control(DEV_OUT, LIBUSB_REQUEST_SET_CONFIGURATION, t.config->bConfigurationValue, 0, NULL, 0), 0);
+    assert_int_equal(control(DEV_OUT, LIBUSB_REQUEST_SET_CONFIGURATION, usb.config->bConfigurationValue, 0, NULL, 0),
+                     0);
     /* A reset sets the same configuration again, and that begins anew: no endpoint is halted, and data toggles are 0 on
      * both sides. */
-    assert_int_equal(libusb_release_interface(t.dev, t.interface.number), 0);
-    assert_int_equal(libusb_reset_device(t.dev), 0);
-    assert_int_equal(libusb_claim_interface(t.dev, t.interface.number), 0);
+    assert_int_equal(libusb_release_interface(usb.dev, usb.interface.number), 0);
+    assert_int_equal(libusb_reset_device(usb.dev), 0);
+    assert_int_equal(libusb_claim_interface(usb.dev, usb.interface.number), 0);
 }
 
 static void test_interfaces(void **state)
 {
     uint8_t value = 0xee;
     (void)state;
-    assert_int_equal(control(IF_IN, LIBUSB_REQUEST_GET_INTERFACE, 0, t.interface.number, &value, 1), 1);
+    assert_int_equal(control(IF_IN, LIBUSB_REQUEST_GET_INTERFACE, 0, usb.interface.number, &value, 1), 1);
     assert_int_equal(value, 0);
-    assert_int_equal(libusb_set_interface_alt_setting(t.dev, t.interface.number, 0), 0);
-    assert_int_equal(control(IF_OUT, LIBUSB_REQUEST_SET_INTERFACE, 5, t.interface.number, NULL, 0), STALL);
-    assert_int_equal(control(IF_IN, LIBUSB_REQUEST_GET_INTERFACE, 0, t.interface.number, &value, 1), 1);
+    assert_int_equal(libusb_set_interface_alt_setting(usb.dev, usb.interface.number, 0), 0);
+    assert_int_equal(control(IF_OUT, LIBUSB_REQUEST_SET_INTERFACE, 5, usb.interface.number, NULL, 0), STALL);
+    assert_int_equal(control(IF_IN, LIBUSB_REQUEST_GET_INTERFACE, 0, usb.interface.number, &value, 1), 1);
     assert_int_equal(value, 0);
 }
 
@@ -205,14 +206,14 @@ static void test_refused(void **state)
 
 static void expect_open(int open)
 {
-    assert_int_equal(control(0xc1, USB_REQUEST_SESSION, 0, t.interface.number, buf, 1), 1);
+    assert_int_equal(control(0xc1, USB_REQUEST_SESSION, 0, usb.interface.number, buf, 1), 1);
     assert_int_equal(buf[0], open);
 }
 
 static void test_session_request(void **state)
 {
     (void)state;
-    int number = t.interface.number;
+    int number = usb.interface.number;
     assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, 2, number, NULL, 0), STALL);
     assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, 0xffff, number, NULL, 0), STALL);
     assert_int_equal(control(VENDOR_IF_OUT, USB_REQUEST_SESSION, 1, number, buf, 4), STALL);

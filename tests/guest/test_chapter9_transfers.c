@@ -15,22 +15,22 @@ static void test_halt(void **state)
 {
     (void)state;
     int n;
-    const uint8_t endpoint[] = {t.interface.in, t.interface.out};
+    const uint8_t endpoint[] = {usb.interface.in, usb.interface.out};
     open_session();
     for (size_t i = 0; i < 2; i++) {
         for (int again = 0; again < 3; again++) {
             ask();
             assert_int_equal(control(EP_OUT, LIBUSB_REQUEST_SET_FEATURE, HALT, endpoint[i], NULL, 0), 0);
             assert_int_equal(is_halted(endpoint[i]), 1);
-            assert_int_equal(libusb_bulk_transfer(t.dev, endpoint[i], buf, 1024, &n, MS), STALL);
+            assert_int_equal(libusb_bulk_transfer(usb.dev, endpoint[i], buf, 1024, &n, MS), STALL);
             assert_int_equal(is_halted(endpoint[i]), 1);
-            assert_int_equal(libusb_clear_halt(t.dev, endpoint[i]), 0);
+            assert_int_equal(libusb_clear_halt(usb.dev, endpoint[i]), 0);
             assert_int_equal(is_halted(endpoint[i]), 0);
         }
-        assert_int_equal(libusb_clear_halt(t.dev, endpoint[i]), 0); /* this is allowed without a halt, too */
+        assert_int_equal(libusb_clear_halt(usb.dev, endpoint[i]), 0); /* this is allowed without a halt, too */
     }
     ask();
-    if (!t.has_kernel) /* dummy_hcd takes any feature of an endpoint for a halt */
+    if (!usb.has_kernel) /* dummy_hcd takes any feature of an endpoint for a halt */
         assert_int_equal(control(EP_OUT, LIBUSB_REQUEST_SET_FEATURE, 9, endpoint[0], NULL, 0), STALL);
     session(0);
 }
@@ -69,7 +69,7 @@ static void wait_done(int *done)
 {
     struct timeval second = {.tv_sec = 5};
     while (!*done)
-        assert_int_equal(libusb_handle_events_timeout_completed(t.ctx, &second, done), 0);
+        assert_int_equal(libusb_handle_events_timeout_completed(usb.ctx, &second, done), 0);
 }
 
 /* Cancels one transfer after some events were handled. Returns how it ended. */
@@ -78,10 +78,10 @@ static enum libusb_transfer_status cancel_one(uint8_t endpoint, int len, int wai
     int done = 0;
     struct libusb_transfer *transfer = libusb_alloc_transfer(0);
     assert_non_null(transfer);
-    libusb_fill_bulk_transfer(transfer, t.dev, endpoint, buf, len, on_done, &done, 0);
+    libusb_fill_bulk_transfer(transfer, usb.dev, endpoint, buf, len, on_done, &done, 0);
     assert_int_equal(libusb_submit_transfer(transfer), 0);
     struct timeval wait = {.tv_usec = wait_us};
-    if (wait_us > 0) libusb_handle_events_timeout_completed(t.ctx, &wait, &done);
+    if (wait_us > 0) libusb_handle_events_timeout_completed(usb.ctx, &wait, &done);
     int rc = libusb_cancel_transfer(transfer);
     assert_true(rc == 0 || rc == LIBUSB_ERROR_NOT_FOUND); /* it may have been done just before */
     wait_done(&done);
@@ -95,7 +95,7 @@ static void test_cancel_without_session(void **state)
     (void)state;
     session(0);
     for (int i = 0; i < 50; i++)
-        assert_int_equal(cancel_one(t.interface.in, 16384, 500 * (i % 4)), LIBUSB_TRANSFER_CANCELLED);
+        assert_int_equal(cancel_one(usb.interface.in, 16384, 500 * (i % 4)), LIBUSB_TRANSFER_CANCELLED);
 }
 
 /* In a session frames come at any time, so a read may be cancelled before, within or after its data. */
@@ -104,7 +104,7 @@ static void test_cancel_reads(void **state)
     (void)state;
     for (int i = 0; i < 40; i++) {
         open_session();
-        enum libusb_transfer_status status = cancel_one(t.interface.in, 16384, 150 * (i % 8));
+        enum libusb_transfer_status status = cancel_one(usb.interface.in, 16384, 150 * (i % 8));
         assert_true(status == LIBUSB_TRANSFER_CANCELLED || status == LIBUSB_TRANSFER_COMPLETED);
     }
     open_session();
@@ -126,7 +126,7 @@ static void test_cancel_many(void **state)
         for (int i = 0; i < N; i++) {
             transfer[i] = libusb_alloc_transfer(0);
             done[i] = 0;
-            libusb_fill_bulk_transfer(transfer[i], t.dev, t.interface.in, room[i], 4096, on_done, &done[i], 0);
+            libusb_fill_bulk_transfer(transfer[i], usb.dev, usb.interface.in, room[i], 4096, on_done, &done[i], 0);
             assert_int_equal(libusb_submit_transfer(transfer[i]), 0);
         }
         for (int i = 0; i < N; i++)
@@ -148,7 +148,7 @@ static void test_cancel_writes(void **state)
     for (int i = 0; i < 20; i++) {
         open_session();
         memset(buf, 'x', 8);
-        cancel_one(t.interface.out, 8, 100 * (i % 3));
+        cancel_one(usb.interface.out, 8, 100 * (i % 3));
         session(0);
     }
     open_session();
@@ -164,10 +164,10 @@ static void test_cancel_control(void **state)
         int done = 0;
         struct libusb_transfer *transfer = libusb_alloc_transfer(0);
         libusb_fill_control_setup(setup, EP0_IN, LIBUSB_REQUEST_GET_DESCRIPTOR, 0x0100, 0, 18);
-        libusb_fill_control_transfer(transfer, t.dev, setup, on_done, &done, MS);
+        libusb_fill_control_transfer(transfer, usb.dev, setup, on_done, &done, MS);
         assert_int_equal(libusb_submit_transfer(transfer), 0);
         struct timeval wait = {.tv_usec = 50 * (i % 5)};
-        if (i % 5 != 0) libusb_handle_events_timeout_completed(t.ctx, &wait, &done);
+        if (i % 5 != 0) libusb_handle_events_timeout_completed(usb.ctx, &wait, &done);
         libusb_cancel_transfer(transfer);
         wait_done(&done);
         assert_true(transfer->status == LIBUSB_TRANSFER_CANCELLED || transfer->status == LIBUSB_TRANSFER_COMPLETED);
@@ -182,11 +182,11 @@ static void test_resets(void **state)
 {
     (void)state;
     for (int i = 0; i < 5; i++)
-        assert_int_equal(libusb_reset_device(t.dev), 0);
+        assert_int_equal(libusb_reset_device(usb.dev), 0);
     open_session();
     ask();
     for (int i = 0; i < 3; i++) { /* the session is open, and frames are on the way */
-        assert_int_equal(libusb_reset_device(t.dev), 0);
+        assert_int_equal(libusb_reset_device(usb.dev), 0);
         open_session();
         ask();
     }

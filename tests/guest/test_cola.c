@@ -20,7 +20,7 @@
 
 #include "tests/guest/plan_room.h"
 
-/* This is ample for an emulated machine, so only a head that hangs reaches it. */
+/* This is ample for an emulated machine, so only a head that never answers reaches it. */
 enum { WAIT_MS = 240000, MOST = 65535, BEAMS = 811, OUT = 0x02, IN = 0x81 };
 
 static libusb_context *ctx;

@@ -25,7 +25,7 @@
 
 #include "tests/guest/plan_room.h"
 
-/* This is ample for an emulated machine, so only a head that hangs reaches it. */
+/* This is ample for an emulated machine, so only a head that never answers reaches it. */
 enum { WAIT_MS = 240000 };
 enum { FIRST = 44, LAST = 725, FRONT = 384, STEPS = 1024, DMIN = 20, DMAX = 5600, SCAN_MS = 100, SCANS = 5 };
 

@@ -16,7 +16,7 @@
 
 #include "drivers/host/scanhead.h"
 
-/* This is ample for an emulated machine, so only a head that hangs reaches it. */
+/* This is ample for an emulated machine, so only a head that never answers reaches it. */
 enum { WAIT_MS = 240000 };
 
 static const char *env(const char *name)

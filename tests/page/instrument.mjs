@@ -33,7 +33,8 @@ function watches() {
   }, {once: true});
 }
 
-// The picture's pixels that no overlay covers: the colours that differ from the ground, with how often each is there.
+// This finds the colours of the picture that differ from the ground, each with its number of pixels. Rows that an
+// overlay covers are left out.
 const COLOURS = `(async () => {
   const {view} = scanhead;
   const {width, height} = view.canvas;
@@ -49,7 +50,8 @@ const COLOURS = `(async () => {
   return [...found];
 })()`;
 
-// The colours in the middle of a picture that looks from a station exactly towards point i of the cloud's block.
+// Looks from the first station exactly towards a point. Returns whether something is drawn in the middle of the
+// picture.
 const towards = (point) => `(async () => {
   const {view} = scanhead, {x, y, z} = ${JSON.stringify(point)}, s = view.stations.list[0], c = view.camera;
   const d = [x - s.x_m, y - s.y_m, z - s.z_m];
@@ -63,8 +65,8 @@ const towards = (point) => `(async () => {
   return [...data].slice(0, 3).some((v, k) => Math.abs(v - ground[k]) > 2);
 })()`;
 
-// The times of the points in the cloud, and one point before and one after a share of them.
-const pointsAround = (share) => `(() => {
+// This finds the first and the last time of the cloud's points, and a point after 25 % and one after 90 % of them.
+const OLD_AND_YOUNG = `(() => {
   const {cloud} = scanhead, all = [];
   for (const block of cloud.blocks) for (let i = 0; i < block.n; i += 97) {
     const at = (a) => block.position[3 * i + a] + cloud.origin[a];
@@ -197,7 +199,7 @@ export async function testInstrument(browser) {
 
   await test('an age limit: older points are not drawn and not found', async () => {
     await page.eval('scanhead.view.pointSize(4)');
-    const {to, old, young} = await page.eval(pointsAround());
+    const {to, old, young} = await page.eval(OLD_AND_YOUNG);
     equal(JSON.stringify([await page.eval(towards(old)), await page.eval(towards(young))]), '[true,true]', 'all points');
     await choose(page, '#age-limit', '0.5');
     is(old.t < to - 0.5 && young.t > to - 0.5, `the limit is between them: ${old.t}, ${young.t}, ${to}`);
@@ -247,13 +249,13 @@ export async function testInstrument(browser) {
       for (const panel of document.querySelectorAll('.panel')) panel.open = true;
       window.shown = () => [...document.querySelectorAll('a, button, input, select, summary, [tabindex]')].filter((e) =>
         e.tabIndex >= 0 && !e.disabled && e.getClientRects().length > 0 && e.checkVisibility() && !e.closest('dialog:not([open])'));
-      window.met = new Set();
+      window.visited = new Set();
       window.dim = [];
       window.note = () => {
         const e = document.activeElement, {outlineStyle, outlineWidth} = getComputedStyle(e);
-        window.met.add(e);
+        window.visited.add(e);
         if (e !== document.body && (outlineStyle === 'none' || parseFloat(outlineWidth) < 1)) window.dim.push(e.id || e.outerHTML.slice(0, 60));
-        return window.shown().every((one) => window.met.has(one) || one.type === 'radio');
+        return window.shown().every((one) => window.visited.has(one) || one.type === 'radio');
       };
     })()`);
     const n = await page.eval('shown().length');
@@ -262,7 +264,7 @@ export async function testInstrument(browser) {
       await page.key('Tab');
       all = await page.eval('note()');
     }
-    const missed = await page.eval('shown().filter((e) => !met.has(e)).map((e) => e.id || e.outerHTML.slice(0, 80)).join()');
+    const missed = await page.eval('shown().filter((e) => !visited.has(e)).map((e) => e.id || e.outerHTML.slice(0, 80)).join()');
     is(all && n > 40, `${n} controls; not come to: ${missed}`);
     equal(await page.eval('dim.join()'), '', 'without a sign of the focus');
   });
@@ -360,7 +362,7 @@ async function testTimeLines(browser, file) {
     await page.until(`scanhead.cloud.total === ${points}`);
     await shifted(page, 'a recording');
     await page.eval('scanhead.view.show({stations: false}), scanhead.view.pointSize(4)');
-    const {from, to, old, young} = await page.eval(pointsAround());
+    const {from, to, old, young} = await page.eval(OLD_AND_YOUNG);
     const seen = async () => JSON.stringify([await page.eval(towards(old)), await page.eval(towards(young))]);
     equal(await seen(), '[true,true]', 'all points');
     const half = 0.5 * (old.t + young.t) - from;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This keeps a folder and the started processes, which are gone at the end, whatever kind of end it is. It also prints TAP.
+// This makes a folder. At the end, however the program ends, it removes the folder and kills the started processes. It
+// also prints TAP.
 import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 

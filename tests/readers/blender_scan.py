@@ -98,11 +98,11 @@ def scanner(scene, step_deg, station):
                     ((0, round(360 / step_deg)), (1, round(180 / step_deg)), (2, 1.0))).outputs[0]
     sphere = t.node("GeometryNodeTransform", ((0, sphere), (2, attitude(heading, pitch, roll)))).outputs[0]
     direction = t.node("GeometryNodeInputPosition").outputs[0]
-    met = raycast(t, target, at, direction)
+    seen = raycast(t, target, at, direction)
     hidden = hidden_by(t, target, at, direction, leg, opening) if leg > 0 else None
-    for name, kind, value in (("hit", "FLOAT", met["Is Hit"]), ("hidden", "FLOAT", hidden),
-                              ("position_m", "FLOAT_VECTOR", met["Hit Position"]),
-                              ("facing", "FLOAT_VECTOR", met["Hit Normal"])):
+    for name, kind, value in (("hit", "FLOAT", seen["Is Hit"]), ("hidden", "FLOAT", hidden),
+                              ("position_m", "FLOAT_VECTOR", seen["Hit Position"]),
+                              ("facing", "FLOAT_VECTOR", seen["Hit Normal"])):
         store = t.node("GeometryNodeStoreNamedAttribute", domain="POINT", data_type=kind)
         t.tree.links.new(sphere, store.inputs[0])
         store.inputs["Name"].default_value = name

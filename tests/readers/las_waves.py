@@ -3,8 +3,8 @@
 # formats 9 and 10, waveform packet descriptors, packets in the file or in a .wdp beside it. It doesn't depend on the
 # program that wrote the file.
 #
-# A line a point: x y z, the descriptor's index; if that is not 0: x y z of the packet's first sample, the number of
-# samples, the time between them in ps, the sum of their values (offset + gain * sample), and the samples.
+# Each point has a line: x y z, the descriptor's index; if that is not 0: x y z of the packet's first sample, the number
+# of samples, the time between them in ps, the sum of their values (offset + gain * sample), and the samples.
 import struct
 import sys
 

@@ -71,10 +71,11 @@ class Head:
 
 
 class Clock:
-    """This compares device time with the clock of this machine, while the head rests. The answer is the time of the last
-    tick. So it belongs to a moment between a tick before the question and the arrival of the answer. The most advanced one
-    of many answers says most. They are spread over seconds, in which a head that was held up catches up. The length of that
-    interval is the bound of the error. The class also keeps the times of the scan's events, in device time."""
+    """This compares device time with the clock of this machine, while the head rests. The answer to TIME? is the time of
+    the last tick. So it was right at some moment between a tick before the question and the arrival of the answer. The
+    length of that interval bounds the error. Many questions are asked over seconds, in which a head that was held up
+    catches up, and the answer that is furthest ahead counts. The class also keeps the times of the scan's events, in device
+    time."""
 
     def __init__(self, endpoint):
         self.endpoint, self.marks, self.scan_ns = endpoint, [], {}

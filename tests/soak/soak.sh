@@ -8,7 +8,7 @@ set -u
 seconds=$1
 build=$2
 case $seconds in
-'' | . | *[!0-9.]* | *.*.*) echo "$seconds: seconds are a number, such as 30 or 0.5" >&2; exit 2 ;;
+'' | . | *[!0-9.]* | *.*.* | 0[0-9]*) echo "$seconds: seconds are a number, such as 30 or 0.5" >&2; exit 2 ;;
 esac
 [ -x "$build/scanhead" ] || { echo "no $build/scanhead: make" >&2; exit 2; }
 out=$build/soak
@@ -77,5 +77,5 @@ elif [ $guest != 0 ]; then
     status=1
     echo "usb BAD: the guest did not get to its end; $out/guest.log"
 fi
-echo "accepted are resealed flips, which no reader can see; $out has the sheets"
+echo "accepted are flips whose checksum was made right, which no reader can see; $out has the sheets"
 exit $status

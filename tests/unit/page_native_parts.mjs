@@ -3,8 +3,9 @@
 // page_native.mjs runs these tests with its own.
 import {CommandError, Replies} from '../../drivers/link/web/replies.js';
 import {Losses} from '../../drivers/link/web/losses.js';
-import {PointHash} from '../../drivers/link/web/native_points.js';
+import {Columns, geoPlacer, PointHash} from '../../drivers/link/web/native_points.js';
 import {Poses} from '../../drivers/link/web/native_poses.js';
+import {Sequence} from '../../drivers/link/web/native_sequence.js';
 import {fitCubic, geodeticToEcef, gridOf, toScene} from '../../drivers/link/web/native_earth.js';
 import {equal, near} from './page_rig.mjs';
 import {test} from './page_tap.mjs';
@@ -21,6 +22,28 @@ test('the hash of points: pulse numbers of more than 32 bits go on', () => {
   };
   const both = of(2, -1, 0), first = of(1, -1, 0), second = of(1, 0, 1, 1);
   both.forEach((sum, i) => equal(sum, (first[i] + second[i]) | 0, `sum ${i}`));
+});
+
+test('the oldest of the 64 gaps that are remembered is cut in two by a late frame, and both parts stay', () => {
+  const sequence = new Sequence();
+  const take = (seq) => sequence.take({seq, flags: 0, type: 3, length: 0, payload_crc: seq, t_ns: BigInt(seq)});
+  equal(take(0), '', 'frame 0');
+  for (let k = 0; k < 64; k++) equal(take(4 + 2 * k), 'gap', `gap ${k}`); // 1 to 3 are missing, then 5, 7, ...
+  for (const seq of [2, 1, 3]) equal(take(seq), 'late', `frame ${seq}`);
+});
+
+test('geodetic points have a range from a station; from a head that moves they have none', () => {
+  const view = new DataView(new ArrayBuffer(40 + 20));
+  view.setInt32(40 + 8, 25000, true); // 2.5 m above the anchor
+  view.setUint32(40 + 16, 0x11000000, true); // echo 1 of 1
+  const rangeOf = (moving) => {
+    const c = new Columns(1), at = [52.3, 13.1, 80];
+    geoPlacer({range_max_m: 100}, {crs: 3, heights: 0, moving, anchor: at, scale: [1e-9, 1e-9, 1e-4], lat_deg: at[0], lon_deg: at[1],
+      height_m: at[2], station_m: [0, 0, 0], axes: [1, 0, 0, 0, 1, 0, 0, 0, 1]})(c, view, 1, 0, 0);
+    return c.range[0];
+  };
+  near(rangeOf(0), 2.5, 1e-6, 'range'); // a float near 2.5 m, from coordinates of 6,400 km in double
+  equal(rangeOf(1), NaN, 'range of a head that moves');
 });
 
 test('poses: from the first to the last of a frame, both included', () => {

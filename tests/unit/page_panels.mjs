@@ -4,7 +4,7 @@
 import {readFileSync} from 'node:fs';
 import {duration, metres, grouped, numberOf, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
-import {few, limit} from '../../drivers/link/web/knobs.js';
+import {limit, shortened} from '../../drivers/link/web/knobs.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
 import {fetchSaved, savedWords} from '../../drivers/link/web/save.js';
 import {eventWords} from '../../drivers/link/web/log.js';
@@ -113,8 +113,8 @@ test('limits that can be read, none beyond what the head allows', () => {
     ['1.2 M', '0.096', '360', '7']);
 });
 
-test('values in few figures; words and short numbers stay', () => {
-  equal(['0.666666667', '-0.0000123456', '1000000.5', '59.999999', 'ALL', '7'].map(few), ['0.6667', '-0.00001235', '1000000.5', '60', 'ALL', '7']);
+test('values in few digits; words and short numbers stay', () => {
+  equal(['0.666666667', '-0.0000123456', '1000000.5', '59.999999', 'ALL', '7'].map(shortened), ['0.6667', '-0.00001235', '1000000.5', '60', 'ALL', '7']);
 });
 
 test('a reply of fields, with commas in quotes', () => {

@@ -218,7 +218,7 @@ test('a station that is dragged tells where it is, once it is let go', () => {
   const from = c.project([0, 0, 0]), to = c.project([1, 0.5, 0]);
   const hit = stations.hit(c, from.x + 3, from.y);
   same(hit, {number: 4, what: 'move'}, 'hit');
-  stations.grab(c, hit, from.x, from.y);
+  stations.grab(hit, from.x, from.y);
   stations.drag(c, from.x + 9, from.y);
   stations.drag(c, to.x, to.y);
   same(told.length, 0, 'not before');
@@ -237,7 +237,7 @@ test('Esc takes a drag back, also for whoever follows it, and further moves of t
   stations.dragged = ({x, y, heading_deg}) => followed.push([x, y, heading_deg]);
   const c = camera({elevation: -0.6});
   const from = c.project([0, 0, 0]), to = c.project([1, 0.5, 0]);
-  stations.grab(c, {number: 4, what: 'move'}, from.x, from.y);
+  stations.grab({number: 4, what: 'move'}, from.x, from.y);
   stations.drag(c, to.x, to.y);
   stations.key(c, 'Escape', false);
   stations.drag(c, to.x + 20, to.y);
@@ -261,7 +261,7 @@ test('a station that is grabbed beside its middle does not jump; keys turn it', 
   stations.set([{number: 4, name: 'a', x_m: 0, y_m: 0, z_m: 0, heading_deg: 10, tripod: null}]);
   const c = camera({elevation: -0.6});
   const from = c.project([0, 0, 0]), to = c.project([1, 0.5, 0]);
-  stations.grab(c, {number: 4, what: 'move'}, from.x + 6, from.y);
+  stations.grab({number: 4, what: 'move'}, from.x + 6, from.y);
   stations.drag(c, from.x + 20, from.y);
   stations.drag(c, to.x + 6, to.y);
   near(stations.moved.x, 1, 0.02, 'x'); // 6 pixels are 0.09 m here, and a tenth more or less half a metre on

@@ -159,7 +159,8 @@ test('a search that takes long: its point is right though its block is closed me
 test('a turn of the wheel during a drag of a station zooms, and the station is let go all the same', () => {
   const on = {}, told = [], view = {camera: camera({elevation: -0.6}), cloud: new Cloud(), movable: true, tool: null, once: null,
     stations: new Stations(() => {}, (move) => told.push(move))};
-  for (const name of ['hover', 'touched', 'cameraMoved']) view[name] = () => {};
+  for (const name of ['touched', 'cameraMoved']) view[name] = () => {};
+  view.pointed = {at() {}};
   view.canvas = {style: {}, tabIndex: 0, focus() {}, setPointerCapture() {}, getBoundingClientRect: () => ({left: 0, top: 0}),
     addEventListener(type, f) { on[type] = f; }};
   view.stations.set([{number: 4, x_m: 0, y_m: 0, z_m: 0, heading_deg: 0, tripod: null}]);

@@ -11,13 +11,13 @@ if sys.argv[1] == "plain":
 import scanhead  # noqa: E402
 
 
-def geodetic(lon_deg, count, echo=1, echoes=1):
+def geodetic(lon_deg, count, echo=1, echoes=1, moving=0):
     """Returns a point of the geo layout, count steps of 1e-8 degrees east of the anchor."""
     record = struct.pack("<IIIhHI", 0, count & 0xFFFFFFFF, 0, -1234, 40000, echoes << 28 | echo << 24 | 7)
     raw = scanhead._raw_columns(bytes(40) + record, 1)
     points = scanhead._common(raw, 1000, scanhead.GEO)
     scanhead._geo_points(points, raw, {"crs": scanhead.CRS_GEODETIC, "anchor": (10.0, lon_deg, 100.0),
-                                       "scale": (1e-8, 1e-8, 1e-3), "moving": 0})
+                                       "scale": (1e-8, 1e-8, 1e-3), "moving": moving})
     return points
 
 
@@ -28,6 +28,7 @@ def points():
         assert abs(p.y[0] - want) < 1e-12, (lon_deg, p.y)
         assert (p.echo[0], p.echo_count[0], p.label[0], p.t_ns[0]) == (14, 15, 40000, 1007)
         assert abs(p.reflectance_db[0] + 12.34) < 1e-12
+        assert p.range_m[0] > 0 and math.isnan(geodetic(lon_deg, count, moving=1).range_m[0])
 
 
 def not_finite():

@@ -4,9 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/bvh/bvh_inside.h"
 #include "core/bvh/leaves.h"
-#include "core/bvh/planes.h"
 #include "core/rng.h"
 #include "tests/common/generate.h"
 #include "tests/unit/bvh_rig.h"

@@ -29,12 +29,12 @@ static struct scene *make_plate(void)
     return s;
 }
 
-static struct distance *make_index(const struct scene *s)
+static struct bvh *make_bvh(const struct scene *s)
 {
-    struct distance *d;
+    struct bvh *bvh;
     struct sh_err err;
-    if (distance_create(s, &d, &err) != SH_OK) fail_msg("%s", err.text);
-    return d;
+    if (bvh_create(s, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    return bvh;
 }
 
 static void offsets_from_a_plate(void **state)
@@ -50,9 +50,9 @@ static void offsets_from_a_plate(void **state)
                                        1};
     enum { N = LENGTH(expected) };
     struct scene *s = make_plate();
-    struct distance *d = make_index(s);
+    struct bvh *bvh = make_bvh(s);
     const struct cloud c = {.n = N, .xyz_m = xyz, .epsg = CLOUD_EPSG_UNKNOWN};
-    const struct cloud_site site = {.index = d, .n_stations = 1, .max_m = 10, .threads = 1};
+    const struct cloud_site site = {.bvh = bvh, .n_stations = 1, .max_m = 10, .threads = 1};
     double distance_m[N];
     uint32_t triangle[N];
     assert_int_equal(cloud_compare(&c, &site, NULL, distance_m, triangle, NULL), SH_OK);
@@ -69,7 +69,7 @@ static void offsets_from_a_plate(void **state)
     assert_int_equal(stats.beyond, 7);
     assert_int_equal(stats.worst, 7);
     assert_true(stats.max_m == 10);
-    distance_free(d);
+    bvh_free(bvh);
     scene_free(s);
 }
 
@@ -84,17 +84,17 @@ static void threads_change_nothing(void **state)
         for (int k = 0; k < 3; k++)
             xyz[i][k] = i % 100 == 0 ? NAN : 16.0 * rand() / RAND_MAX - 4;
     struct scene *s = make_plate();
-    struct distance *d = make_index(s);
+    struct bvh *bvh = make_bvh(s);
     const struct cloud c = {.n = N, .xyz_m = xyz, .epsg = CLOUD_EPSG_UNKNOWN};
     static const unsigned threads[] = {1, 2, 7};
     for (size_t i = 0; i < LENGTH(threads); i++) {
         size_t to = i > 0 ? N : 0;
-        const struct cloud_site site = {.index = d, .n_stations = 1, .max_m = 10, .threads = threads[i]};
+        const struct cloud_site site = {.bvh = bvh, .n_stations = 1, .max_m = 10, .threads = threads[i]};
         assert_int_equal(cloud_compare(&c, &site, NULL, distance_m + to, triangle + to, NULL), SH_OK);
         assert_memory_equal(distance_m, distance_m + to, N * sizeof *distance_m);
         assert_memory_equal(triangle, triangle + to, N * sizeof *triangle);
     }
-    distance_free(d);
+    bvh_free(bvh);
     scene_free(s);
     free(xyz);
     free(distance_m);
@@ -136,9 +136,9 @@ static void check_crs(enum georef_crs crs, int epsg)
             xyz[i][k] = anchor[k] + d[k];
     }
     struct scene *s = make_plate();
-    struct distance *index = make_index(s);
+    struct bvh *bvh = make_bvh(s);
     struct cloud c = {.n = 4, .xyz_m = xyz, .station = station, .epsg = epsg};
-    struct cloud_site site = {.index = index, .georef = georef, .n_stations = 2, .max_m = 10, .threads = 2};
+    struct cloud_site site = {.bvh = bvh, .georef = georef, .n_stations = 2, .max_m = 10, .threads = 2};
     struct sh_err err;
     assert_int_equal(cloud_compare(&c, &site, NULL, distance_m, triangle, &err), SH_OK);
     /* Sums of 6e6 m round by 4.7e-10 on each axis; GeographicLib states 5 nm for its transverse Mercator,
@@ -155,7 +155,7 @@ static void check_crs(enum georef_crs crs, int epsg)
     assert_non_null(strstr(err.text, "point 2 is of station 2; there are 1"));
     for (int i = 0; i < 2; i++)
         georef_free((struct georef *)(uintptr_t)georef[i]);
-    distance_free(index);
+    bvh_free(bvh);
     scene_free(s);
 }
 

@@ -185,7 +185,6 @@ static void deviations_along_the_beam(void **state)
     double xyz[N][3], distance_m[N];
     uint32_t triangle[N];
     struct deviation_points out;
-    struct distance *index;
     struct bvh *bvh;
     struct sh_err err;
     for (int i = 0; i < N; i++) {
@@ -193,7 +192,6 @@ static void deviations_along_the_beam(void **state)
         for (int k = 0; k < 3; k++)
             xyz[i][k] = p[k] * (1.0 + POINT[i].further_m / range_m);
     }
-    assert_int_equal(distance_create(scene, &index, &err), SH_OK);
     assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), SH_OK);
     assert_int_equal(deviation_points_create(N, &out, &err), SH_OK);
     struct deviation_head head = ideal_head();
@@ -201,7 +199,7 @@ static void deviations_along_the_beam(void **state)
     head.setup.noise_on = 1;
     head.setup.range_sigma_m = 0.005;
     const struct cloud cloud = {.n = N, .xyz_m = xyz};
-    const struct cloud_site site = {.index = index, .n_stations = 1, .max_m = 10, .threads = 2};
+    const struct cloud_site site = {.bvh = bvh, .n_stations = 1, .max_m = 10, .threads = 2};
     const struct cloud_compared compared = {&cloud, &site, distance_m, triangle};
     assert_int_equal(cloud_compare(&cloud, &site, NULL, distance_m, triangle, &err), SH_OK);
     assert_int_equal(deviation_along(&compared, &head, NULL, &out, &err), SH_OK);
@@ -223,7 +221,6 @@ static void deviations_along_the_beam(void **state)
     assert_true(fabs((double)out.sigma_m[0] - 0.1) < 1e-6);
     deviation_points_free(&out);
     bvh_free(bvh);
-    distance_free(index);
     scene_free(scene);
 }
 

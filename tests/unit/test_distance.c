@@ -103,21 +103,21 @@ static struct scene *make_scene(double (*v)[3], uint32_t n_triangles)
     return scene;
 }
 
-static struct distance *make_index(const struct scene *scene)
+static struct bvh *make_bvh(const struct scene *scene)
 {
-    struct distance *index;
+    struct bvh *bvh;
     struct sh_err err;
-    if (distance_create(scene, &index, &err) != SH_OK) fail_msg("%s", err.text);
-    return index;
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    return bvh;
 }
 
 /* Compares one query with brute force, and with its own answer. */
-static void check_query(const struct distance *index, const struct scene *s, const double p[3])
+static void check_query(const struct bvh *bvh, const struct scene *s, const double p[3])
 {
     struct distance_hit hit;
     uint32_t nearest = 0;
     double expected = brute_force(s, p, &nearest);
-    assert_int_equal(distance_query(index, p, INFINITY, &hit), 1);
+    assert_int_equal(distance_query(bvh, p, INFINITY, &hit), 1);
     double size = fmax(farthest_corner(s, nearest, p), farthest_corner(s, hit.triangle, p));
     double bound = ROUNDING * size;
     if (fabs(hit.distance_m - expected) > bound)
@@ -128,8 +128,8 @@ static void check_query(const struct distance *index, const struct scene *s, con
     if (fabs(vec3_distance(p, hit.point_m) - expected) > bound + 2 * largest * 0x1p-53)
         fail_msg("the point is %g off", vec3_distance(p, hit.point_m) - expected);
     if (expected > 0) {
-        assert_int_equal(distance_query(index, p, expected + bound, &hit), 1);
-        if (expected > bound) assert_int_equal(distance_query(index, p, expected - bound, &hit), 0);
+        assert_int_equal(distance_query(bvh, p, expected + bound, &hit), 1);
+        if (expected > bound) assert_int_equal(distance_query(bvh, p, expected - bound, &hit), 0);
     }
 }
 
@@ -147,16 +147,16 @@ static void random_scene(const double origin[3], int queries)
                 v[i * 3 + c][k] = at[k] + uniform(-size, size);
     }
     struct scene *s = make_scene(v, COUNT);
-    struct distance *index = make_index(s);
+    struct bvh *bvh = make_bvh(s);
     for (int i = 0; i < queries; i++) {
         double p[3];
         /* Points are spread out, and then close to a surface, where a query prunes most. */
         const double *near = v[rand() % (COUNT * 3)];
         for (int k = 0; k < 3; k++)
             p[k] = i % 2 ? near[k] + uniform(-1, 1) * 1e-3 : origin[k] + uniform(-300, 300);
-        check_query(index, s, p);
+        check_query(bvh, s, p);
     }
-    distance_free(index);
+    bvh_free(bvh);
     scene_free(s);
 }
 
@@ -192,7 +192,7 @@ static void sheets_that_float_cannot_tell(void **state)
             v[i][1] += 5800000;
         }
         struct scene *s = make_scene(v, SHEETS + 1);
-        struct distance *index = make_index(s);
+        struct bvh *bvh = make_bvh(s);
         srand(5);
         for (int i = 0; i < 300; i++) {
             double p[3] = {uniform(199, 201), uniform(-2, 2), 200 + uniform(-20, 5) * 1e-6};
@@ -200,9 +200,9 @@ static void sheets_that_float_cannot_tell(void **state)
                 p[0] += 500000;
                 p[1] += 5800000;
             }
-            check_query(index, s, p);
+            check_query(bvh, s, p);
         }
-        distance_free(index);
+        bvh_free(bvh);
         scene_free(s);
     }
 }
@@ -218,7 +218,7 @@ static void points_on_the_surface(void **state)
             for (int k = 0; k < 3; k++)
                 v[c][k] = origin[k] + uniform(-5, 5);
         struct scene *s = make_scene(v, 1);
-        struct distance *index = make_index(s);
+        struct bvh *bvh = make_bvh(s);
         for (int i = 0; i < 30; i++) {
             double a = i % 3 == 0 ? 0 : uniform(0, 1), b = i % 3 == 1 ? 0 : uniform(0, 1), p[3];
             if (a + b > 1) {
@@ -229,7 +229,7 @@ static void points_on_the_surface(void **state)
             for (int k = 0; k < 3; k++)
                 p[k] = v[0][k] + (v[1][k] - v[0][k]) * a + (v[2][k] - v[0][k]) * b;
             struct distance_hit hit;
-            assert_int_equal(distance_query(index, p, 1, &hit), 1);
+            assert_int_equal(distance_query(bvh, p, 1, &hit), 1);
             /* Three roundings at most on each of three axes, half a unit of the largest coordinate each, and
              * of the differences (below 20) */
             double largest = turn % 2 ? 5800010 : 10;
@@ -237,7 +237,7 @@ static void points_on_the_surface(void **state)
             if (hit.distance_m > bound) fail_msg("%g m off the surface, bound %g", hit.distance_m, bound);
             if (i < 3) assert_true(hit.distance_m == 0);
         }
-        distance_free(index);
+        bvh_free(bvh);
         scene_free(s);
     }
 }
@@ -265,7 +265,7 @@ static void needles(void **state)
             v[2][k] = v[0][k] + d[k] * length * along + e[k] * ratio * length;
         }
         struct scene *s = make_scene(v, 1);
-        struct distance *index = make_index(s);
+        struct bvh *bvh = make_bvh(s);
         for (int i = 0; i < 20; i++) {
             double at = uniform(-0.2, 1.2), off = i % 2 ? pow(10, uniform(-12, 0)) : 0, p[3];
             double up = i % 3 ? 0 : pow(10, uniform(-12, 0)) * length, in = i % 3 ? 0 : 0.1 * ratio * at * length;
@@ -275,12 +275,12 @@ static void needles(void **state)
             struct distance_hit hit;
             double expected = reference_distance(p, s->vertex_m[0], s->vertex_m[1], s->vertex_m[2]);
             double bound = ROUNDING * farthest_corner(s, 0, p);
-            assert_int_equal(distance_query(index, p, INFINITY, &hit), 1);
+            assert_int_equal(distance_query(bvh, p, INFINITY, &hit), 1);
             if (fabs(hit.distance_m - expected) > bound)
                 fail_msg("ratio %g: %.17g, not %.17g: off by %g, bound %g", ratio, hit.distance_m, expected,
                          hit.distance_m - expected, bound);
         }
-        distance_free(index);
+        bvh_free(bvh);
         scene_free(s);
     }
 }
@@ -290,17 +290,17 @@ static void limits_and_ties(void **state)
     (void)state;
     double v[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}};
     struct scene *s = make_scene(v, 2);
-    struct distance *index = make_index(s);
+    struct bvh *bvh = make_bvh(s);
     struct distance_hit hit;
     const double above_the_edge[3] = {0.5, 0.5, 2}, nowhere[3] = {NAN, 0, 0}, far[3] = {1e9, 0, 0};
-    assert_int_equal(distance_query(index, above_the_edge, 2, &hit), 1); /* a limit is within */
+    assert_int_equal(distance_query(bvh, above_the_edge, 2, &hit), 1); /* a limit is within */
     assert_true(hit.distance_m == 2 && hit.point_m[2] == 0 && hit.triangle == 0);
-    assert_int_equal(distance_query(index, above_the_edge, 1.9999999, &hit), 0);
-    assert_int_equal(distance_query(index, above_the_edge, 0, &hit), 0);
-    assert_int_equal(distance_query(index, above_the_edge, -1, &hit), 0);
-    assert_int_equal(distance_query(index, above_the_edge, NAN, &hit), 0);
-    assert_int_equal(distance_query(index, nowhere, INFINITY, &hit), 0);
-    assert_int_equal(distance_query(index, far, 1e9, &hit), 1);
+    assert_int_equal(distance_query(bvh, above_the_edge, 1.9999999, &hit), 0);
+    assert_int_equal(distance_query(bvh, above_the_edge, 0, &hit), 0);
+    assert_int_equal(distance_query(bvh, above_the_edge, -1, &hit), 0);
+    assert_int_equal(distance_query(bvh, above_the_edge, NAN, &hit), 0);
+    assert_int_equal(distance_query(bvh, nowhere, INFINITY, &hit), 0);
+    assert_int_equal(distance_query(bvh, far, 1e9, &hit), 1);
     assert_true(hit.distance_m == 999999999);
     /* A double or a float can't hold the squares of these. */
     for (int k = 0; k < 3; k++) {
@@ -308,16 +308,15 @@ static void limits_and_ties(void **state)
         for (int i = 0; i < 10; i++) {
             double p[3] = {0.3, 0.3, 0};
             p[k] = i % 2 == 0 ? size_m[i / 2] : -size_m[i / 2];
-            assert_int_equal(distance_query(index, p, 1e9, &hit), 0);
-            assert_int_equal(distance_query(index, p, INFINITY, &hit), 0);
+            assert_int_equal(distance_query(bvh, p, 1e9, &hit), 0);
+            assert_int_equal(distance_query(bvh, p, INFINITY, &hit), 0);
         }
     }
     const double beyond_utm[3] = {0.5, 0.25, -1e15};
-    assert_int_equal(distance_query(index, beyond_utm, INFINITY, &hit), 1);
+    assert_int_equal(distance_query(bvh, beyond_utm, INFINITY, &hit), 1);
     assert_true(fabs(hit.distance_m - 1e15) <= 1);
-    distance_free(index);
+    bvh_free(bvh);
     scene_free(s);
-    distance_free(NULL);
 }
 
 int main(void)

@@ -28,6 +28,7 @@ static const struct kind KINDS[] = {
     {"utm, moving", 1, 1, .crs = NATIVE_CRS_UTM, .scale = {1e-4, 1e-4, 1e-4}, .at = {5e5, 5.4e6, 300}},
     {"geodetic", 1, .crs = NATIVE_CRS_GEODETIC, .scale = {1e-8, 1e-7, 1e-3}, .at = {45, 179.9999, 100}},
     {"geodetic, west", 1, .crs = NATIVE_CRS_GEODETIC, .scale = {1e-8, 1e-7, 1e-3}, .at = {-80, -179.9999, 100}},
+    {"geodetic, moving", 1, 1, .crs = NATIVE_CRS_GEODETIC, .scale = {1e-8, 1e-7, 1e-3}, .at = {45, 10, 100}},
 };
 
 static void sincos_plain(double u, double *sine, double *cosine)

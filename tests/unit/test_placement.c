@@ -249,6 +249,10 @@ static void what_has_no_place_is_refused(void **state)
         if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
             fail_msg("case %zu: %d \"%s\" without \"%s\"", i, code, err.text, bad[i].part);
     }
+    const char *apart = "  - {lat_deg: 89.5, lon_deg: 0, height_m: 0}\n  - {lat_deg: 60, lon_deg: 0, height_m: 0}";
+    assert_int_equal(load("  anchor: {source: explicit, lat_deg: 89.5, lon_deg: 0, height_m: 0}", apart, "utm"),
+                     SH_EINPUT);
+    assert_non_null(strstr(err.text, ": station station-2: georef: UPS does not reach latitude 60"));
 }
 
 /* Reads the printed azimuth of the y axis: from true north, and from grid north. */

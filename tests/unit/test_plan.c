@@ -157,7 +157,7 @@ static void test_sight_packets(void **state)
         saved_ns[k] = -row.cost_ns;
         for (size_t i = 0; i < sizeof plan_ray_costs / sizeof plan_ray_costs[0]; i++)
             if (plan_ray_costs[i].packet == packet[k] && k > 0)
-                assert_true(fabs(saved_ns[k] - saved_ns[0] - (plan_ray_costs[i].out - plan_ray_costs[0].out)) < 1e-9);
+                assert_true(fabs(saved_ns[k] - saved_ns[0] - (plan_ray_costs[i].miss - plan_ray_costs[0].miss)) < 1e-9);
     }
     assert_true(saved_ns[0] < saved_ns[1] && saved_ns[1] < saved_ns[2] && saved_ns[3] == saved_ns[1]);
 }

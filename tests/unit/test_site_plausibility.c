@@ -72,6 +72,25 @@ static void out_of_reach(void **state)
     says("no surface within");
 }
 
+/* The second copy is 120 m wide: its edge is at x = -2940. */
+static void copies_out_of_reach(void **state)
+{
+    (void)state;
+    char text[512];
+    write_box(-0.2, 0);
+    for (int x = -2141; x <= -2139; x += 2) { /* 799 m and 801 m from that edge */
+        snprintf(text, sizeof text,
+                 "head: {profile: any-rate, prr_hz: 600000, lines_hz: 100}\n"
+                 "scene:\n  meshes:\n    - {file: mesh.obj, up: z, scale: 1,\n"
+                 "       copies: [{offset_m: [3000, 0, 0]}, {offset_m: [-3000, 0, 0], scale: 2}]}\n"
+                 "stations:\n  - {position_m: [%d, 0, 0]}\n",
+                 x);
+        write_in("test.yaml", text);
+        load_file(config_path);
+        if ((strstr(warned, "no surface within") != NULL) != (x > -2140)) fail_msg("at %d m:\n%s", x, warned);
+    }
+}
+
 static void under_the_floor(void **state)
 {
     (void)state;
@@ -180,6 +199,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_usual_scene_is_silent),
         cmocka_unit_test(out_of_reach),
+        cmocka_unit_test(copies_out_of_reach),
         cmocka_unit_test(under_the_floor),
         cmocka_unit_test(within_a_slab),
         cmocka_unit_test(a_scan_that_is_mostly_empty),

@@ -156,11 +156,11 @@ static void errors_of_embree(void **state)
 {
     (void)state;
     struct sh_err err;
-    assert_int_equal(embree_fail(RTC_ERROR_OUT_OF_MEMORY, "bvh", &err), SH_ENOMEM);
+    assert_int_equal(embree_fail(RTC_ERROR_OUT_OF_MEMORY, &err), SH_ENOMEM);
     assert_non_null(strstr(err.text, "bvh: no memory"));
-    assert_int_equal(embree_fail(RTC_ERROR_UNSUPPORTED_CPU, "bvh", &err), SH_EIO);
+    assert_int_equal(embree_fail(RTC_ERROR_UNSUPPORTED_CPU, &err), SH_EIO);
     assert_non_null(strstr(err.text, "doesn't support this processor"));
-    assert_int_equal(embree_fail(RTC_ERROR_INVALID_OPERATION, "bvh", &err), SH_EIO);
+    assert_int_equal(embree_fail(RTC_ERROR_INVALID_OPERATION, &err), SH_EIO);
     assert_non_null(strstr(err.text, "RTCError 3"));
 }
 

@@ -298,7 +298,7 @@ static void limits_are_told(void **state)
         "a dead time of 10 ns begins with saturation, and no signal saturates here",
         "noise of -1 times the threshold: 0 to 1e+06 is allowed",
         "windows around a signal of 0 times the threshold: 1e-06 to 1e+09 is allowed",
-        "9000 ns kept before an echo and 8 ns behind it: together at most 2048 ns, 2048 samples",
+        "9000 ns kept before an echo and 8 ns after it: together at most 2048 ns, 2048 samples",
         "a window from 10 to 700 m: 0.1499 to 613.825 m of length are allowed, 1 to 4095 samples",
         "a window from 10 to 10.1 m: 0.1499 to 613.825 m of length are allowed, 1 to 4095 samples",
         "the near end of the window of -1 m: 0 to 1e+07 is allowed",
@@ -310,7 +310,7 @@ static void limits_are_told(void **state)
         "samples of 0.1 ns long; at most 4096 are allowed",
         "noise of nan times the threshold: 0 to 1e+06 is allowed",
         "a pulse's table of 2000 values: 2 to 1024 are allowed",
-        "time kept behind an echo of 100000 ns: 0 to 10000 is allowed"};
+        "time kept after an echo of 100000 ns: 0 to 10000 is allowed"};
     for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
         struct waveform_spec spec = waveform_rig_spec();
         struct waveform *w = NULL;

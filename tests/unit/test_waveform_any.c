@@ -213,8 +213,7 @@ static void any_pulse(uint64_t *seed, const struct waveform *w, uint64_t pulse)
         struct waveform_echo echo[WAVE_MOST];
         uint32_t crowded = 0;
         const uint32_t most = (uint32_t)case_between(seed, 1, WAVE_MOST);
-        const uint32_t found = waveform_detect(w, all[d], chance(seed, 0.7) ? 1.0 : any_of(seed, 0.01, 100.0), &record,
-                                               echo, most, &crowded);
+        const uint32_t found = waveform_detect(w, all[d], &record, echo, most, &crowded);
         assert_true(found <= most);
         check_echoes(&record, echo, found, sample_m);
     }

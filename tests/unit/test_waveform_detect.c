@@ -306,6 +306,31 @@ static void a_saturated_echo_is_flagged_and_ranged(void **state)
     }
 }
 
+/* Only the digits are at their limit, of 100 thresholds: the receiver takes 400, so it is not blind for 40 ns after. A
+ * wall 3 m behind the target stays an echo of its own. Ranges are within 4 deviations of `threshold`, the roughest:
+ * 14 mm at an amplitude of 24 (core/waveform/README.md). */
+static void a_receiver_that_does_not_saturate_is_not_blind(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.saturation = 400.0;
+    spec.dead_s = 40e-9;
+    wave_open(&w, &spec);
+    assert_true(spec.full_scale == 100.0);
+    for (int d = 0; d < WAVE_DETECTORS; d++)
+        for (uint64_t p = 0; p < 40; p++) {
+            const double near_m = 20.0 + 0.004 * (double)p;
+            const struct waveform_return r[2] = {{near_m, 200.0, 0.0, WAVEFORM_POINT},
+                                                 {near_m + 3.0, 30.0, 0.0, WAVEFORM_POINT}};
+            assert_int_equal(wave_shoot(&w, all[d], p, r, 2), 2);
+            assert_true(w.echo[0].saturated && !w.echo[1].saturated);
+            wave_near(w.echo[0].range_m, r[0].range_m, 0.056);
+            wave_near(w.echo[1].range_m, r[1].range_m, 0.056);
+        }
+    wave_close(&w);
+}
+
 /* The result depends on the samples alone, and on nothing left from before. */
 static void detection_is_pure(void **state)
 {
@@ -400,6 +425,7 @@ int main(void)
         cmocka_unit_test(three_surfaces_are_three_echoes),
         cmocka_unit_test(the_deviation_shows_mixed_echoes),
         cmocka_unit_test(a_saturated_echo_is_flagged_and_ranged),
+        cmocka_unit_test(a_receiver_that_does_not_saturate_is_not_blind),
         cmocka_unit_test(detection_is_pure),
         cmocka_unit_test(any_samples_are_taken),
     };

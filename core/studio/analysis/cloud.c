@@ -43,7 +43,7 @@ int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *er
 
 void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_report *report)
 {
-    const double worth_a_word_m = 1e-4;
+    const double coarse_m = 1e-4;
     double largest = 0;
     for (size_t i = 0; i < cloud->n; i++)
         for (int k = 0; k < 3; k++)
@@ -51,7 +51,7 @@ void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_re
     if (cloud->epsg == 4979) largest *= 111320.0; /* degrees */
     cloud->count_m = fmax(cloud->count_m, cloud_single_unit(largest));
     cloud->is_single = 1;
-    if (largest * 6e-8 > worth_a_word_m)
+    if (largest * 6e-8 > coarse_m)
         sh_warn(report, "%s: stored in single precision, with errors up to %.2g m", path, largest * 6e-8);
 }
 

@@ -3,6 +3,7 @@
 #include <stdatomic.h>
 #include <string.h>
 
+#include "core/distance.h"
 #include "core/studio/cloud.h"
 #include "core/together.h"
 
@@ -58,11 +59,11 @@ void cloud_to_scene(const struct cloud *cloud, const struct cloud_site *site, si
 }
 
 /* A triangle that is found within some reach is the nearest of all. */
-static int find_nearest(const struct distance *index, double max_m, const double p_prcs[3], struct distance_hit *hit)
+static int find_nearest(const struct bvh *bvh, double max_m, const double p_prcs[3], struct distance_hit *hit)
 {
     for (double reach_m = FIRST_REACH_M; reach_m < max_m; reach_m *= 10)
-        if (distance_query(index, p_prcs, reach_m, hit)) return 1;
-    return distance_query(index, p_prcs, max_m, hit);
+        if (distance_query(bvh, p_prcs, reach_m, hit)) return 1;
+    return distance_query(bvh, p_prcs, max_m, hit);
 }
 
 static void compare_point(const struct work *w, size_t i)
@@ -74,10 +75,10 @@ static void compare_point(const struct work *w, size_t i)
     if (isnan(w->cloud->xyz_m[i][0])) return;
     w->distance_m[i] = INFINITY;
     cloud_to_scene(w->cloud, w->site, i, p_prcs);
-    const struct distance *body = NULL;
+    const struct bvh *body = NULL;
     if (w->site->body != NULL && w->cloud->label != NULL)
         body = w->site->body(w->site->body_ctx, cloud_station(w->cloud, i), w->cloud->label[i], p_prcs);
-    if (!find_nearest(body != NULL ? body : w->site->index, w->site->max_m, p_prcs, &hit)) return;
+    if (!find_nearest(body != NULL ? body : w->site->bvh, w->site->max_m, p_prcs, &hit)) return;
     w->distance_m[i] = hit.distance_m;
     if (body == NULL) w->triangle[i] = hit.triangle;
 }

@@ -52,8 +52,8 @@ static int read_header(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
-/* The code of the projected CRS, of ECEF, or of geodetic WGS 84, which has no code for x as longitude. UPS,
- * 32661 or 32761 in our stream, is written as the same projection with the easting first. */
+/* Returns the EPSG code of a projected CRS, of ECEF, or of geodetic WGS 84 (EPSG has none for the order longitude,
+ * latitude). UPS has other codes in LAS files, 5041 and 5042, since the easting comes first there. */
 static int64_t epsg_of(const char *wkt)
 {
     static const char mark[] = "AUTHORITY[\"EPSG\",\"";
@@ -132,7 +132,7 @@ static int is_ours(const struct las *las)
     return strncmp((const char *)las->data + 58, "scanhead", 32) == 0;
 }
 
-/* The columns that are asked for and that the file has. */
+/* Returns the columns that are asked for and that the file has. */
 static unsigned columns_of(const struct las *las, unsigned asked)
 {
     unsigned has = CLOUD_ECHO_COUNT;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* PCD 0.7 of the Point Cloud Library: as text, binary, and binary_compressed. In the last one the bytes are LZF, and
- * each field stands for all points before the next one begins. */
+/* PCD 0.7 of the Point Cloud Library: as text, binary, and binary_compressed. In the last one the bytes are packed by
+ * LZF, and one field of all points comes before the next field. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -76,7 +76,7 @@ static int read_fields(struct pcd *g, struct text_span key, struct sh_err *err)
     return rc;
 }
 
-/* One line. *done: it was DATA, the header's last. */
+/* Reads one line. *done: it was DATA, the header's last. */
 static int read_header_line(struct pcd *g, bool *done, struct sh_err *err)
 {
     const struct text_span key = text_word(&g->t);
@@ -147,7 +147,7 @@ static int keep_position(const struct pcd *g, size_t i, struct sh_err *err)
     return cloud_check_position(&g->t, 0, g->cloud->xyz_m[i], err);
 }
 
-/* data: `len` bytes, where field f of point i stands at start + i * step. */
+/* Reads points from `len` bytes, where field f of point i stands at start + i * step. */
 static int take_binary(struct pcd *g, const uint8_t *data, size_t len, bool by_field, struct sh_err *err)
 {
     if (g->n > len / g->record_len)

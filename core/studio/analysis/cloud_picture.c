@@ -37,7 +37,7 @@ static size_t find_area(const struct cloud_picture_spec *spec, struct cloud_pict
     return n;
 }
 
-/* A margin of 2 %, and whole pixels. */
+/* Adds a margin of 2 % on each side, and makes the area whole pixels. Returns the size of a pixel. */
 static double choose_pixels(struct cloud_picture *p, size_t n)
 {
     double span[2], longer = 1e-3;

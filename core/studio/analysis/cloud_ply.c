@@ -41,7 +41,7 @@ static int whole(struct reading *g, enum ply_use use, int min, int max, int *out
     return ply_fail(&g->r, err, what);
 }
 
-/* Figures that no check depends on: NaN is one of them. */
+/* Keeps the figures that may be NaN, and the number of echoes. */
 static int keep_columns(struct reading *g, size_t i, struct sh_err *err)
 {
     struct cloud *c = g->cloud;
@@ -88,7 +88,7 @@ static int keep_point(void *reading, struct sh_err *err)
     return keep_columns(g, i, err);
 }
 
-/* Colours count where they are whole bytes: as floats they mean something else in every program. */
+/* Colours count only where they are whole bytes, since programs disagree on the range of floats. */
 static bool has_colours(const struct ply_header *h, const struct ply_element *e)
 {
     for (int use = PLY_RED; use <= PLY_BLUE; use++) {

@@ -10,10 +10,10 @@
 
 struct text;
 
-/* Beside enum cloud_column. */
+/* Further bits for `has`, together with those of enum cloud_column. */
 enum { CLOUD_HAS_STATION = 256, CLOUD_HAS_LABEL = 512, CLOUD_HAS_ECHO = 1024 };
 
-/* Arrays for n points: positions, and those named in `has`. */
+/* Allocates arrays for n points: positions, and those named in `has`. */
 int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
 
 /* Sets count_m to what single precision rounds to. Warns where that is coarse. */

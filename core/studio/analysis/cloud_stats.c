@@ -44,7 +44,7 @@ static void count_far(struct cloud_stats *s, size_t i)
 void cloud_stats(const double *distance_m, size_t n, double tolerance_m, struct cloud_stats *out)
 {
     struct cloud_stats s = {.worst = n, .max_m = -INFINITY};
-    /* 64 bits of mantissa: 2^32 equal summands lose less than a double's rounding. */
+    /* A long double has 64 bits of mantissa, so 2^32 equal summands lose less than a double's rounding. */
     long double sum = 0, sum2 = 0;
     for (size_t i = 0; i < n; i++) {
         double d = distance_m[i];

@@ -27,7 +27,8 @@ static char separator_of(const struct text *t)
     return memchr(t->p, ';', len) != NULL ? ';' : memchr(t->p, ',', len) != NULL ? ',' : ' ';
 }
 
-/* The separator becomes a blank, so that a number before it ends there. Beside semicolons a comma is a decimal one. */
+/* The separator becomes a blank, so that a number before it ends there. Where semicolons separate, a comma is a decimal
+ * point. */
 static struct text_span cut_cell(struct text *t, char separator)
 {
     char *p = t->data + (t->p - t->data), *from;
@@ -137,7 +138,7 @@ static int read_lines(struct table *g, const struct sh_report *report, struct sh
     return rc;
 }
 
-/* The lines of a PTX look like points, and so do those of its header. */
+/* The lines of a PTX file would be taken for points, and so would its header. */
 static int is_ptx(const char *path)
 {
     const char *ending = strrchr(path, '.');

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/distance.h"
 #include "core/together.h"
 #include "core/vec3.h"
 
@@ -27,7 +28,7 @@ struct work {
     const struct deviation_head *head;
     const struct deviation_points *out;
     const struct sh_report *report;
-    size_t every; /* sigma is worked out for one point in so many */
+    size_t every; /* sigma is computed for one of this many points */
     atomic_size_t next;
     atomic_int failed;
 };
@@ -84,7 +85,7 @@ static int crosses(const struct scene *scene, uint32_t triangle, const double at
     return 1;
 }
 
-/* Sets the normal, and gives the cosine of the incidence. */
+/* Sets the normal, and returns the cosine of the incidence. */
 static double normal_of(const struct bvh *bvh, uint32_t triangle, struct deviation_hit *hit)
 {
     const double *n = bvh_plane(bvh, triangle)->n;
@@ -94,6 +95,7 @@ static double normal_of(const struct bvh *bvh, uint32_t triangle, struct deviati
     return fabs(vec3_dot(hit->normal, hit->beam));
 }
 
+/* Whether the nearest surface is the one that the beam hits: the distance is then the deviation times the cosine. */
 static int deviation_is_same(double distance_m, double along_m, double cosine)
 {
     const double across_m = fabs(along_m) * cosine;
@@ -102,14 +104,14 @@ static int deviation_is_same(double distance_m, double along_m, double cosine)
 
 /* Whether nothing else lies around the place where the beam meets a face: within the balls of radius_m that touch it
  * there, in front and behind. */
-static int is_alone(const struct distance *index, const double at_m[3], const double normal[3], double radius_m)
+static int is_alone(const struct bvh *bvh, const double at_m[3], const double normal[3], double radius_m)
 {
     struct distance_hit hit;
     for (int side = -1; side <= 1; side += 2) {
         double middle[3];
         for (int k = 0; k < 3; k++)
             middle[k] = at_m[k] + side * radius_m * normal[k];
-        if (distance_query(index, middle, 0.999 * radius_m, &hit)) return 0;
+        if (distance_query(bvh, middle, 0.999 * radius_m, &hit)) return 0;
     }
     return 1;
 }
@@ -127,12 +129,12 @@ static void deviation_judge(const struct work *w, const struct deviation_head *h
     double counts_m;
     const double sigma_m = deviation_sigma_m(head, hit, &counts_m),
                  radius_m = DEVIATION_CLEAR * hypot(sigma_m, counts_m);
-    if (radius_m > LEAST_CLEAR_M && !is_alone(w->of->site->index, at_m, hit->normal, radius_m)) return;
+    if (radius_m > LEAST_CLEAR_M && !is_alone(w->of->site->bvh, at_m, hit->normal, radius_m)) return;
     w->out->sigma_m[i] = (float)sigma_m;
     w->out->counts_m[i] = (float)counts_m;
 }
 
-/* The nearest surface is the one that the beam meets, along_m before the point. */
+/* Keeps a deviation on a smooth face: the beam hits the nearest surface, along_m before the point. */
 static void deviation_keep(const struct work *w, const struct deviation_head *head, size_t i, double along_m,
                            const struct deviation_hit *hit)
 {
@@ -187,8 +189,8 @@ static int is_on_plane(const struct batch *b, uint32_t k, const struct bvh *bvh)
     return fabs(b->around[3][k] - range_m) <= 1e-6 * range_m + SAME_M;
 }
 
-/* Rays along the border of each footprint: where one of them does not meet the plane of the middle, the footprint is
- * cut. */
+/* Casts rays along the border of each footprint. Where one of them does not hit the plane of the middle, the footprint
+ * is cut. */
 static void look_around(struct batch *b, const struct deviation_head *head, const struct bvh_rays *central)
 {
     struct bvh_rays rays = *central;

@@ -21,7 +21,7 @@ static void encoder_steps(const struct cast_setup *setup, double step_rad[2])
     step_rad[1] = counts ? 2.0 * M_PI / setup->pan_counts : 0.0;
 }
 
-/* Range noise of one pulse. */
+/* Returns sigma of the range noise of one pulse. */
 static double range_sigma_m(const struct cast_setup *setup, double range_m, double cosine, int32_t label)
 {
     const struct cast_detect *detect = setup->detect;
@@ -38,7 +38,7 @@ static double range_sigma_m(const struct cast_setup *setup, double range_m, doub
     return sqrt(detect->signal->floor2 + detect->signal->jitter2 / (a * a)) + detect->signal->per_distance * range_m;
 }
 
-/* How far mirror and pan move the beam along the normal, per radian and per metre of range. */
+/* Sets effect to how far mirror and pan move the beam along the normal, per radian and per metre of range. */
 static void angle_effects(const double rotation[9], const double beam[3], const double normal[3], double effect[2])
 {
     const double up[3] = {rotation[2], rotation[5], rotation[8]};
@@ -50,7 +50,7 @@ static void angle_effects(const double rotation[9], const double beam[3], const 
     effect[1] = vec3_dot(normal, by_pan);
 }
 
-/* The variance of a ball's moves across the face (formula: core/studio/deviation.h). */
+/* Returns the variance of a ball's moves along the normal (formula: core/studio/deviation.h). */
 static double ball_variance(const struct deviation_head *head, double range_m, const double beam[3],
                             const double normal[3])
 {

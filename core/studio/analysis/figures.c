@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Sums of one group. 64 bits of mantissa: 2^32 equal summands lose less than a double's rounding. */
+/* Sums of one group. A long double has 64 bits of mantissa: 2^32 equal summands lose less than a double's rounding. */
 struct sums {
     long double d, d2, a, a2, j, j2, s2, z, z2, c2;
 };
@@ -74,7 +74,7 @@ struct groups {
     void *ctx;
 };
 
-/* Distances by group, then the 95th percentile of each. at: [by->n + 1] where each begins. */
+/* Sorts distances by group, and finds the 95th percentile of each. at: [by->n + 1], for where each group goes on. */
 static void find_p95(const struct figures_in *in, const struct groups *by, double *by_group, size_t *at,
                      struct figures *out)
 {
@@ -106,7 +106,7 @@ int figures_by(const struct figures_in *in, uint32_t n_groups, uint32_t (*group)
         goto done;
     }
     for (uint32_t g = 0; g < n_groups; g++)
-        out[g] = (struct figures){.max_m = (double)NAN, .along_max_m = (double)NAN}; /* fmax passes them over */
+        out[g] = (struct figures){.max_m = (double)NAN, .along_max_m = (double)NAN}; /* fmax ignores NaN */
     for (size_t i = 0; i < in->n; i++) {
         const uint32_t g = group != NULL ? group(ctx, i) : 0;
         if (g < n_groups) add_point(in, i, &out[g], &sums[g]);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How dense points lie: cells of surfaces in a hash table. */
+/* Finds the density of points. The cells of surfaces lie in a hash table. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -28,7 +28,7 @@ static size_t slot_of(const struct table *t, uint64_t key)
     return at;
 }
 
-/* 1: made larger, 0: no memory. */
+/* Makes the table larger. Returns 0 where there is no memory. */
 static int figures_density_make_room(struct table *t)
 {
     struct table larger = {.bits = t->bits == 0 ? FIRST_BITS : t->bits + 1, .used = t->used};
@@ -41,8 +41,8 @@ static int figures_density_make_room(struct table *t)
     return 1;
 }
 
-/* The key of a place on a triangle, and the area of its cell. Planes that are the same give the same height at the
- * middle of a cell but for rounding: heights are shifted so that round ones do not lie on a border. */
+/* Returns the key of a place on a triangle, and sets the area of its cell. Triangles in one plane give the same height
+ * at the middle of a cell, but for rounding. So heights are shifted: round ones don't lie on a border of two steps. */
 static uint64_t key_of(const struct cutter *cut, uint32_t triangle, const double p[3], unsigned station,
                        double *area_m2)
 {
@@ -137,7 +137,7 @@ int figures_density_of(const struct figures_on_scene *in, double cell_m, const s
         longest_m = fmax(longest_m, scene->max_m[k] - scene->min_m[k]);
         cut.low_m[k] = scene->min_m[k];
     }
-    const double reach_m = most_m < longest_m ? most_m : longest_m; /* of points beside the scene */
+    const double reach_m = most_m < longest_m ? most_m : longest_m; /* of points outside the scene's bounds */
     while ((longest_m + 2.0 * reach_m) / cut.cell_m > (double)((1 << KEY_BITS) - 2))
         cut.cell_m *= 2.0;
     for (int rc = 1; rc != 0; cut.cell_m *= 2.0) {

@@ -15,7 +15,7 @@ double figures_nice(double v)
     return 10.0 * pow(10.0, power);
 }
 
-/* Values by size, eight classes an octave from 2^-60 m to 2^60 m: enough to choose an axis. */
+/* Counts values by size, in eight classes an octave from 2^-60 m to 2^60 m: enough to choose an axis. */
 enum { PER_OCTAVE = 8, OCTAVES = 120, CLASSES = PER_OCTAVE * OCTAVES };
 struct sizes {
     uint64_t n, count[CLASSES];
@@ -30,7 +30,7 @@ static void add_size(struct sizes *s, double v)
     s->count[k < 0 ? 0 : k >= CLASSES ? CLASSES - 1 : k]++;
 }
 
-/* A size above 0 that at least this share of the values does not exceed. */
+/* Returns a size above 0 that at least this share of the values does not exceed. */
 static double size_of_share(const struct sizes *s, double share)
 {
     uint64_t sum = 0;
@@ -55,7 +55,7 @@ static int set_bins(const struct sizes *s, double share, int is_signed, struct f
     return 1;
 }
 
-static void figures_histogram_put(struct figures_histogram *h, double v)
+static void figures_histogram_add(struct figures_histogram *h, double v)
 {
     if (!isfinite(v)) return;
     const double bin = floor((v - h->from) / h->width);
@@ -74,7 +74,7 @@ void figures_histogram_of(const double *value, size_t n, double share, struct fi
         add_size(&sizes, value[i]);
     if (!set_bins(&sizes, share, 0, out)) return;
     for (size_t i = 0; i < n; i++)
-        figures_histogram_put(out, value[i]);
+        figures_histogram_add(out, value[i]);
 }
 
 void figures_histogram_of_signed(const float *value, size_t n, double share, struct figures_histogram *out)
@@ -84,5 +84,5 @@ void figures_histogram_of_signed(const float *value, size_t n, double share, str
         add_size(&sizes, (double)value[i]);
     if (!set_bins(&sizes, share, 1, out)) return;
     for (size_t i = 0; i < n; i++)
-        figures_histogram_put(out, (double)value[i]);
+        figures_histogram_add(out, (double)value[i]);
 }

@@ -31,7 +31,8 @@ static int check_area(const struct map_spec *spec, struct sh_err *err)
     return SH_OK;
 }
 
-/* Pixels along a side; a place on the upper limit belongs to the last one. The number may be beyond any integer. */
+/* Returns the pixels along a side; a place on the upper limit belongs to the last one. The number may be beyond any
+ * integer. */
 static double side_px(const struct map_spec *spec, int axis, double pixel_m)
 {
     return fmax(1, ceil((spec->max_m[axis] - spec->min_m[axis]) / pixel_m - 1e-9));

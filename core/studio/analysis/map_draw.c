@@ -19,8 +19,8 @@ static const struct picture_type caption = {11, 0, 0};
 static const uint8_t ink[3] = {40, 44, 52}, red[3] = {214, 39, 40}, blue[3] = {31, 119, 180},
                      white[3] = {255, 255, 255};
 
-/* Heights between which the hues spread. The ends are those of 99 % of the pixels, so that a single stray
- * point does not take the colours from all others. */
+/* Heights between which the hues spread. They hold 99 % of the pixels, so that a single stray point does not take the
+ * colours from all others. */
 struct height_range {
     double low_m, high_m;
 };
@@ -75,15 +75,19 @@ static int gather(const struct map *map, uint32_t column, uint32_t row, int *lev
     return hit;
 }
 
+static double structure_of(int levels)
+{
+    return fmin(1, fmax(0, (double)(levels - FREE_LEVELS) / (WALL_LEVELS - FREE_LEVELS)));
+}
+
 double map_structure(const struct map *map, uint32_t column, uint32_t row)
 {
     int levels;
     double low_m;
-    if (!gather(map, column, row, &levels, &low_m)) return 0;
-    return fmin(1, fmax(0, (double)(levels - FREE_LEVELS) / (WALL_LEVELS - FREE_LEVELS)));
+    return gather(map, column, row, &levels, &low_m) ? structure_of(levels) : 0;
 }
 
-/* The colour of a structure and a height, both 0..1. */
+/* Sets the colour of a structure and a height, both 0..1. */
 static void colour_of(double structure, double height, uint8_t rgb[3])
 {
     /* From blue over green and yellow to red, away from the purple that would close the circle. */
@@ -106,14 +110,13 @@ int map_draw_pixels(const struct map *map, struct picture *out, struct sh_err *e
             int levels;
             double low_m;
             if (!gather(map, column, row, &levels, &low_m)) continue;
-            const double structure = (double)(levels - FREE_LEVELS) / (WALL_LEVELS - FREE_LEVELS);
-            colour_of(fmin(1, fmax(0, structure)), height_share(range, low_m), rgb);
+            colour_of(structure_of(levels), height_share(range, low_m), rgb);
         }
     }
     return SH_OK;
 }
 
-/* Where a place is in the image. */
+/* Finds where a place of the scene is in the image. */
 static void map_draw_place_of(const struct map *map, double x_m, double y_m, double place[2])
 {
     struct map_layout at;
@@ -132,16 +135,16 @@ static void draw_lines(const struct map *map, enum map_line kind, struct pen *pe
     static const struct {
         const char *class, *title;
         const uint8_t *rgb;
-    } looks[MAP_LINES] = {[MAP_OPEN_EDGE] = {"edges", "open edges of the scene", red},
+    } style[MAP_LINES] = {[MAP_OPEN_EDGE] = {"edges", "open edges of the scene", red},
                           [MAP_FIELD] = {"fields", "monitored fields", blue}};
     if (map->counts.lines[kind] == 0) return;
-    pen->begin(pen->on, looks[kind].class, looks[kind].title);
+    pen->begin(pen->on, style[kind].class, style[kind].title);
     for (uint64_t i = 0; i < map->counts.lines[kind]; i++) {
         const double(*ends)[2] = map->line[kind][i];
         double from[2], to[2];
         map_draw_place_of(map, ends[0][0], ends[0][1], from);
         map_draw_place_of(map, ends[1][0], ends[1][1], to);
-        pen->line(pen->on, from, to, 2, looks[kind].rgb);
+        pen->line(pen->on, from, to, 2, style[kind].rgb);
     }
     pen->end(pen->on);
 }
@@ -211,7 +214,7 @@ static int draw_stations(const struct map *map, struct pen *pen, struct sh_err *
     return SH_OK;
 }
 
-/* The longest of 1, 2, 5 x 10^n metres that takes at most max_px. */
+/* Returns the longest of 1, 2, 5 x 10^n metres that takes at most max_px. */
 static double bar_length(double pixel_m, double max_px)
 {
     const double most_m = max_px * pixel_m, decade = pow(10, floor(log10(most_m)));

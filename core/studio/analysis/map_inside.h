@@ -26,9 +26,9 @@ struct map {
     struct map_counts counts;
 };
 
-/* How much the pixels about a place are like a wall, 0..1. */
+/* Returns how much the pixels about a place are like a wall, 0..1. */
 double map_structure(const struct map *map, uint32_t column, uint32_t row);
-/* Where a station is in the image. */
+/* Finds where a station is in the image. */
 void map_station_place(const struct map *map, uint32_t station, double place[2]);
 
 enum {
@@ -39,7 +39,7 @@ extern const struct picture_type map_name_type, map_height_type;
 
 /* Draws all but the pixels. */
 int map_draw_marks(const struct map *map, struct pen *pen, struct sh_err *err);
-/* The image with its pixels alone; the caller frees it. */
+/* Makes the image with its pixels alone; the caller frees it. */
 int map_draw_pixels(const struct map *map, struct picture *out, struct sh_err *err);
 
 #endif

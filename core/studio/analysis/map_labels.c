@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the labels of stations stand. Each one tries places about its station, the nearest first, and takes the one
- * that costs least: it must lie in the map, cover no other label and no station, and should cover few walls. */
+/* Places the labels of stations. Each one tries places about its station, the nearest first, and takes the one that
+ * costs least: it must lie in the map, cover no other label and no station, and should cover few walls. */
 #include <math.h>
 
 #include "core/studio/analysis/map_inside.h"
@@ -22,7 +22,8 @@ static void measure(const struct map_station *station, double size[2])
     if (station->name[0] != '\0' && station->height[0] != '\0') size[1] += 6;
 }
 
-/* To the right at first, then left, above, below, and between; farther rings go round in the same order. */
+/* Returns a box for a label: to the right at first, then left, above, below, and between. Farther rings go round in the
+ * same order. */
 static struct picture_box box_at(const double at[2], const double size[2], int ring, int place)
 {
     static const double direction[PLACES][2] = {{1, 0},       {-1, 0},       {0, -1},     {0, 1},
@@ -51,7 +52,7 @@ static int is_free(const struct map *map, const struct map_label *label, uint32_
     return 1;
 }
 
-/* The share of walls under the box, and a little more where the box covers its own station's tick. */
+/* Returns the share of walls under the box, and a little more where it covers its own station's tick. */
 static double cost_of(const struct map *map, const struct map_layout *at, uint32_t station,
                       const struct picture_box *box)
 {

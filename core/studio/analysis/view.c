@@ -47,7 +47,8 @@ int view_create(const struct view_spec *spec, struct view **out, struct sh_err *
 {
     int rc = check_camera(&spec->camera, err);
     if (rc == SH_OK && !(spec->point_m >= 0 && spec->point_m <= 1e9 && spec->point_px > 0 && spec->point_px <= 32))
-        rc = sh_fail(err, SH_EINPUT, "view: points of %g m, at least %g pixels; allowed are 0 or more, 32 or less",
+        rc = sh_fail(err, SH_EINPUT,
+                     "view: points of %g m, at least %g pixels; allowed are 0 to 1e9 m, above 0 to 32 pixels",
                      spec->point_m, spec->point_px);
     if (rc != SH_OK) return rc;
     struct view *view = calloc(1, sizeof *view);
@@ -185,8 +186,9 @@ int view_range(const struct view *view, double *low, double *high)
 
 /* ---- where to look from */
 
-/* Along one axis of the image: corner i is across[i] beside the box's middle and deep[i] beyond it. An eye that is
- * `back` before the middle and `beside` beside it sees them all if |across - beside| <= tangent (deep + back). */
+/* A box is fitted into the image along one of its axes. Corner i is across[i] away from the box's middle along that
+ * axis, and deep[i] beyond it. An eye that is `back` in front of the middle, and `aside` along the axis, sees all
+ * corners if |across - aside| <= tangent (deep + back). */
 struct fit {
     double low, high; /* least of across + tangent deep, most of across - tangent deep */
     double tangent;
@@ -197,7 +199,7 @@ static double fit_back(const struct fit *f)
     return (f->high - f->low) / (2 * f->tangent);
 }
 
-static double fit_beside(const struct fit *f)
+static double fit_aside(const struct fit *f)
 {
     return 0.5 * (f->high + f->low);
 }
@@ -229,7 +231,7 @@ void view_frame(const double min_m[3], const double max_m[3], double azimuth_rad
     const double back_m = fmax(fmax(fit_back(&fit[0]), fit_back(&fit[1])), 0.2 * size_m - nearest_m);
     for (int i = 0; i < 3; i++) {
         camera->look_at_m[i] =
-            0.5 * (min_m[i] + max_m[i]) + fit_beside(&fit[0]) * view.right[i] + fit_beside(&fit[1]) * view.up[i];
+            0.5 * (min_m[i] + max_m[i]) + fit_aside(&fit[0]) * view.right[i] + fit_aside(&fit[1]) * view.up[i];
         camera->eye_m[i] = camera->look_at_m[i] - back_m * view.ahead[i];
     }
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Places as an image: colour, light, and the mean of a pixel's places. */
+/* Makes an image of the places: colour, light, and the mean of a pixel's places. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -30,7 +30,7 @@ static void place_colour(const struct view *view, const struct drawing *d, const
         sum[k] += light * (float)rgb[k];
 }
 
-/* Rounded to thirds of all steps: no eye sees it, and a PNG has half the size. */
+/* Rounds to every third step: no eye sees it, and a PNG has half the size. */
 static uint8_t even(float channel)
 {
     return (uint8_t)(3 * (int)fminf(85, channel / 3 + 0.5f));

@@ -9,7 +9,7 @@
 enum { VIEW_SUB = 2 }; /* places along a pixel's side: edges are even */
 
 struct view_place {
-    float order_m; /* of the disc there, bulge included: what is nearest; INFINITY: none */
+    float order_m; /* depth of the disc there with its bulge, which decides what is in front; INFINITY: no disc */
     float depth_m; /* of its centre */
     union {
         float value;
@@ -30,8 +30,8 @@ struct view {
 /* Smooths depths within surfaces and closes small holes: depth_m[height][width]; INFINITY: nothing is there. near: the
  * index of the place from which each place has its colour, for a closed hole another one. */
 int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct sh_err *err);
-/* Brightness of each place, 0..1, from these depths. log_depth: room for as many figures, for the work. SH_ESTOPPED
- * where colours->report asks to stop. */
+/* Sets light to the brightness of each place, 0..1, from these depths. log_depth: working memory for as many figures.
+ * SH_ESTOPPED where colours->report asks to stop. */
 int view_shade(const struct view *view, const float *depth_m, const struct view_colours *colours, float *log_depth,
                float *light, struct sh_err *err);
 

@@ -61,7 +61,7 @@ static int is_free(const struct taken *taken, const struct picture_box *own, uin
     return 1;
 }
 
-/* To the right of the mark, or to the left of it. Returns 0 where neither has room. */
+/* Draws a name to the right of its mark, or to the left of it. Returns 0 where neither has room. */
 static int draw_name(struct picture *picture, const double at[2], const char *name, uint32_t mark, struct taken *taken)
 {
     const double width = picture_text_width(&name_type, name);

@@ -34,8 +34,8 @@ static void close_hole(const struct view *view, int x, int y, float *depth_m, ui
     near[i] = (uint32_t)found;
 }
 
-/* A mean along one axis, over depths that change evenly: weights fall with their second difference, as a share of the
- * depth. */
+/* Takes means along one axis, over depths that change evenly: weights fall with their second difference, as a share of
+ * the depth. */
 static void smooth_line(const float *in, float *out, size_t n, size_t step)
 {
     for (size_t i = 0; i < n; i++) {
@@ -78,8 +78,8 @@ int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct 
     return SH_OK;
 }
 
-/* Boucheny's response: how much nearer the eight neighbours at a distance are, in logarithms of depth. A place without
- * depth, as the sky, is infinitely far and darkens none. */
+/* Returns Boucheny's response: how much nearer the eight neighbours at a distance are, in logarithms of depth. A place
+ * without depth, as the sky, is infinitely far and darkens none. */
 static float nearer(const struct view *view, const float *log_depth, int x, int y, int reach)
 {
     const float own = log_depth[(size_t)y * view->width + (size_t)x];
@@ -94,7 +94,7 @@ static float nearer(const struct view *view, const float *log_depth, int x, int 
     return sum / 8;
 }
 
-/* A place of the image, in space: right, up, ahead from the eye. */
+/* Finds where a place of the image lies in space: right, up, ahead from the eye. */
 static void spot(const struct view *view, const float *depth_m, int x, int y, float p[3])
 {
     const float d = depth_m[(size_t)y * view->width + (size_t)x];
@@ -103,7 +103,8 @@ static void spot(const struct view *view, const float *depth_m, int x, int y, fl
     p[2] = d;
 }
 
-/* Difference to the neighbour on that side of the two where the depth changes less. */
+/* Sets `out` to the difference to one of two neighbours, the one whose depth differs less. Returns 0 if neither has a
+ * depth. */
 static int slope(const struct view *view, const float *depth_m, const int at[2], const int step[2], float out[3])
 {
     float own[3], side[2][3];
@@ -123,7 +124,7 @@ static int slope(const struct view *view, const float *depth_m, const int at[2],
     return 1;
 }
 
-/* Lambert's law for a light at the upper left of the eye, half of it from everywhere. */
+/* Returns the brightness by Lambert's law, of a light at the upper left of the eye. 0.62 of it comes from all sides. */
 static float facing(const struct view *view, const float *depth_m, int x, int y)
 {
     static const int right[2] = {3, 0}, up[2] = {0, -3};

@@ -14,12 +14,12 @@
 
 /* The most memory that a piece takes, where each piece is a cell and a column of its own: entries, the cell's key of 16
  * bytes, places of the table, and the spare room of arrays that grow. */
-enum { PIECE_BYTES = 4 + 2 * (4 + sizeof(struct cell) + 16) + sizeof(struct cell_met) + 16 };
+enum { PIECE_BYTES = 4 + 2 * (4 + sizeof(struct cell) + 16) + sizeof(struct cell_hits) + 16 };
 enum { TRIANGLE_BYTES = 4 };
 static const double MAX_PIECES = 4e9; /* they are numbered in 32 bits */
 enum { REPORT_EVERY = 1 << 16 };
-/* The corner of the cubes lies so many cells before that of the scene's bounds: walls at round coordinates shall not
- * lie on a cube's side, where rounding would deal their pieces out to two. */
+/* The cubes begin this share of a cell before the scene's bounds. So walls at round coordinates don't lie on a side
+ * between two cubes, where rounding would divide their pieces between both. */
 static const double ASIDE = 0.38196601125010515;
 
 struct build {
@@ -32,12 +32,6 @@ struct build {
     struct sh_err *err;
     int rc;
 };
-
-void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3])
-{
-    for (int i = 0; i < 3; i++)
-        memcpy(corner[i], c->scene->vertex_m[c->scene->triangle[triangle][i]], sizeof corner[i]);
-}
 
 static float float_of(uint32_t bits)
 {
@@ -54,7 +48,7 @@ uint32_t coverage_bits(double value)
     return bits;
 }
 
-/* The largest component, and its sign: 0..5. */
+/* Returns the largest component and its sign as one number, 0..5. */
 static uint32_t side_of(const double n[3])
 {
     int axis = fabs(n[1]) > fabs(n[0]) ? 1 : 0;
@@ -80,7 +74,7 @@ static double count_pieces(const struct coverage *c, double cell_m)
     for (uint32_t t = 0; t < c->scene->n_triangles; t++) {
         double corner[3][3];
         if (!has_cells(c, t)) continue;
-        coverage_corners(c, t, corner);
+        scene_corners(c->scene, t, corner);
         pieces += cut_count((const double(*)[3])corner, cell_m);
     }
     return pieces;
@@ -93,7 +87,7 @@ static double mib_of(const struct coverage *c, double pieces)
 
 static int refuse(const struct coverage *c, double pieces, struct sh_err *err)
 {
-    char named[32]; /* the cell as the message has it: that one is tried */
+    char named[32]; /* the cell as the message shows it, which is the one that is tried */
     double cell_m = c->spec.cell_m;
     int tries = 0;
     do {
@@ -148,7 +142,7 @@ static void cut_triangle(struct build *b, uint32_t t)
     struct coverage *c = b->c;
     double corner[3][3], n[3];
     struct cut cut;
-    coverage_corners(c, t, corner);
+    scene_corners(c->scene, t, corner);
     vec3_normal(corner[0], corner[1], corner[2], n);
     const double area_m2 = 0.5 * vec3_length(n);
     if (c->first[t] == NO_CELL) {
@@ -178,8 +172,8 @@ static int build(struct coverage *c, const struct sh_report *report, struct sh_e
     }
     numbering_free(&b.cells);
     if (b.rc != SH_OK) return b.rc;
-    c->met = calloc(c->n_cells, sizeof *c->met);
-    return c->met != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the cells of coverage");
+    c->hits = calloc(c->n_cells, sizeof *c->hits);
+    return c->hits != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the cells of coverage");
 }
 
 static int cells_set_up(struct coverage *c, struct sh_err *err)
@@ -191,7 +185,7 @@ static int cells_set_up(struct coverage *c, struct sh_err *err)
     }
     if (span_m / c->spec.cell_m > 1e9)
         return sh_fail(err, SH_EINPUT, "cells of %g m in a scene of %.3g m; allowed is a cell of at least %.2g m",
-                       c->spec.cell_m, span_m, 1.05e-9 * span_m); /* more than two digits can be rounded down */
+                       c->spec.cell_m, span_m, 1.05e-9 * span_m); /* 5 % more than the two digits can round down */
     const double pieces = count_pieces(c, c->spec.cell_m);
     return mib_of(c, pieces) > c->spec.memory_mib || !(pieces < MAX_PIECES) ? refuse(c, pieces, err) : SH_OK;
 }
@@ -209,7 +203,7 @@ static int number_pieces(struct coverage *c, struct sh_err *err)
         c->first[t] = NO_CELL;
         if (!has_cells(c, t)) continue;
         c->first[t] = (uint32_t)c->n_columns;
-        coverage_corners(c, t, corner);
+        scene_corners(c->scene, t, corner);
         cut_set_up((const double(*)[3])corner, c->spec.cell_m, &cut);
         const uint32_t columns = cut_columns(&cut);
         has_room = grow(&c->column, &room, c->n_columns + columns, sizeof *c->column);
@@ -247,7 +241,7 @@ void coverage_free(struct coverage *coverage)
     free(coverage->column);
     free(coverage->piece);
     free(coverage->cell);
-    free(coverage->met);
+    free(coverage->hits);
     free(coverage);
 }
 
@@ -257,7 +251,7 @@ uint32_t coverage_cell_at(const struct coverage *c, uint32_t triangle, const dou
     double corner[3][3], n[3], weight[3];
     struct cut cut;
     uint32_t column, row;
-    coverage_corners(c, triangle, corner);
+    scene_corners(c->scene, triangle, corner);
     vec3_normal(corner[0], corner[1], corner[2], n);
     for (int i = 0; i < 3; i++) { /* a weight is the area of the triangle that the point and the opposite edge make */
         double across[3];

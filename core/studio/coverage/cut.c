@@ -40,7 +40,7 @@ static void count_part(double leg_m, double height_m, double size_m, struct coun
     count->across = fmin(leg_m, height_m) / wide_m;
 }
 
-/* 1: the triangle is one piece. */
+/* Returns 1 where the triangle is one piece. */
 static int count_parts(const double corner[3][3], double size_m, struct cut *cut, struct count count[2])
 {
     double base[3], side[3], across[3];
@@ -71,7 +71,7 @@ void cut_set_up(const double corner[3][3], double size_m, struct cut *cut)
                                          .columns = (uint32_t)ceil(count[i].columns),
                                          .across = count[i].across,
                                          .share = i == 0 ? cut->foot : 1.0 - cut->foot};
-    /* Where a leg is too short for a double, all of the area is the other part's. */
+    /* Where a leg is too short for a double, the other part has all of the area. */
     for (int i = 0; i < 2; i++)
         if (cut->part[i].columns == 0) {
             cut->part[i].share = 0.0;
@@ -79,7 +79,7 @@ void cut_set_up(const double corner[3][3], double size_m, struct cut *cut)
         }
 }
 
-/* The sum over columns of the rows, each rounded up. */
+/* Returns the sum of the rows of all columns, each rounded up. */
 static double pieces_of(const struct count *count)
 {
     const double n = ceil(count->columns);
@@ -103,7 +103,7 @@ uint32_t cut_columns(const struct cut *cut)
     return cut->part[0].columns + cut->part[1].columns;
 }
 
-/* The part of a column; *column becomes its number there. */
+/* Returns the part of a column; *column becomes its number there. */
 static int part_of(const struct cut *cut, uint32_t *column)
 {
     if (*column < cut->part[0].columns) return 0;
@@ -130,7 +130,7 @@ static uint32_t step_of(double part, uint32_t n)
     return at > 0.0 ? (at < n ? (uint32_t)at : n - 1) : 0; /* NaN: 0 */
 }
 
-/* With E the part's end of the base, a point is e E + g F + t T. From the tip on, u goes along the longer leg and v
+/* With E the part's end of the base, a point is e E + g F + t T. u and v count from the tip: u along the longer leg, v
  * along the other one. */
 void cut_find(const struct cut *cut, const double weight[3], uint32_t *column, uint32_t *row)
 {

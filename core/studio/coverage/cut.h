@@ -3,8 +3,8 @@
  * pieces there are, the one that a point lies in, its corners, and its share of the area.
  *
  *             T            The longest edge is the base; the foot F of its height cuts the triangle into two with a
- *            /|\           right angle, A F T and B F T. Each of these is cut into columns of the same width, across
- *           / | \          its longer leg, and counted from the tip, which is that leg's other end. Each column is cut
+ *            /|\           right angle, A F T and B F T. Each part is cut across its longer leg into columns of one
+ *           / | \          width. They are counted from the tip, the end of that leg that is not F. Each column is cut
  *          /  |  \         into rows by lines through the tip, evenly.
  *       A /___|___\ B
  *             F
@@ -12,7 +12,7 @@
  * Columns are at most size / sqrt(5) wide, and so are rows at a column's wide end. A row rises by no more than its
  * width again, since it leaves the longer leg at 45 degrees at most: no two points of a piece are farther apart than
  * size. A triangle whose longest edge is no longer than size is one piece. The number of pieces grows with the area
- * and the longest edge: needles cost no more than their length. Of a part with n columns, column k (from 0) has the
+ * and the longest edge: needles cost no more than their length. In a part with n columns, column k (from 0) has the
  * share (2 k + 1) / n^2, and all of its pieces are equal: shares are ratios of whole numbers and sum to 1. Pure; any
  * thread. */
 #ifndef CORE_STUDIO_COVERAGE_CUT_H
@@ -38,15 +38,15 @@ double cut_count(const double corner[3][3], double size_m);
 uint32_t cut_columns(const struct cut *cut);
 uint32_t cut_rows(const struct cut *cut, uint32_t column);
 
-/* Column and row of the point with these barycentric weights (of any sum); what is outside by rounding counts to the
- * border. */
+/* Finds column and row of the point with these barycentric weights (of any sum). A point that is outside by rounding
+ * counts as one on the border. */
 void cut_find(const struct cut *cut, const double weight[3], uint32_t *column, uint32_t *row);
 
-/* The share that a piece of that column has of the triangle's area. */
+/* Returns the share that a piece of that column has of the triangle's area. */
 double cut_share(const struct cut *cut, uint32_t column);
 
-/* Corners of rows first .. end of a column, which are one polygon: 3 or 4, counter-clockwise where the triangle's are.
- * Returns how many. */
+/* Finds the corners of the polygon that rows first .. end of a column make: 3 or 4, counter-clockwise where the
+ * triangle's are. Returns how many. */
 int cut_corners(const struct cut *cut, const double corner[3][3], uint32_t column, uint32_t first, uint32_t end,
                 double out[4][3]);
 

@@ -17,7 +17,7 @@ static int figures_compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* The value at which so much of the area is reached. */
+/* Returns the value at which `part` of the area is reached; shares are in the order of their values. */
 static double part_of(const struct share *share, uint32_t n, double area_m2, double part)
 {
     double sum_m2 = 0.0;

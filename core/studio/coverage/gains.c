@@ -20,9 +20,9 @@ struct gains {
     atomic_int failed;
 };
 
-/* A claim of the rays of one place on a cell. */
+/* The areas that rays of one place stand for in one cell. */
 struct claim {
-    double sum_m2, most_m2; /* of the areas that they stand for */
+    double sum_m2, most_m2;
 };
 
 struct gain_worker {
@@ -30,7 +30,7 @@ struct gain_worker {
     struct bvh_work *work;
     struct claim *claim; /* [n_cells] 0 between places */
     uint32_t *claimed;   /* [directions] cells with a claim */
-    uint32_t n_claimed, met, front;
+    uint32_t n_claimed, n_hits, front;
     double x[BVH_CHUNK], y[BVH_CHUNK], z[BVH_CHUNK], range_m[BVH_CHUNK], cosine[BVH_CHUNK];
     uint32_t triangle[BVH_CHUNK];
 };
@@ -49,7 +49,7 @@ static void take_ray(struct gain_worker *w, const double from_m[3], uint32_t i, 
     const double range_m = w->range_m[i], dir[3] = VEC3_AT(*w, i);
     double p_m[3];
     if (!(range_m >= d->range_min_m && range_m <= d->range_max_m)) return;
-    w->met++;
+    w->n_hits++;
     w->front += vec3_dot(bvh_plane(w->g->bvh, w->triangle[i])->n, dir) < 0.0;
     for (int k = 0; k < 3; k++)
         p_m[k] = from_m[k] + range_m * dir[k];
@@ -81,10 +81,10 @@ static void gains_look(struct gain_worker *w, uint32_t place)
 {
     const uint32_t n = w->g->directions->n;
     struct coverage_gain *gain = &w->g->gain[place];
-    w->met = w->front = w->n_claimed = 0;
+    w->n_hits = w->front = w->n_claimed = 0;
     for (uint32_t first = 0; first < n && !sh_stopped(w->g->report); first += BVH_CHUNK)
         cast(w, w->g->places->place_m[place], first, n - first < BVH_CHUNK ? n - first : BVH_CHUNK);
-    *gain = (struct coverage_gain){0.0, w->met > 0 ? (double)w->front / w->met : (double)NAN};
+    *gain = (struct coverage_gain){0.0, w->n_hits > 0 ? (double)w->front / w->n_hits : (double)NAN};
     for (uint32_t i = 0; i < w->n_claimed; i++) {
         struct claim *c = &w->claim[w->claimed[i]];
         const double area_m2 = w->g->c->cell[w->claimed[i]].area_m2;

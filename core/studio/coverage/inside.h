@@ -9,9 +9,9 @@
 
 enum { NO_CELL = COVERAGE_NO_CELL };
 
-/* How near and how steeply a cell was hit at best, as the bits of a float. The bits of positive floats have the same
+/* The nearest and the steepest hits of a cell, as the bits of floats. The bits of positive floats have the same
  * order as the numbers, so threads can keep the larger one without a lock. */
-struct cell_met {
+struct cell_hits {
     _Atomic uint32_t pulses, cosine, nearness; /* nearness: 1 / range */
 };
 
@@ -33,11 +33,8 @@ struct coverage {
     uint64_t *duplicate; /* bits: triangles that lie on others */
     double duplicate_m2, silent_m2;
     struct cell *cell;
-    struct cell_met *met; /* of the scan that waits */
+    struct cell_hits *hits; /* of the scan that waits */
 };
-
-/* Corners of a triangle, prcs. */
-void coverage_corners(const struct coverage *c, uint32_t triangle, double corner[3][3]);
 
 uint32_t coverage_bits(double value);
 

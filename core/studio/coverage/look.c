@@ -43,7 +43,7 @@ static void add_hits(struct worker *w, uint32_t n)
         if (h->body != 0) continue;
         const uint32_t cell = coverage_cell_at(c, h->triangle, h->p_m);
         if (cell == NO_CELL) continue;
-        struct cell_met *m = &c->met[cell];
+        struct cell_hits *m = &c->hits[cell];
         atomic_fetch_add_explicit(&m->pulses, 1, memory_order_relaxed);
         keep_larger(&m->cosine, coverage_bits(h->cosine));
         keep_larger(&m->nearness, coverage_bits(1.0 / h->range_m));
@@ -57,7 +57,7 @@ static void add_hits(struct worker *w, uint32_t n)
     atomic_fetch_add(&w->look->met, met);
 }
 
-/* Pulses first .. end of one line. */
+/* Casts pulses first .. end of one line. */
 static void cast_line(struct worker *w, const struct schedule_line *line, uint64_t first, uint64_t end)
 {
     const struct coverage_scan *scan = w->look->scan;
@@ -133,7 +133,7 @@ void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *
 {
     *seen_m2 = *gain_m2 = 0.0;
     for (uint32_t i = 0; i < coverage->n_cells; i++) {
-        if (coverage->met[i].pulses == 0) continue;
+        if (coverage->hits[i].pulses == 0) continue;
         *seen_m2 += coverage->cell[i].area_m2;
         if (coverage->cell[i].stations == 0) *gain_m2 += coverage->cell[i].area_m2;
     }
@@ -143,7 +143,7 @@ void coverage_keep(struct coverage *coverage)
 {
     const uint16_t station = (uint16_t)++coverage->n_stations;
     for (uint32_t i = 0; i < coverage->n_cells; i++) {
-        const struct cell_met *m = &coverage->met[i];
+        const struct cell_hits *m = &coverage->hits[i];
         struct cell *cell = &coverage->cell[i];
         if (m->pulses == 0) continue;
         if (cell->stations++ == 0) cell->first_station = station;
@@ -156,14 +156,14 @@ void coverage_keep(struct coverage *coverage)
 
 void coverage_drop(struct coverage *coverage)
 {
-    memset(coverage->met, 0, coverage->n_cells * sizeof *coverage->met);
+    memset(coverage->hits, 0, coverage->n_cells * sizeof *coverage->hits);
 }
 
 void coverage_waiting_cells(const struct coverage *coverage, uint64_t *cells)
 {
     memset(cells, 0, ((size_t)coverage->n_cells + 63) / 64 * sizeof *cells);
     for (uint32_t i = 0; i < coverage->n_cells; i++)
-        if (coverage->met[i].pulses != 0) cells[i / 64] |= 1ULL << i % 64;
+        if (coverage->hits[i].pulses != 0) cells[i / 64] |= 1ULL << i % 64;
 }
 
 void coverage_keep_cells(struct coverage *coverage, const uint64_t *cells)

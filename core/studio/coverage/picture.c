@@ -16,7 +16,7 @@ static const uint8_t BY_NONE[3] = {206, 52, 44}, BY_ONE[3] = {236, 200, 58}, BY_
 
 /* ---- the pieces in their order */
 
-/* As many rows from `first` on as are one cell. */
+/* Returns the end of the rows from `first` on that belong to one cell. */
 static uint32_t rows_alike(const uint32_t *piece, uint32_t first, uint32_t rows)
 {
     uint32_t end = first + 1;
@@ -31,7 +31,7 @@ void coverage_pieces(const struct coverage *coverage, coverage_piece *piece, voi
         double corner[3][3], at[4][3];
         struct cut cut;
         if (coverage->first[t] == NO_CELL) continue;
-        coverage_corners(coverage, t, corner);
+        scene_corners(coverage->scene, t, corner);
         cut_set_up((const double(*)[3])corner, coverage->spec.cell_m, &cut);
         for (uint32_t k = 0; k < cut_columns(&cut); k++) {
             const uint32_t *of = coverage->piece + coverage->column[coverage->first[t] + k], rows = cut_rows(&cut, k);

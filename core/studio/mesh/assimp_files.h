@@ -19,7 +19,7 @@ struct exporter {
     struct aiFileIO io;
 };
 
-/* out, is_raw and io are set; io.OpenProc and CloseProc are these two, io.UserData is the exporter. */
+/* Callbacks for io.OpenProc and io.CloseProc; io.UserData is the exporter, whose out, is_raw and io are set. */
 struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mode);
 void assimp_close(struct aiFileIO *io, struct aiFile *handle);
 /* After the export: fails where something could not be written, and says why. */

@@ -26,7 +26,7 @@ struct work {
     double per_step[3]; /* steps a metre */
     double cell_m;
     uint32_t most;
-    uint32_t *of_vertex; /* [n_vertices] its cluster; NONE: not met yet */
+    uint32_t *of_vertex; /* [n_vertices] its cluster; NONE: not known yet */
     struct numbering clusters, faces;
     struct cluster *cluster;
     uint32_t (*face)[3]; /* of clusters */
@@ -35,7 +35,7 @@ struct work {
 
 /* ---- a pass over the mesh */
 
-/* The cluster of a vertex; NONE: no memory. */
+/* Returns the cluster of a vertex; NONE: no memory. */
 static uint32_t cluster_of(struct work *w, uint32_t vertex)
 {
     const double *v = w->mesh->vertex_m[vertex];
@@ -61,7 +61,7 @@ static void swap_if_above(uint32_t *a, uint32_t *b)
     *b = kept;
 }
 
-/* Adds a triangle of clusters, unless it is there already. 0: no memory. */
+/* Adds a triangle of clusters, unless it is there already. Returns 0 where there is no memory. */
 static int add_face(struct work *w, const uint32_t c[3])
 {
     const uint32_t known = w->faces.n;
@@ -87,8 +87,8 @@ static void begin_pass(struct work *w, double cell_m)
     memset(w->of_vertex, 0xff, w->mesh->n_vertices * sizeof *w->of_vertex);
 }
 
-/* How many triangles there are, or how many there would be where they are more than `most`; then the pass ends before
- * all is done. Negative: an error. */
+/* Returns the number of triangles. Where it passes `most`, the pass ends early and returns how many there would be.
+ * Negative: an error. */
 static double pass(struct work *w, double cell_m, struct sh_err *err)
 {
     const struct decimate_mesh *m = w->mesh;
@@ -112,7 +112,7 @@ static double pass(struct work *w, double cell_m, struct sh_err *err)
 
 /* ---- before and after the passes */
 
-/* Bounds and area of all triangles. */
+/* Finds the bounds and the area of all triangles. */
 static void measure(struct work *w)
 {
     const struct decimate_mesh *m = w->mesh;
@@ -190,9 +190,9 @@ static void tear_down(struct work *w)
     free(w->face);
 }
 
-/* The number of triangles goes with 1 / cell^2 where the mesh is finer than the cells. A grid cuts a surface at an
- * angle into one and a half times as many cells, and each of them has two triangles. A first guess that gives far
- * fewer triangles is made finer once. */
+/* The number of triangles is proportional to 1 / cell^2 where the mesh is finer than the cells. A slanted surface meets
+ * one and a half times as many cells of a grid, and each of them has two triangles. A first guess that gives far fewer
+ * triangles is made finer once. */
 int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_report *report, struct decimated *out,
              struct sh_err *err)
 {

@@ -75,13 +75,13 @@ double scan_sampler_count(const struct scan_sampler *s, double per_m2)
     return round(s->area_m2 * per_m2);
 }
 
-/* 0 <= u < 1, in steps of 2^-53. */
+/* Returns u, 0 <= u < 1, in steps of 2^-53. */
 static double uniform(uint64_t bits)
 {
     return (double)(bits >> 11) * 0x1p-53;
 }
 
-/* The first face whose sum is above x. */
+/* Returns the first face whose sum is above x. */
 static uint32_t face_at(const struct scan_sampler *s, double x)
 {
     uint32_t low = 0, high = s->n_faces - 1;
@@ -95,7 +95,7 @@ static uint32_t face_at(const struct scan_sampler *s, double x)
     return low;
 }
 
-/* Within the triangle by a square root: 1 - sqrt(u), sqrt(u) (1 - v), sqrt(u) v (Turk, Graphics Gems, 1990). */
+/* The weights are 1 - sqrt(u), sqrt(u) (1 - v), sqrt(u) v: uniform within the triangle (Turk, Graphics Gems, 1990). */
 void scan_sampler_point(const struct scan_sampler *s, uint64_t k, uint32_t *face, double weight[3])
 {
     *face = face_at(s, uniform(rng_u64(s->key, rng_echo(k, 0))) * s->area_m2);

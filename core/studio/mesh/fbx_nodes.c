@@ -38,7 +38,7 @@ static int fbx_nodes_fail(const struct nodes *n, uint64_t at, struct sh_err *err
                    n->to->path, (unsigned long long)at);
 }
 
-/* 1: a node. 0: the end of a list. */
+/* Returns 1 for a node, 0 for the end of a list. */
 static int read_node(const struct nodes *n, uint64_t at, uint64_t end, struct node *node, struct sh_err *err)
 {
     if (at > end || end - at < NODE_LEN) return fbx_nodes_fail(n, at, err);
@@ -55,7 +55,7 @@ static int read_node(const struct nodes *n, uint64_t at, uint64_t end, struct no
     return 1;
 }
 
-/* Bytes of the node with all ends. Negative: an error. */
+/* Returns the length of the node with all ends, in bytes. Negative: an error. */
 static int64_t length_of(const struct nodes *n, const struct node *node, int depth, struct sh_err *err)
 {
     int64_t sum = (int64_t)(node->inside - node->at);

@@ -22,7 +22,7 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
 }
 
 /* ---- a stream that remembers why it failed. After that it seems to take all bytes, since Assimp's exporter of FBX
- * ends the program where a write does not move its place on. */
+ * ends the whole program where the stream's position does not move with a write. */
 
 /* Returns whether these are full buffers of a long file, as the stream writes them one after the other. */
 static int is_full_buffer(const struct mesh_file *file, const char *data, size_t n)
@@ -175,7 +175,7 @@ int mesh_output_close(struct mesh_output *out, int keep, struct sh_err *err)
     int rc = SH_OK;
     for (size_t i = 0; i < out->n && keep && rc == SH_OK; i++)
         if (out->file[i]->fd >= 0 && !is_mesh(out, out->file[i])) rc = mesh_file_finish(out->file[i], err);
-    for (size_t i = 0; i < out->n && keep && rc == SH_OK; i++) /* locked until the end */
+    for (size_t i = 0; i < out->n && keep && rc == SH_OK; i++) /* stays open, and so locked, until the end */
         if (is_mesh(out, out->file[i])) {
             rc = mesh_file_check(out->file[i], err);
             if (rc == SH_OK) rc = newfile_sync(out->file[i]->part, out->file[i]->fd, err);
@@ -244,7 +244,7 @@ const char *mesh_stem(const char *path, size_t *len)
     return name;
 }
 
-char *mesh_beside(const char *path, const char *ending)
+char *mesh_with_ending(const char *path, const char *ending)
 {
     size_t len;
     const char *name = mesh_stem(path, &len);

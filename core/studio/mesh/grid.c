@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Triangles of a scan's grid. First come all triangles; then the mean of their edges; then the filter.
  *
- * Each edge counts once. Diagonals belong to one cell. An edge along a column, and one across two columns, borders on
- * two cells: each cell that uses it marks it at the same one of its points, and marks are summed afterwards. */
+ * Each edge counts once. Diagonals belong to one cell. An edge along a column, or across two columns, borders on two
+ * cells. Each cell that uses it sets the same mark at the same one of its points. Marks are counted afterwards. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,8 +45,8 @@ static double distance2(const struct scan_grid *g, uint32_t p, uint32_t q)
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
 }
 
-/* Its edges count even where it is left out, without area or edge-on to the head. */
-static void put_triangle(struct build *b, uint32_t p, uint32_t q, uint32_t r)
+/* Adds a triangle. It is left out if it has no area or is edge-on to the head, but its edges count even then. */
+static void add_triangle(struct build *b, uint32_t p, uint32_t q, uint32_t r)
 {
     const struct scan_grid *g = b->grid;
     const double *a = g->xyz_m[p];
@@ -64,35 +64,35 @@ static void put_triangle(struct build *b, uint32_t p, uint32_t q, uint32_t r)
     face[2] = facing > 0 ? r : q;
 }
 
-static void put_diagonal(struct build *b, uint32_t p, uint32_t q)
+static void count_edge(struct build *b, uint32_t p, uint32_t q)
 {
     b->sum_m += sqrt(distance2(b->grid, p, q));
     b->out->n_edges++;
 }
 
-static void put_full_cell(struct build *b, const struct cell *c)
+static void add_full_cell(struct build *b, const struct cell *c)
 {
     b->mark[c->a] |= TO_NEXT_ROW | TO_NEXT_COLUMN;
     b->mark[c->b] |= TO_NEXT_COLUMN;
     b->mark[c->d] |= TO_NEXT_ROW;
     if (distance2(b->grid, c->a, c->c) <= distance2(b->grid, c->b, c->d)) {
-        put_diagonal(b, c->a, c->c);
-        put_triangle(b, c->a, c->b, c->c);
-        put_triangle(b, c->a, c->c, c->d);
+        count_edge(b, c->a, c->c);
+        add_triangle(b, c->a, c->b, c->c);
+        add_triangle(b, c->a, c->c, c->d);
     } else {
-        put_diagonal(b, c->b, c->d);
-        put_triangle(b, c->a, c->b, c->d);
-        put_triangle(b, c->b, c->c, c->d);
+        count_edge(b, c->b, c->d);
+        add_triangle(b, c->a, c->b, c->d);
+        add_triangle(b, c->b, c->c, c->d);
     }
 }
 
-static void put_cell(struct build *b, const struct cell *c)
+static void add_cell(struct build *b, const struct cell *c)
 {
     const int has_a = c->a != SCAN_MESH_NONE, has_b = c->b != SCAN_MESH_NONE, has_c = c->c != SCAN_MESH_NONE,
               has_d = c->d != SCAN_MESH_NONE;
     if (has_a + has_b + has_c + has_d < 3) return;
     if (has_a && has_b && has_c && has_d) {
-        put_full_cell(b, c);
+        add_full_cell(b, c);
         return;
     }
     if (has_a && has_b) b->mark[c->a] |= TO_NEXT_ROW;
@@ -100,13 +100,13 @@ static void put_cell(struct build *b, const struct cell *c)
     if (has_a && has_d) b->mark[c->a] |= TO_NEXT_COLUMN;
     if (has_b && has_c) b->mark[c->b] |= TO_NEXT_COLUMN;
     if (!has_a || !has_c)
-        put_diagonal(b, c->b, c->d);
+        count_edge(b, c->b, c->d);
     else
-        put_diagonal(b, c->a, c->c);
-    if (!has_a) put_triangle(b, c->b, c->c, c->d);
-    if (!has_b) put_triangle(b, c->a, c->c, c->d);
-    if (!has_c) put_triangle(b, c->a, c->b, c->d);
-    if (!has_d) put_triangle(b, c->a, c->b, c->c);
+        count_edge(b, c->a, c->c);
+    if (!has_a) add_triangle(b, c->b, c->c, c->d);
+    if (!has_b) add_triangle(b, c->a, c->c, c->d);
+    if (!has_c) add_triangle(b, c->a, c->b, c->d);
+    if (!has_d) add_triangle(b, c->a, c->b, c->c);
 }
 
 /* Returns the point of a column in the row after `row`, or SCAN_MESH_NONE. after: the first point beyond `row`. */
@@ -117,8 +117,8 @@ static uint32_t next_in(const struct scan_grid *g, const struct side *s, uint32_
     return after < s->end && g->row[after] == row + 1 ? after : SCAN_MESH_NONE;
 }
 
-/* Cells of two columns, row by row. */
-static void put_cells(struct build *b, const struct side *left, const struct side *right)
+/* Adds the cells of two columns, row by row. */
+static void add_cells(struct build *b, const struct side *left, const struct side *right)
 {
     const struct scan_grid *g = b->grid;
     uint32_t l = left->first, r = right->first;
@@ -131,45 +131,45 @@ static void put_cells(struct build *b, const struct side *left, const struct sid
         if (row_r == row) cell.d = r++;
         cell.b = next_in(g, left, row, l);
         cell.c = next_in(g, right, row, r);
-        put_cell(b, &cell);
+        add_cell(b, &cell);
     }
 }
 
 /* Adds triangles of a pole and each two neighbours in the column beside it. */
-static void put_fan(struct build *b, const struct side *pole, const struct side *ring, int mark)
+static void add_fan(struct build *b, const struct side *pole, const struct side *ring, int mark)
 {
     for (uint32_t p = ring->first; p < ring->end; p++) {
         const uint32_t next = next_in(b->grid, ring, b->grid->row[p], p + 1);
         if (next == SCAN_MESH_NONE) continue;
         b->mark[p] |= (uint8_t)(TO_NEXT_ROW | mark);
         b->mark[next] |= (uint8_t)mark;
-        put_triangle(b, pole->first, p, next);
+        add_triangle(b, pole->first, p, next);
     }
 }
 
-static void put_between(struct build *b, const struct side *left, const struct side *right)
+static void add_between(struct build *b, const struct side *left, const struct side *right)
 {
     if (left->first == left->end || right->first == right->end || (left->is_pole && right->is_pole)) return;
     if (left->is_pole)
-        put_fan(b, left, right, TO_POLE_BEFORE);
+        add_fan(b, left, right, TO_POLE_BEFORE);
     else if (right->is_pole)
-        put_fan(b, right, left, TO_NEXT_COLUMN);
+        add_fan(b, right, left, TO_NEXT_COLUMN);
     else
-        put_cells(b, left, right);
+        add_cells(b, left, right);
 }
 
-/* Edges from a column's points to the next row, and to the next column (or the pole before it). */
+/* Counts edges from a column's points to the next row, to the next column, and to a pole before it. */
 static void sum_edges(struct build *b, const struct side *s, const struct side *next, const struct side *before)
 {
     const struct scan_grid *g = b->grid;
     uint32_t r = next != NULL ? next->first : 0;
     for (uint32_t p = s->first; p < s->end; p++) {
-        if (b->mark[p] & TO_NEXT_ROW) put_diagonal(b, p, next_in(g, s, g->row[p], p + 1));
-        if ((b->mark[p] & TO_POLE_BEFORE) && before != NULL) put_diagonal(b, p, before->first);
+        if (b->mark[p] & TO_NEXT_ROW) count_edge(b, p, next_in(g, s, g->row[p], p + 1));
+        if ((b->mark[p] & TO_POLE_BEFORE) && before != NULL) count_edge(b, p, before->first);
         if (!(b->mark[p] & TO_NEXT_COLUMN) || next == NULL) continue;
         while (!next->is_pole && r < next->end && g->row[r] < g->row[p])
             r++;
-        put_diagonal(b, p, r);
+        count_edge(b, p, r);
     }
 }
 
@@ -196,7 +196,7 @@ static int for_columns(struct build *b, int is_sum, const struct sh_report *repo
         if (is_sum)
             sum_edges(b, &s, has_next ? &next : NULL, has_before ? &before : NULL);
         else if (has_next)
-            put_between(b, &s, &next);
+            add_between(b, &s, &next);
         before = s;
         has_before = has_next;
     }
@@ -223,7 +223,7 @@ int scan_faces_make(const struct scan_grid *grid, struct scan_faces *faces, cons
     struct build b = {.grid = grid, .out = faces};
     memset(faces, 0, sizeof *faces);
     if (grid->n_points == 0) return SH_OK;
-    /* a triangle has one edge along a column, and such an edge at most one triangle a side */
+    /* Each triangle has one edge along a column, and such an edge has at most one triangle on each side. */
     faces->face = malloc(2 * (size_t)grid->n_points * sizeof *faces->face);
     b.mark = calloc(grid->n_points, 1);
     int rc = SH_OK;
@@ -234,7 +234,7 @@ int scan_faces_make(const struct scan_grid *grid, struct scan_faces *faces, cons
     if (rc == SH_OK && faces->n_edges > 0) faces->mean_edge_m = b.sum_m / (double)faces->n_edges;
     if (rc == SH_OK && grid->long_edge > 0) filter(grid, faces);
     free(b.mark);
-    if (faces->n_faces > 0) resize(&faces->face, faces->n_faces, sizeof *faces->face); /* gives back what is too much */
+    if (faces->n_faces > 0) resize(&faces->face, faces->n_faces, sizeof *faces->face); /* frees the rest */
     return rc;
 }
 

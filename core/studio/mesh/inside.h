@@ -18,7 +18,7 @@ struct mesh_file {
     int is_named;  /* it has its name by now */
     off_t at, end; /* of the stream, also after a write has failed */
     int error;     /* errno of the first write that failed; 0: none */
-    int is_direct; /* the descriptor writes past the system's cache, just now; -1: the file system can't do it */
+    int is_direct; /* now the descriptor writes past the system's cache; -1: the file system can't do it */
 };
 
 /* The files of one output, which come and go together (file.c). Begins as zeros but for path. */
@@ -33,19 +33,19 @@ int mesh_output_open(struct mesh_output *out, const char *path, struct mesh_file
 int mesh_file_write(struct mesh_file *file, const void *data, size_t len, struct sh_err *err);
 /* Fails where something of it could not be written, and says why. */
 int mesh_file_check(struct mesh_file *file, struct sh_err *err);
-/* It is whole: goes to the disk, and is closed. It gets its name with the others. */
+/* Writes a complete file to the disk, and closes it. It gets its name with the others. */
 int mesh_file_finish(struct mesh_file *file, struct sh_err *err);
-/* Removes it alone. */
+/* Removes this file alone. */
 void mesh_output_drop(struct mesh_output *out, struct mesh_file *file);
 /* keep: finishes and renames all. Else, and where that fails, nothing is left. */
 int mesh_output_close(struct mesh_output *out, int keep, struct sh_err *err);
-/* The images of parts, beside the mesh. */
+/* Writes the images of parts into the mesh's folder. */
 int mesh_output_images(struct mesh_output *out, const struct mesh *mesh, struct sh_err *err);
 
-/* Copies a binary FBX file as Assimp exports it, with what is missing in it. SH_EIO: it is not one. */
+/* Copies a binary FBX file of Assimp's exporter, and adds the ends of lists that it lacks. SH_EIO: it is none. */
 int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct sh_err *err);
 
-/* Long work: what is done of it. Reports and asks for a stop every 65536 steps. */
+/* The progress of long work. mesh_work_step reports it, and asks whether to stop, every 65536 steps. */
 struct mesh_work {
     const struct sh_report *report;
     char what[96];
@@ -60,16 +60,16 @@ char *mesh_put_number(char *to, double v);
 /* Puts a line of a key, which ends with a blank, and a text. Control characters in the text become question marks. */
 void mesh_put_line(FILE *out, const char *key, const char *text);
 
-/* The path's name without folders; its length without the ending. */
+/* Returns the path's name without folders. *len: its length without the ending. */
 const char *mesh_stem(const char *path, size_t *len);
-/* The path with another ending; free it. NULL: no memory. */
-char *mesh_beside(const char *path, const char *ending);
+/* Returns the path with another ending, which the caller frees. NULL: no memory. */
+char *mesh_with_ending(const char *path, const char *ending);
 
 struct mesh_format {
     const char *ending;
     int is_float, takes_points;
     const char *exporter; /* Assimp's name of the format */
-    /* Opens and writes out->path and what belongs to it; the caller closes. */
+    /* Opens and writes out->path and what belongs to it; the caller closes. The mesh has at least one part. */
     int (*write)(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
                  struct mesh_work *work, struct sh_err *err);
 };

@@ -147,8 +147,19 @@ int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report
     snprintf(work.what, sizeof work.what, "writing %s", name);
     int rc = check(path, format, mesh, err);
     if (rc != SH_OK) return rc;
+    /* A mesh without parts is one part, named as the file. Assimp's exporter must not get that name: it would choose
+     * another one for the .bin of a .gltf. */
     struct mesh_output out = {.path = path};
-    rc = format->write(format, &out, mesh, &work, err);
+    struct mesh parts = *mesh;
+    char stem[MESH_NAME_LEN];
+    snprintf(stem, sizeof stem, "%.*s", (int)len, name);
+    const struct mesh_part whole = {format->exporter != NULL ? "mesh" : stem, mesh->n_vertices, mesh->n_faces,
+                                    mesh->texture, NULL};
+    if (mesh->n_parts == 0) {
+        parts.part = &whole;
+        parts.n_parts = 1;
+    }
+    rc = format->write(format, &out, &parts, &work, err);
     const int closed = mesh_output_close(&out, rc == SH_OK, err);
     return rc != SH_OK ? rc : closed;
 }

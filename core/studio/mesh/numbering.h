@@ -15,7 +15,7 @@ struct numbering {
     size_t n_slots, key_room;
 };
 
-/* Where a key is, or would be. n_slots is a power of two, and one of the slots is free. */
+/* Returns the slot of a key, or the free one that it would get. n_slots is a power of two, and a slot is free. */
 static inline size_t numbering_slot(const struct numbering *t, const uint64_t key[2])
 {
     const size_t mask = t->n_slots - 1;

@@ -12,7 +12,7 @@
 #include "core/colour.h"
 #include "core/studio/mesh/assimp_files.h"
 
-static const double MAX_BYTES = 4294000000.0; /* of 2^32, less than 1 MB for the rest of a .glb */
+static const double MAX_BYTES = 4294000000.0; /* 2^32 less 967,296 bytes, which the rest of a .glb may take */
 
 /* ---- the scene */
 
@@ -58,7 +58,8 @@ static struct aiVector3D turned(const struct export_scene *s, double x, double y
                       : (struct aiVector3D){(float)x, (float)y, (float)z};
 }
 
-/* Vertices from first on. 0: no memory. A texture is the colour where there is one: glTF would multiply the two. */
+/* Sets vertices from `first` on. Returns 0 where there is no memory. Where there is a texture, colours are left out,
+ * since glTF multiplies the two. */
 static int fill_vertices(const struct export_scene *s, const struct mesh *m, int textured, uint32_t first,
                          struct aiMesh *to)
 {
@@ -148,15 +149,15 @@ static int put_string(struct aiMaterial *to, struct aiMaterialProperty *at, cons
     return put_property(to, at, key, semantic, (struct property){aiPTI_String, &string, 4 + (size_t)string.length + 1});
 }
 
-/* A PNG within the scene; materials call it by its number. 0: no memory. */
+/* Puts a PNG into the scene, which materials name by its number. Returns 0 where there is no memory. */
 static int add_image(struct export_scene *s, const struct picture *image, struct aiTexture *texture, char name[16])
 {
     char *png = NULL;
     size_t n = 0;
     FILE *out = open_memstream(&png, &n);
     int rc = out != NULL ? picture_put_png(out, image, NULL) : SH_ENOMEM;
-    /* Numbers follow, which have to begin at multiples of 4 bytes; Assimp counts that wrongly. Readers of PNG stop
-     * before these zeros. */
+    /* The numbers that follow in a .glb must begin at multiples of 4 bytes, which Assimp does not see to. So zeros are
+     * added here; readers of PNG ignore them. */
     if (rc == SH_OK) fwrite("\0\0\0", 1, (4 - n % 4) % 4, out);
     if (out != NULL && fclose(out) != 0) rc = SH_ENOMEM;
     texture->pcData = (struct aiTexel *)(void *)png;
@@ -188,7 +189,7 @@ static int fill_material(struct export_scene *s, const struct mesh_part *part, s
             put_string(to, &at[3], "$tex.file", (unsigned)aiTextureType_DIFFUSE, is_within ? name : part->texture));
 }
 
-/* z up, y to the back (FrontAxis 1, sign -1: the front is -y), and a unit of 100 cm. */
+/* Sets z up, y to the back (FrontAxis 1, sign -1: the front is -y), and a unit of 100 cm. */
 static void fill_meta(struct export_scene *s)
 {
     static const struct {
@@ -264,12 +265,11 @@ static int fill_part(struct export_scene *s, const struct mesh *m, unsigned i, c
 }
 
 /* Parts without a face are left out. */
-static int make_scene(struct export_scene *s, const struct mesh *m, const struct mesh_part *whole)
+static int make_scene(struct export_scene *s, const struct mesh *m)
 {
-    const uint32_t n_parts = m->n_parts > 0 ? m->n_parts : 1;
-    const struct mesh_part *part = m->n_parts > 0 ? m->part : whole;
+    const struct mesh_part *part = m->part;
     unsigned n = 0;
-    for (uint32_t i = 0; i < n_parts; i++)
+    for (uint32_t i = 0; i < m->n_parts; i++)
         n += part[i].n_faces > 0;
     if (!allocate(s, n)) return 0;
     set_string(&s->root.mName, "scan");
@@ -280,7 +280,7 @@ static int make_scene(struct export_scene *s, const struct mesh *m, const struct
     s->scene.mMaterials = s->materials;
     uint32_t vertex = 0, face = 0;
     unsigned at = 0;
-    for (uint32_t i = 0; i < n_parts; i++) {
+    for (uint32_t i = 0; i < m->n_parts; i++) {
         if (part[i].n_faces > 0 && !fill_part(s, m, at++, &part[i], vertex, face)) return 0;
         vertex += part[i].n_vertices;
         face += part[i].n_faces;
@@ -328,16 +328,13 @@ static int check_size(const struct mesh_format *format, const char *path, const 
 int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out, const struct mesh *mesh,
                       struct mesh_work *work, struct sh_err *err)
 {
-    const char *path = out->path;
     struct export_scene s = {.is_fbx = strcmp(format->exporter, "fbx") == 0,
                              .holds_images = strcmp(format->exporter, "glb2") == 0};
-    /* It does not have the file's name: then the exporter would choose another name for the .bin of a .gltf. */
-    const struct mesh_part whole = {"mesh", mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
-    int rc = check_size(format, path, mesh, s.is_fbx, err);
+    int rc = check_size(format, out->path, mesh, s.is_fbx, err);
     if (rc != SH_OK) return rc;
     if (s.is_fbx) fill_meta(&s);
-    rc = make_scene(&s, mesh, &whole) ? export_scene(format, out, &s, work, err)
-                                      : sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
+    rc = make_scene(&s, mesh) ? export_scene(format, out, &s, work, err)
+                              : sh_fail(err, SH_ENOMEM, "%s: no memory to write it", out->path);
     free_scene(&s);
     return rc == SH_OK && !s.holds_images ? mesh_output_images(out, mesh, err) : rc;
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* .obj, and .mtl beside it where there is a texture or a part with one. A colour of a vertex follows its coordinates,
- * as fractions: many readers take that, though the format does not name it. */
+/* .obj, and .mtl where the mesh or a part has a texture. A colour of a vertex follows its coordinates, as fractions:
+ * many readers take that, though the format does not name it. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,24 +13,12 @@ struct obj {
     const struct mesh *mesh;
     struct mesh_file *file;
     struct mesh_work *work;
-    struct mesh_part whole; /* the only part where the mesh has none */
-    char whole_name[MESH_NAME_LEN];
 };
 
-static uint32_t n_parts(const struct obj *o)
+static int has_textures(const struct mesh *mesh)
 {
-    return o->mesh->n_parts > 0 ? o->mesh->n_parts : 1;
-}
-
-static const struct mesh_part *part(const struct obj *o, uint32_t i)
-{
-    return o->mesh->n_parts > 0 ? &o->mesh->part[i] : &o->whole;
-}
-
-static int has_textures(const struct obj *o)
-{
-    for (uint32_t i = 0; i < n_parts(o); i++)
-        if (part(o, i)->texture != NULL) return 1;
+    for (uint32_t i = 0; i < mesh->n_parts; i++)
+        if (mesh->part[i].texture != NULL) return 1;
     return 0;
 }
 
@@ -39,8 +27,8 @@ static int write_materials(const struct obj *o, struct mesh_output *out, const c
     struct mesh_file *file;
     int rc = mesh_output_open(out, path, &file, err);
     if (rc != SH_OK) return rc;
-    for (uint32_t i = 0; i < n_parts(o); i++) {
-        const struct mesh_part *p = part(o, i);
+    for (uint32_t i = 0; i < o->mesh->n_parts; i++) {
+        const struct mesh_part *p = &o->mesh->part[i];
         mesh_put_line(file->file, "newmtl ", p->name);
         fputs("Ka 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\n", file->file);
         if (p->texture != NULL) mesh_put_line(file->file, "map_Kd ", p->texture);
@@ -99,7 +87,7 @@ static char *put_point(char *p, const struct mesh *m, uint32_t i)
     return p;
 }
 
-/* work: counts the rows; NULL: they don't count. */
+/* Writes n rows. work: counts them; NULL: they don't count. */
 static int put_rows(const struct obj *o, char *(*put)(char *p, const struct mesh *m, uint32_t i), uint32_t first,
                     uint32_t n, struct mesh_work *work, struct sh_err *err)
 {
@@ -120,8 +108,8 @@ static int put_parts(const struct obj *o, int materials, struct sh_err *err)
 {
     uint32_t vertex = 0, face = 0;
     int rc = SH_OK;
-    for (uint32_t i = 0; rc == SH_OK && i < n_parts(o); i++) {
-        const struct mesh_part *p = part(o, i);
+    for (uint32_t i = 0; rc == SH_OK && i < o->mesh->n_parts; i++) {
+        const struct mesh_part *p = &o->mesh->part[i];
         mesh_put_line(o->file->file, "o ", p->name);
         rc = put_rows(o, put_vertex, vertex, p->n_vertices, o->work, err);
         if (materials) mesh_put_line(o->file->file, "usemtl ", p->name);
@@ -151,13 +139,9 @@ int mesh_write_obj(const struct mesh_format *format, struct mesh_output *out, co
                    struct mesh_work *work, struct sh_err *err)
 {
     struct obj o = {.mesh = mesh, .work = work};
-    size_t len;
     char *materials = NULL;
     (void)format;
-    const char *name = mesh_stem(out->path, &len);
-    snprintf(o.whole_name, sizeof o.whole_name, "%.*s", (int)len, name);
-    o.whole = (struct mesh_part){o.whole_name, mesh->n_vertices, mesh->n_faces, mesh->texture, NULL};
-    if (has_textures(&o) && (materials = mesh_beside(out->path, ".mtl")) == NULL)
+    if (has_textures(mesh) && (materials = mesh_with_ending(out->path, ".mtl")) == NULL)
         return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", out->path);
     int rc = write_main(&o, out, materials, err);
     free(materials);

@@ -6,10 +6,8 @@
 #include "core/decimal.h"
 #include "core/studio/mesh/inside.h"
 
-enum {
-    MAX_SCALARS = 8,
-    ROW = (3 + 3 + 3 + 2 + MAX_SCALARS) * (DECIMAL_GENERAL_ROOM + 1)
-}; /* a vertex; a face has less */
+enum { MAX_SCALARS = 8 };
+enum { ROW = (3 + 3 + 3 + 2 + MAX_SCALARS) * (DECIMAL_GENERAL_ROOM + 1) }; /* bytes of a vertex; a face has less */
 
 static const char *const type_name[] = {"double", "float", "ushort"};
 
@@ -76,7 +74,7 @@ static void put_float(struct row *r, float v)
         end_text(r, decimal_put_general(begin_text(r), (double)v, 9));
 }
 
-/* size: bytes of its type, 1, 2 or 4. */
+/* Puts a whole number of `size` bytes: 1, 2 or 4. */
 static void put_whole(struct row *r, uint32_t v, size_t size)
 {
     if (r->ascii)

@@ -6,7 +6,7 @@
 
 #include "core/studio/picture/inside.h"
 
-/* libpng reports by a callback that must not return. */
+/* libpng reports errors by a callback that must not return. */
 static void on_error(png_structp png, png_const_charp text)
 {
     sh_fail(png_get_error_ptr(png), SH_EIO, "%s", text);
@@ -19,7 +19,7 @@ static void on_warning(png_structp png, png_const_charp text)
     (void)text; /* libpng's warnings concern chunks that we do not write */
 }
 
-/* Nothing here is changed between setjmp and longjmp but through pointers. */
+/* Nothing that is used after longjmp changes between setjmp and longjmp. */
 static int encode(const struct picture_part *part, FILE *file, png_structp png, png_infop info)
 {
     if (setjmp(png_jmpbuf(png)) != 0) return SH_EIO;

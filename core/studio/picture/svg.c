@@ -34,7 +34,7 @@ static void put_colour(FILE *out, const char *name, const uint8_t rgb[3])
     fprintf(out, " %s=\"#%02x%02x%02x\"", name, rgb[0], rgb[1], rgb[2]);
 }
 
-/* Length of a whole UTF-8 character that XML allows; 0: it is none. */
+/* Returns the length of a whole UTF-8 character that XML allows; 0: it is none. */
 static int character(const char *p)
 {
     const int is_control = (unsigned char)*p < 0x20 || *p == 0x7f;
@@ -128,8 +128,8 @@ static void pen_triangle(void *on, const double corner[3][2], const uint8_t rgb[
     fputs("/>\n", out);
 }
 
-/* Capitals of the usual sans-serif fonts are 0.72 of the font's size. The width is that of our own font, so that
- * what was placed beside each other stays so. */
+/* Capitals of the usual sans-serif fonts are 0.72 of the font's size. The width is that of our own font, so that texts
+ * don't reach into each other in any font. */
 static void pen_text(void *on, const double at[2], enum picture_anchor anchor, const struct picture_type *type,
                      const uint8_t rgb[3], const char *text)
 {

@@ -80,7 +80,7 @@ static void add_strokes(struct strokes *s, const char *text, double dx, double d
     }
 }
 
-/* The next character; wrong bytes are characters of their own that no font has. */
+/* Returns the next character. A wrong byte counts as a character that no font has. */
 static uint32_t next_code(const char **text)
 {
     const unsigned char *p = (const unsigned char *)*text;
@@ -116,7 +116,7 @@ static void make_glyph(uint32_t code, struct strokes *s)
     const double low = s->low, high = s->high;
     const int stays = accent[0] == '_';
     add_strokes(s, accent + stays, 0.5 * (low + high), base < 'a' && !stays ? 8 : 0);
-    s->low = low; /* accents take no room beside */
+    s->low = low; /* accents add no width */
     s->high = high;
 }
 
@@ -140,7 +140,7 @@ static double distance2(const double from[2], const double to[2], double x, doub
     return r[0] * r[0] + r[1] * r[1];
 }
 
-/* Strokes in pixels. Each pixel is blended once, by the nearest stroke. */
+/* Draws strokes, in pixels. Each pixel is blended once, by the nearest stroke. */
 static void draw_strokes(struct picture *picture, const struct strokes *s, double width, const uint8_t rgb[3])
 {
     if (s->n == 0) return;

@@ -12,7 +12,6 @@ enum { N_COLUMNS = COLUMNS * COLUMNS };
 static const double HEAD_M = 1.6, LEAST_ROOM_M = 1.5;
 static const double LEVEL = 0.7;             /* cosine of a floor's slope, 45 degrees */
 static const double LEAST_SEEN_INSIDE = 0.8; /* a room, with windows and doors */
-static const double down[3] = {0.0, 0.0, -1.0};
 
 struct floor {
     double at_m[3], room_m; /* room above it; INFINITY: the sky */
@@ -22,67 +21,40 @@ struct floor {
 };
 
 struct floors {
+    const struct survey *survey;
+    struct survey_column column[N_COLUMNS];
     struct floor *floor;
     size_t n, room;
     uint32_t covered; /* columns that hold anything */
 };
 
-/* All columns are followed at a time: each ray begins just below the surface that the last one hit. */
-struct column {
-    double top_m, last_m; /* where the next ray begins; the last surface, INFINITY: none yet */
-};
-
-static void add_drops(struct survey *s, const struct column *column)
+static int take_floor(void *ctx, uint32_t i, double z_m)
 {
-    survey_clear(s);
+    struct floors *floors = ctx;
+    const struct survey_column *c = &floors->column[i];
+    const double cosine = survey_cosine(floors->survey, i);
+    if (isinf(c->last_m)) floors->covered++;
+    if (!(fabs(cosine) >= LEVEL && c->last_m - z_m >= LEAST_ROOM_M)) return 1;
+    if (!grow(&floors->floor, &floors->room, floors->n + 1, sizeof *floors->floor)) return 0;
+    floors->floor[floors->n++] =
+        (struct floor){.at_m = {c->x_m, c->y_m, z_m}, .room_m = c->last_m - z_m, .front = cosine < 0.0, .column = i};
+    return 1;
+}
+
+/* Finds all floors. Returns 0 where there is no memory. */
+static int find_floors(struct survey *s, const struct sh_report *report, struct floors *floors)
+{
     for (uint32_t i = 0; i < N_COLUMNS; i++) {
         /* The column is a little beside the middle of its cell, to miss a model's own planes of symmetry. */
         const double x = (i % COLUMNS + 0.537) / COLUMNS, y = ((double)(i / COLUMNS) + 0.537) / COLUMNS;
-        const double from[3] = {s->scene->min_m[0] + s->size_m[0] * x, s->scene->min_m[1] + s->size_m[1] * y,
-                                column[i].top_m};
-        survey_add(s, from, down);
+        floors->column[i] =
+            (struct survey_column){s->scene->min_m[0] + s->size_m[0] * x, s->scene->min_m[1] + s->size_m[1] * y,
+                                   s->scene->max_m[2] + 0.01 * s->radius_m, INFINITY};
     }
-}
-
-/* Returns how many rays hit a surface; negative: no memory. */
-static int take_layer(struct survey *s, struct column *column, struct floors *floors)
-{
-    const double step_m = fmax(1e-6 * s->radius_m, 1e-6); /* coordinates up to 1e9 m still move by it */
-    int n_hits = 0;
-    for (uint32_t i = 0; i < N_COLUMNS; i++) {
-        struct column *c = &column[i];
-        if (isnan(s->rays.range_m[i])) continue;
-        n_hits++;
-        const double z_m = c->top_m - s->rays.range_m[i], cosine = survey_cosine(s, i);
-        if (isinf(c->last_m)) floors->covered++;
-        if (fabs(cosine) >= LEVEL && c->last_m - z_m >= LEAST_ROOM_M) {
-            if (!grow(&floors->floor, &floors->room, floors->n + 1, sizeof *floors->floor)) return -1;
-            floors->floor[floors->n++] = (struct floor){.at_m = {s->rays.from.x[i], s->rays.from.y[i], z_m},
-                                                        .room_m = c->last_m - z_m,
-                                                        .front = cosine < 0.0,
-                                                        .column = i};
-        }
-        c->last_m = z_m;
-        c->top_m = z_m - step_m;
-    }
-    return n_hits;
-}
-
-/* 0: no memory. */
-static int drop(struct survey *s, const struct sh_report *report, struct floors *floors)
-{
-    struct column column[N_COLUMNS];
-    for (int i = 0; i < N_COLUMNS; i++)
-        column[i] = (struct column){s->scene->max_m[2] + 0.01 * s->radius_m, INFINITY};
-    for (int n_hits = 1; n_hits > 0 && !sh_stopped(report);) { /* a forest has hundreds of surfaces over its ground */
-        add_drops(s, column);
-        survey_cast(s);
-        n_hits = take_layer(s, column, floors);
-        if (n_hits < 0) return 0;
-    }
+    if (!survey_descend(s, floors->column, N_COLUMNS, report, take_floor, floors)) return 0;
     for (size_t k = 0; k < floors->n; k++) {
         struct floor *f = &floors->floor[k];
-        f->depth_m = f->at_m[2] - column[f->column].last_m;
+        f->depth_m = f->at_m[2] - floors->column[f->column].last_m;
     }
     return 1;
 }
@@ -102,7 +74,7 @@ static int stands(const struct survey *s, uint32_t first, double height)
     return n >= LEGS - 2;
 }
 
-/* Directions as a scan's: even in azimuth and in line angle. Each line begins a little further. */
+/* Casts rays as a scan does, evenly in azimuth and in line angle. Each line begins a little further round. */
 static struct survey_sight floors_look(struct survey *s, const struct floor *f, double height, int *level)
 {
     const double p[3] = {f->at_m[0], f->at_m[1], f->at_m[2] + height};
@@ -111,7 +83,7 @@ static struct survey_sight floors_look(struct survey *s, const struct floor *f, 
     survey_clear(s);
     for (int i = 0; i < LEGS; i++) {
         const double turn = 2.0 * M_PI * i / LEGS;
-        survey_add(s, (const double[3]){p[0] + leg_m * sin(turn), p[1] + leg_m * cos(turn), p[2]}, down);
+        survey_add(s, (const double[3]){p[0] + leg_m * sin(turn), p[1] + leg_m * cos(turn), p[2]}, survey_down);
     }
     for (int i = 0; i < LOOKS; i++) {
         double dir[3], line = (i / AZIMUTHS + 0.5) / LINES;
@@ -124,7 +96,8 @@ static struct survey_sight floors_look(struct survey *s, const struct floor *f, 
     return survey_look(s, LEGS, LOOKS);
 }
 
-/* More is better: what is seen, how far away it is, how near to the middle and how low the place is. */
+/* Returns a score that grows with the share seen and with its distance. It falls with the place's distance from the
+ * middle and with its height. */
 static double score(const struct survey *s, const struct floor *f, const struct survey_sight *sight)
 {
     double aside = hypot(f->at_m[0] - s->centre_m[0], f->at_m[1] - s->centre_m[1]) / s->radius_m;
@@ -182,8 +155,8 @@ static void try(struct survey *s, const struct floors *floors, const struct floo
 
 int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err)
 {
-    struct floors floors = {0};
-    const int has_room = drop(s, report, &floors);
+    struct floors floors = {.survey = s};
+    const int has_room = find_floors(s, report, &floors);
     for (size_t i = 0; i < floors.n && has_room && !sh_stopped(report); i++)
         try(s, &floors, &floors.floor[i], best);
     free(floors.floor);

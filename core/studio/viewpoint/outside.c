@@ -14,8 +14,8 @@ static const double side_deg[SIDES] = {0, 45, -45, 90, -90, 135, -135, 180};
 static const double side_worth[SIDES] = {1.0, 0.95, 0.95, 0.9, 0.9, 0.85, 0.85, 0.8};
 static const double height_deg[HEIGHTS] = {8, 22, 35}, height_worth[HEIGHTS] = {1.0, 0.9, 0.8};
 
-/* The distance from the centre: the sphere around the scene fills 47 degrees. It is not less than the head can see.
- * Where the scene is larger than the head's range, the head stands near enough to the scene's side. */
+/* Returns the distance from the centre. From there the sphere around the scene fills 47 degrees, and lies beyond the
+ * head's least range. Where the scene is larger than the head's range, the head stands nearer, at the scene's side. */
 static double distance_m(const struct survey *s, const double toward[3])
 {
     const struct viewpoint_view *v = s->view;
@@ -25,7 +25,7 @@ static double distance_m(const struct survey *s, const double toward[3])
     return fmin(far_m, half_m + 0.3 * v->range_max_m + v->range_min_m);
 }
 
-/* The part of the view that holds the bounds, as seen from p with the azimuth `ahead` in its middle. */
+/* Sets the part of the view that holds the bounds, as seen from the place with the azimuth `ahead` in its middle. */
 static void frame(const struct survey *s, double ahead_rad, struct viewpoint *at)
 {
     const double *p = at->position_m;
@@ -52,7 +52,7 @@ static void frame(const struct survey *s, double ahead_rad, struct viewpoint *at
     at->line1_rad = fmin(atan2(up, up > 0.0 ? near : far_m) + margin, fmin(s->view->line_max_rad, M_PI_2));
 }
 
-/* Casts rays over the part of the view that a place has, and gives what they hit. */
+/* Casts rays over the part of the view that a place has, and returns figures of their hits. */
 static struct survey_sight outside_look(struct survey *s, const struct viewpoint *at)
 {
     survey_clear(s);
@@ -118,7 +118,7 @@ static void outside_fill(const struct survey *s, struct cells *c)
     }
 }
 
-/* The part with the most surface is taken; among equals, up to rounding, the one nearest to the middle. */
+/* Returns the cell with the most surface; among equals, up to rounding, the one nearest to the middle. */
 static uint32_t find_fullest(const struct cells *c)
 {
     uint32_t best = 0;
@@ -134,7 +134,7 @@ static uint32_t find_fullest(const struct cells *c)
     return best;
 }
 
-/* From here on the survey has the bounds of the surface in that cell. */
+/* Gives the survey the bounds of the surface in that cell. */
 static void narrow(struct survey *s, const struct cells *c, uint32_t cell)
 {
     double low[3], high[3];

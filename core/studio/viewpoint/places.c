@@ -12,22 +12,16 @@ enum { LEGS = 8, LOOKS = 2 * LEGS, TOGETHER = BVH_CHUNK / LOOKS };
 
 static const double LEVEL = 0.9397; /* cosine of a floor's slope, 20 degrees */
 static const double ABOVE_M = 0.2, AROUND_M = 0.3, LEVEL_M = 0.15;
-static const double down[3] = {0.0, 0.0, -1.0};
 
 struct search {
     struct survey survey;
     const struct viewpoint_grid *grid;
     const struct sh_report *report;
+    struct survey_column column[BVH_CHUNK];
     uint64_t across[2]; /* columns along x, y */
     double first_m[2];  /* of the first one */
     struct viewpoint_place *floor, *place;
     size_t n_floors, floor_room, n_places, place_room;
-};
-
-/* A ray goes on just below the last surface that it hit. */
-struct drop {
-    double x, y, top_m, last_m; /* last_m: the last surface, INFINITY: none yet */
-    int done;
 };
 
 static int places_keep(struct viewpoint_place **list, size_t *n, size_t *room, const struct viewpoint_place *place)
@@ -42,37 +36,16 @@ static double to_mm(double m)
     return round(1e3 * m) * 1e-3;
 }
 
-/* 0: no memory. */
-static int take_surface(struct search *s, struct drop *d, uint32_t ray)
+/* Keeps a surface that is a floor. Returns 0 where there is no memory. */
+static int take_surface(void *ctx, uint32_t i, double z_m)
 {
-    const double z_m = d->top_m - s->survey.rays.range_m[ray];
-    const struct viewpoint_place floor = {{to_mm(d->x), to_mm(d->y), to_mm(z_m + s->grid->height_m)}, z_m};
-    const int has_room = d->last_m - z_m >= s->grid->height_m + ABOVE_M;
+    struct search *s = ctx;
+    const struct survey_column *c = &s->column[i];
+    const struct viewpoint_place floor = {{to_mm(c->x_m), to_mm(c->y_m), to_mm(z_m + s->grid->height_m)}, z_m};
+    const int has_room = c->last_m - z_m >= s->grid->height_m + ABOVE_M;
     const int asked_for = z_m >= s->grid->min_m[2] && z_m <= s->grid->max_m[2];
-    d->last_m = z_m;
-    d->top_m = z_m - fmax(1e-6 * s->survey.radius_m, 1e-6);
-    if (!has_room || !asked_for || fabs(survey_cosine(&s->survey, ray)) < LEVEL) return 1;
+    if (!has_room || !asked_for || fabs(survey_cosine(&s->survey, i)) < LEVEL) return 1;
     return places_keep(&s->floor, &s->n_floors, &s->floor_room, &floor);
-}
-
-/* Floors of up to BVH_CHUNK columns, layer by layer. */
-static int find_floors(struct search *s, struct drop *drop, uint32_t n)
-{
-    int has_room = 1, open = 1;
-    while (open && has_room && !sh_stopped(s->report)) {
-        open = 0;
-        survey_clear(&s->survey);
-        for (uint32_t i = 0; i < n; i++)
-            survey_add(&s->survey, (const double[3]){drop[i].x, drop[i].y, drop[i].top_m}, down);
-        survey_cast(&s->survey);
-        for (uint32_t i = 0; i < n && has_room; i++) {
-            drop[i].done |= isnan(s->survey.rays.range_m[i]);
-            if (drop[i].done) continue;
-            open = 1;
-            has_room = take_surface(s, &drop[i], i);
-        }
-    }
-    return has_room;
 }
 
 static int places_compare(const void *a, const void *b)
@@ -83,13 +56,13 @@ static int places_compare(const void *a, const void *b)
     return (p->position_m[2] < q->position_m[2]) - (p->position_m[2] > q->position_m[2]);
 }
 
-/* Rays of one place: down beside it, and outward from the head. */
+/* Adds the rays of one place: down around it, and outward from the head. */
 static void add_looks(struct search *s, const struct viewpoint_place *p)
 {
     const double *at = p->position_m;
     for (int i = 0; i < LEGS; i++) {
         const double turn = 2.0 * M_PI * i / LEGS, x = sin(turn), y = cos(turn);
-        survey_add(&s->survey, (const double[3]){at[0] + AROUND_M * x, at[1] + AROUND_M * y, at[2]}, down);
+        survey_add(&s->survey, (const double[3]){at[0] + AROUND_M * x, at[1] + AROUND_M * y, at[2]}, survey_down);
         survey_add(&s->survey, at, (const double[3]){x, y, 0.0});
     }
 }
@@ -124,23 +97,23 @@ static int choose(struct search *s)
 static int places_find(struct search *s, struct sh_err *err)
 {
     const uint64_t all = s->across[0] * s->across[1];
-    struct drop drop[BVH_CHUNK];
     for (uint64_t first = 0; first < all; first += BVH_CHUNK) {
         const uint32_t n = (uint32_t)(all - first < BVH_CHUNK ? all - first : BVH_CHUNK);
         if (sh_stopped(s->report)) return sh_fail_stopped(err);
         for (uint32_t i = 0; i < n; i++)
-            drop[i] = (struct drop){.x = s->first_m[0] + (double)((first + i) / s->across[1]) * s->grid->step_m,
-                                    .y = s->first_m[1] + (double)((first + i) % s->across[1]) * s->grid->step_m,
-                                    .top_m = s->survey.scene->max_m[2] + 0.01 * s->survey.radius_m + 1e-3,
-                                    .last_m = INFINITY};
-        if (!find_floors(s, drop, n)) return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
+            s->column[i] =
+                (struct survey_column){s->first_m[0] + (double)((first + i) / s->across[1]) * s->grid->step_m,
+                                       s->first_m[1] + (double)((first + i) % s->across[1]) * s->grid->step_m,
+                                       s->survey.scene->max_m[2] + 0.01 * s->survey.radius_m + 1e-3, INFINITY};
+        if (!survey_descend(&s->survey, s->column, n, s->report, take_surface, s))
+            return sh_fail(err, SH_ENOMEM, "no memory for places to stand");
         sh_progress(s->report, "looking for floors", (double)(first + n) / (double)all);
     }
     if (s->n_floors > 0) qsort(s->floor, s->n_floors, sizeof *s->floor, places_compare);
     return choose(s) ? sh_check_stop(s->report, err) : sh_fail(err, SH_ENOMEM, "no memory for places to stand");
 }
 
-/* The step with which the grid has as many places as are allowed. A side that is shorter than a step still has one. */
+/* Returns the step with which the grid has as many places as are allowed. A side shorter than a step has one. */
 static double least_step_m(const struct viewpoint_grid *g)
 {
     const double x_m = g->max_m[0] - g->min_m[0], y_m = g->max_m[1] - g->min_m[1];

@@ -22,8 +22,6 @@ int survey_open(struct survey *s, const struct scene *scene, const struct viewpo
                 const struct sh_report *report, struct sh_err *err)
 {
     rays_set_up(s, scene, view);
-    /* Places outside are farther away: from there a ray may take one surface for another at their border, which a
-     * survey can bear. If the BVH reached so far for places inside, too, most of their hits would be in doubt. */
     int rc = bvh_create(scene, 0, report, &s->own, err);
     s->bvh = s->own;
     return rc == SH_OK ? bvh_work_create(&s->work, err) : rc;
@@ -66,6 +64,28 @@ void survey_cast(struct survey *s)
 void survey_clear(struct survey *s)
 {
     s->rays.n = 0;
+}
+
+int survey_descend(struct survey *s, struct survey_column *column, uint32_t n, const struct sh_report *report,
+                   int (*take)(void *ctx, uint32_t i, double z_m), void *ctx)
+{
+    const double step_m = fmax(1e-6 * s->radius_m, 1e-6); /* coordinates up to 1e9 m still move by it */
+    for (int open = 1; open && !sh_stopped(report);) {    /* a forest has hundreds of surfaces over its ground */
+        open = 0;
+        survey_clear(s);
+        for (uint32_t i = 0; i < n; i++)
+            survey_add(s, (const double[3]){column[i].x_m, column[i].y_m, column[i].top_m}, survey_down);
+        survey_cast(s);
+        for (uint32_t i = 0; i < n; i++) {
+            if (isnan(s->rays.range_m[i])) continue;
+            const double z_m = column[i].top_m - s->rays.range_m[i];
+            open = 1;
+            if (!take(ctx, i, z_m)) return 0;
+            column[i].last_m = z_m;
+            column[i].top_m = z_m - step_m;
+        }
+    }
+    return 1;
 }
 
 double survey_cosine(const struct survey *s, uint32_t ray)

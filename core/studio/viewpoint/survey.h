@@ -40,17 +40,29 @@ void survey_add(struct survey *s, const double from_m[3], const double dir[3]);
 void survey_cast(struct survey *s);
 void survey_clear(struct survey *s);
 
-/* Cosine between a ray and its triangle's normal, -1..1: negative where it meets the front. */
+/* A column of the scene that rays go down, from surface to surface. */
+struct survey_column {
+    double x_m, y_m;
+    double top_m;  /* where the next ray begins, just below the last surface */
+    double last_m; /* that surface; INFINITY: none yet */
+};
+static const double survey_down[3] = {0.0, 0.0, -1.0};
+/* Follows n <= BVH_CHUNK columns together, until none has a further surface or report asks to stop. take gets each
+ * surface at z_m, hit by ray i of column i, whose last_m is still the surface above. Returns 0 where take does. */
+int survey_descend(struct survey *s, struct survey_column *column, uint32_t n, const struct sh_report *report,
+                   int (*take)(void *ctx, uint32_t i, double z_m), void *ctx);
+
+/* Returns the cosine between a ray and its triangle's normal, -1..1: negative where it hits the front. */
 double survey_cosine(const struct survey *s, uint32_t ray);
 
-/* Figures of the rays first to first + n - 1. */
+/* survey_look returns these figures of the rays first to first + n - 1. */
 struct survey_sight {
     double seen, front; /* shares: of rays with a hit in range; of these, on a front */
     double far_m;       /* geometric mean of these ranges; 0: none */
 };
 struct survey_sight survey_look(const struct survey *s, uint32_t first, uint32_t n);
 
-/* Direction at an azimuth (clockwise from y) and an elevation. */
+/* Sets dir to the direction at an azimuth (clockwise from y) and an elevation. */
 void survey_direction(double azimuth_rad, double elevation_rad, double dir[3]);
 
 /* floors.c: the best place above a floor, inside and on the ground. The score is 0 where there is none. */
@@ -61,7 +73,7 @@ struct survey_best {
 };
 int survey_floors(struct survey *s, const struct sh_report *report, struct survey_best *best, struct sh_err *err);
 
-/* outside.c. Returns 0 where the view holds none of the scene from any place. */
+/* outside.c: finds the best place outside. Returns 0 where the view holds none of the scene from any place. */
 int survey_outside(struct survey *s, struct viewpoint *out);
 /* Sets the bounds to those of the part that has the most surface: a cell of a quarter of the range. */
 int survey_narrow(struct survey *s, struct sh_err *err);

@@ -731,10 +731,11 @@ def _geo_points(p: Points, raw, a: Dict) -> None:
     x, y, z = (_scaled(v, 1.0, shift) for v, shift in zip(d, a["anchor"]))
     if a["crs"] == CRS_GEODETIC:
         y = _mapped(_short_way, y)
+    if a["moving"] & 1:
+        p.range_m = _column((_NAN for _ in range(len(p))), len(p))
+    elif a["crs"] == CRS_GEODETIC:
         home = geodetic_to_ecef(*a["anchor"])
         p.range_m = _mapped(lambda *at: _distance(geodetic_to_ecef(*at), home), x, y, z)
-    elif a["moving"] & 1:
-        p.range_m = _column((_NAN for _ in range(len(p))), len(p))
     else:
         p.range_m = _mapped(_length, *d)
     p.x, p.y, p.z, p.range_m = (_empty_as_nan(c, p.echo_count) for c in (x, y, z, p.range_m))

@@ -13,7 +13,7 @@ export function ageRow(view) {
   const follow = () => {
     const {drawn, left} = view.state;
     const isSoon = left > 0.2 * drawn && performance.now() - since_ms < PATIENCE_MS;
-    if (view.cloud.latest_s === latest_s || view.cloud.latest_s === -Infinity || isSoon) return; // tried points have no time
+    if (view.cloud.latest_s === latest_s || view.cloud.latest_s === -Infinity || isSoon) return; // trial points have no time
     since_ms = performance.now();
     latest_s = view.cloud.latest_s;
     view.times({from: latest_s - Number(select.value), to: latest_s + 1}); // later ones are of a head that was restarted

@@ -18,7 +18,7 @@ export class Bar {
     byId('start').addEventListener('click', () => run(session.state === 'fault' ? '*RST' : 'SCAN:STARt')());
     byId('stop').addEventListener('click', run('SCAN:STOP'));
     byId('control').addEventListener('click', () =>
-      this.#do(() => (session.mine ? session.release() : session.take()), log));
+      this.#do(() => (session.mine ? session.head.releaseControl() : session.head.takeControl()), log));
     session.addEventListener('change', () => this.show());
     this.show();
   }

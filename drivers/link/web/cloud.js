@@ -40,6 +40,7 @@ function mix(h) {
 }
 
 const MODELLED = ['reflectance', 'amplitude']; // a block whose values are all NaN, not modelled, has no array
+const ARRAYS = ['position', 't', 'range', 'label', 'echo', 'pulse', ...MODELLED, 'rgb'];
 
 class Block {
   n = 0;
@@ -101,7 +102,6 @@ class Block {
     this.label.set(part(batch.label), this.n);
     for (const name of MODELLED) {
       const values = batch[name];
-      if (this[name] === null && values && !Number.isNaN(values[from])) this[name] = new Float32Array(BLOCK).fill(NaN);
       if (this[name] === null && values && part(values).some((v) => v === v)) this[name] = new Float32Array(BLOCK).fill(NaN);
       if (this[name] !== null && values) this[name].set(part(values), this.n);
     }
@@ -116,7 +116,7 @@ class Block {
     const order = evenOrder(this.n);
     this.closed = true;
     this.order = order;
-    for (const name of ['position', 't', 'range', 'label', 'echo', 'pulse', 'reflectance', 'amplitude', 'rgb']) {
+    for (const name of ARRAYS) {
       const from = this[name];
       if (from === null) continue;
       const size = from.length / BLOCK;
@@ -134,7 +134,7 @@ class Block {
     }
   }
 
-  // The first and the last time of its points. It is looked for when somebody asks.
+  // Returns the first and the last time of its points, which are looked for only when somebody asks.
   get span() {
     const {n, t} = this, s = this.#span;
     for (; s.n < n; s.n++) {
@@ -144,13 +144,7 @@ class Block {
     return s;
   }
 
-  bytes() {
-    let sum = 0;
-    for (const name of ['position', 't', 'range', 'label', 'echo', 'pulse', 'reflectance', 'amplitude', 'rgb']) {
-      if (this[name] !== null) sum += this[name].byteLength;
-    }
-    return sum;
-  }
+  bytes() { return ARRAYS.reduce((sum, name) => sum + (this[name]?.byteLength ?? 0), 0); }
 }
 
 export class Cloud {
@@ -189,7 +183,7 @@ export class Cloud {
       if (block.n === BLOCK) block.close();
     }
     if (!batch.past && batch.t[batch.n - 1] >= 0) this.latest_s = this.blocks.at(-1).began_s + batch.t[batch.n - 1];
-    this.#let_go();
+    this.#dropOldest();
     this.changed?.();
   }
 
@@ -199,14 +193,14 @@ export class Cloud {
   }
 
   // Drops whole blocks, as long as the rest has at least the capacity.
-  #let_go() {
+  #dropOldest() {
     let n = 0;
     let over = this.count - this.capacity;
     while (over > 0 && this.blocks[n].n <= over) over -= this.blocks[n++].n;
-    this.#count_gone(this.blocks.splice(0, n));
+    this.#countGone(this.blocks.splice(0, n));
   }
 
-  #count_gone(blocks) {
+  #countGone(blocks) {
     for (const block of blocks) this.gone += block.n;
   }
 
@@ -239,7 +233,7 @@ export class Cloud {
     const out = this.blocks.filter(isOut);
     if (out.length === 0) return;
     this.blocks = this.blocks.filter((block) => !isOut(block));
-    this.#count_gone(out);
+    this.#countGone(out);
     this.replaced++;
     if (this.blocks.length === 0) this.clear();
     else this.changed?.();

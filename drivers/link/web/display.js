@@ -65,11 +65,6 @@ export class Display {
     return byId(`show-${key}`)?.checked ?? true;
   }
 
-  // It takes the scene as the head sent it, or null.
-  setScene(bytes) {
-    this.#view?.setScene(bytes);
-  }
-
   #apply() {
     this.#view.show({scene: this.#is('scene'), stations: this.#is('stations')});
     this.#showLegend();

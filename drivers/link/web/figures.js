@@ -27,11 +27,11 @@ const PAGE = [
   ['decode', 'To decode a point'],
   ['held', 'Points held'],
   ['gone', 'Points gone', 'The oldest, which had no room any more, and those of scans that were made again'],
-  ['past', 'Points from before', 'Of the time before this page was opened: the head keeps the last ones'],
+  ['past', 'Points from before', 'From before this page was opened: the head keeps the last ones'],
   ['drawn', 'Pictures a second', 'Drawn of late; none are drawn while nothing changes'],
 ];
 
-// In these rows any count but 0 is bad. Each row has its name in what figures() of a head returns.
+// In these rows any count but 0 is bad. Each value is the name of the count in the figures() of a Head.
 const LOSSES = {'lost-frames': 'lost_frames', 'repeated': 'repeated_frames', 'late-frames': 'late_frames',
   'restarts': 'jumps_back', 'lost-pulses': 'left_out_pulses', 'dropped': 'dropped_pulses',
   'unplaced': 'unplaced_pulses', 'bad': 'bad_bytes'};
@@ -158,10 +158,10 @@ function pastText({past_points: points, past_gone: gone, past_lost_frames: lost}
     lost > 0 && `${grouped(lost)} stream frames not kept`].filter(Boolean).join(', ');
 }
 
-// By the number of the port's state (drivers/protocol/EVENTS.md).
+// These are the names of a port's states, by their numbers (drivers/protocol/EVENTS.md).
 const PTP_PORTS = {1: 'INITIALIZING', 2: 'FAULTY', 4: 'LISTENING', 8: 'UNCALIBRATED', 9: 'SLAVE'};
 
-/** The port, the servo and the offset; empty where the head follows no master. */
+/** Returns the port, the servo and the offset in words; '' if the head follows no master. */
 export function ptpText(t) {
   if (!t.ptp_port) return '';
   return `, PTP ${PTP_PORTS[t.ptp_port] ?? t.ptp_port}, s${t.ptp_servo}, ${grouped(number(t.ptp_offset_ns))} ns`;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// One head: its connection, commands and replies, control, its description, and losses.
+// This class is the client of one head: connection, commands and replies, control, description, and losses.
 import {STATES} from './native.js';
 import {Losses} from './losses.js';
 import {CommandError, Replies} from './replies.js';
@@ -27,7 +27,7 @@ export const peerOf = ({session, text = ''}) => (session && text.includes(' ') ?
  * - `state` {state, before}; `control` {session: 0 nobody, who: kind and address, or '', own, mine}
  * - `lost` {by, frames, pulses}, by 'head' (not computed in time), 'link' (this page was too slow), 'wire' (damaged) or
  *   'page' (dropped here)
- * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; null for what was lost on the way
+ * - `scan` {scan, fired, cast, lost, received, missing} at a scan's end; a count is null if it was lost on the way
  * - `waves` {pulse, scan, windows}: what askWaves asked for
  * - `restarted`: the sequence of frames began anew, so all that the head said before is void
  * - `points`, `descriptor`, `anchor`, `emitter`, `names`, `line-end`, `telemetry`, `event`, `poses` as the Decoder has
@@ -56,12 +56,12 @@ export class Head extends EventTarget {
   #isClosed = false;
   #figures = {};
   #losses = null;
-  #knowsWho = false; // the head says who has control
+  #knowsWho = false; // the head has SYSTem:CONTrol:WHO?
   #told = ''; // who has control, as in the last `control` event
 
-  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points from
-   * before, too, where the head keeps them; a batch of these has `past`. It connects at once, and again and again until
-   * close(). */
+  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points
+   * from before, too, where the head keeps them; a batch of these has `past`. It connects at once, and again and again
+   * until close(). */
   constructor(url, {worker = typeof Worker === 'function', past = false} = {}) {
     super();
     this.#past = past;
@@ -78,8 +78,8 @@ export class Head extends EventTarget {
 
   // ---- commands
 
-  /** A promise of the reply to one command line. It throws CommandError {number, text} for an ERR; its number is 0
-   * where no reply came. */
+  /** Returns a promise of the reply to one command line. It throws CommandError {number, text} for an ERR; its number
+   * is 0 if no reply came. */
   command(line, {timeout_s = TIMEOUT_S} = {}) {
     return this.#replies.ask(line, timeout_s);
   }
@@ -122,8 +122,9 @@ export class Head extends EventTarget {
 
   /** Counts of this connection, by the words of COUNTS.md:
    * - frames, bytes, points (records, shots without echo among them), pulses (received), empty
-   * - lost_frames: missing in the sequence; of these left_out_frames, with left_out_pulses, as this page was too slow
-   * - lost_pulses: lost by the head; missing_pulses: of all scans that ended here, delivered and not received
+   * - lost_frames: missing in the sequence
+   * - left_out_frames, left_out_pulses: the part of these that the head left out, since this page was too slow
+   * - lost_pulses: lost by the head; missing_pulses: of all scans that ended here, delivered but not received
    * - dropped_points, dropped_pulses: decoded, and dropped by the page itself
    * - unplaced_points, unplaced_pulses: came before their anchor or their pose
    * - past_points, past_pulses, past_hash: from before this connection, and in none of the other counts
@@ -155,7 +156,7 @@ export class Head extends EventTarget {
       event.preventDefault?.();
       worker.terminate();
       this.#wire = this.#inPage();
-      if (this.isOpen) this.#closed({code: 1006, reason: 'this page failed to read the stream'}); // which connects again
+      if (this.isOpen) this.#closed({code: 1006, reason: 'this page failed to read the stream'}); // this connects again
       else this.#connect();
     };
     return {post: (message) => worker.postMessage(message), end: () => worker.terminate()};
@@ -219,7 +220,7 @@ export class Head extends EventTarget {
     this.isOpen = true;
     this.#replies.open();
     this.#say('open', {connection});
-    this.#introduce().catch(() => {}); // gone again, which `close` says
+    this.#introduce().catch(() => {}); // the head is gone again; a `close` event says so
   }
 
   // Asks for identity and state. HELP comes first: an older head has no session numbers, and the question would put an
@@ -252,7 +253,7 @@ export class Head extends EventTarget {
     this.#say('close', {code, words, again_s, wasOpen});
   }
 
-  // ---- what the head says of itself
+  // ---- the head's description and state
 
   #become(state) {
     if (state === this.state || state === undefined) return;

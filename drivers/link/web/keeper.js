@@ -24,7 +24,7 @@ export class Keeper {
     const bytes = new Uint8Array(buffer, byteOffset - HEADER, HEADER + length).slice();
     if (frame.type === FRONT[0] && !(frame.flags & REPEAT)) this.#front.clear(); // a new scan has another anchor
     if (isFront) this.#front.set(frame.type, bytes);
-    if (this.isOn) this.#put(bytes);
+    if (this.isOn) this.#append(bytes);
   }
 
   /** Another connection begins, maybe with another head. */
@@ -38,7 +38,7 @@ export class Keeper {
     this.#parts = [];
     this.#waiting = 0;
     this.#blob = new Blob([]);
-    for (const type of FRONT) if (this.#front.has(type)) this.#put(repeated(this.#front.get(type)));
+    for (const type of FRONT) if (this.#front.has(type)) this.#append(repeated(this.#front.get(type)));
   }
 
   /** Returns the recording as a Blob. */
@@ -51,7 +51,7 @@ export class Keeper {
   }
 
   // The browser may move what is in a Blob to its disk.
-  #put(bytes) {
+  #append(bytes) {
     if (this.bytes + bytes.length > MOST) this.isFull = true;
     if (this.isFull) return;
     this.#parts.push(bytes);

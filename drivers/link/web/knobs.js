@@ -26,7 +26,7 @@ const choice = (word) => CHOICES[word.toUpperCase()] ?? word;
 const sameWord = (a, b) => a.toUpperCase() === b.toUpperCase()
   || a.toUpperCase().startsWith(b.replace(/[a-z]+$/, '').toUpperCase()) && b.toUpperCase().startsWith(a.toUpperCase());
 
-// Turns '1200000' into '1 200 000'; the figures stay those of the head.
+// Turns '1200000' into '1 200 000'; the digits stay those of the head.
 function readable(text) {
   const [whole, part] = text.split('.');
   const grouped = whole.length > 5 ? whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') : whole;
@@ -35,8 +35,8 @@ function readable(text) {
 
 const decimals = (text) => (/^\d*\.(\d*)$/.exec(text)?.[1] ?? '').length;
 
-// Writes a limit in few figures, where it has no more: 1200000 becomes '1.2 M'. A limit one step beside a round number
-// that is not allowed is shown by that number: 59.999999 -> '< 60'; the tooltip has all figures.
+// Writes a limit in few digits: 1200000 becomes '1.2 M'. If a limit is one step from a round number that is not
+// allowed, it is shown by that number: 59.999999 becomes '< 60'. The tooltip has all digits.
 export function limit(text, step = '', isUpper = false) {
   const round = Number(Number(text).toFixed(Math.max(0, decimals(step) - 2)));
   const off = Math.abs(round - Number(text));
@@ -46,26 +46,26 @@ export function limit(text, step = '', isUpper = false) {
   const value = Number(text);
   for (const [scale, prefix] of [[1e6, 'M'], [1e3, 'k']]) {
     if (Math.abs(value) >= Math.max(scale, 1e4)) {
-      const few = value / scale;
-      if (Number(few.toPrecision(4)) === few) return `${String(few).replace('-', '−')}\u00a0${prefix}`;
+      const scaled = value / scale;
+      if (Number(scaled.toPrecision(4)) === scaled) return `${String(scaled).replace('-', '−')}\u00a0${prefix}`;
     }
   }
   return readable(text.replace(/^-?\d*\.\d+$/, (all) => inward(all, isUpper)));
 }
 
-// Rounds a number to four decimals or, below 0.1, to four significant figures (at most 12 decimals).
-function inFew(text, round) {
+// Rounds a number to four decimals or, below 0.1, to four significant digits (at most 12 decimals).
+function rounded(text, round) {
   const value = Number(text), places = Math.min(12, 3 - Math.min(-1, Math.floor(Math.log10(Math.abs(value) || 1))));
   if ((text.split('.')[1] ?? '').length <= places) return text;
   const scale = 10 ** places;
   return String(Number((round(value * scale) / scale).toFixed(places)));
 }
 
-// Returns a value in few figures; a word stays as it is.
-export const few = (text) => (/^-?\d*\.\d+$/.test(text) ? inFew(text, Math.round) : text);
+// Returns a value with few digits; a word stays as it is.
+export const shortened = (text) => (/^-?\d*\.\d+$/.test(text) ? rounded(text, Math.round) : text);
 
 // A lower limit is rounded up, an upper one down, so that the shown number is allowed.
-const inward = (text, isUpper) => inFew(text, isUpper ? Math.floor : Math.ceil);
+const inward = (text, isUpper) => rounded(text, isUpper ? Math.floor : Math.ceil);
 
 // Returns whether no other value can be set now: only one is allowed or, as with a pan that stands still, only the
 // present one.
@@ -78,7 +78,7 @@ export class Knobs extends EventTarget {
   #knobs = new Map(); // it maps a header to {field, hint, box, setting, value}
   #note = make('p', {class: 'note'});
   #form = make('div', {class: 'groups'});
-  #again;
+  askAgain = atMostEvery(500, () => this.#ask().catch(() => {}));
 
   constructor(session) {
     super();
@@ -86,7 +86,6 @@ export class Knobs extends EventTarget {
     const reset = make('button', {type: 'button', id: 'reset', click: () => this.#reset()}, 'Settings of power-up');
     this.reset = reset;
     bodyOf('knobs').append(this.#note, this.#form, make('div', {class: 'actions'}, reset));
-    this.#again = atMostEvery(500, () => this.#ask().catch(() => {}));
     session.addEventListener('change', () => {
       if (session.link === 'open' && this.#knobs.size === 0) this.load();
       this.#allow();
@@ -114,10 +113,6 @@ export class Knobs extends EventTarget {
     this.#lastDescriptor = now;
   }
 
-  askAgain() {
-    this.#again();
-  }
-
   #loading = false;
   async load() {
     if (this.#loading) return;
@@ -143,7 +138,7 @@ export class Knobs extends EventTarget {
       this.#form.replaceChildren(...groups.map(([title, rows]) => [title, rows.filter(([header]) => has.has(header))])
         .filter(([, own]) => own.length > 0).map(([title, own]) => this.#makeGroup(title, own, has)));
     }
-    this.#allow(); // before the values have come, too
+    this.#allow(); // this must hold before the values have come, too
   }
 
   // The title of a group has the unit if all its settings have the same one.
@@ -162,13 +157,13 @@ export class Knobs extends EventTarget {
 
   #makeKnob(setting, name, says) {
     const id = `knob-${setting.header.replaceAll(':', '-').toLowerCase()}`;
-    const knob = {setting, value: '', shown: '', says}; // shown is its value, in few figures
+    const knob = {setting, value: '', shown: '', says}; // shown is its value, with few digits
     const attributes = {id, name: setting.header, 'aria-describedby': `${id}-hint ${says.id}`, autocomplete: 'off'};
     const isChoice = setting.kind === 'word' || setting.values.length > 0;
     knob.field = isChoice ? make('select', attributes) : make('input', {...attributes, type: 'text', inputmode: 'decimal', spellcheck: 'false'});
     knob.field.addEventListener('change', () => this.#set(knob));
     knob.field.addEventListener('keydown', (event) => {
-      if (event.key === 'Escape') this.#put(knob, knob.value);
+      if (event.key === 'Escape') this.#showValue(knob, knob.value);
       if (event.key === 'ArrowUp' || event.key === 'ArrowDown') this.#nudge(knob, event);
     });
     knob.hint = make('span', {class: 'hint', id: `${id}-hint`});
@@ -184,7 +179,7 @@ export class Knobs extends EventTarget {
       knob.options = setting.values.join();
       const name = (value) => (setting.kind === 'word' ? choice(value) : readable(value));
       knob.field.replaceChildren(...setting.values.map((value) => make('option', {value}, name(value))));
-      if (knob.value) this.#put(knob, knob.value);
+      if (knob.value) this.#showValue(knob, knob.value);
     }
     this.#hint(knob);
   }
@@ -204,17 +199,17 @@ export class Knobs extends EventTarget {
     return say(knob.hint, NOTES[header] ?? (min ? `${limit(min, step)}\u2009…\u2009${limit(max, step, true)}` : ''));
   }
 
-  #put(knob, value) {
+  #showValue(knob, value) {
     knob.value = value;
     const option = knob.setting.values.find((word) => (knob.setting.kind === 'word' ? sameWord(word, value) : Number(word) === Number(value)));
-    knob.shown = knob.field.value = option ?? few(value);
+    knob.shown = knob.field.value = option ?? shortened(value);
     knob.field.title = knob.shown === value || option ? '' : value; // it has all figures
   }
 
   async #read() {
     await Promise.all([...this.#knobs.values()].map(async (knob) => {
       const value = await this.#session.command(`${knob.setting.header}?`);
-      if (knob.field !== document.activeElement || knob.field.value === knob.shown) this.#put(knob, value);
+      if (knob.field !== document.activeElement || knob.field.value === knob.shown) this.#showValue(knob, value);
       else knob.value = value; // the user types: the text stays, Escape brings the present value
     }));
     this.dispatchEvent(new Event('values'));
@@ -234,7 +229,7 @@ export class Knobs extends EventTarget {
 
   async #set(knob) {
     const value = knob.field.value.trim();
-    if (value === '' || value === knob.shown) return this.#put(knob, knob.value);
+    if (value === '' || value === knob.shown) return this.#showValue(knob, knob.value);
     knob.box.dataset.waiting = '';
     try {
       const reply = await this.#session.command(`${knob.setting.header} ${value}`);
@@ -242,7 +237,7 @@ export class Knobs extends EventTarget {
       knob.value = reply === 'OK' ? value : reply;
     } catch (error) {
       this.#refuse(knob, why(error));
-      this.#put(knob, knob.value);
+      this.#showValue(knob, knob.value);
     }
     delete knob.box.dataset.waiting;
     try {
@@ -251,7 +246,7 @@ export class Knobs extends EventTarget {
     } catch { /* gone */ }
   }
 
-  // Arrow keys change the last figure that is shown by one; the head has the last word, as always.
+  // Arrow keys change the last digit that is shown by one. The head may still refuse the value.
   #nudge(knob, event) {
     if (knob.field.tagName === 'SELECT' || knob.field.readOnly) return;
     const number = Number(knob.field.value);
@@ -272,7 +267,7 @@ export class Knobs extends EventTarget {
     }
   }
 
-  // Settings are there for those who may change them.
+  // Settings are shown only to the session that has control, and a field is disabled if it can't be set now.
   #allow() {
     const common = this.#session.whyNot();
     byId('panel-knobs').hidden = !this.#session.mine;

@@ -32,8 +32,8 @@ export class Limits {
     view.ramp({scale: p.scale.value});
   }
 
-  // When another figure is shown, it gets the limits that it had last on this page. Another scene has limits of its
-  // own.
+  // When another figure is shown, it gets the limits that it had last on this page. The browser does not keep them,
+  // since another scene has other limits.
   show(mode) {
     const p = this.#parts, {kind, unit} = MODES[mode];
     this.#mode = mode;
@@ -71,7 +71,7 @@ export class Limits {
     this.#chosenOf.set(this.#mode, {share: share.value, low: low.value, high: high.value});
   }
 
-  // Returns whether the limits hold.
+  // Returns whether the limits are valid.
   #apply() {
     const p = this.#parts, isByHand = p.share.value === 'hand' && this.#mode !== 'age';
     const [low, high] = [numberOf(p.low.value), numberOf(p.high.value)], isRight = low < high;

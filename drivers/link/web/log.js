@@ -10,26 +10,25 @@ const MOST = 200; // so many entries are stored
 const HEADS_OWN = {101: 'Client lost (101):', 102: 'Reader too slow (102):', 103: 'Pulses lost (103):', 104: 'Client refused (104):',
   105: 'Incomplete command (105):', 106: 'Lines lost (106):', 107: 'Time server (107):'};
 
-const ns = (value) => Number(value);
-const seconds = (value) => `${(ns(value) / 1e9).toFixed(3)} s`;
+const seconds = (ns) => `${(Number(ns) / 1e9).toFixed(3)} s`;
 
 // Returns an event in words, and how bad it is; null: there is nothing to report.
 export function eventWords(e) {
   switch (e.name) {
     case 'STATE': return [stateWord(stateName(e.state)), stateName(e.state) === 'fault' ? 'bad' : ''];
     case 'SCAN_START': return [`Scan ${e.scan} begins`, ''];
-    case 'SCAN_END': return [`Scan ${e.scan} ends: ${grouped(ns(e.fired))} pulses fired`
-      + (ns(e.lost) > 0 ? `, ${grouped(ns(e.lost))} lost by the head` : ''), ns(e.lost) > 0 ? 'warn' : ''];
-    case 'OVERRUN': return [`The head could not keep up: ${grouped(ns(e.lost))} pulses lost`, 'warn'];
-    case 'READER_LOST': return ns(e.frames) > 0
-      ? [`This page could not follow: ${grouped(ns(e.frames))} stream frames with ${grouped(ns(e.pulses))} pulses lost`, 'warn'] : null;
+    case 'SCAN_END': return [`Scan ${e.scan} ends: ${grouped(Number(e.fired))} pulses fired`
+      + (Number(e.lost) > 0 ? `, ${grouped(Number(e.lost))} lost by the head` : ''), Number(e.lost) > 0 ? 'warn' : ''];
+    case 'OVERRUN': return [`The head could not keep up: ${grouped(Number(e.lost))} pulses lost`, 'warn'];
+    case 'READER_LOST': return Number(e.frames) > 0
+      ? [`This page could not follow: ${grouped(Number(e.frames))} stream frames with ${grouped(Number(e.pulses))} pulses lost`, 'warn'] : null;
     case 'CONTROL': return [e.session ? `${sessionWords(e.session, peerOf(e))} has control` : 'Nobody has control', ''];
-    case 'ERROR': return ns(e.held_back) > 0
-      ? [`${grouped(ns(e.held_back))} more errors, the last one ${e.number}`, 'bad']
+    case 'ERROR': return Number(e.held_back) > 0
+      ? [`${grouped(Number(e.held_back))} more errors, the last one ${e.number}`, 'bad']
       : [`${e.session ? `Session ${e.session}: ` : ''}${HEADS_OWN[e.number] ?? e.number}${e.text ? ` ${e.text}` : ''}`, 'bad'];
-    case 'SETTINGS': return [`Other settings from pulse ${grouped(ns(e.first_pulse))} on`, ''];
+    case 'SETTINGS': return [`Other settings from pulse ${grouped(Number(e.first_pulse))} on`, ''];
     case 'SITE': return [`Station ${e.a}${e.text ? ` (${e.text})` : ''} was moved`
-      + (ns(e.b) > 0 ? `; ${grouped(ns(e.b))} warnings` : ''), ns(e.b) > 0 ? 'warn' : ''];
+      + (Number(e.b) > 0 ? `; ${grouped(Number(e.b))} warnings` : ''), Number(e.b) > 0 ? 'warn' : ''];
     case 'PTP': return [`PTP: ${e.text}`, e.text.includes(' on FAULT_DETECTED') ? 'bad' : ''];
     case 'POSE_LATE': return [`No pose of the platform in time, for ${seconds(e.since_ns)}`, 'warn'];
     case 'PPS': case 'TIME': return null; // they come every second; the figures show the time
@@ -66,7 +65,7 @@ export class Log {
   #show() {
     this.#timer = 0;
     const list = this.#list, before = list.scrollHeight, top = list.scrollTop;
-    for (const entry of this.#waiting.splice(0)) this.#put(entry);
+    for (const entry of this.#waiting.splice(0)) this.#showEntry(entry);
     while (list.children.length > MOST) {
       list.lastChild.remove();
       this.#gone++;
@@ -75,7 +74,7 @@ export class Log {
     say(this.#aside, this.#gone > 0 ? `the last ${MOST}` : '');
   }
 
-  #put({text, kind, at}) {
+  #showEntry({text, kind, at}) {
     if (this.#last?.text === text) {
       this.#last.times++;
       this.#last.span.textContent = `${text} (${this.#last.times} times)`;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Losses of a connection's scans, as COUNTS.md defines them. It also finds the end of a scan
-// whose SCAN_END was lost (LOSSES.md). Pure.
+// This class counts the losses of a connection's scans, as COUNTS.md defines them. It also finds the end of a scan
+// whose SCAN_END was lost (LOSSES.md). It is pure.
 import {STATES} from './native.js';
 
 const IN_SCAN = ['scanning', 'spin-down'];
@@ -9,14 +9,14 @@ export class Losses {
   leftOutFrames = 0; // by the head, since this page was too slow (READER_LOST)
   leftOutPulses = 0;
   missing = 0; // pulses of the scans that ended: delivered, and not received
-  #said = 0; // pulses lost by the head, from OVERRUN events, and
-  #ended = 0; // the same from the ends of scans; some events of either kind may not have come
+  #byOverruns = 0; // pulses that the head lost, by OVERRUN events
+  #byScanEnds = 0; // the same, by the ends of scans; events of either kind may be missing
   #damaged = 0; // missing frames that no READER_LOST explains, and that were reported
   #unexplained = 0; // all such frames at the last telemetry
   #scan = null;
   #isRunning = false;
   #shots = 0; // pulses received before the scan
-  #before = {scan: null, shots: 0}; // pulses received of a scan from before this page came
+  #before = {scan: null, shots: 0}; // the pulses of a scan that past() brought
   #counts = null; // the last telemetry
   #say;
 
@@ -28,7 +28,7 @@ export class Losses {
 
   /** Pulses that the head says it lost. */
   get byHead() {
-    return Math.max(this.#said, this.#ended);
+    return Math.max(this.#byOverruns, this.#byScanEnds);
   }
 
   descriptor(d) {
@@ -73,14 +73,14 @@ export class Losses {
         this.#isRunning = true;
         break;
       case 'SCAN_END':
-        if (!this.#isRunning || e.scan !== this.#scan) this.#ended += e.lost;
+        if (!this.#isRunning || e.scan !== this.#scan) this.#byScanEnds += e.lost;
         this.#end(e.scan, this.#final(e.scan) ?? {scan_fired: e.fired, scan_cast: null, scan_lost: e.lost}, e.shots);
         break;
       case 'STATE': // if SCAN_END was lost, the last telemetry has the counts, or else the next one
         if (STATES[e.before] === 'scanning' && this.#final(this.#scan)) this.#end(this.#scan, this.#counts, e.shots);
         break;
       case 'OVERRUN':
-        this.#said += e.lost;
+        this.#byOverruns += e.lost;
         if (e.lost > 0) this.#say('lost', {by: 'head', frames: 0, pulses: e.lost});
         break;
       case 'READER_LOST':
@@ -112,7 +112,7 @@ export class Losses {
     this.#isRunning = false;
     const {scan_fired: fired = null, scan_cast: cast = null, scan_lost: lost = null} = counts ?? {};
     const received = shots - this.#shots, missing = cast === null ? null : cast - lost - received;
-    this.#ended += lost ?? 0;
+    this.#byScanEnds += lost ?? 0;
     this.missing += missing ?? 0;
     this.#say('scan', {scan, fired, cast, lost, received, missing});
   }

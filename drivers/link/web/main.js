@@ -30,7 +30,7 @@ function startPanels() {
   for (const panel of document.querySelectorAll('.panel')) {
     const was = kept.get(panel.id);
     let open = panel.open = was === null ? matchMedia(WIDE).matches || few.includes(panel.id) : was === 'open';
-    panel.addEventListener('toggle', () => { // also once for the line above, which is not the user's wish
+    panel.addEventListener('toggle', () => { // this also comes once for the line above, which is no choice of the user
       if (panel.open !== open) kept.set(panel.id, panel.open ? 'open' : 'closed');
       open = panel.open;
     });
@@ -136,7 +136,7 @@ function startHead(cloud, view, names, keepsPast) {
     if (view) view.stations.fields = info.fields ?? [];
     stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true, info.run)).catch(() => {}); // it is gone again
     showPlan();
-    display.setScene(await fetchScene());
+    view?.setScene(await fetchScene());
   };
   stations.addEventListener('tell', ({detail}) => {
     bar.notice(detail.text, 6000, detail.kind);
@@ -195,7 +195,7 @@ async function start() {
   if (view) window.scanhead.tools = startTools(view, names.of);
   if (info?.recording) window.scanhead.recording = startRecording(info, cloud, view, names);
   else window.scanhead.head = startHead(cloud, view, names, Boolean(info?.run));
-  document.body.dataset.ready = ''; // until then nothing is shown, since parts are filled, or go
+  document.body.dataset.ready = ''; // nothing is shown before, since parts are still filled or removed
 }
 
 start();

@@ -34,7 +34,7 @@ function errorTerms(point, station, t) {
   const range_m = length(beam);
   if (Number.isFinite(point.range) && Math.abs(point.range - range_m) > PLACED * range_m + 0.1) return null;
   const u = unit(beam), [, , up] = headAxes(station);
-  const byPan = cross(up, u); // as long as the cosine of the elevation
+  const byPan = cross(up, u); // its length is the cosine of the elevation
   const right = unit(length(byPan) > 1e-9 ? byPan : headAxes(station)[0]);
   const higher = cross(u, right);
   const angle = (k) => t.angle_sigma_rad[k] ** 2 + t.angle_step_rad[k] ** 2 / 12;
@@ -213,7 +213,8 @@ export function flatnessOf(places, corners, origin, eye) {
 const NEIGHBOURS = 8;
 
 // Steps towards the mean distance of the points around a place. It follows from the area of the k nearest points, which
-// has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m, or the cloud was cleared.
+// has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m, or the cloud was
+// cleared.
 export function* spacingAround(cloud, place, first_m) {
   const {window, origin} = cloud;
   if (origin === null) return NaN;
@@ -237,7 +238,7 @@ export function* spacingAround(cloud, place, first_m) {
 
 // ---- in words
 
-// Returns how many decimals a figure has, by its error: the error has two figures if it begins below 2, else one.
+// Returns how many decimals a figure has, by its error: the error gets two digits if it begins with 1, else one.
 export function decimalsOf(error) {
   if (!(error > 0)) return 3;
   const power = Math.floor(Math.log10(error));

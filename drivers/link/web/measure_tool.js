@@ -52,8 +52,6 @@ export class MeasureTool {
     this.#choose('distance');
   }
 
-  isOn() { return false; }
-
   start() {
     this.#expected.ask();
     this.#view.tool = this;
@@ -66,7 +64,7 @@ export class MeasureTool {
     this.#view.tool = null;
     this.#picked = [];
     this.#view.overlay.layers.delete(this.#layer);
-    this.#view.hover(null);
+    this.#view.pointed.at(null);
     this.#show();
   }
 
@@ -74,7 +72,7 @@ export class MeasureTool {
 
   // The view asks these two for a click and a key on the picture.
   tap(p) {
-    this.#expected.ask(); // for the points of a scan since
+    this.#expected.ask(); // a newer scan may have other errors
     this.#stop?.();
     if (this.#kind === 'flatness' && this.#picked.length >= 3 && this.#isAt(this.#picked[0], p)) {
       this.#endOutline();
@@ -243,7 +241,7 @@ export class MeasureTool {
   }
 }
 
-// Writes two figures.
+// Writes a length in millimetres, with two significant digits.
 const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
 
 // Flatness stands beside the flatness that noise alone gives.

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The native protocol, from PROTOCOL.md and its pages alone: bytes to frames (Parser), frames to values and batches of
-// points in the scene frame (Decoder). Pure: it runs in a page, in a worker and in node.
+// This module reads the native protocol, by PROTOCOL.md and its pages alone. A Parser turns bytes into frames; a
+// Decoder turns frames into values and batches of points in the scene frame. It is pure: it runs in a page, a worker
+// and node.
 import {LOCAL, Parser, REPEAT} from './native_parser.js';
 import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLineEnd, readNames, readPoses,
   readTelemetry, refuse, Refused} from './native_fields.js';
@@ -21,7 +22,7 @@ export {POINTS};
 export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
 const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768, HAS_DEVIATIONS = 8;
 
-/** Frames to values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
+/** Turns frames into values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
  * counted, and otherwise ignored. Only callbacks may throw. */
 export class Decoder {
   /** Each callback may be left out: points(batch), descriptor(d), anchor(a), emitter(e), names(list), lineEnd(l),
@@ -44,12 +45,12 @@ export class Decoder {
     this.placer = null;
   }
 
-  /** 16 hexadecimal digits over all records of all points frames so far. */
+  /** Returns the hash of all records of all points frames so far, as 16 hexadecimal digits. */
   get pointHash() {
     return this.hash.toString();
   }
 
-  /** Whether points can be placed. */
+  /** Returns whether points can be placed. */
   get canPlace() {
     return this.descriptor !== null && this.anchor !== null;
   }
@@ -68,8 +69,8 @@ export class Decoder {
     }
   }
 
-  /** Takes a notice of the parser. Where another sequence begins, all that the stream has said is void, except what a
-   *  descriptor for this reader alone has said just before: it is the one of the new sequence. */
+  /** Takes a notice of the parser. When another sequence begins, all that the stream has said is void. But a descriptor
+   *  that came just before for this reader alone belongs to the new sequence, and stays. */
   notice({kind}) {
     if (kind !== 'restarted') return;
     if (!this.toldAlone) this.#forget();
@@ -77,7 +78,7 @@ export class Decoder {
     this.on.restarted?.({});
   }
 
-  /** The windows of a pulse, as Waves.of has them. */
+  /** Returns the windows of a pulse, as Waves.of does. */
   wavesOf(pulse, scan) {
     return this.waves.of(pulse, scan);
   }
@@ -176,7 +177,7 @@ export class Decoder {
     const t0_ns = view.getInt32(20, true) * 2 ** 32 + view.getUint32(16, true);
     if (pulse0 < this.lastPulse0) this.#forget();
     const until_ms = this.anchor?.until_ms ?? 0;
-    if (until_ms !== 0 && t0_ns >= until_ms * 1e6) this.anchor = null; // these have one that did not come
+    if (until_ms !== 0 && t0_ns >= until_ms * 1e6) this.anchor = null; // the next one did not come
     this.lastPulse0 = pulse0;
     this.hash.add(view, n, low, high);
     this.stats.shots += shots;

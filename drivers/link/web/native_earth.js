@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-// From the CRS of an anchor back to the scene frame: the exact way of ANCHOR.md, *From the scene to the CRS*.
-// WGS 84: NIMA TR8350.2. Transverse Mercator: Krueger's series in the form of Karney, Journal of Geodesy 85 (2011) 475,
-// to the fourth power of the third flattening: below 0.1 um within a zone. Polar stereographic: Snyder, USGS
-// Professional Paper 1395 (1987) 161.
+// This module converts places from an anchor's CRS back to the scene frame, exactly as ANCHOR.md, *From the scene to
+// the CRS*, defines it. WGS 84: NIMA TR8350.2. Transverse Mercator: Krueger's series in the form of Karney, Journal of
+// Geodesy 85 (2011) 475, to the fourth power of the third flattening: below 0.1 um within a zone. Polar stereographic:
+// Snyder, USGS Professional Paper 1395 (1987) 161.
 
 const RAD = Math.PI / 180, A_M = 6378137, F = 1 / 298.257223563, E2 = F * (2 - F), E = Math.sqrt(E2), N = F / (2 - F);
 const RADIUS_M = (A_M / (1 + N)) * (1 + N ** 2 / 4 + N ** 4 / 64);
@@ -20,7 +20,7 @@ export function geodeticToEcef(lat_deg, lon_deg, height_m) {
     (n * (1 - E2) + height_m) * s];
 }
 
-// Bowring's iteration (Survey Review 23, 1976); near the Earth three steps leave rounding alone.
+// Bowring's iteration (Survey Review 23, 1976); near the Earth only rounding is left after three steps.
 function ecefToGeodetic([x_m, y_m, z_m]) {
   const p = Math.hypot(x_m, y_m);
   let beta = Math.atan2(z_m, (1 - F) * p), lat = 0;
@@ -33,7 +33,8 @@ function ecefToGeodetic([x_m, y_m, z_m]) {
   return [lat / RAD, Math.atan2(y_m, x_m) / RAD, p * Math.cos(lat) + z_m * s - A_M * Math.sqrt(1 - E2 * s * s)];
 }
 
-// tan of the latitude -> tan of the conformal latitude, and back by Newton's method (Karney's equations 19 to 21).
+// Returns the tangent of the conformal latitude from that of the latitude. geographic() is the inverse, by Newton's
+// method (Karney's equations 19 to 21).
 function conformal(tau) {
   const sec = Math.sqrt(1 + tau * tau), sigma = Math.sinh(E * Math.atanh((E * tau) / sec));
   return tau * Math.sqrt(1 + sigma * sigma) - sigma * sec;
@@ -59,7 +60,8 @@ function series(coefficients, xi, eta) {
   return [a, b];
 }
 
-/** UTM or UPS of an EPSG code: degrees <-> easting, northing in metres. null: neither. */
+/** Returns the UTM or UPS grid of an EPSG code, which converts degrees to easting and northing in metres, and back.
+ * null: the code is of neither. */
 export function gridOf(epsg) {
   const isUps = epsg === 32661 || epsg === 32761, isSouth = Math.floor(epsg / 100) === 327, zone = epsg % 100;
   if (!isUps && !((isSouth || Math.floor(epsg / 100) === 326) && zone >= 1 && zone <= 60)) return null;
@@ -98,7 +100,7 @@ function utmGrid(lon0_deg, north0_m) {
       const tau = geographic(Math.sin(xi) / Math.hypot(Math.sinh(eta), Math.cos(xi)));
       return [Math.atan(tau) / RAD, lon0_deg + Math.atan2(Math.sinh(eta), Math.cos(xi)) / RAD];
     },
-    // By differences over 22 m, good to 1e-10 rad.
+    // It follows from a difference over 22 m, and is good to 1e-10 rad.
     convergence(lat_deg, lon_deg) {
       const [e0, n0] = forward(lat_deg - 1e-4, lon_deg), [e1, n1] = forward(lat_deg + 1e-4, lon_deg);
       return Math.atan2(e0 - e1, n1 - n0);
@@ -106,7 +108,7 @@ function utmGrid(lon0_deg, north0_m) {
   };
 }
 
-// The EPSG code of the scene's own grid: the one in which the station has its scene coordinates. 0: none.
+// Returns the EPSG code of the scene's own grid, in which the station has its scene coordinates. 0: there is none.
 function gridOfScene(a) {
   if (a.lat_deg === 0 && a.lon_deg === 0 && a.height_m === 0) return 0;
   const zone = Math.floor((a.lon_deg + 180) / 6), codes = [32661, 32761];
@@ -119,7 +121,7 @@ function gridOfScene(a) {
 
 const transposedTimes = (m, v) => [0, 1, 2].map((i) => m[i] * v[0] + m[3 + i] * v[1] + m[6 + i] * v[2]);
 
-// A function that takes a difference in ECEF to the scene frame.
+// Returns a function that turns a difference in ECEF into one in the scene frame.
 function sceneTurn(a, grid) {
   if (a.crs === 1) return (d) => transposedTimes(a.axes, d);
   let [lat_deg, lon_deg] = a.anchor, g = 0;
@@ -134,15 +136,16 @@ function sceneTurn(a, grid) {
   return (d) => transposedTimes(a.axes, transposedTimes(north, transposedTimes(east, d)));
 }
 
-/** A function from a place in the anchor's CRS, [x, y, z], to the scene frame, metres. Where the geoid's height is not
- * known (a head that moves, heights above the geoid), heights are taken as ellipsoidal: the scene is then too low or too
- * high by the geoid's height, everywhere the same. `isFlat`: it is the anchor's axes, transposed, and a shift. */
+/** Returns {at, isFlat}. at([x, y, z]) takes a place in the anchor's CRS to the scene frame, metres. isFlat: at() is
+ * only the anchor's axes, transposed, and a shift. If a head moves and heights are above the geoid, the geoid's height
+ * is not known. Heights are then taken as ellipsoidal, and the whole scene is too low or too high by the geoid's
+ * height. */
 export function toScene(a) {
   const shift = (p) => plus(a.station_m, transposedTimes(a.axes, minus(p, a.anchor)));
   if (a.crs === 0) return {isFlat: true, at: shift};
   const geoid_m = a.heights === 1 && (a.moving & 1) === 0 ? a.height_m - a.anchor[2] : 0;
   const own = gridOfScene(a), grid = a.crs === 2 ? gridOf(a.epsg) : null;
-  const lift_m = a.station_m[2] - a.height_m; // of a scene that lies in a grid
+  const lift_m = a.station_m[2] - a.height_m; // a scene in a grid has heights that differ by this
   if (own !== 0 && own === a.epsg) return {at: (p) => [p[0], p[1], p[2] + geoid_m + lift_m]};
   const toEcef = (p) => {
     if (a.crs === 1) return p;
@@ -162,14 +165,14 @@ export function toScene(a) {
 const plus = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 
-// ---- the same as a polynomial, since the exact way takes a microsecond a point
+// ---- a polynomial for the same, since the exact way takes a microsecond a point
 
 const POWERS = [];
 for (let i = 0; i < 4; i++) for (let j = 0; i + j < 4; j++) for (let k = 0; i + j + k < 4; k++) POWERS.push([i, j, k]);
 
-/** The cubic in u, v, w through `map` at the 20 places of a tetrahedral lattice in -1..1: 60 coefficients, those of
- * x, then y, then z, in the order of POWERS (1, w, w2, w3, v, vw, vw2, v2, v2w, v3, u, uw, uw2, uv, uvw, uv2, u2, u2w,
- * u2v, u3). */
+/** Returns the cubic in u, v, w through `map` at the 20 places of a tetrahedral lattice in -1..1: 60 coefficients,
+ * those of x, then y, then z, in the order of POWERS (1, w, w2, w3, v, vw, vw2, v2, v2w, v3, u, uw, uw2, uv, uvw, uv2,
+ * u2, u2w, u2v, u3). */
 export function fitCubic(map) {
   const rows = POWERS.map(([i, j, k]) => {
     const [u, v, w] = [i, j, k].map((m) => [0, 1, -1, 0.5][m]);

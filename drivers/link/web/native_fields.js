@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Payloads of fixed layout by the tables of the protocol's pages, as objects. A payload that LOSSES.md tells a
-// reader to refuse throws Refused.
+// This module reads payloads of fixed layout into objects, by the tables of the protocol's pages. A payload that
+// LOSSES.md tells a reader to refuse throws Refused.
 //
 // Whole numbers of 64 bits: times (`_ns`), the seed and an event's a, b, c are BigInt. All others are Numbers, or
 // BigInt where a Number can't hold them exactly (beyond 2^53).
@@ -37,7 +37,7 @@ function text(view, at, width) {
   return refuse('a text without an end');
 }
 
-// "name type" or "name type[count]", one after the other.
+// The table has "name type" or "name type[count]", one after the other.
 function layout(table) {
   let at = 0;
   const fields = table.trim().split(/\s*,\s*/).map((row) => {
@@ -113,8 +113,8 @@ export function readAnchor(view) {
 
 export const readLineEnd = (view) => whole(lineEnd, view, 'a line end');
 
-/** The scan's counts are null in recordings of older heads, which did not have them. lost_lines is sent where it is not 0.
- * ptp_port is 0, and the rest of ptp is not there, where the head follows no PTP master. */
+/** The scan's counts are null in recordings of older heads, which did not have them. lost_lines is sent where it is not
+ * 0. ptp_port is 0, and the rest of ptp is not there, where the head follows no PTP master. */
 export function readTelemetry(view) {
   const t = whole(telemetry, view, 'a telemetry');
   t.scan_fired = t.scan_cast = t.scan_lost = null;
@@ -143,8 +143,8 @@ const EVENTS = {
   13: ['PTP', 'port_and_servo', 'at_ns'],
 };
 
-/** Besides code, a, b, c and text: `name`, and what a, b, c mean under names of their own. An unknown code has the
- * name ''. */
+/** Returns code, a, b, c and text, the `name` of the event, and a, b, c again under names that say what they mean. An
+ * unknown code has the name ''. */
 export function readEvent(view) {
   const e = whole(event, view, 'an event');
   const [name, ...meanings] = EVENTS[e.code] ?? [''];
@@ -157,7 +157,7 @@ export function readEvent(view) {
   return e;
 }
 
-/** beams: {elevation_udeg, azimuth_udeg, offset_ns (a Number)} in the order in which they fire. */
+/** Its `beams` are {elevation_udeg, azimuth_udeg, offset_ns (a Number)} in the order in which they fire. */
 export function readEmitter(view) {
   const e = whole(emitter, view, 'an emitter');
   if (e.kind > 4 || e.sequence_ns_den === 0 || Math.abs(e.turn) !== 1) refuse('an emitter of an unknown kind');
@@ -168,7 +168,7 @@ export function readEmitter(view) {
   return e;
 }
 
-/** {t_ns, position_m, quat (w, x, y, z), frame, flags}, their times rising. */
+/** Returns [{t_ns, position_m, quat (w, x, y, z), frame, flags}], with rising times. */
 export function readPoses(view) {
   const n = view.byteLength >= 8 ? view.getUint32(0, true) : 0;
   if (n < 2 || n > (view.byteLength - 8) / pose.bytes) refuse('a poses frame with a wrong number of poses');
@@ -181,7 +181,7 @@ export function readPoses(view) {
   return poses;
 }
 
-/** The beginning of a waveforms frame; native_waves.js has its windows. */
+/** Reads the beginning of a waveforms frame; native_waves.js reads its windows. */
 export function readWavesHead(view) {
   const w = whole(waves, view, 'waveforms');
   if (w.sample_ps === 0 || w.bits < 8 || w.bits > 14 || !(w.count_signal > 0)) refuse('waveforms without a scale');
@@ -190,7 +190,7 @@ export function readWavesHead(view) {
 
 const utf8 = new TextDecoder();
 
-/** [{label, object, material}]. */
+/** Returns [{label, object, material}]. */
 export function readNames(view) {
   const first = view.byteLength >= 8 ? view.getUint32(0, true) : 0;
   const count = view.byteLength >= 8 ? view.getUint32(4, true) : Infinity;
@@ -208,7 +208,7 @@ export function readNames(view) {
   return Array.from({length: count}, (_, i) => ({label: first + i, object: name(), material: name()}));
 }
 
-/** The beginning of attributes and colours frames. */
+/** Reads the beginning of an attributes or colours frame. */
 export function readBeside(view, bytes, what) {
   if (view.byteLength < 16) refuse(`${what} shorter than their header`);
   const n_points = view.getUint32(12, true);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Bytes into frames and reply lines, by PROTOCOL.md (*Frames*) and LOSSES.md (*Resynchronisation*). Pure: no page, no network.
+// This module splits bytes into frames and reply lines, by PROTOCOL.md (*Frames*) and LOSSES.md (*Resynchronisation*).
+// It is pure: it needs no page and no network.
 import {crc32c} from './crc32c.js';
 import {Sequence} from './native_sequence.js';
 
@@ -33,8 +34,9 @@ const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 /** Takes bytes as they come. It keeps what it has not understood yet: less than a frame, 64 KiB. */
 export class Parser {
   /** Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
-   * n, t_ns}). A notice comes before the item that follows it. kind is gap, repeated, late, restarted, bad payload, bad
-   * bytes or cut; drivers/host/scanhead.h explains the rest. t_ns is a BigInt, or null before the first frame. */
+   * n, t_ns}). A notice comes before the frame or text that follows the damage. kind is gap, repeated, late, restarted,
+   * bad payload, bad bytes or cut; drivers/host/scanhead.h explains the rest. t_ns is a BigInt, or null before the
+   * first frame. */
   constructor({frame, text, notice} = {}) {
     this.onFrame = frame ?? (() => {});
     this.onText = text ?? (() => {});

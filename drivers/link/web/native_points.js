@@ -123,7 +123,8 @@ export function geoPlacer(descriptor, anchor) {
   const home = isGeodetic ? geodeticToEcef(...anchor.anchor) : null;
   const [ax, ay, az] = anchor.anchor, moves = anchor.moving & 1;
   const rangeOf = (dx, dy, dz) => {
-    if (!isGeodetic) return moves ? NaN : Math.sqrt(dx * dx + dy * dy + dz * dz);
+    if (moves) return NaN;
+    if (!isGeodetic) return Math.sqrt(dx * dx + dy * dy + dz * dz);
     const e = geodeticToEcef(ax + dx, ay + dy, az + dz);
     return Math.sqrt((e[0] - home[0]) ** 2 + (e[1] - home[1]) ** 2 + (e[2] - home[2]) ** 2);
   };

@@ -4,7 +4,8 @@
 
 const KEEP = 8192; // some seconds, and more than two of the longest frames
 
-// From pose a to pose b: the rotation at a, and the axis (head's frame) and angle of the turn from there.
+// Returns the way from pose a to pose b: the rotation at a, and the axis (head's frame) and angle of the turn from
+// there.
 function leg(a, b) {
   const [w, x, y, z] = a.quat, q = b.quat;
   const d = [w * q[0] + x * q[1] + y * q[2] + z * q[3], w * q[1] - x * q[0] - y * q[3] + z * q[2],
@@ -35,7 +36,7 @@ export class Poses {
     while (this.n > KEEP) this.n -= this.frames.shift().length;
   }
 
-  // The latest two poses of a frame with the time between them; null: the stream has not said it.
+  // Returns the leg between the two poses around a time, both of one frame, the newest that has them. null: none has.
   #leg(t_ns) {
     for (let f = this.frames.length - 1; f >= 0; f--) {
       const poses = this.frames[f], last = poses.length - 1;
@@ -69,7 +70,7 @@ export class Poses {
   }
 }
 
-// Rodrigues' formula in the head's frame, then the rotation at the leg's begin.
+// Turns by Rodrigues' formula in the head's frame, and then by the rotation at the leg's begin.
 function turn({a, b, axis, angle, rotation: m}, f, c, i) {
   const s = Math.sin(f * angle), versine = 1 - Math.cos(f * angle), [ax, ay, az] = axis;
   let x = c.x[i], y = c.y[i], z = c.z[i];

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-// The sequence numbers of frames, as LOSSES.md has them: which are missing, repeated or late.
+// This module finds missing, repeated and late frames by their sequence numbers, as LOSSES.md defines them.
 const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
 const LOCAL = 2;
 
-/** Whether number a comes before b, modulo 2^32. */
+/** Returns whether number a comes before b, modulo 2^32. */
 export const isBefore = (a, b) => ((a - b) >>> 0) >= 2 ** 31;
 
 /** Takes the headers of whole frames, one after the other. */
@@ -22,8 +22,9 @@ export class Sequence {
   first = 0;
   n = 1;
 
-  /** '', or what is noticed of the frame: 'gap': `n` frames are missing from number `first` on; 'restarted': another
-   * sequence begins; 'repeated', 'late': it is to be dropped. `first` is its own number but for a gap. */
+  /** Returns '', or a notice about the frame: 'gap': `n` frames are missing from number `first` on; 'restarted':
+   * another sequence begins; 'repeated' or 'late': it is to be dropped. Except for a gap, `first` is the frame's own
+   * number. */
   take(frame) {
     const {seq} = frame;
     this.first = seq;
@@ -67,13 +68,15 @@ export class Sequence {
       if (before >= gap.n) continue;
       const rest = gap.n - before - 1;
       gap.n = before;
+      // The second part drops the oldest gap if there is no room. That must not be the first part of the same gap.
+      if (this.#gaps.length === GAPS && gap === this.#gaps[0]) this.#gaps.push(this.#gaps.shift());
       this.#addGap((seq + 1) >>> 0, rest);
       return true;
     }
     return false;
   }
 
-  // Whether LATE_RUN late frames came in a row: they are another sequence, whose numbers were all missing.
+  // Returns whether LATE_RUN late frames came in a row. They are another sequence then: its numbers all lie in gaps.
   #isRun(seq) {
     this.#lateRun = this.#lateRun > 0 && seq === (this.#lastLate + 1) >>> 0 ? this.#lateRun + 1 : 1;
     this.#lastLate = seq;

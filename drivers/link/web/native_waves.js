@@ -18,7 +18,7 @@ function walk(view, n_windows, each) {
   }
 }
 
-/** The waveforms of the last pulses of a scan. */
+/** This class keeps the waveforms of the last pulses of a scan. */
 export class Waves {
   #frames = []; // {view, from, to}: number of the first and of the last pulse, rising; #frames[#begin] is the oldest
   #begin = 0;
@@ -63,9 +63,9 @@ export class Waves {
     }
   }
 
-  /** The windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples: Float32Array
-   * in units of the detection threshold, without the baseline}]. Empty where the head kept none, or they are no longer
-   * here. */
+  /** Returns the windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples:
+   * Float32Array in units of the detection threshold, without the baseline}]. The list is empty if the head kept none,
+   * or they are no longer here. */
   of(pulse, scan = this.#scan) {
     const found = [], frames = scan === this.#scan ? this.#frames : [];
     let low = Math.min(this.#begin, frames.length), high = frames.length; // the first frame that ends with this pulse or later

@@ -29,10 +29,10 @@ export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-// Says of a field whether what is in it can be taken.
+// Marks a field as valid or not.
 export function markField(field, isRight) {
   if (isRight) field.removeAttribute('aria-invalid');
-  else field.setAttribute('aria-invalid', 'true'); // an empty value would say that it is right
+  else field.setAttribute('aria-invalid', 'true'); // an empty value would mark it as valid
 }
 
 // Returns the number that a user has written, NaN for none: an empty text is not 0.
@@ -63,7 +63,7 @@ export function grouped(value, digits = 0) {
   return Number(text.replace(/\u2009/g, '')) !== 0 && value < 0 ? `−${text}` : text;
 }
 
-// Turns 1234567 into '1.23 M': three figures and a prefix, for rates and counts.
+// Turns 1234567 into '1.23 M': three digits and a prefix, for rates and counts.
 export function short(value, unit = '') {
   if (typeof value === 'bigint') value = Number(value);
   if (!known(value)) return NONE;
@@ -90,6 +90,9 @@ export function metres(value) {
   if (size < 0.99995) return `${sign}${three(size * 1e3)}\u00a0mm`;
   return `${sign}${three(size)}\u00a0m`;
 }
+
+// Writes the place of a station for people, to a centimetre.
+export const placeText = ({x_m, y_m, z_m}) => [x_m, y_m, z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−');
 
 // Writes seconds for people: nanoseconds up to minutes.
 export function duration(value_s) {

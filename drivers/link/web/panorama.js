@@ -16,8 +16,8 @@ const EMPTY = 0xffffffff;
 const SHAPES = [1, 0.125, 0.25, 0.5, 2, 4, 8]; // of pixels: height over width
 const TRIED = 500_000; // points for choosing one of them
 
-// A station is {number, x_m, y_m, z_m, heading_deg, pitch_deg, roll_deg}. Points outside the cloud's window of times, or
-// outside the section, are left out.
+// A station is {number, x_m, y_m, z_m, heading_deg, pitch_deg, roll_deg}. Points outside the cloud's window of times,
+// or outside the section, are left out.
 export class Panorama {
   width = 0;
   height = 0;
@@ -127,7 +127,7 @@ export class Panorama {
       yield;
     }
     const share = ({has}) => has.reduce((sum, v) => sum + v, 0) / has.length;
-    let best = tries[0], most = 1.1 * share(best); // square ones where others have hardly more
+    let best = tries[0], most = 1.1 * share(best); // pixels stay square unless others fill clearly more
     for (const other of tries) if (share(other) > most) [best, most] = [other, share(other)];
     this.#size(best.shape);
   }

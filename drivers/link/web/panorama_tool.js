@@ -133,10 +133,10 @@ export class PanoramaTool {
     return [Math.floor((e.clientX - left) / width * this.#canvas.width), Math.floor((e.clientY - top) / height * this.#canvas.height)];
   }
 
-  // Whether the picture shows other points now.
+  // Returns whether the picture shows other points now.
   get isOld() { return this.panorama.isOld(this.#view.cloud, this.#view.camera.section); }
 
-  // Returns the figures of the point of a pixel, or null: also while the picture shows another cloud.
+  // Returns the figures of the point of a pixel. null: it has none, or the picture shows another cloud now.
   pointAt([x, y]) {
     const {panorama} = this;
     const found = panorama?.cloud === this.#view.cloud ? panorama.pointAt(x, y) : null;
@@ -170,20 +170,20 @@ export class PanoramaTool {
       const k = e.shiftKey ? 10 : 1;
       this.#cursor = this.#cursor.map((v, a) => Math.min([width, height][a] - 1, Math.max(0, v + k * step[a])));
       this.#point(this.#cursor);
-      if (this.pointAt(this.#cursor) === null) this.#put([(this.#cursor[0] + 0.5) / width, (this.#cursor[1] + 0.5) / height]);
+      if (this.pointAt(this.#cursor) === null) this.#placeCross([(this.#cursor[0] + 0.5) / width, (this.#cursor[1] + 0.5) / height]);
     }
     e.preventDefault();
   }
 
-  // The user points at a point, here or in the picture.
+  // Shows the point at which the user points, here or in the picture.
   #markPoint(point) {
     const {panorama} = this;
-    this.#put(point && panorama ? panorama.shareOf(panorama.anglesOf([point.x, point.y, point.z])) : null);
+    this.#placeCross(point && panorama ? panorama.shareOf(panorama.anglesOf([point.x, point.y, point.z])) : null);
     this.#tell(point);
   }
 
   // Shows the cross at a share of width and height, or hides it.
-  #put(share) {
+  #placeCross(share) {
     this.#cross.hidden = share === null || share.some((v) => v < 0 || v > 1);
     if (this.#cross.hidden) return;
     this.#cross.style.left = `${(100 * share[0]).toFixed(2)}%`;

@@ -126,7 +126,7 @@ export class Past {
     try {
       await this.#readAll(() => connection === this.#connection);
     } catch {
-      // The head is gone, which the connection says.
+      // The head is gone; the connection reports that.
     }
     if (connection === this.#connection) this.#isReading = false;
   }

@@ -4,7 +4,7 @@ import {nearestTo} from './cloud.js';
 import {bodyOf, byId, fetchJson, figureList, grouped, make, makeSvg, metres, percent, say, short, NONE} from './page.js';
 
 const ROWS = [
-  ['sampled', 'Points looked at', 'Of those measured; the head looks at as many as it has time for'],
+  ['sampled', 'Points looked at', 'A part of those measured: the head looks at as many as it has time for'],
   ['empty', 'Pulses without echo'],
   ['density', 'Density, median', 'Points per square metre of the surfaces that are seen'],
   ['density-range', '5 % to 95 %'],
@@ -13,8 +13,8 @@ const DEVIATION = [
   ['dev-mean', 'Mean'],
   ['dev-rms', 'RMS'],
   ['dev-p95', 'p95', '95 % are smaller'],
-  ['dev-max', 'Largest', 'Of the points looked at; another point may be farther from its surface'],
-  ['dev-bound', 'Bound', 'What the methods and the noise allow'],
+  ['dev-max', 'Largest', 'The largest of the points looked at; another point may be farther from its surface'],
+  ['dev-bound', 'Bound', 'The largest that the methods and the noise allow'],
   ['dev-far', 'Far', 'Points with no surface within 10 m, which are in no other figure'],
   ['dev-along', 'In range', 'RMS along the beam, of points on smooth faces'],
   ['dev-sigma', 'Expected', 'RMS along the beam that noise and counts give'],

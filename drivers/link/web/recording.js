@@ -60,8 +60,8 @@ export class Recording {
       change: () => this.#what === 'sparse' && this.load()});
     p.edgeText = make('output', {for: 'long-edge', class: 'unit'});
     p.density = make('input', {id: 'density', type: 'text', inputmode: 'decimal', value: '100', change: () => this.load()});
-    p.says = make('p', {class: 'note', id: 'loaded'}); // it counts
-    p.done = make('p', {class: 'unseen', role: 'status'}); // a screen reader reads its end alone
+    p.says = make('p', {class: 'note', id: 'loaded'}); // it shows how much is loaded
+    p.done = make('p', {class: 'unseen', role: 'status'}); // a screen reader reads only the result
     p.bar = make('div');
     p.scanRow = make('div', {class: 'row'}, make('label', {for: 'mesh-scan'}, 'Scan'), p.scan);
     p.edgeRow = make('div', {class: 'row'}, make('label', {for: 'long-edge',
@@ -189,7 +189,7 @@ export class Recording {
     this.#progress(n, m.ratio.length, `${grouped(n)} of ${grouped(m.ratio.length)} triangles`);
   }
 
-  // The points are removed for a mesh.
+  // A mesh is shown instead of the points.
   #draw(mesh) {
     this.drawn = mesh !== null;
     if (!this.#view) return;

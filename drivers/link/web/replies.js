@@ -116,7 +116,7 @@ export class Replies {
     this.#send('*IDN?');
   }
 
-  // Answers to an earlier *IDN? may have been lost: after the first one the others have a moment.
+  // Answers to an earlier *IDN? may have been lost, so after the first answer the others have only LATER_MS to come.
   #settled() {
     clearTimeout(this.#timer);
     this.#settling.left--;

@@ -204,7 +204,7 @@ export class SectionTool {
     else if (id === 'move') {
       const [dx, dy] = arrowStep(camera, e.key, STEP_M * k);
       s.middle = sub(s.middle, [-dx, -dy, 0]);
-    } else s.push(id, sign * STEP_M * k * (id === 'bottom' ? -1 : 1)); // up is up
+    } else s.push(id, sign * STEP_M * k * (id === 'bottom' ? -1 : 1)); // the key up moves the bottom up, too
     this.#changed();
   }
 }

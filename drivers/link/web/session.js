@@ -73,21 +73,13 @@ export class Session extends EventTarget {
     this.#changed();
   }
 
-  take() {
-    return this.head.takeControl();
-  }
-
-  release() {
-    return this.head.releaseControl();
-  }
-
   #opened() {
     this.link = 'open';
     this.since = null;
     this.#changed();
   }
 
-  // again_s is the time until the next attempt; words say why the connection ended.
+  // words say why the connection ended.
   #closed({words = '', wasOpen = true} = {}) {
     if (wasOpen || this.link === 'opening') this.since = new Date();
     if (wasOpen || this.words === '') this.words = words;

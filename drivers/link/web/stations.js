@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 // This panel shows the places of the stations. With control, and while the head is idle, they can be moved.
-import {bodyOf, fetchJson, make, say} from './page.js';
+import {bodyOf, fetchJson, make, placeText, say} from './page.js';
 import {why} from './session.js';
 
-const PARTS = [['x_m', 'East x', 'm'], ['y_m', 'North y', 'm'], ['z_m', 'Height z', 'm'],
+export const PARTS = [['x_m', 'East x', 'm'], ['y_m', 'North y', 'm'], ['z_m', 'Height z', 'm'],
   ['heading_deg', 'Heading', '°'], ['pitch_deg', 'Pitch', '°'], ['roll_deg', 'Roll', '°']];
 
 const PLAN_TIMEOUT_S = 120; // a visibility map of a station may take long
@@ -118,7 +118,7 @@ export class Stations extends EventTarget {
   // Numbers that the user is typing stay, unless `anyway`.
   #fill(station, anyway = false) {
     const {place, fields, item} = this.#items.get(station.number);
-    say(place, station.x_m === null ? 'not in the file' : [station.x_m, station.y_m, station.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−'));
+    say(place, station.x_m === null ? 'not in the file' : placeText(station));
     for (const {key, field} of fields) {
       if (anyway || field.value === (field.dataset.holds ?? '')) field.value = shown(station[key]);
       field.dataset.holds = shown(station[key]);

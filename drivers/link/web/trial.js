@@ -9,9 +9,9 @@ import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} f
 // which grazing surfaces need.
 const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station rests so long before the finer ones
-const COVER_MS = 500; // while a station is dragged, its cells come so far apart
-const MOST_OF = 16; // stations that a suggestion may be about
-const MOST_RENEWED = 3; // so often in a row stations are asked for again, where the head no longer has them
+const COVER_MS = 500; // while a station is dragged, its cells are asked for no more often
+const MOST_STATIONS = 16; // so many stations may be in a request for a suggestion
+const MOST_RENEWED = 3; // so often in a row stations are asked for again if the head no longer has their answers
 
 // These are settings of a station that a preview takes; null: as at power-up.
 export const SETTINGS = ['step_deg', 'far_m', 'line0_deg', 'line1_deg', 'pan0_deg', 'pan1_deg'];
@@ -44,11 +44,11 @@ export class Trial extends EventTarget {
     super();
     this.#cloud = cloud;
     this.step_deg = step_deg;
-    for (const s of list) this.#put({...s, of: s.number, was: pick(s, PLACE), isAdded: false});
+    for (const s of list) this.#enter({...s, of: s.number, was: pick(s, PLACE), isAdded: false});
     this.#learnCells();
   }
 
-  #put(station) {
+  #enter(station) {
     Object.assign(station, {served: true, seen: null, answer: 0, covered_ms: -Infinity, wanted: 0, shown: 0, isBusy: false, points: 0, error: '',
       ...Object.fromEntries(SETTINGS.map((key) => [key, station[key] ?? null]))});
     this.stations.push(station);
@@ -88,7 +88,7 @@ export class Trial extends EventTarget {
   add(place, like = this.stations[0]) {
     const number = Math.max(0, ...this.stations.map((s) => s.number)) + 1;
     const {of, tripod} = like;
-    return this.#put({...pick({...like, ...place}, [...PLACE, ...SETTINGS]), number, of, tripod, name: '',
+    return this.#enter({...pick({...like, ...place}, [...PLACE, ...SETTINGS]), number, of, tripod, name: '',
       isAdded: true, was: null}).number;
   }
 
@@ -114,9 +114,9 @@ export class Trial extends EventTarget {
     this.#tell('change');
     if (station.isBusy) return;
     station.isBusy = true;
-    for (let of = 0; of !== station.wanted && this.#has(station);) {
-      of = station.wanted;
-      await this.#look(station, of);
+    for (let asked = 0; asked !== station.wanted && this.#has(station);) {
+      asked = station.wanted;
+      await this.#look(station, asked);
     }
     station.isBusy = false;
     if (this.#has(station)) this.#count();
@@ -130,15 +130,16 @@ export class Trial extends EventTarget {
     return parsePreview(await ask(pathOf('preview', {station: station.of, ...place, ...settings, ...more}), this.#ended.signal));
   }
 
-  async #look(station, of) {
+  // Asks for the points and cells of change number `asked`, as station.wanted counts changes.
+  async #look(station, asked) {
     try {
       const shown = await this.#ask(station, {step_deg: station.step_deg ?? this.step_deg});
       if (!this.#has(station)) return;
-      this.#take(station, shown, of);
+      this.#take(station, shown, asked);
     } catch (error) {
       if (!this.#has(station)) return;
       Object.assign(station, {seen: null, points: 0, error: error.message});
-      this.#cloud.replace({station: station.number, scan: ++this.#scans}); // they are of another place
+      this.#cloud.replace({station: station.number, scan: ++this.#scans}); // its points are from another place
       return;
     }
     for (const step_deg of COVER_STEPS_DEG) {
@@ -146,7 +147,7 @@ export class Trial extends EventTarget {
       if (this.isBlind) return;
       if (!isFirst) await new Promise((done) => setTimeout(done, REST_MS));
       const isDue = isFirst && performance.now() - station.covered_ms > COVER_MS;
-      if ((of !== station.wanted && !isDue) || !this.#has(station)) return;
+      if ((asked !== station.wanted && !isDue) || !this.#has(station)) return;
       try {
         const {seen, number, hits, front} = await this.#ask(station, {step_deg, points: 0});
         Object.assign(station, {seen, answer: number, hits, front, error: '', covered_ms: performance.now()});
@@ -158,10 +159,10 @@ export class Trial extends EventTarget {
     }
   }
 
-  #take(station, shown, of) {
+  #take(station, shown, asked) {
     const scan = ++this.#scans;
     const {above_m, hides_m, feet_m, n} = shown;
-    Object.assign(station, {above_m, hides_m, points: n, shown: of, error: ''});
+    Object.assign(station, {above_m, hides_m, points: n, shown: asked, error: ''});
     if (station.tripod) station.tripod = {...station.tripod, foot_radius_m: feet_m};
     this.#cloud.replace({station: station.number, scan});
     this.#cloud.add(batchOf(shown, station.number, scan));
@@ -183,12 +184,12 @@ export class Trial extends EventTarget {
     try {
       this.reach = parseReach(await ask(this.#about('reach'), this.#ended.signal));
       if (this.#on) this.#count();
-    } catch { /* shares are then of all surfaces */ }
+    } catch { /* shares are then shares of all surfaces */ }
   }
 
   // Returns the path of a request about the cells that the stations see.
   #about(name) {
-    const like = this.stations[0], seen = this.stations.filter((s) => s.seen).slice(0, MOST_OF);
+    const like = this.stations[0], seen = this.stations.filter((s) => s.seen).slice(0, MOST_STATIONS);
     const height_m = like.above_m > 0 ? round(like.above_m) : null;
     return pathOf(name, {station: like.of, height_m, ...Object.fromEntries(seen.map((s, i) => [`p${i + 1}`, s.answer])),
       ...(name === 'next' ? this.#box() : {})});
@@ -202,7 +203,7 @@ export class Trial extends EventTarget {
       .concat([['turn_deg', turned(round(heading_deg))]]));
   }
 
-  // Returns true where the stations see the backs of most faces: these then look the other way.
+  // Returns whether the stations see mostly the backs of faces. The mesh then has its faces turned the other way.
   get seesBacks() {
     const all = this.stations.filter((s) => s.seen);
     return all.length > 0 && 2 * all.reduce((sum, s) => sum + s.front, 0) < all.reduce((sum, s) => sum + s.hits, 0);
@@ -212,8 +213,8 @@ export class Trial extends EventTarget {
   async suggest() {
     if (this.stations.length === 0 || this.isBusy) return undefined;
     const all = this.stations.filter((s) => s.seen), before = this.#stamp();
-    if (all.length > MOST_OF) {
-      this.nextError = `The head can suggest a place only for up to ${MOST_OF} stations; there are ${all.length}.`;
+    if (all.length > MOST_STATIONS) {
+      this.nextError = `The head can suggest a place only for up to ${MOST_STATIONS} stations; there are ${all.length}.`;
       return this.#tell('change');
     }
     try {

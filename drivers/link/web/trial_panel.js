@@ -3,9 +3,10 @@
 // alone, the surface that they see together, and the best next place. It takes the place of the list of stations while
 // it is open.
 
-import {bodyOf, grouped, kept, make, markField, numberOf, percent, say} from './page.js';
+import {bodyOf, grouped, kept, make, markField, numberOf, percent, placeText, say} from './page.js';
 import {why} from './session.js';
 import {Cloud} from './cloud.js';
+import {PARTS} from './stations.js';
 import {SETTINGS, Trial} from './trial.js';
 import {hasBit, seenWithin} from './previews.js';
 import {TargetList} from './trial_targets.js';
@@ -16,8 +17,7 @@ import {tableOf} from './view_colours.js';
 const STEPS = [4, 2, 1, 0.5];
 const PAINTS = [['seen', 'What is seen'], ['all', 'Also what is left'], ['off', 'Nothing']];
 const SEEN = ['Seen by no station', 'By one', 'By several'];
-const PLACE = [['x_m', 'East x, m'], ['y_m', 'North y, m'], ['z_m', 'Height z, m'], ['heading_deg', 'Heading, °'],
-  ['pitch_deg', 'Pitch, °'], ['roll_deg', 'Roll, °']];
+const PLACE = PARTS.map(([key, name, unit]) => [key, `${name}, ${unit}`]);
 const NAMES = {step_deg: 'Step, °', far_m: 'Farthest, m', line0_deg: 'Line from, °', line1_deg: 'Line to, °',
   pan0_deg: 'Pan from, °', pan1_deg: 'Pan to, °'};
 const GHOST = 0; // the number of the suggested station in the picture; others begin at 1
@@ -67,7 +67,7 @@ export class TrialPanel {
     this.#open.hidden = !hasPreviews || this.#view === null || this.#trial !== null;
   }
 
-  // ---- what there is, made once
+  // ---- the elements, made once
 
   #make() {
     const button = (id, name, click, more = {}) => make('button', {type: 'button', id, click, ...more}, name);
@@ -165,7 +165,7 @@ export class TrialPanel {
     return this.#trial.change(station, {x_m: x, y_m: y, z_m: z, heading_deg});
   }
 
-  // ---- what is shown
+  // ---- showing
 
   #show() {
     const trial = this.#trial;
@@ -213,7 +213,7 @@ export class TrialPanel {
 
   #fill(station) {
     const {fields, place, says, mark} = this.#items.get(station.number);
-    say(place, [station.x_m, station.y_m, station.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−'));
+    say(place, placeText(station));
     for (const {key, input} of fields) {
       if (document.activeElement !== input) input.value = shown(station[key]);
     }
@@ -249,7 +249,7 @@ export class TrialPanel {
     this.#within();
   }
 
-  // A suggestion is about what is in the section.
+  // A suggestion counts only what is in the section.
   #cut() {
     this.#trial.section = this.#view.camera.section;
     this.#trial.next = null;
@@ -297,7 +297,7 @@ export class TrialPanel {
     this.apply.title = not || (this.#isApplying && 'Their places are being sent') || (moved.length === 0 ? 'None of them has moved' : 'Sends their places to the head');
     this.take.disabled = !next;
     for (const field of [this.paint, this.suggests]) field.disabled = this.#trial.isBlind;
-    say(this.says, next ? `At ${[next.x_m, next.y_m, next.z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−')}: ${this.#gain()}.`
+    say(this.says, next ? `At ${placeText(next)}: ${this.#gain()}.`
       : this.suggests.checked ? nextError || 'Looking for it.' : 'It can be clicked in the picture.');
   }
 
@@ -309,7 +309,7 @@ export class TrialPanel {
     return `${percent(next.gain_m2 / all_m2)} more of the section, ${percent((seen_m2 + next.gain_m2) / all_m2)} in all`;
   }
 
-  // ---- what is done
+  // ---- actions
 
   #suggestSoon() {
     clearTimeout(this.#timer);

@@ -68,7 +68,7 @@ export class TargetList {
     return true;
   }
 
-  // trial: that of the targets from now on; null: there is none any more.
+  // From now on targets belong to this trial; null: there is none any more.
   begin(trial) {
     this.#trial = trial;
     this.#targets = [];

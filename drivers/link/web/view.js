@@ -13,7 +13,6 @@ import {Hover} from './view_hover.js';
 import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
 import {Programs} from './view_gl.js';
-import {lookAt} from './view_pick.js';
 import {listenTo} from './view_events.js';
 
 const GONE_SHARE = 0.04; // if more than this share of the capacity is gone from the picture, it is drawn again
@@ -101,7 +100,7 @@ export class View extends EventTarget {
     this.#frames.bare();
   }
 
-  // ---- what the page asks for
+  // ---- for the page
 
   setScene(bytes) {
     this.#solids.setScene(bytes);
@@ -209,9 +208,6 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
-  // Turns about the point at a place of the canvas from now on, and goes half the distance to it.
-  lookAt(p) { lookAt(this, p); }
-
   // Resolves with a 2D canvas of the picture and what stands over it, once all present points are on the page.
   picture() { return this.#frames.picture(); }
 
@@ -226,8 +222,6 @@ export class View extends EventTarget {
 
   touched() { this.#touched = true; }
 
-  hover(p) { this.pointed.at(p); }
-
   // Looks for the point in the middle of the picture.
   pickMiddle() { this.pointed.middle(); }
 
@@ -236,7 +230,7 @@ export class View extends EventTarget {
   // Draws again only the layers over the picture.
   redraw() { this.#frames.ask('overlay'); }
 
-  // ---- what follows from the cloud
+  // ---- following the cloud
 
   // Returns whether too many drawn points are gone, or the colours' limits have changed.
   #follow() {

@@ -6,8 +6,8 @@
 // Depth is logarithmic: from NEAR_M to FAR_M each doubling of the distance has the same share of the 24 bits, so two
 // points 1.2 um apart at 1 m, or 1.2 mm at 1 km, have different depths. Shaders and test have the same formula.
 //
-// A flat (orthographic) view has the scale that a perspective one has at the target. Nothing is behind its eye: its
-// depth has no ends (flatDepthOf), and its lines of sight begin anywhere.
+// A flat (orthographic) view has the scale that a perspective one has at the target. It has neither a near nor a far
+// end: places behind its eye are drawn, too (flatDepthOf).
 
 export const NEAR_M = 1e-3;
 export const FAR_M = 1e6;
@@ -25,7 +25,7 @@ export const radians = (deg) => deg * Math.PI / 180;
 // Returns the depth of a distance along the line of sight: 0 at NEAR_M, 1 at FAR_M.
 export const depthOf = (w) => Math.log2(w / NEAR_M) / Math.log2(FAR_M / NEAR_M);
 
-// In a flat view the depth is 0.5 at the target, with the step there that depthOf has at that distance.
+// In a flat view the depth is 0.5 at the target, and grows there about as fast as depthOf at that distance.
 export const FLAT_REACH = 10; // the depth is 0.25 or 0.75 at so many times the target's distance before or behind it
 export function flatDepthOf(w, distance) {
   const x = (w - distance) / (FLAT_REACH * distance);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Draws parts piece by piece into a stored picture: a prefix of each part while the view moves, the rest once it
-// rests, and only new points as they come.
+// This module draws parts piece by piece into a stored picture: a prefix of each part while the view moves, the rest
+// once it rests, and only new points as they come.
 //
 // A part is {n, drawn, weight, skip, draw(from, to)}. `drawn` of its elements are in the picture being worked on. The
 // amount per step follows from the time that the last steps took on the GPU (by fences), so that a step takes STEP_MS.

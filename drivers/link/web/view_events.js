@@ -9,9 +9,7 @@ export function listenTo(canvas, on) {
   });
   canvas.addEventListener('webglcontextrestored', () => on.restored());
   new ResizeObserver(() => on.resized()).observe(canvas);
-  new MutationObserver(() => on.themed()).observe(document.documentElement, {attributeFilter: ['data-theme', 'class', 'style']});
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => on.themed());
+  new MutationObserver(() => on.themed()).observe(document.documentElement, {attributeFilter: ['data-theme']});
   canvas.setAttribute('role', 'application');
   canvas.setAttribute('aria-roledescription', 'picture of points in space');
-  if (!canvas.hasAttribute('aria-label')) canvas.setAttribute('aria-label', 'The points in space. Arrow keys turn, plus and minus zoom, Home shows all.');
 }

@@ -120,7 +120,7 @@ export class Frames {
       return;
     }
     if (this.#made) {
-      this.#put(now);
+      this.#showMade(now);
       return;
     }
     const want = this.#want;
@@ -195,7 +195,7 @@ export class Frames {
   }
 
   // Puts it onto the page, now that the GPU has it.
-  #put(now) {
+  #showMade(now) {
     const {target, camera, moving} = this.#made;
     this.#made = null;
     this.#shownAt = now;

@@ -15,10 +15,22 @@ uniform vec2 u_lens; // clip units per slope, or per metre in a flat view
 vec3 seen(vec3 p) { return ((p - u_eye_hi) - u_eye_lo) * u_axes; }
 #ifdef FLAT
 vec4 placed(vec3 s) { return vec4(s.xy * u_lens, 2.0 * depth_of(s.z, 1.0) - 1.0, 1.0); }
+vec4 placed_face(vec3 s) { return vec4(s.xy * u_lens, 0.0, 1.0); } // depth is the fragment's
 #else
 vec4 placed(vec3 s) {
   return s.z <= NEAR ? OUT : vec4(s.xy * u_lens, (2.0 * depth_of(s.z, 1.0) - 1.0) * s.z, s.z);
 }
+vec4 placed_face(vec3 s) { return vec4(s.xy * u_lens, s.z - 2.0 * NEAR, s.z); }
+#endif
+`;
+
+// These give the normal of a face, and the cosine between it and the line of sight, in a fragment of it.
+export const FACING = `
+vec3 normal_of(vec3 s) { return normalize(cross(dFdx(s), dFdy(s))); }
+#ifdef FLAT
+float facing_of(vec3 s, vec3 n) { return abs(n.z); }
+#else
+float facing_of(vec3 s, vec3 n) { return abs(dot(n, normalize(s))); }
 #endif
 `;
 
@@ -70,7 +82,7 @@ uniform sampler2D u_table;
 flat out vec3 v_colour;
 void main() {
   vec3 s = seen(a_position);
-  gl_Position = a_time < u_times.x || a_time > u_times.y ? vec4(0.0, 0.0, 2.0, 1.0) : placed(s);
+  gl_Position = a_time < u_times.x || a_time > u_times.y ? OUT : placed(s);
 #ifdef CUT
   if (is_cut(a_position)) gl_Position = OUT;
 #endif
@@ -107,13 +119,9 @@ void main() {
 #ifdef CUT
   v_place = p + u_shift;
 #endif
-#ifdef FLAT
-  gl_Position = vec4(v_seen.xy * u_lens, 0.0, 1.0); // depth is the fragment's
-#else
-  gl_Position = vec4(v_seen.xy * u_lens, v_seen.z - 2.0 * NEAR, v_seen.z);
-#endif
+  gl_Position = placed_face(v_seen);
 }`,
-  fragment: `${HEAD}${DEPTH}${CUT}
+  fragment: `${HEAD}${DEPTH}${CUT}${FACING}
 in vec3 v_seen;
 #ifdef CUT
 in vec3 v_place;
@@ -133,12 +141,8 @@ void main() {
   gl_FragDepth = depth;
   float light = 1.0, alpha = u_colour.a;
   if (!u_flat) {
-    vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
-#ifdef FLAT
-    float facing = abs(n.z);
-#else
-    float facing = abs(dot(n, normalize(v_seen)));
-#endif
+    vec3 n = normal_of(v_seen);
+    float facing = facing_of(v_seen, n);
     light = 0.45 + 0.42 * facing + 0.13 * abs(n.y);
     alpha = min(1.0, alpha + u_edge * pow(1.0 - facing, 3.0));
   }
@@ -245,7 +249,7 @@ export class Programs {
   }
 }
 
-function texture(gl, internal, format, type, width, height, data = null) {
+export function texture(gl, internal, format, type, width, height, data = null) {
   const t = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, t);
   gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, height, 0, format, type, data);

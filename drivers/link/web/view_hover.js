@@ -5,7 +5,7 @@
 import {searchSlowly} from './view_pick.js';
 import {pointOf} from './cloud.js';
 
-const HOVER_MS = 70, RADIUS_PX = 8, MIDDLE_PX = 40; // nobody aims well with the middle of a picture
+const HOVER_MS = 70, RADIUS_PX = 8, MIDDLE_PX = 40; // it is hard to aim with the middle of a picture
 
 export class Hover {
   point = null; // its figures, as pointOf() returns them

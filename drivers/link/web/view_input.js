@@ -7,7 +7,7 @@
 //   double click or tap       look at what is there
 //   a station                 drag it; its handle turns it
 
-import {grip} from './view_pick.js';
+import {grip, lookAt} from './view_pick.js';
 import {lookBy} from './view_sides.js';
 
 export const KEYS = [
@@ -32,15 +32,12 @@ export class Input {
 
   constructor(view) {
     this.#view = view;
-    const {canvas} = view;
-    canvas.style.touchAction = 'none';
-    if (canvas.tabIndex < 0) canvas.tabIndex = 0;
-    const on = (type, f, options) => canvas.addEventListener(type, f, options);
+    const on = (type, f, options) => view.canvas.addEventListener(type, f, options);
     on('pointerdown', (e) => this.#press(e));
     on('pointermove', (e) => this.#move(e));
     on('pointerup', (e) => this.#release(e, false));
     on('pointercancel', (e) => this.#release(e, true));
-    on('pointerleave', () => this.#view.hover(null));
+    on('pointerleave', () => this.#view.pointed.at(null));
     on('wheel', (e) => this.#wheel(e), {passive: false});
     on('keydown', (e) => this.#key(e));
     on('contextmenu', (e) => e.preventDefault());
@@ -59,13 +56,13 @@ export class Input {
       view.canvas.setPointerCapture(e.pointerId);
     } catch { /* a script made this pointer */ }
     this.#down.set(e.pointerId, p);
-    view.hover(null);
+    view.pointed.at(null);
     view.touched();
     if (this.#down.size === 1) {
       this.#moved = 0;
       const hit = e.button === 0 && !view.tool && !view.once ? view.stations.hit(view.camera, p.x, p.y) : null;
       if (hit && view.movable) {
-        view.stations.grab(view.camera, hit, p.x, p.y);
+        view.stations.grab(hit, p.x, p.y);
         this.#gesture = {kind: 'station'};
       } else {
         if (hit) view.stations.select(hit.number);
@@ -97,7 +94,7 @@ export class Input {
     const p = this.#at(e);
     const last = this.#down.get(e.pointerId);
     if (!last) {
-      if (e.pointerType !== 'touch') view.hover(p);
+      if (e.pointerType !== 'touch') view.pointed.at(p);
       return;
     }
     this.#down.set(e.pointerId, p);
@@ -158,9 +155,9 @@ export class Input {
     const twice = now - this.#tap.time < 350 && Math.hypot(p.x - this.#tap.x, p.y - this.#tap.y) < 20;
     this.#tap = {time: twice ? 0 : now, ...p};
     if ((view.once ?? view.tool)?.tap(p)) return;
-    if (twice) view.lookAt(p);
+    if (twice) lookAt(view, p);
     else if (kind !== 'station' && view.stations.hit(view.camera, p.x, p.y) === null) view.stations.select(null);
-    view.hover(p);
+    view.pointed.at(p);
   }
 
   #wheel(e) {
@@ -172,7 +169,7 @@ export class Input {
     const factor = Math.exp(Math.max(-300, Math.min(300, e.deltaY * lines)) * 0.0016);
     const now = performance.now();
     const w = this.#wheeled;
-    // One turn of the wheel keeps one place.
+    // As long as the wheel turns, the view zooms about the same place.
     if (w === null || now - w.time > 400 || Math.hypot(p.x - w.x, p.y - w.y) > 4) {
       this.#wheeled = {...p, place: camera.inside ? null : grip(cloud, camera, p.x, p.y)};
     }
@@ -202,7 +199,7 @@ export class Input {
     else if (e.key === '-' || e.key === '_') camera.zoom(1 / 0.85);
     else if (e.key === 'Home') view.fit();
     else if (/^i$/i.test(e.key)) view.pickMiddle();
-    else if (/^c$/i.test(e.key)) view.lookAt({x: 0.5 * camera.width, y: 0.5 * camera.height});
+    else if (/^c$/i.test(e.key)) lookAt(view, {x: 0.5 * camera.width, y: 0.5 * camera.height});
     else if (/^[tfso]$/i.test(e.key)) lookBy(camera, e.key);
     else if (/^[np]$/i.test(e.key)) stations.next(/n/i.test(e.key) ? 1 : -1);
     else if (e.key === 'Enter' && stations.selected !== null) view.lookFrom(stations.selected);

@@ -2,7 +2,7 @@
 // The overlay has the scale bar, axes with north, stations' names and handles, and the point under the pointer. It is
 // a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's colour.
 
-import {roundBelow} from './view_camera.js';
+import {degrees, roundBelow} from './view_camera.js';
 import {inScene} from './view_stations.js';
 
 const FONT = '12px system-ui, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
@@ -24,8 +24,6 @@ function scaleBar(camera, most = 150) {
 export class Overlay {
   targets = []; // {at, name, isSeen: by two stations or more}
   constructor(canvas) {
-    const parent = canvas.parentElement;
-    if (getComputedStyle(parent).position === 'static') parent.style.position = 'relative';
     this.canvas = document.createElement('canvas');
     this.canvas.setAttribute('aria-hidden', 'true');
     this.canvas.style.cssText = 'position:absolute;pointer-events:none';
@@ -47,7 +45,7 @@ export class Overlay {
     this.ratio = ratio;
   }
 
-  // all: {camera, colours: {ground, ink, soft, accent, panel}, stations (or null), marked: point or null}
+  // all: {camera, colours: {ground, ink, accent}, stations (or null), marked: point or null}
   draw({camera, colours, stations, marked}) {
     const c = this.context;
     c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
@@ -105,8 +103,7 @@ export class Overlay {
 
   #looking(camera) {
     const deg = (rad) => (rad * 180 / Math.PI);
-    const heading = ((deg(camera.azimuth) % 360) + 360) % 360;
-    this.#text(`${heading.toFixed(0)}° · ${deg(camera.elevation).toFixed(0).replace('-', '−')}° · field ${deg(camera.fov).toFixed(0)}°`, 16,
+    this.#text(`${degrees(camera.azimuth).toFixed(0)}° · ${deg(camera.elevation).toFixed(0).replace('-', '−')}° · field ${deg(camera.fov).toFixed(0)}°`, 16,
       camera.height - 18, {align: 'left'});
   }
 
@@ -124,7 +121,7 @@ export class Overlay {
     }
   }
 
-  // Draws a field as far as it is before the eye.
+  // Draws the part of a field that lies before the eye.
   #field(camera, stations, station, {outline_m}) {
     const ends = inScene(stations.placeOf(station), station, outline_m).map((at) => camera.project(at));
     let run = [];
@@ -178,7 +175,7 @@ export class Overlay {
     if (points.every(({w}) => w > 0.01)) this.#line(points.map(({x, y}) => [x, y]), 1.25, this.colours.ink, [3, 5]);
   }
 
-  // Draws a square mark on its corner, filled where two scans have it in common.
+  // Draws a diamond, filled if two scans have the target in common.
   #target(camera, {at, name, isSeen}) {
     const {x, y, w} = camera.project(at);
     if (w <= 0.05) return;

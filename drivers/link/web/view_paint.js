@@ -2,7 +2,7 @@
 // This module paints the surface by how many stations see each of its cells. A face is painted on the side that faces
 // the stations, and left out from behind, so that one looks into a house through its roof and its near walls.
 
-import {CUT, DEPTH, HEAD, PLACE} from './view_gl.js';
+import {CUT, DEPTH, FACING, HEAD, PLACE, texture} from './view_gl.js';
 
 const WIDE = 1024; // cells in a row of the texture
 
@@ -25,15 +25,11 @@ void main() {
 #ifdef CUT
   v_place = a_position;
 #endif
-#ifdef FLAT
-  gl_Position = vec4(v_seen.xy * u_lens, 0.0, 1.0); // depth is the fragment's
-#else
-  gl_Position = vec4(v_seen.xy * u_lens, v_seen.z - 2.0 * NEAR, v_seen.z);
-#endif
+  gl_Position = placed_face(v_seen);
   int n = int(texelFetch(u_counts, ivec2(a_cell % ${WIDE}u, a_cell / ${WIDE}u), 0).r * 255.0 + 0.5);
   v_colour = vec4(u_colours[min(n, 2)], n == 0 ? 0.0 : 1.0);
 }`,
-  fragment: `${HEAD}${DEPTH}${CUT}
+  fragment: `${HEAD}${DEPTH}${CUT}${FACING}
 in vec3 v_seen;
 #ifdef CUT
 in vec3 v_place;
@@ -47,15 +43,10 @@ void main() {
 #endif
   gl_FragDepth = depth_of(v_seen.z, 1.001);
   if (gl_FrontFacing == u_turned) discard;
-  bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1; // a cell that nobody sees has every other pixel
+  // Every other pixel of a cell that nobody sees is drawn.
+  bool odd = ((int(gl_FragCoord.x) ^ int(gl_FragCoord.y)) & 1) == 1;
   if (v_colour.a == 0.0 && odd) discard;
-  vec3 n = normalize(cross(dFdx(v_seen), dFdy(v_seen)));
-#ifdef FLAT
-  float facing = abs(n.z);
-#else
-  float facing = abs(dot(n, normalize(v_seen)));
-#endif
-  colour = vec4(v_colour.rgb * (0.6 + 0.4 * facing), 1.0);
+  colour = vec4(v_colour.rgb * (0.6 + 0.4 * facing_of(v_seen, normal_of(v_seen))), 1.0);
 }`,
 };
 
@@ -65,7 +56,7 @@ export class CellsPart {
   drawn = 0;
   skip = false;
   n = 0; // triangles
-  #counts;
+  #counts = null;
 
   constructor(gl, programs, cells) {
     Object.assign(this, {gl, programs});
@@ -91,10 +82,9 @@ export class CellsPart {
     this.buffers.push(gl.createBuffer());
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[2]);
     gl.bindVertexArray(null);
-    this.#counts = gl.createTexture();
   }
 
-  // Draws these pieces alone: where there is no GPU, each triangle costs as much as two points.
+  // Draws only these pieces, because without a GPU each triangle costs as much as two points.
   #choose(isDrawn) {
     const {gl, cell} = this;
     const corners = new Uint32Array(6 * cell.length);
@@ -118,10 +108,8 @@ export class CellsPart {
     const rows = Math.max(1, Math.ceil(this.all / WIDE));
     const texels = new Uint8Array(WIDE * rows);
     texels.set(counts);
-    gl.bindTexture(gl.TEXTURE_2D, this.#counts);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R8, WIDE, rows, 0, gl.RED, gl.UNSIGNED_BYTE, texels);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
-    for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+    gl.deleteTexture(this.#counts);
+    this.#counts = texture(gl, gl.R8, gl.RED, gl.UNSIGNED_BYTE, WIDE, rows, texels);
   }
 
   draw(from, to) {

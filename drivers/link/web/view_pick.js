@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Finds the point under the pointer: the nearest one on the screen; nearer ones win over those behind them. It is pure.
+// This module finds the point under the pointer: the nearest one on the screen, where points near the eye win over
+// those behind them. It is pure.
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 
@@ -10,8 +11,9 @@ import {isWithin} from './section.js';
 // Four pixels beside the pointer count as much as lying a tenth further away.
 const PIXELS_PER_DEPTH = 4 / Math.log(1.1);
 
-// Returns whether a box may have a place at most `slope` from the ray, per length along it, plus `beside_m`. It tests
-// the sphere around the box, so it may be true without such a place. The box and the ray's begin have one origin.
+// Returns whether a box may reach into the cone around a ray. The cone's radius is beside_m at its begin, and grows by
+// `slope` per length. The test takes the sphere around the box, so it may be true for a box outside the cone. The box
+// and the ray's begin have one origin.
 function meets(block, eye, forward, slope, beside_m) {
   const c = [0, 1, 2].map((a) => 0.5 * (block.lo[a] + block.hi[a]) - eye[a]);
   const r = 0.5 * Math.hypot(...[0, 1, 2].map((a) => block.hi[a] - block.lo[a]));
@@ -39,7 +41,7 @@ export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   for (const block of [...cloud.blocks]) {
     const {window} = cloud;
     if (!meets(block, from, f, flat ? 0 : reach, flat ? reach : 0) || isOutside(window, block)) continue;
-    yield; // not after the last block: points that come meanwhile would close it, which changes the order of its own
+    yield; // never after the last block: points that come meanwhile may close it, which changes the order of its points
     const p = block.position;
     const n = Math.min(block.n, limit);
     for (let i = 0, at = 0; i < n; i++, at += 3) {
@@ -68,13 +70,13 @@ export function nearest(cloud, camera, x, y, radius_px, limit) {
   }
 }
 
-// Returns the place that a gesture at (x, y) keeps: of a sample of the points, else at the target's distance.
+// Returns the place that a gesture at (x, y) keeps. It has the distance of a point of a sample, or else of the target.
 export function grip(cloud, camera, x, y) {
   const found = nearest(cloud, camera, x, y, 14, 4096);
   return camera.at(x, y, found ? found.w : camera.distance);
 }
 
-// Does the same in slices, so that the page goes on.
+// Searches in slices, so that the page goes on. The function returned stops it.
 export const searchSlowly = (cloud, camera, x, y, radius_px, then) => runSlowly(search(cloud, camera, x, y, radius_px), then);
 
 // Takes the steps of a generator in slices of a few milliseconds. The callback gets its result; the function returned

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Draws everything except the points: the coarse scene, a recording's mesh, the stations. It owns their buffers on the
-// GPU.
+// This class draws everything except the points: the coarse scene, a recording's mesh, the stations. It owns their
+// buffers on the GPU.
 
 import {Mesh, useMesh} from './view_parts.js';
 import {featureEdges, legsMesh, parseScene, stationMesh} from './view_mesh.js';
@@ -11,7 +11,7 @@ import {CellsPart} from './view_paint.js';
 const EDGES = 16_000, EDGES_MOVING = 3_000;
 
 export class Solids {
-  scene = null; // it stores {origin, positions, triangles, lines}, so that a lost context can be made again
+  scene = null; // it stores {origin, positions, triangles, lines}, to make buffers again after a lost context
   mesh = null;
   sceneMode = 'glass'; // it is 'off', 'glass' or 'solid'
   meshOn = true;

@@ -38,7 +38,7 @@ export class Stations {
   #changed;
   #tell;
   #timer = 0;
-  #hold = null; // a drag is {what, dx, dy, dHeading}
+  #hold = null; // a drag is {number, what, x, y, began}, and reach, off, turn, steep once it has begun
 
   // changed() says that the picture must be drawn again; tell(move) says that a station was let go.
   constructor(changed, tell) {
@@ -126,7 +126,7 @@ export class Stations {
     this.pending = false;
   }
 
-  grab(camera, {number, what}, x, y) {
+  grab({number, what}, x, y) {
     this.select(number);
     this.#hold = {number, what, x, y, began: false};
   }

@@ -15,13 +15,10 @@ function parts(css) {
 
 export function readTheme(element) {
   const style = getComputedStyle(element);
-  const darkByDefault = matchMedia('(prefers-color-scheme: dark)').matches;
-  const read = (name, light, dark) => style.getPropertyValue(name).trim() || (darkByDefault ? dark : light);
-  const css = {ground: read('--ground', '#e9ecef', '#0c1014'), ink: read('--ink', '#14191e', '#e2e7eb'),
-    accent: read('--accent', '#0a58a6', '#6cb0ff')};
+  const css = Object.fromEntries(['ground', 'ink', 'accent'].map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   const ground = parts(css.ground);
   const dark = ground[0] + ground[1] + ground[2] < 1.5;
-  return {css, dark, ground, ink: parts(css.ink), accent: parts(css.accent),
+  return {css, ground, ink: parts(css.ink), accent: parts(css.accent),
     scene: dark ? [0.62, 0.72, 0.82] : [0.25, 0.33, 0.42], solid: dark ? [0.36, 0.4, 0.44] : [0.74, 0.77, 0.8],
     mesh: dark ? [0.62, 0.65, 0.68] : [0.8, 0.81, 0.82]};
 }

@@ -36,7 +36,7 @@ function rangesOf(cloud, {pulse, scan, station}) {
 }
 
 export class WavePlot {
-  #cloud; // that of the head; tried points have no pulse of it
+  #cloud; // the head's points; those of a trial have no pulses of the head
   #point = null;
   #svg = makeSvg('svg', {class: 'wave', viewBox: `0 0 ${WIDTH} 78`, role: 'img'});
   #title = make('p', {class: 'note'});

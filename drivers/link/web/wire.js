@@ -129,7 +129,7 @@ export class Wire {
     this.#addNow('close', {code, reason});
   }
 
-  // ---- what comes
+  // ---- receiving
 
   #bytes(bytes) {
     this.#open();

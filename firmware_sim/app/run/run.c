@@ -9,7 +9,6 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/capture.h"
 #include "firmware_sim/site/plan_rows.h"
-#include "firmware_sim/site/rate.h"
 
 static void say_sights(const struct site *site)
 {

@@ -12,7 +12,6 @@
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/config/profile.h"
 #include "firmware_sim/site/placement.h"
-#include "firmware_sim/site/tripod.h"
 
 enum { PLACE_VERSION = 1, POINT_BYTES = 12 + 4 + 2 };
 

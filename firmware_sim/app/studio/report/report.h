@@ -55,9 +55,6 @@ struct report {
     struct sites sites;
     struct site *site;            /* of the scanner of head.station */
     const struct georef **georef; /* of each station */
-    struct distance *index;
-    struct distance *mover_index[CAST_MAX_MOVERS]; /* of each body that moves, in its own frame */
-    struct distance **legs_index;                  /* of each station's tripod, where its legs are in view */
     struct cloud cloud;
     struct cloud_site cloud_site;
     double *distance_m; /* per point */

@@ -26,17 +26,6 @@ static void leave_out_ghosts(struct report *r)
     }
 }
 
-static int index_legs(struct report *r, struct sh_err *err)
-{
-    int rc = SH_OK;
-    r->legs_index = calloc(r->site->n_stations, sizeof *r->legs_index);
-    if (r->legs_index == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the legs of tripods");
-    for (uint32_t i = 0; i < r->site->n_stations && rc == SH_OK; i++)
-        if (sites_of(&r->sites, i)->station[i].tripod.legs != NULL)
-            rc = distance_create(sites_of(&r->sites, i)->station[i].tripod.legs, &r->legs_index[i], err);
-    return rc;
-}
-
 static int work_load(struct report *r, struct sh_err *err)
 {
     struct stat file;
@@ -45,22 +34,20 @@ static int work_load(struct report *r, struct sh_err *err)
     if (rc == SH_OK && stat(r->cloud_path, &file) == 0) r->modified = file.st_mtim;
     if (rc == SH_OK) rc = sites_load(r->cfg, SITE_WRITTEN_OUT, &app_report_stderr, &r->sites, err);
     r->site = r->sites.first;
-    if (rc == SH_OK) rc = distance_create(r->site->scene, &r->index, err);
     if (rc == SH_OK) leave_out_ghosts(r);
-    for (uint32_t k = 0; rc == SH_OK && k < r->site->n_movers; k++)
-        rc = distance_create(r->site->mover[k].scene, &r->mover_index[k], err);
-    return rc == SH_OK && r->site->legs != NULL ? index_legs(r, err) : rc;
+    return rc;
 }
 
-/* Takes a point on a moving body to the body's own frame, and returns the body's index. At a stop the body stands still
+/* Takes a point on a moving body to the body's own frame, and returns the body's BVH. At a stop the body stands still
  * during the scan. */
-static const struct distance *body_of(void *ctx, unsigned station, uint16_t label, double p_prcs[3])
+static const struct bvh *body_of(void *ctx, unsigned station, uint16_t label, double p_prcs[3])
 {
     const struct report *r = ctx;
     const struct site *site = r->site;
     uint32_t k = 0, first = site->scene->n_surfaces;
     if (label < first || label >= site->n_surfaces) return NULL;
-    if (site->legs != NULL && label == site->legs_label) return r->legs_index[station - 1];
+    if (site->legs != NULL && label == site->legs_label)
+        return sites_of(&r->sites, station - 1)->station[station - 1].tripod.bvh;
     for (; label >= first + site->mover[k].scene->n_surfaces; k++)
         first += site->mover[k].scene->n_surfaces;
     struct cast_setup setup;
@@ -68,7 +55,7 @@ static const struct distance *body_of(void *ctx, unsigned station, uint16_t labe
     const struct cast_mover *at = &setup.mover[k];
     const double d[3] = {p_prcs[0] - at->shift_m[0], p_prcs[1] - at->shift_m[1], p_prcs[2] - at->shift_m[2]};
     mat3_apply_transposed(at->rotation, d, p_prcs);
-    return r->mover_index[k];
+    return site->mover[k].bvh;
 }
 
 /* Without stops a body's place depends on the time of each point, which not every file has. */
@@ -97,7 +84,7 @@ static int prepare(struct report *r, struct sh_err *err)
         return sh_fail(err, SH_ENOMEM, "no memory for %u stations", site->n_stations);
     for (uint32_t i = 0; i < site->n_stations; i++)
         r->georef[i] = site->station[i].georef;
-    r->cloud_site = (struct cloud_site){.index = r->index,
+    r->cloud_site = (struct cloud_site){.bvh = site->bvh,
                                         .georef = r->cfg->output.layout == LINE_GEO ? r->georef : NULL,
                                         .n_stations = site->n_stations,
                                         .max_m = r->max_m,
@@ -287,11 +274,5 @@ void report_free(struct report *r)
     figures_density_free(&r->f.density);
     deviation_points_free(&r->points);
     cloud_free(&r->cloud);
-    distance_free(r->index);
-    for (uint32_t i = 0; r->legs_index != NULL && i < r->site->n_stations; i++)
-        distance_free(r->legs_index[i]);
-    free(r->legs_index);
-    for (uint32_t k = 0; k < CAST_MAX_MOVERS; k++)
-        distance_free(r->mover_index[k]);
     sites_free(&r->sites);
 }

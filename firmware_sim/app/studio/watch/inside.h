@@ -78,7 +78,6 @@ struct watch {
     atomic_int ending;
 
     /* for the observer's thread alone, except for constants */
-    struct distance *index;
     struct deviation_head *head; /* [n_stations] */
     struct deviation_head now;   /* of the scan at hand */
     struct device_held held;     /* keeps the site of `now` */

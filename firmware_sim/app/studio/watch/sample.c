@@ -28,7 +28,7 @@ int watch_sample_open(struct watch *w, struct sh_err *err)
         rc = sh_fail(err, SH_ENOMEM, "no memory for the points that are looked at");
     s->every = 1;
     s->cell_m = REPORT_CELL_M;
-    return rc == SH_OK ? distance_create(w->site->scene, &w->index, err) : rc;
+    return rc;
 }
 
 void watch_sample_close(struct watch *w)
@@ -39,7 +39,6 @@ void watch_sample_close(struct watch *w)
     free(s->distance_m);
     free(s->triangle);
     deviation_points_free(&s->points);
-    distance_free(w->index);
 }
 
 void watch_sample_begin(struct watch *w)
@@ -135,7 +134,7 @@ int watch_sample_compare(struct watch *w, struct sh_err *err)
     if (n == 0) return SH_OK;
     const int64_t from_ns = clock_thread_ns();
     const struct cloud cloud = {.n = n, .xyz_m = s->xyz_m + first, .epsg = CLOUD_EPSG_UNKNOWN};
-    const struct cloud_site site = {.index = w->index, .n_stations = 1, .max_m = REACH_M, .threads = 1};
+    const struct cloud_site site = {.bvh = w->site->bvh, .n_stations = 1, .max_m = REACH_M, .threads = 1};
     const struct cloud_compared compared = {&cloud, &site, s->distance_m + first, s->triangle + first};
     const struct deviation_points points = points_from(&s->points, first);
     int rc = cloud_compare(&cloud, &site, NULL, s->distance_m + first, s->triangle + first, err);
@@ -154,7 +153,7 @@ int watch_sample_compare(struct watch *w, struct sh_err *err)
 static int density(struct watch *w, const struct cloud *cloud, struct sh_err *err)
 {
     struct watch_sample *s = &w->sample;
-    const struct cloud_site site = {.index = w->index, .n_stations = 1, .max_m = REACH_M, .threads = 1};
+    const struct cloud_site site = {.bvh = w->site->bvh, .n_stations = 1, .max_m = REACH_M, .threads = 1};
     const struct cloud_compared compared = {cloud, &site, s->distance_m, s->triangle};
     const struct figures_on_scene in = {&compared, w->site->scene, s->points.range_m};
     struct figures_density all;
