@@ -120,7 +120,7 @@ static void missing_parts_are_named(void **state)
     struct recording_result r = {.counts = {.left_out = 5}, .crowded = 7, .replugs = 1, .bus_resets = 1};
     (void)state;
     incomplete(&r, SH_OK, ""); /* what the head left out, and replugs between scans, cost nothing here */
-    /* Each alone is enough. Frames lost: in gaps, with a bad checksum at the ends, or dropped. */
+    /* Frames are lost in gaps, with a bad checksum at the ends, or dropped here. */
     r.stream = (struct scanhead_stats){.seq_lost = 1, .bad_unseen = 20, .dropped = 300};
     r.counts.missing = 4;
     incomplete(

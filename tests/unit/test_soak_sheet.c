@@ -270,7 +270,7 @@ static const struct {
     {lose_pulses, "the head lost pulses"},
 };
 
-/* In turn on either link. */
+/* Each reason is tried on either link. */
 static void each_reason_is_enough(void **state)
 {
     (void)state;

@@ -30,7 +30,7 @@ static struct client client;
 static struct checks checks;
 static struct verdict v;
 
-/* A client without a fault: connected after 2 s, asked for 30 s after its start to end, ended 0.25 s later. */
+/* A client without a fault connected after 2 s. It was asked to end 30 s after its start, and ended 0.25 s later. */
 static void begin(void)
 {
     watch = (struct watch){.first_open_ns = 12 * S, .n_span = 3, .injected = 4, .heard_bytes = 55, .wrong_state = 6};

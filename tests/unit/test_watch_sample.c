@@ -6,7 +6,7 @@
 
 static struct watch w;
 
-/* A quad as the scene; only its index of distances is made. */
+/* The scene is a quad. Of the watch only the sample is opened, with its index of distances. */
 static void open_sample(void)
 {
     write_in("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
