@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* These are previews of stations for a page. Expected values are worked out by hand for an L-shaped room, or by
  * another way: each point lies on a wall, at its range from the place that was asked for. */
+#include "firmware_sim/app/studio/preview/inside.h"
 #include "tests/unit/preview_room.h"
 #include "tests/unit/site_rig.h"
 
@@ -153,6 +154,22 @@ static void test_scanners(void **state)
     room_close(&r);
 }
 
+/* A scanner that could not be set up has no site (firmware_sim/app/sites.h). */
+static void test_broken_scanner(void **state)
+{
+    (void)state;
+    struct room r = room_open("}\n  - {position_m: [1, 3, 1.2], heading_deg: 0, scanner: {head: {frames: 2}}");
+    const struct preview_options options = {.cfg = cfg, .site = r.site};
+    const struct sites broken = {.first = r.site, .n = 1, .other = {{.scanner = 2}}};
+    const struct preview_work work = {.options = &options, .sites = &broken};
+    const struct preview_request request = {.station = 1, .step_deg = 4.0};
+    struct preview_site *site;
+    assert_int_equal(preview_site_open(&work, &request, &site, &err), SH_EINPUT);
+    assert_null(site);
+    assert_string_equal(err.text, "station 2 has a scanner that can't be previewed");
+    room_close(&r);
+}
+
 /* A scene without a coverage has points, and no cells. */
 static void test_without_cells(void **state)
 {
@@ -206,9 +223,9 @@ static void test_refusals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_points),   cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
-        cmocka_unit_test(test_tripod),   cmocka_unit_test(test_scanners), cmocka_unit_test(test_without_cells),
-        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_points),        cmocka_unit_test(test_settings), cmocka_unit_test(test_cells),
+        cmocka_unit_test(test_tripod),        cmocka_unit_test(test_scanners), cmocka_unit_test(test_broken_scanner),
+        cmocka_unit_test(test_without_cells), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

@@ -49,6 +49,7 @@ static void test_failing(void **state)
     snprintf(sweep, sizeof sweep, "scene.meshes.0.file=%s,%s", wire_path(wire, "room.obj"),
              wire_path(wire, "broken.obj"));
     batch_expect(wire, "one", WITH("--sweep", sweep), 1, "6 of 12 jobs of shard 1/1 failed");
+    batch_expect(wire, "one", WITH("--sweep", sweep), 1, ": 6 of 12 here done\n"); /* the others are not done again */
     char *text = wire_read(batch_in(wire, "one", "manifest-1-of-1.jsonl"), NULL);
     int lines = 0;
     for (const char *at = text; (at = strchr(at, '\n')) != NULL; at++)
@@ -65,6 +66,43 @@ static void test_failing(void **state)
     batch_expect(wire, "none", WITH("--sweep", "scene.meshes.0.scale=1,2", "--set", "scene.meshes[0].scale=3"), 2,
                  "is in --set and in --sweep");
     assert_int_not_equal(access(wire_path(wire, "none"), F_OK), 0); /* nothing was begun */
+}
+
+/* A scanner whose scans never end can't record. It stops only campaigns in which its station is chosen. */
+static void test_chosen_stations(void **state)
+{
+    struct wire *wire = *state;
+    char config[352];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    batch_change(config, "heading_deg: 30,", "heading_deg: 30, scanner: {head: {frames: 0}},");
+    wire_run(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list", "--stations", "1"), 0);
+    wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list", "--stations", "2"),
+                      "head.frames");
+    wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list"), "head.frames");
+}
+
+/* Jobs are counted from 1 over all shards; a job's shard is its number modulo their count (batch.h). */
+static void test_list(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], dir[352];
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(dir, sizeof dir, "%s", wire_path(wire, "listed"));
+    static const char *const sweeps[] = {"head.prr_hz=100000,150000", "head.lines_hz=50,60"};
+    const char *const list[] = {"batch",      config, "-o",      dir,       "--format", "ply",
+                                "--stations", "2",    "--sweep", sweeps[0], "--sweep",  sweeps[1],
+                                "--shard",    "2/2",  "--list",  "--json",  NULL};
+    wire_run(wire, list, 0);
+    char *text = wire_read(wire_path(wire, "out"), NULL);
+    assert_string_equal(text, "[\n  {\n    \"job\": 2,\n"
+                              "    \"name\": \"0002_station-2_head.prr_hz=100000_head.lines_hz=60\",\n"
+                              "    \"station\": 2,\n    \"set\": [\n      \"head.prr_hz=100000\",\n"
+                              "      \"head.lines_hz=60\"\n    ],\n    \"done\": false\n  },\n"
+                              "  {\n    \"job\": 4,\n"
+                              "    \"name\": \"0004_station-2_head.prr_hz=150000_head.lines_hz=60\",\n"
+                              "    \"station\": 2,\n    \"set\": [\n      \"head.prr_hz=150000\",\n"
+                              "      \"head.lines_hz=60\"\n    ],\n    \"done\": false\n  }\n]\n");
+    free(text);
 }
 
 /* All files that are written with a mesh are the job's: for two frames, two images. Without one of them the job isn't
@@ -103,10 +141,10 @@ static void test_one_warning(void **state)
     free(err);
 }
 
-static int points_of(struct wire *wire, const char *name)
+static int points_of(struct wire *wire, const char *dir, const char *name)
 {
     int n = -1;
-    char *text = wire_read(batch_in(wire, "dark", name), NULL);
+    char *text = wire_read(batch_in(wire, dir, name), NULL);
     const char *at = strstr(text, "element vertex ");
     assert_non_null(at);
     assert_int_equal(sscanf(at, "element vertex %d", &n), 1);
@@ -130,8 +168,8 @@ static void test_scenario(void **state)
     wire_write_text(wire, "dark.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
     /* The other pulses are blind: all 10,000 pulses of a job have 3,900 points where none is dark. */
-    assert_in_range(points_of(wire, "0001_station-1.ply"), 1000, 3000);
-    assert_in_range(points_of(wire, "0002_station-2.ply"), 1000, 3000);
+    assert_in_range(points_of(wire, "dark", "0001_station-1.ply"), 1000, 3000);
+    assert_in_range(points_of(wire, "dark", "0002_station-2.ply"), 1000, 3000);
     wire_write_text(wire, "other.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
     *last = other;
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
@@ -140,6 +178,82 @@ static void test_scenario(void **state)
     char *err = wire_read(wire_path(wire, "err"), NULL);
     assert_non_null(strstr(err, "scenario"));
     free(err);
+}
+
+/* ---- the manifest of the whole campaign, beside its files */
+
+static void next(const char **at, const char *text)
+{
+    const char *found = strstr(*at, text);
+    if (found == NULL) fail_msg("no %s in %.300s", text, *at);
+    *at = found + strlen(text);
+}
+
+/* coreutils says the hash of a file. */
+static void next_sha(const char **at, const char *key, const char *path)
+{
+    char command[512], sha[65] = "", text[128];
+    snprintf(command, sizeof command, "sha256sum '%s'", path);
+    FILE *in = popen(command, "r");
+    assert_true(in != NULL && fscanf(in, "%64[0-9a-f]", sha) == 1);
+    assert_int_equal(pclose(in), 0);
+    snprintf(text, sizeof text, "\"%s\": \"%s\"", key, sha);
+    next(at, text);
+}
+
+static void next_file(struct wire *wire, const char **at, int job, const char *ending)
+{
+    char text[256];
+    struct stat st;
+    assert_int_equal(stat(batch_file(wire, "ref", job, ending), &st), 0);
+    snprintf(text, sizeof text, "\"name\": \"%s%s\",\n          \"bytes\": %lld,", batch_names[job], ending,
+             (long long)st.st_size);
+    next(at, text);
+    next_sha(at, "sha256", batch_file(wire, "ref", job, ending));
+}
+
+/* A job's pulses are those that the head casts: each is a point or a shot without echo. The stream's hash is that of
+ * the same scan by `record`. */
+static void next_job(struct wire *wire, const char **at, int job)
+{
+    static const char *const rates[] = {"100000", "150000", "200000"};
+    char text[256], ply[64], config[352], set[64], stats[352], out[352];
+    char hex[65];
+    snprintf(ply, sizeof ply, "%s.ply", batch_names[job]);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(set, sizeof set, "head.prr_hz=%s", rates[job / 2]);
+    snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
+    snprintf(out, sizeof out, "%s", wire_path(wire, "again.ply"));
+    wire_run(wire,
+             WITH("record", config, "-o", out, "--set", set, "--station", job % 2 ? "2" : "1", "--crs", "utm",
+                  "--stats", stats, "--quiet"),
+             0);
+    snprintf(
+        text, sizeof text,
+        "{\n      \"job\": %d,\n      \"name\": \"%s\",\n      \"station\": %d,\n      \"set\": [\n        \"%s\"\n"
+        "      ],",
+        job + 1, batch_names[job], job % 2 + 1, set);
+    next(at, text);
+    stats_hash(wire, hex);
+    snprintf(text, sizeof text, "\"pulses\": %llu,\n      \"points\": %d,\n      \"stream_sha256\": \"%s\"",
+             (unsigned long long)stats_uint(wire, "pulses"), points_of(wire, "ref", ply), hex);
+    next(at, text);
+    next_file(wire, at, job, ".ply");
+    next_file(wire, at, job, ".las");
+}
+
+static void test_manifest(void **state)
+{
+    struct wire *wire = *state;
+    char *text = wire_read(batch_in(wire, "ref", "manifest.json"), NULL);
+    const char *at = text;
+    next(&at, "\"configuration\": \"config.yaml\",\n  ");
+    next_sha(&at, "configuration_sha256", wire_path(wire, "config.yaml"));
+    next(&at, ",\n  \"set\": [],\n  \"options\": [\n    \"--crs\",\n    \"utm\"\n  ],\n  \"jobs\": [\n");
+    for (int job = 0; job < BATCH_JOBS; job++)
+        next_job(wire, &at, job);
+    assert_null(strstr(at, "\"job\""));
+    free(text);
 }
 
 /* ---- engines */
@@ -201,9 +315,12 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_shards, batch_setup_with_ref, batch_teardown),
         cmocka_unit_test_setup_teardown(test_shared, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_failing, batch_setup, batch_teardown),
+        cmocka_unit_test_setup_teardown(test_chosen_stations, batch_setup, batch_teardown),
+        cmocka_unit_test_setup_teardown(test_list, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_images, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_one_warning, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_scenario, batch_setup, batch_teardown),
+        cmocka_unit_test_setup_teardown(test_manifest, batch_setup_with_ref, batch_teardown),
         cmocka_unit_test_setup_teardown(test_slurm, batch_setup_with_ref, batch_teardown),
         cmocka_unit_test_setup_teardown(test_parallel, batch_setup_with_ref, batch_teardown),
     };

@@ -229,6 +229,30 @@ static void test_next_of_pulses(void **state)
     }
 }
 
+/* A head near the floor looks up: it sees most of the walls and of the ceiling in the upper leg. Rays that went down
+ * would meet the floor near it, and little else. Cells along outlines count as a whole in a scan: half of their 0.25 m
+ * along some 20 m of outlines is 12 % of what it sees. */
+static void test_next_looks_up(void **state)
+{
+    struct wire *wire = *state;
+    char config[256], places[256];
+    wire_write_text(wire, "room.obj", L_ROOM);
+    snprintf(places, sizeof places, "%s",
+             wire_write_text(wire, "places.csv", "x_m,y_m,z_m,heading_deg\n1,4,0.4,130\n"));
+    snprintf(config, sizeof config, "%s",
+             wire_write_text(wire, "up.yaml",
+                             "head: {profile: full-sweep, prr_hz: 100000, line_start_deg: 10}\n"
+                             "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\n"
+                             "stations:\n  - {name: right, position_m: [5, 1, 1.2]}\n"));
+    const char *const args[] = {"coverage", config, "--json", "--candidates", places, NULL};
+    char *json = run(wire, args, 0);
+    const char *next = strstr(json, "\"next\"");
+    assert_non_null(next);
+    const double gain_m2 = number_of(next, "gain_m2");
+    assert_near("up", number_of(next, "estimate_m2"), gain_m2, 0.15 * gain_m2);
+    free(json);
+}
+
 /* ---- refusals, and a signal */
 
 static void test_refused(void **state)
@@ -313,6 +337,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_mesh, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next_of_pulses, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_next_looks_up, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_interrupt, wire_setup, wire_teardown),
     };

@@ -210,6 +210,26 @@ static void test_scenarios_in_turn(void **state)
     free(text);
 }
 
+/* A file of points that was there before, and that the client left as it was, is not judged as its own. */
+static void test_a_file_from_before(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], old[352], command[512], names[256];
+    write_files(wire);
+    snprintf(config, sizeof config, "%s", wire_path(wire, "config.yaml"));
+    snprintf(old, sizeof old, "%s", wire_write_text(wire, "old.points", "1 2 3\n"));
+    snprintf(command, sizeof command, "exec %s {host} {port} {out} none", client_in_c());
+    const char *const args[] = {"soak",          config, "--client",   command, "--json",          "-",
+                                "--client-file", old,    "--duration", "0.1",   "--client-folder", wire->dir,
+                                "--quiet",       NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 1);
+    char *text = wire_read(wire_path(wire, "out"), NULL);
+    find_names(text, names, sizeof names);
+    assert_string_equal(names, "points-read");
+    assert_int_equal(count_of(text, "old.points: the client did not write it"), 1);
+    free(text);
+}
+
 static void test_a_client_that_stays_away(void **state)
 {
     struct wire *wire = *state;
@@ -352,6 +372,7 @@ int main(int argc, char **argv)
         cmocka_unit_test_setup_teardown(test_a_client_in_c, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_other_faults, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_scenarios_in_turn, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_file_from_before, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_that_stays_away, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_stop_in_the_second_scenario, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_usage, wire_setup, wire_teardown),

@@ -5,11 +5,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "core/crs.h"
 #include "core/geotiff.h"
+#include "core/text.h"
 #include "firmware_sim/app/app.h"
 
 /* A mesh without a unit that would be larger than LARGEST_M is taken to be in millimetres, unless it is a survey, or
@@ -28,8 +28,7 @@ double init_largest_m(const struct scene *scene)
 
 static const char *said_by(const char *file)
 {
-    const char *dot = strrchr(file, '.');
-    return dot != NULL && strcasecmp(dot, ".fbx") == 0 ? "as the file says" : "as the format defines it";
+    return text_has_ending(file, ".fbx") ? "as the file says" : "as the format defines it";
 }
 
 /* --up turns the mesh so that y or z becomes z. It can do nothing about other axes. */

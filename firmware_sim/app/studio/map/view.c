@@ -146,7 +146,6 @@ struct showing {
     struct cloud cloud;
     struct site *site;
     const char *path;
-    const struct sh_report *report;
 };
 
 /* Points of the geo layout are in output.crs; they are brought to the scene's frame. */
@@ -161,7 +160,7 @@ static int to_scene(struct showing *s, const struct config *cfg, struct sh_err *
     if (georef == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", site->n_stations);
     for (uint32_t i = 0; i < site->n_stations; i++)
         georef[i] = site->station[i].georef;
-    const int rc = cloud_into_scene(&s->cloud, &of, s->report, &why);
+    const int rc = cloud_into_scene(&s->cloud, &of, &app_report_seconds, &why);
     free(georef);
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %.300s", s->path, why.text);
 }
@@ -186,7 +185,8 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
 {
     struct picturing_bounds bounds;
     app_catch_signals();
-    int rc = cloud_read_columns(s->path, CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_RGB, s->report, &s->cloud, err);
+    int rc =
+        cloud_read_columns(s->path, CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_RGB, &app_report_seconds, &s->cloud, err);
     if (rc == SH_OK && cfg != NULL) rc = site_load(cfg, &app_report_stderr, &s->site, err);
     s->p->site = s->site;
     if (rc == SH_OK) rc = check_columns(s, err);
@@ -210,8 +210,8 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
             .rgb = c->rgb != NULL ? c->rgb[i] : NULL,
         };
         picturing_add(s->p, c->xyz_m[i], &f);
-        if ((i & 0xffff) == 0) sh_progress(s->report, "drawing the points", (double)i / (double)c->n);
-        if ((i & 0xffff) == 0) rc = sh_check_stop(s->report, err);
+        if ((i & 0xffff) == 0) sh_progress(&app_report_seconds, "drawing the points", (double)i / (double)c->n);
+        if ((i & 0xffff) == 0) rc = sh_check_stop(&app_report_seconds, err);
     }
     return rc == SH_OK ? picturing_finish(s->p, err) : rc;
 }
@@ -219,7 +219,7 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
 int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, const char *output,
                    int quiet, struct sh_err *err)
 {
-    struct showing s = {.path = cloud, .report = quiet ? &app_report_quiet : &app_report_seconds};
+    struct showing s = {.path = cloud};
     int rc = picturing_begin(plan, output, quiet, &s.p, err);
     if (rc != SH_OK) return rc;
     rc = show(&s, cfg, err);

@@ -14,9 +14,9 @@ struct picturing {
     int quiet;
     const struct site *site; /* NULL: no configuration */
     struct view *view;
-    uint64_t cut;     /* points that --below and --above leave out */
-    uint64_t *number; /* [MAP_VIEW_NUMBERS] points by label, or by station */
-    double limit[2];  /* of the colours */
+    uint64_t cut;                      /* points that --below and --above leave out */
+    uint64_t number[MAP_VIEW_NUMBERS]; /* points by label, or by station */
+    double limit[2];                   /* of the colours */
     /* points to be added, and their figures or colours */
     size_t n;
     double xyz_m[MAP_VIEW_BATCH][3];

@@ -212,9 +212,7 @@ static int draw_stations(const struct picturing *p, struct picture *picture, str
 int picturing_finish(struct picturing *p, struct sh_err *err)
 {
     struct picture picture = {0};
-    struct sh_report report = app_report_seconds;
-    if (p->quiet) report.progress = NULL;
-    const struct view_colours colours = {colour_of, p, p->plan->given->shade, {252, 252, 252}, &report};
+    const struct view_colours colours = {colour_of, p, p->plan->given->shade, {252, 252, 252}, &app_report_seconds};
     add_batch(p);
     int rc = check_figures(p, err);
     if (rc == SH_OK) rc = view_draw(p->view, &colours, &picture, err);
@@ -236,7 +234,6 @@ int picturing_finish(struct picturing *p, struct sh_err *err)
 void picturing_end(struct picturing *p)
 {
     view_free(p->view);
-    free(p->number);
     free(p);
 }
 
@@ -246,11 +243,7 @@ int picturing_begin(const struct map_view_plan *plan, const char *output, int qu
     const int rc = newfile_check(output, err);
     if (rc != SH_OK) return rc;
     struct picturing *p = calloc(1, sizeof *p);
-    if (p != NULL) p->number = calloc(MAP_VIEW_NUMBERS, sizeof *p->number);
-    if (p == NULL || p->number == NULL) {
-        free(p);
-        return sh_fail(err, SH_ENOMEM, "no memory for a picture");
-    }
+    if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a picture");
     p->plan = plan;
     p->output = output;
     p->quiet = quiet;

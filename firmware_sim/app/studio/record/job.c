@@ -110,6 +110,7 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     const int has_points = result->points != 0 && r->files.has_points; /* a format may have refused the first ones */
     const int keep = r->only_whole ? whole : has_points || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
+    if (r->may_end && rc == SH_ECLOSED && has_points) rc = SH_OK;
     int after = close_files(r, keep && !is_stopped(r), &why);
     rc = app_and_also(rc, after, &why, err);
     if (!has_figures || r->stats == NULL) return rc;
@@ -154,7 +155,7 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
         sh_warn(&app_report_stderr, "the stream was not in order: %s", order);
     app_warn_left_out(result->crowded, result->unfit, result->lost_samples);
     if (rc == SH_OK) warn_of_little(r);
-    return rc == SH_OK ? recording_check_complete(result, err) : rc;
+    return rc == SH_OK && !r->may_end ? recording_check_complete(result, err) : rc;
 }
 
 /* --crs also sets the layout geo, since polar points are in no CRS. */

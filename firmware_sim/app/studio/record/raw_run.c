@@ -80,7 +80,7 @@ static int raw_run_report(struct raw *r, int64_t now_ns, int64_t *next_ns, struc
     raw_run_describe(r, what + strlen(what), sizeof what - strlen(what));
     const double done =
         r->duration_s > 0.0 && r->first_ns != 0 ? 1e-9 * (double)(now_ns - r->first_ns) / r->duration_s : -1.0;
-    if (!r->quiet) sh_progress(&app_report_stderr, what, done < 1.0 ? done : 1.0);
+    sh_progress(&app_report_stderr, what, done < 1.0 ? done : 1.0);
     return capture_save(&r->capture, err);
 }
 

@@ -69,7 +69,7 @@ int record_repair(const char *const *paths, int n, const char *stats, int quiet)
     for (int i = 0; i < n; i++) {
         struct result *r = &all.of[i];
         r->path = paths[i];
-        const int rc = repair_file(paths[i], quiet ? &app_report_quiet : &app_report_seconds, &r->file, &r->err);
+        const int rc = repair_file(paths[i], &app_report_seconds, &r->file, &r->err);
         r->status = rc == SH_OK ? APP_OK : app_fail(&r->err);
         if (rc == SH_OK && !quiet) repair_say(&r->file);
         if (r->status > status) status = r->status;

@@ -73,7 +73,7 @@ static int show(const struct view_options *o, struct viewed *v, struct sh_err *e
     int rc = viewed_check_ending(o->in.operand[0], err);
     if (rc == SH_OK) rc = ops->open(&spec, &link, err);
     if (rc != SH_OK) return rc;
-    rc = viewed_load(v, o->in.operand[0], o->quiet ? &app_report_quiet : &app_report_seconds, err);
+    rc = viewed_load(v, o->in.operand[0], &app_report_seconds, err);
     if (rc == SH_OK) {
         if (!o->quiet) say_what_is_shown(v);
         ops->endpoint(link, endpoint, sizeof endpoint);

@@ -144,7 +144,7 @@ static void observe_take_points(struct watch *w, const struct scanhead_frame *fr
     for (uint32_t i = 0; i < frame->n_points; i++) {
         struct native_point p;
         native_decode_point(frame->payload, i, &p);
-        if (p.echo == 0 || p.dt_ns != last_dt || p.echo <= last_echo) hash = hash_of(++pulse);
+        if (p.dt_ns != last_dt || p.echo <= last_echo) hash = hash_of(++pulse);
         last_dt = p.dt_ns;
         last_echo = p.echo;
         if (p.echo_count == 0)

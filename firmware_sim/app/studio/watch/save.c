@@ -101,19 +101,18 @@ static int write_stream(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* This stream has no event of a scan's end, so for its reader it ends in the middle of a scan: SH_ECLOSED. */
+/* This stream has no event of a scan's end, so for its reader it ends in the middle of a scan. */
 static int write_file(struct save *s, struct sh_err *err)
 {
     struct record_job *job = calloc(1, sizeof *job);
     if (job == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a file");
     job->source = s->stream;
-    job->brief = job->no_hash = 1;
+    job->brief = job->no_hash = job->may_end = 1;
     job->stop = save_ends;
     job->stop_ctx = s;
     job->recording.frames = -1;
     int rc = record_files_add(&job->files, s->file, err);
     if (rc == SH_OK) rc = record_job_stream(job, err);
-    if (rc == SH_ECLOSED && job->result.points > 0) rc = SH_OK;
     free(job);
     return rc;
 }
