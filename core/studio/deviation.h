@@ -35,7 +35,7 @@
  *   the plan's errors of cast and georeferencing;
  *   half the diagonal of a count: sqrt(3)/2 counts of the coordinates, and of the file's where it rounds them again;
  *   half of sqrt(r^2 + (R a)^2 + (R b)^2), with the counts r of a polar range, else 0, and a, b of the encoders;
- *   the ball's radius. */
+ *   the ball's radius at that range, times its largest factor. */
 #ifndef CORE_STUDIO_DEVIATION_H
 #define CORE_STUDIO_DEVIATION_H
 
