@@ -148,8 +148,8 @@ double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3
 /* Rays from .. to - 1 hit that triangle, or nothing (BVH_NO_TRIANGLE). Sets their ranges, labels and steepness,
  * bit by bit as bvh_hits does. It may overwrite up to seven rays after these, so set later ones afterwards. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
-/* The same where ray `from` hits triangle[0], the next one triangle[1], and so on. A ray whose number is beyond the
- * scene's triangles stays as it is. */
+/* The same where ray `from` hits triangle[0], the next one triangle[1], and so on. A ray stays as it
+ * is where its entry of `triangle` is neither a triangle of the scene nor BVH_NO_TRIANGLE. */
 void bvh_ranges_each(const struct bvh *bvh, const uint32_t *triangle, const struct bvh_rays *rays, uint32_t from,
                      uint32_t to);
 /* The range of one plane along a ray, by the same arithmetic. */

@@ -50,7 +50,7 @@ enum pose_flags {
 };
 
 void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, double quat[4]);
-/* heading in [0, 2 pi), pitch in [-pi/2, pi/2], roll in (-pi, pi]; at the poles of pitch roll is 0. */
+/* Heading lies in [0, 2 pi), pitch in [-pi/2, pi/2], roll in (-pi, pi]. Roll is 0 where pitch is +-pi/2. */
 void pose_to_angles(const double quat[4], double *heading_rad, double *pitch_rad, double *roll_rad);
 void pose_from_matrix(const double rotation[9], double quat[4]);
 /* R of a head turned by heading, then pitch, then roll, each about the axes as they lie by then; row by row:

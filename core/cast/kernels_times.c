@@ -18,7 +18,8 @@ static void times_of_table(const struct schedule_run *run, uint32_t *dt_ns)
     }
 }
 
-/* The time of TIMES pulses: whole nanoseconds, and a rest in 1 / den, below den. */
+/* The times of up to TIMES pulses in a row, counted from the first of them: whole nanoseconds, and a rest in units of
+ * 1 / den ns, which is below den. */
 enum { TIMES = 64 };
 struct times {
     int64_t part[TIMES + 1];
@@ -53,7 +54,7 @@ static void add_times(const struct times *t, uint32_t begin_ns, int64_t begin_pa
 /* Each block of TIMES pulses adds its begin to one table of times. */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns)
 {
-    const int64_t den = (int64_t)run->ns_den; /* below 2^62, as pulse rates are */
+    const int64_t den = (int64_t)run->ns_den; /* below 2^62: the largest is a pulse rate in uHz */
     int64_t part = (int64_t)run->ns_acc;
     uint32_t ns = 0;
     struct times t;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Hits of pulses, with their triangles: the first stages of a pulse (caster.c). After these it only decides whether a
- * hit makes an echo. */
+/* Finds the hits of pulses, with their triangles, by the first stages of a pulse (caster.c). From the later stages it
+ * takes only one decision: whether a hit makes an echo. */
 #include <math.h>
 
 #include "core/cast/aim.h"
@@ -9,7 +9,7 @@
 #include "core/surface.h"
 #include "core/vec3.h"
 
-/* Hits of a chunk on their way out. */
+/* The hits that caster_meet returns are collected here. */
 struct meeting {
     const struct cast_setup *s;
     const struct chunk *k;

@@ -14,8 +14,9 @@ static inline int caster_is_hidden(const struct cast_tripod *t, const struct vec
     return cosine > t->cos_opening;
 }
 
-/* d: directions of n_pulses <= CHUNK, prcs. Returns how many of them are hidden. For single rays it is called before
- * optics, which then follows no hidden ray; for footprints, after they have become echoes. */
+/* d: directions of n_pulses <= CHUNK, prcs. Returns how many of them are hidden. The caster hides single
+ * rays before optics, which then follows no hidden ray. It hides footprints once caster_sub_rays has put their hits
+ * into l. */
 uint32_t caster_hide(const struct cast_tripod *t, const struct vec3_in *d, uint32_t n_pulses, struct echo_list *l);
 
 #endif

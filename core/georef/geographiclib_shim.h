@@ -31,15 +31,15 @@ struct georef_geoid *shim_geoid_open(char *why, size_t len);
 /* From the scene frame about a centre to a grid zone, geodetic coordinates or ECEF. */
 struct shim_map;
 
-/* spec: checked, of a CRS other than local; its rotation is one where the scene frame is no grid. NULL on
- * failure, with the reason. */
+/* spec: checked, of a CRS other than local. Where the scene frame is no grid, spec->rotation must be a rotation; all 0
+ * is not allowed here. NULL on failure, with the reason. */
 struct shim_map *shim_map_create(const struct georef_spec *spec, char *why, size_t len);
 /* The same frame and zone about another centre, given as difference in prcs. */
 struct shim_map *shim_map_recentre(const struct shim_map *map, const double d_prcs[3], char *why, size_t len);
 void shim_map_free(struct shim_map *map);
 
-/* The anchor, at the centre: easting and northing with false origin, degrees, or X and Y; height as it is
- * sent, or Z. */
+/* The anchor, at the centre. In utm it is easting and northing with false origin, and the height as it is sent. In
+ * geodetic it is latitude and longitude in degrees, and that height. In ecef it is X, Y and Z. */
 void shim_map_anchor(const struct shim_map *map, double anchor[3]);
 /* The place of the centre: degrees, degrees, ellipsoidal height. */
 void shim_map_place(const struct shim_map *map, double place[3]);
@@ -49,7 +49,7 @@ struct shim_meridian {
     double axis_m;           /* from the Earth's axis, or from the pole in a UPS grid */
     double sin_lat, cos_lat; /* components of up and of north along the Earth's axis; in a UPS grid those at the pole */
 };
-/* 0 where there is none: from a UTM grid. */
+/* Returns 0 where there are none, since the scene frame is a UTM grid; else 1. */
 int shim_map_meridian(const struct shim_map *map, struct shim_meridian *out);
 /* The EPSG code of the CRS. */
 int shim_map_epsg(const struct shim_map *map);

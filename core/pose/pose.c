@@ -17,9 +17,9 @@ void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, dou
     quat_multiply(quat, qy, quat);
 }
 
-/* R's middle column is (sin h cos p, cos h cos p, sin p). Turned back by the heading, its first row is (cos r, 0,
- * sin r). Near the pole the heading has a large error. The error of roll is then the opposite one, so that both cancel
- * in the attitude. */
+/* R's middle column is (sin h cos p, cos h cos p, sin p). Once R is turned back by the heading, its first row is
+ * (cos r, 0, sin r). Near the pole the heading has a large error. The error of roll is then the opposite one, so that
+ * both cancel in the attitude. */
 static void matrix_to_angles(const double r[9], double *heading_rad, double *pitch_rad, double *roll_rad)
 {
     double flat = hypot(r[1], r[4]);

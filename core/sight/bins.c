@@ -18,8 +18,9 @@ static uint32_t region_at(double x, uint32_t regions)
     return at <= 0.0 ? 0 : at >= regions ? regions - 1 : (uint32_t)at;
 }
 
-/* Finds the regions where a box may be seen. They are all of the face's where it lies behind the station in part, or
- * almost. Returns 0 where the face shows nothing of it. */
+/* Finds the regions of a face where a box may be seen. These are all regions of the face if a part of the box lies
+ * behind the plane through the station that is parallel to the face, or almost in that plane. Returns 0 where the face
+ * shows nothing of the box. */
 static int range_of(const struct build_group *box, uint32_t face, uint32_t regions, struct range *r)
 {
     double rect[2][2];
@@ -50,7 +51,7 @@ static void find_seen(struct build_shared *b)
                 d[axis] = (face & 1 ? -1.0 : 1.0) / length;
                 d[(axis + 1) % 3] = u / length;
                 d[(axis + 2) % 3] = v / length;
-                /* No corner is further from the middle than on the plane of the face. */
+                /* A corner's angle from the middle is at most its distance on the face's plane, sqrt(2) * half. */
                 const double radius_rad = 1.5 * half + 4.0 * SIGHT_PAD;
                 b->seen[region_number(b, face, i, j)] =
                     b->spec->sees == NULL || b->spec->sees(b->spec->ctx, d, radius_rad) != 0;
@@ -107,7 +108,8 @@ int build_bins(struct build_shared *b, struct sh_err *err)
     b->bin = calloc((size_t)regions + 2, sizeof *b->bin);
     if (b->seen == NULL || b->bin == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory for %u regions", regions);
     find_seen(b);
-    /* Regions were counted one place further: filling a region moves its begin to its end. */
+    /* From here on bin[r] is the begin of region r. Filling the region moves it to the region's end, which is the begin
+     * of region r + 1. So after bin-- at the end, bin[r] is the begin of region r again. */
     b->bin++;
     int rc = put_all(b, 0, err);
     for (uint32_t i = 0; i < regions; i++)

@@ -8,8 +8,8 @@
  * BVH's first hit. Where the point belongs to another surface (a later echo, a point beyond glass), it is that of the
  * nearest triangle, if the line crosses that one.
  *
- * On a smooth face: the point's distance from the nearest triangle is the deviation times the cosine of the
- * incidence, to 1 % and 2 um. So the surface that the beam hits is also the nearest one, and no edge or corner is
+ * A point is on a smooth face where its distance from the nearest triangle equals the deviation times the cosine of
+ * the incidence, to 1 % and 2 um. Then the surface that the beam hits is also the nearest one, and no edge or corner is
  * between. With a footprint, twelve rays along its border have to hit the same plane, too. Only such points have a
  * deviation along the beam: at an edge it may be any number, however good the point.
  *
@@ -33,10 +33,9 @@
  *
  * The distance has a bound where the only random effect is a ball. The bound is the sum of:
  *   the plan's errors of cast and georeferencing;
- *   half a count an axis: sqrt(3)/2 counts of a position, or a polar point's range and angles at right angles to each
- *   other;
- *   half an encoder count an axis, times R;
- *   the ball's radius. */
+ *   half the diagonal of a count: sqrt(3)/2 counts of the coordinates, and of the file's where it rounds them again;
+ *   half of sqrt(r^2 + (R a)^2 + (R b)^2), with the counts r of a polar range, else 0, and a, b of the encoders;
+ *   the ball's radius at that range, times its largest factor. */
 #ifndef CORE_STUDIO_DEVIATION_H
 #define CORE_STUDIO_DEVIATION_H
 

@@ -54,7 +54,7 @@ int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *rev
         if (n > 0) return 0;
         if (n == 0) return sh_fail(&sh->err, SH_ETIMEOUT, "%s: no data came within the time limit", sh->source.name);
         if (errno != EINTR) return sh_fail(&sh->err, SH_EIO, "%s: %s", sh->source.name, strerror(errno));
-        /* Without a time limit, only a signal gives the program its turn. */
+        /* A wait without a time limit may last for ever. So a signal ends it, and the program can act on that. */
         if (sh->has_no_limit)
             return sh_fail(&sh->err, SH_ETIMEOUT, "%s: a signal interrupted the wait", sh->source.name);
     }

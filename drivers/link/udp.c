@@ -2,9 +2,9 @@
 /* The UDP link: one session, open from the start. Each write is one datagram to the receiver.
  *
  * It sends unicast to any address, but broadcast only from an interface that the configuration names: to that
- * interface's own broadcast address, or to 255.255.255.255. The packets' source is then the interface's address. If a
- * route says otherwise, packets to 255.255.255.255 would leave on another interface all the same. So they are sent to
- * the interface's own broadcast address instead. (SO_BINDTODEVICE would direct them, but takes a privilege.)
+ * interface's own broadcast address, or to 255.255.255.255. The packets' source is then the interface's address. But
+ * the system's routes choose the interface for packets to 255.255.255.255, whatever their source is. So these are sent
+ * to the named interface's own broadcast address instead. (SO_BINDTODEVICE would direct them, but takes a privilege.)
  * Multicast, too, goes out only on an interface that is named.
  *
  * A source port may be one that a receiver on this machine listens on, too. So addresses are shared (SO_REUSEADDR), and

@@ -28,7 +28,7 @@ void http_reader_drop(struct http_reader *r)
     forget(r, r->head_len + r->request.body_len);
 }
 
-/* The parts that the fields of a head are cut into. */
+/* What read_head needs of the request line and of the fields: values, how often each field came, and flags. */
 struct head {
     struct http_text host, origin, target_place; /* without one, s is NULL */
     int n_host, n_origin, n_length, n_coding, expects, expects_other, close, keep_alive;
@@ -128,7 +128,8 @@ static int read_head(struct http_reader *r, struct head *h)
     return 0;
 }
 
-/* Whether the empty line that ends the head has come; or a status. Empty lines before a request are skipped. */
+/* Sets head_len once the empty line that ends the head has come. Returns 0, or a status where the head is wrong. Empty
+ * lines before a request are skipped. */
 static int find_head(struct http_reader *r)
 {
     size_t empty = 0;

@@ -86,7 +86,7 @@ int recorder_save(struct recorder *rec, struct sh_err *err)
 }
 
 /* After a failed write the file is not completed, even if there is room again: points in its middle would be missing.
- * Its header still says so. */
+ * A header that marks the file as incomplete stays. */
 static int recorder_finish(struct recorder *rec, struct sh_err *err)
 {
     int rc = outfile_check(&rec->file, err);

@@ -50,7 +50,7 @@ int command_stored_text(struct command_device *dev, const struct head_settings *
     return 0;
 }
 
-/* ---- back */
+/* ---- from the stored text back to settings */
 
 enum { MAX_LINES = 32 };
 

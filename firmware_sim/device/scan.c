@@ -7,8 +7,8 @@
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/device/frames.h"
 
-/* Plans the site for the settings. It was possible when the command tried it; it fails without memory, or at this
- * station. */
+/* Plans the site for the settings. This may fail although each setting was accepted: without memory, or because the
+ * scan begins at another station. */
 static int plan_scan(struct device *device, struct device_variant **variant, uint64_t tick)
 {
     const struct head_settings *settings = &device->cmd.settings;
@@ -66,8 +66,9 @@ uint32_t device_tick_lines(const struct config *cfg)
     return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->loop.tick_hz) + 2;
 }
 
-/* The first pulse that is too many for this tick. When the rates rise suddenly, the pulses due since the last cut, up
- * to 15 at the old rate, are counted at the new rate and may fill several ticks. */
+/* Returns the first pulse that has no room in this tick. When the rates rise suddenly, more pulses may be due than one
+ * tick holds. An incomplete packet has then waited for up to 15 pulse periods of the old rate, and that time is counted
+ * at the new rate. */
 static uint64_t tick_room_end(const struct device *device)
 {
     const struct schedule_segment *seg = &device->scan.segment;
@@ -101,7 +102,8 @@ static void count_pulses(struct device *device, struct device_work *work)
     atomic_fetch_add(&device->counters.cast, work->n_cast);
 }
 
-/* Returns when the scan ends, since its start, whatever its frames: after its time, or at its path's end. */
+/* Returns the time from the scan's start after which it ends at the latest, by the option scan_s or by the end of its
+ * path. It may end earlier by its number of frames. */
 static int64_t scan_end_ns(const struct device *device)
 {
     int64_t path_end_ns = device_path_end_ns(device);
@@ -110,8 +112,8 @@ static int64_t scan_end_ns(const struct device *device)
     return end_ns < path_end_ns ? end_ns : path_end_ns;
 }
 
-/* Another simulator that steps a live platform gets all pulses of a grant within it. Elsewhere an incomplete packet
- * waits for the next tick: the stream is the same at any pace. */
+/* A client that grants time and moves a live platform gets all pulses of a grant within that grant. In all other cases
+ * an incomplete packet waits for the next tick, so that the stream is the same at any pace. */
 static int is_lock_step(const struct device *device)
 {
     const struct config *cfg = device->site->cfg;

@@ -14,7 +14,7 @@ int faulty_is_on(const struct faulty_link *f)
     return f->spec.board != NULL && fault_board_version(f->spec.board) != 0;
 }
 
-/* Whether the session's bytes go through a wire. */
+/* Returns whether the session's bytes go through a wire. Makes the wire once there is a fault. */
 static int has_wire(struct faulty_link *f, int session)
 {
     struct faulty_session *s = &f->session[session];
@@ -72,7 +72,8 @@ static void faulty_link_put(struct faulty_link *f, int session, const uint8_t *b
     }
 }
 
-/* Follows bytes that go out without a wire: one that begins later must know where it begins, and what was answered. */
+/* Follows bytes that go out without a wire. A wire that is made later must know how many bytes of the present item are
+ * still to come, and which commands were answered. */
 static void faulty_link_follow(struct faulty_link *f, int session, const uint8_t *bytes, size_t len, size_t written)
 {
     struct faulty_session *s = &f->session[session];
@@ -108,7 +109,7 @@ static int flush(struct faulty_link *f, int session)
             faulty_drop_act(f, session, piece);
             continue;
         }
-        if (piece->kind == WIRE_ACT && faulty_is_pulled(f)) { /* nothing else is done to it meanwhile */
+        if (piece->kind == WIRE_ACT && faulty_is_pulled(f)) { /* other acts wait until the cable is in */
             s->is_blocked = 1;
             return 0;
         }

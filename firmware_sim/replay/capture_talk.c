@@ -11,7 +11,7 @@
 enum { MAX_REQUESTS = 20000, MAX_STREAMS = 16, MOST_PENDING = 16, MOST_BACK = 4096, KIND_BYTES = 1024 };
 enum { OF_CONNECTION = -1 };
 
-/* A request, as often as it came. */
+/* A request of a client. One that came several times has an entry for each time. */
 struct asked {
     uint32_t request; /* of the store */
     size_t at;
@@ -21,7 +21,7 @@ struct asked {
     struct talk_run run;
 };
 
-/* A place at work. */
+/* A place of the capture while its talk is made. */
 struct builder {
     struct replay_capture *capture;
     struct capture_place *place;
@@ -141,7 +141,8 @@ static struct talk_run *run_of(struct builder *b, struct talk_run *connection, i
     return owner == OF_CONNECTION ? connection : &b->asked[owner].run;
 }
 
-/* Puts the messages of the flow at hand run by run. The connection's run is that of the flow where it is longest. */
+/* Puts the messages of the flow at hand into the store, run by run (drivers/protocol/talk.h says what a run is). Flows
+ * of a place may each have a run of the connection: the longest one is kept. */
 static int put_messages(struct builder *b, int device, int64_t t0_ns)
 {
     struct capture_store *store = b->store;
@@ -244,7 +245,8 @@ static void describe(struct capture_place *place, const struct capture_flow *f)
     inet_ntop(device->is_v6 ? AF_INET6 : AF_INET, device->address, place->device, sizeof place->device);
 }
 
-/* udp_t0_ns: of all datagrams, so that ports keep their times to each other. */
+/* udp_t0_ns: the time of the devices' first datagram. The messages of all UDP ports count from it, so that ports stay
+ * in step with each other. */
 static int build_place(struct replay_capture *c, const struct capture_flow *first, int64_t udp_t0_ns)
 {
     struct capture_place *place = &c->place[c->n_places];
@@ -295,7 +297,7 @@ int capture_build(struct replay_capture *c, struct sh_err *err)
 {
     for (size_t i = 0; i < c->n_flows; i++) {
         struct capture_flow *f = &c->flow[i];
-        if (!f->is_tcp) f->device = f->n_sent[1] >= f->n_sent[0]; /* of equals, the second answers */
+        if (!f->is_tcp) f->device = f->n_sent[1] >= f->n_sent[0]; /* if both sent as many: the second */
         if (f->is_tcp && !f->has_begin) f->device = f->bytes_sent[1] > f->bytes_sent[0];
     }
     const int64_t udp_t0_ns = first_datagram_ns(c);

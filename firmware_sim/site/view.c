@@ -50,7 +50,8 @@ static void add_sweep(struct site_view *view, const struct head_settings *s)
               0.5 * turn_rad);
 }
 
-/* Adds the rings of a sphere, and its sector; with a pole among them, the cap around it. */
+/* Adds the elevations from the first ring of a sphere to the last one, over the azimuths of its sector. Close to a pole
+ * meets() takes all azimuths. */
 static void add_rings(struct site_view *view, const struct emitter *e, const struct head_settings *s)
 {
     const double start_rad = from_udeg(s->line_start_udeg), stop_rad = from_udeg(s->line_stop_udeg);

@@ -34,7 +34,8 @@ static int wrong(const struct reading *r, const char *what)
     return sh_fail(r->err, SH_EINPUT, "its result is inconsistent at byte %zu: %s", r->at, what);
 }
 
-/* The next bytes, up to a multiple of 8; NULL: there are not as many. */
+/* Returns the next `size` bytes, and skips the zeros that fill them up to a multiple of 8. NULL: there are not as
+ * many. */
 static const void *ifc_bodies_take(struct reading *r, uint64_t size)
 {
     const void *at = r->b->bytes + r->at;

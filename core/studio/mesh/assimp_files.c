@@ -31,7 +31,7 @@ struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mo
     return &e->handle[e->n_files++];
 }
 
-/* The output keeps or drops the file at its end. */
+/* The file itself stays open. mesh_output_close renames or removes it. */
 void assimp_close(struct aiFileIO *io, struct aiFile *handle)
 {
     (void)io;

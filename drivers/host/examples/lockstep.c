@@ -135,7 +135,7 @@ int main(int argc, char **argv)
     if (argc < 2 || steps < 100) fail("usage", "lockstep SOURCE [STEPS, 100 or more]");
     if (scanhead_open(argv[1], &run.sh, err, sizeof err) != SCANHEAD_OK) fail(argv[1], err);
     run.granted_ns = strtoll(tell(&run, "TIME?"), NULL, 10);
-    while (strcmp(tell(&run, "HEAD:STATe?"), "idle") != 0) /* it boots in its own time, too */
+    while (strcmp(tell(&run, "HEAD:STATe?"), "idle") != 0) /* its boot takes device time */
         grant(&run);
     tell(&run, "SCAN:STARt");
     const double start_s = now_s();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// This tool looks from the top, the front and the side without perspective, and back.
+// This tool looks from the top, the front and the side without perspective, and returns to the view with perspective.
 import {make} from './page.js';
 import {lookDeep, lookFromSide, SIDES} from './view_sides.js';
 

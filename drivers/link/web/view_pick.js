@@ -70,7 +70,8 @@ export function nearest(cloud, camera, x, y, radius_px, limit) {
   }
 }
 
-// Returns the place that a gesture at (x, y) keeps. It has the distance of a point of a sample, or else of the target.
+// Returns the place that a gesture keeps at (x, y). It is as far away as the point found there, or else as the target.
+// The search looks at the first 4096 points of each block: in a closed block these are spread evenly (cloud.js).
 export function grip(cloud, camera, x, y) {
   const found = nearest(cloud, camera, x, y, 14, 4096);
   return camera.at(x, y, found ? found.w : camera.distance);

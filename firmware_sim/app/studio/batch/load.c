@@ -12,8 +12,8 @@ struct loading {
     struct batch_loaded *before, *now;
 };
 
-/* Returns the site before, where now->cfg can share its scene. Else frees that site first, so that there are never two
- * scenes at a time, and returns NULL. */
+/* Returns the site of the previous combination, if now->cfg can share its scene. Else frees that site, so that there
+ * are never two scenes at a time, and returns NULL. */
 static const struct site *shared_site(struct loading *l)
 {
     struct batch_loaded *before = l->before;
@@ -56,8 +56,10 @@ int batch_load(struct batch *b, uint32_t combination, struct batch_loaded *loade
     struct loading loading = {b, &before, loaded};
     if (loaded->status != 0 && loaded->combination == combination) return loaded->status;
     *loaded = (struct batch_loaded){.n_reads = before.n_reads, .combination = combination};
+    /* Only the configuration of this line is used. Its outputs are named "x", which is no job's name, so they are left
+     * out. */
     loaded->status = batch_line_make(b, combination, 1, "x", &loaded->line);
-    if (loaded->status == APP_GO_ON) loaded->line->line.in.n_files = 0; /* no job has this name */
+    if (loaded->status == APP_GO_ON) loaded->line->line.in.n_files = 0;
     if (loaded->status == APP_GO_ON) loaded->status = app_with_config(&loaded->line->line.in, load_site, &loading);
     if (loaded->status == APP_OK) loaded->status = APP_GO_ON;
     batch_unload(&before);

@@ -5,8 +5,9 @@
  *
  * A request is known by its text. One for a place stops the search for a next station, which takes longer. The search
  * begins again afterwards, so that a dragged station does not wait for it. The newest request is worked on first: while
- * a station is dragged, older ones are about places that it has left. A search lets some places pass, and is then due:
- * another page may drag all the time. A request that nobody asked for lately gives its slot away, and so do the oldest
+ * a station is dragged, older ones are about places that it has left. A search that waited while MOST_PASSED others
+ * were worked on is due: it is the next one, and no place stops it. Else a page that drags all the time would keep it
+ * from ending. A request that nobody asked for lately gives its slot away, and so do the oldest
  * answers, except those that a search names. */
 #include "firmware_sim/app/studio/preview/preview.h"
 
@@ -52,7 +53,7 @@ struct preview {
     struct preview_options options;
     struct sites sites;
     struct preview_work work;
-    struct coverage *blind;                       /* of a scene that has no coverage */
+    struct coverage *blind;                       /* without cells; used where the options have no coverage */
     struct sh_err why;                            /* why there is no `blind` either */
     atomic_int ending, gives_way, is_place_asked; /* the work at hand stops for a place; one was asked for since */
     pthread_t thread;

@@ -83,7 +83,7 @@ static void offline_leave(struct host_source *source)
 static const struct host_source_ops offline_ops = {
     .lend = offline_lend, .write = offline_write, .wait = offline_wait, .close = offline_leave};
 
-/* A head at off->site. */
+/* Makes a head at off->site and a client that is connected to it, and starts the head's loop. */
 static int power_up(struct offline *off, double scan_s, const struct sh_report *report, struct sh_err *err)
 {
     struct device_options device = {.scan_s = scan_s, .truth = off->truth};

@@ -96,7 +96,8 @@ static void put_expected(struct json *json, const struct watch_scan *s)
     json_close_object(json);
 }
 
-/* Members of an open object, as `report` has them of a file. */
+/* Writes the members of a scan into the open object: counts, expected errors, figures. `all` and `verdict` are those of
+ * `report --json`. */
 static void put_scan(struct json *json, const struct watch_scan *s)
 {
     put_counts(json, s);
