@@ -75,7 +75,7 @@ struct ply_list {
 extern const uint8_t ply_type_size[8];                 /* bytes, by ply_type */
 extern const char *const ply_scalar_name[PLY_SCALARS]; /* in the file, by ply_use from PLY_X on */
 
-/* Called by ply_open alone. Leaves t at the first byte of data. A vertex has x, y and z afterwards; faces may lack
+/* Called by ply_open alone. Leaves t at the first byte of data. Fails where vertices lack x, y or z; faces may lack
  * their list. */
 int ply_read_header(struct ply_header *h, struct text *t, struct sh_err *err);
 

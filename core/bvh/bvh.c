@@ -71,9 +71,9 @@ static int build(struct bvh *bvh, unsigned threads, const struct sh_report *repo
     return rc;
 }
 
-/* The most leaves that Embree may put at one node of its tree. Four, where it finds that cheaper, save a seventh of
- * the memory, and rays are as fast where surfaces are connected. In foliage a ray would try 1.5 times as many
- * leaves. */
+/* Returns the largest number of leaves that Embree may put at one node of its tree, where it finds that cheaper. With
+ * four of them the tree takes a seventh less memory, and rays are as fast where surfaces are connected. In foliage a
+ * ray would try 1.5 times as many leaves. */
 static unsigned most_together(const struct scene *scene)
 {
     const int is_large = scene->n_triangles >= 500000, hangs_together = scene->n_vertices <= 0.6 * scene->n_triangles;
@@ -92,7 +92,7 @@ int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, co
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
     if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
-    /* Embree sets 128 MB aside for subdivision surfaces, of which there are none here: 1 MB, the least. */
+    /* Embree sets 128 MB aside for subdivision surfaces. Scenes have none of these, so it gets the least: 1 MB. */
     char config[96];
     snprintf(config, sizeof config, "tessellation_cache_size=1,object_accel_max_leaf_size=%u,threads=%u",
              most_together(scene), threads);

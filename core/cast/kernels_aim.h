@@ -17,7 +17,7 @@ struct kernel_turns {
     uint32_t n;
     const double *mirror, *pan;
 };
-/* Directions as the encoders read them, in whole counts: how they are turned, and where they go. */
+/* The directions as the encoders read them, in whole counts. They are turned by `rotation`, and written to e. */
 struct kernel_reading {
     const struct cast_setup *setup; /* has the counts */
     const double *rotation;         /* to the frame of positions */

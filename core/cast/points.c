@@ -141,8 +141,8 @@ static void insert_secondary(struct caster *c, const struct chunk *k)
     }
 }
 
-/* Writes the times of all entries. The pulses' times may stand further on in the same array, so it begins
- * with the first. */
+/* Writes the times of all entries, the first one first: the pulses' times may stand further on in the same array, and
+ * in this order each is read before it is overwritten. */
 static void write_times(const struct echo_list *l, const struct chunk *k)
 {
     uint32_t *to = k->block->dt_ns + k->at, from = 0;
@@ -213,7 +213,7 @@ uint32_t caster_points(struct caster *c, struct chunk *k)
         detect_move_in_ball(d->ball, k->s->rotation, &points);
         caster_aim_read(c, k);
     }
-    if (k->colours) caster_colours(k, c->d.z, l); /* by the ranges that are sent, which the ball has changed */
+    if (k->colours) caster_colours(k, c->d.z, l); /* by the ranges as they are sent: with ball-shaped noise */
     uint32_t echoes = write_firsts(c, k) + secondary;
     uint32_t unfit = place(c, k, 0, k->n, &(struct kernel_wire){b->a + k->at, b->b + k->at, b->c + k->at});
     if (secondary > 0) {

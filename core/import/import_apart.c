@@ -23,7 +23,7 @@
 
 enum { LOOK_MS = 20, MAX_WARNINGS = 1000 };
 
-#define LEAST_MORE_NS ((int64_t)10000000000) /* what a second reader gets at least, once the first has ended */
+#define LEAST_MORE_NS ((int64_t)10000000000) /* least time of the second reader, once the first has ended */
 
 uint64_t import_memory_of(pid_t pid, enum import_memory which)
 {

@@ -33,7 +33,7 @@ struct mtl {
     uint32_t definition;       /* number of the newmtl at hand, from 1 */
     char name[SCENE_NAME_LEN]; /* of newmtl, cut as the names of surfaces are */
     struct text_span material; /* all of name */
-    bool has_opacity;          /* the material at hand has had d, which counts before Tr */
+    bool has_opacity;          /* the material at hand has had d: a Tr is then ignored */
     struct missing colour, opacity, texture;
 };
 
@@ -212,7 +212,8 @@ static void move_uv(struct scene_build *b, uint32_t label, const struct map *map
             s->uv[i][k / 2][k % 2] = (float)((double)s->uv[i][k / 2][k % 2] * map->scale[k % 2] + map->shift[k % 2]);
 }
 
-/* map_Kd or map_d. Where a surface has both, the first one says how they lie. Warns of an image that is missing. */
+/* map_Kd or map_d. Where a surface has both, scale and shift of the first one hold for both. Warns of an image that is
+ * missing. */
 static int set_texture(struct mtl *m, struct text_span text, bool is_opacity, struct sh_err *err)
 {
     struct scene *scene = m->b->scene;

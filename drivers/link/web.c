@@ -48,7 +48,7 @@ static int open_context(struct web_link *web)
     info.user = web;
     info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_SKIP_SERVER_CANONICAL_NAME |
                    LWS_SERVER_OPTION_VALIDATE_UTF8;
-    info.max_http_header_pool = WEB_PLACES + WEB_AT_A_TIME; /* those that make room end a little later */
+    info.max_http_header_pool = WEB_PLACES + WEB_AT_A_TIME; /* connections closed to make room end a little later */
     info.fd_limit_per_thread = info.max_http_header_pool + 8;
     info.timeout_secs = WEB_PATIENCE_S;
     info.keepalive_timeout = WEB_PATIENCE_S;

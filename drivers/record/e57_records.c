@@ -42,7 +42,8 @@ VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n
     return n_bad == 0;
 }
 
-/* Returns how many points come before the first one that has no room, by the plain formula; far_m is its place. */
+/* Returns how many points come before the first one whose counts have no room; far_m is its place. It looks at one
+ * point after the other; put_counts has found that there is such a point. */
 static int find_far(const struct run *run, double scale_m, int n, double far_m[3])
 {
     int i = 0;
@@ -54,7 +55,7 @@ static int find_far(const struct run *run, double scale_m, int n, double far_m[3
     return i;
 }
 
-/* A reflectance of NaN is not modelled. */
+/* NaN: the reflectance is not modelled. Such a point has `none` 1, and the intensity of 0 dB. */
 VEC_CLONES static void put_intensities(const double *restrict reflectance_db, int n, uint8_t *restrict to,
                                        uint8_t *restrict none)
 {

@@ -5,7 +5,7 @@
  * no multiple of the line rate.
  *
  * The grid of a planar head has a column per turn and a row per step; the first row is the first step that is cast.
- * The grid of a sphere has a column per ring; that of a pole has one shot. Beams and lists of directions have
+ * The grid of a sphere has a column per ring; the column of a pole has one shot. Beams and lists of directions have
  * no rows and columns: they are refused.
  *
  * With colours each text line of a point ends in red, green and blue, 0 to 255. They are 0 for a place without a point.
@@ -158,7 +158,7 @@ static int take_shot(struct ptx *ptx, int i, struct ptx_cell *cell)
     ptx->last_line = t->line;
     ptx->last_row = t->row[i];
     const int is_larger = ptx_grid_shot(&ptx->grid, t->line, t->row[i]);
-    return make_cell(ptx, i, cell) || is_larger; /* so that the file alone says how large the grid is */
+    return make_cell(ptx, i, cell) || is_larger; /* so that the cells alone say how large the grid is */
 }
 
 static int take_shots(struct ptx *ptx, int first, int n, struct sh_err *err)

@@ -89,7 +89,7 @@ int socket_reserve(void)
 
 static int accept_next(int listener, int *reserve, int *fd, struct sockaddr *at, socklen_t *len)
 {
-    if (*reserve < 0) *reserve = socket_reserve(); /* somebody else was quicker, last time */
+    if (*reserve < 0) *reserve = socket_reserve(); /* none could be opened last time */
     *fd = accept4(listener, at, len, SOCK_NONBLOCK | SOCK_CLOEXEC);
     const int starved = *fd < 0 && (errno == EMFILE || errno == ENFILE) && *reserve >= 0;
     if (!starved) return *fd >= 0;

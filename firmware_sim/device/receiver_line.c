@@ -21,7 +21,7 @@ static uint64_t oldest_of(const struct receiver_line *line)
     return line->n > RECEIVER_KEPT ? line->n - RECEIVER_KEPT : 0;
 }
 
-/* Each kind that strikes at this fix counts it. */
+/* Returns whether a fault of this kind strikes at the fix of t_ns. If so, the fault counts it. */
 static int receiver_line_strikes(struct head_faults *faults, enum fault_kind kind, int64_t t_ns)
 {
     if (!device_has_clock_fault(faults, kind, t_ns)) return 0;

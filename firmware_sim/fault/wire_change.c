@@ -10,7 +10,7 @@
 #include "drivers/protocol/native.h"
 #include "firmware_sim/fault/wire_inside.h"
 
-/* The random draws of one place. */
+/* The random draws of one change (fault_random). */
 enum { DRAW_N = 1, DRAW_MS, DRAW_BYTES };
 
 struct change {
@@ -267,7 +267,8 @@ static int echo(struct change *c)
     return put_before(c, piece);
 }
 
-/* Sends the reply before instead. Where there is none, or it is the same, OK is sent, or else 0. */
+/* Sends the previous reply in the place of this one. Where there is none, or it is the same, a native client gets
+ * OK or, where this one is OK, 0. */
 static int wrong_reply(struct change *c)
 {
     struct wire *wire = c->wire;
@@ -288,7 +289,7 @@ static int wrong_reply(struct change *c)
 
 /* ---- one fault */
 
-/* Whether the fault acts before the frame, and so needs no frame. */
+/* Returns whether the fault acts before the frame, and so needs no frame. */
 static int is_before(enum fault_kind kind)
 {
     return kind == FAULT_GARBAGE || kind == FAULT_STALL || kind == FAULT_ECHO || kind >= FAULT_DISCONNECT;

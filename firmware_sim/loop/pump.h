@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A link with its thread: frames and replies out, command lines in, for each of the link's sessions.
  *
- * In: the stream, through the links it belongs to, and what clients write. Out: bytes on the link. */
+ * In: the stream, through the links that the pump belongs to, and what clients write. Out: bytes on the link. */
 #ifndef FIRMWARE_SIM_LOOP_PUMP_H
 #define FIRMWARE_SIM_LOOP_PUMP_H
 
@@ -9,7 +9,8 @@
 
 /* links must outlive the pump. index: of the link, from 0; session numbers follow from it. */
 int pump_open(struct links *links, uint32_t index, const struct link_spec *spec, struct pump **out, struct sh_err *err);
-/* Before the start: whether sessions can be made with what clients have stored. SH_EINPUT: they can't. */
+/* To be called before pump_start: checks that a session can be made with the settings that clients have stored.
+ * SH_EINPUT: it can't. */
 int pump_check_stored(struct pump *pump, struct sh_err *err);
 int pump_start(struct pump *pump, struct sh_err *err);
 void pump_join(struct pump *pump);

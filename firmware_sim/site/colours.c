@@ -56,8 +56,8 @@ static void widen(struct colour_scale *scale, double v)
     scale->high = fmax(scale->high, v);
 }
 
-/* Finds the smallest and the largest value that a stream may have. Numbers of frames are those of the part of the
- * trajectory. */
+/* Finds the smallest and the largest value that a stream may have. Where the quantity is the frame number,
+ * these are of the frames in the part of the trajectory that is used. */
 static void find_limits(const struct site *site, struct colour_scale *scale)
 {
     scale->low = INFINITY;

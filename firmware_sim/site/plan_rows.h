@@ -6,14 +6,14 @@
 
 #include "firmware_sim/site/site.h"
 
-/* Fills site->plan.row: stage by stage, then what this machine computes of it (rate.c). */
+/* Fills site->plan.row: rows of each stage, then one with the pulses per second that this machine computes (rate.c). */
 int site_plan_rows(struct site *site, struct sh_err *err);
 /* Processor time that the plan has for a pulse, ns: the sum of its rows, and a part that each pulse takes. The figures
  * are rounded: good enough to recognise an unusual cost. */
 double site_planned_ns(const struct site *site);
-/* Why a pulse may take far more than that, as far as the plan shows it; and what the user can do. */
+/* Writes why a pulse may take far more than that, as far as the plan shows it, and what the user can do. */
 void site_cost_reason(const struct site *site, char *text, size_t room);
-/* The methods that a run uses, in one line. */
+/* Writes the methods that a run uses, in one line. */
 void site_plan_text(const struct site *site, char *text, size_t room);
 
 /* ---- rate.c: measures how many pulses per second this machine computes at a site. It casts pulses of the head to

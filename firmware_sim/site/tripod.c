@@ -17,7 +17,7 @@
 #include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 
-/* A prism of SIDES faces a leg, and its two ends. */
+/* Each leg is a prism with SIDES side faces and two ends. */
 enum { LEGS = 3, SIDES = 6, LEG_VERTICES = 2 * SIDES, LEG_TRIANGLES = 2 * SIDES + 2 * (SIDES - 2) };
 
 /* Returns the number of the configured station that a stop is at: stops go through all stations, round after round

@@ -42,8 +42,9 @@ static int plan_again(struct site_vary *v, const struct site *from, struct sh_er
     if (site->station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu stations", n);
     memcpy(site->station, from->station, n * sizeof *site->station);
     site->station[v->station].georef = NULL;
+    /* Scales are written into the legs of a path. The legs that were copied belong to `from`, so they are not kept. */
     for (size_t i = 0; i < n; i++)
-        site->station[i].leg = NULL; /* the scale is written into legs, and those of the others are from's */
+        site->station[i].leg = NULL;
     int rc = site_vary_detect(site, err);
     return rc == SH_OK ? site_georeference_one(site, v->station, err) : rc;
 }

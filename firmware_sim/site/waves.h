@@ -24,8 +24,9 @@ struct site_waves {
     struct site_wave_room usual; /* of a usual pulse */
 };
 
-/* Makes site->waves; NULL where the configuration has no waveforms. Warns where digits hide what the head detects.
- * SH_EINPUT also where the stream would have more than memory can hold of it. */
+/* Makes site->waves; NULL where the configuration has no waveforms. Warns where a count of the digitiser is
+ * too coarse for echoes that the head detects. SH_EINPUT also where the stream would have more than 400 MB of waveforms
+ * per second (MOST_BYTES_S in waves.c). */
 int site_set_up_waves(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_waves(struct site *site);
 

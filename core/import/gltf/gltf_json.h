@@ -16,9 +16,9 @@ struct gltf;
 int gltf_object(struct gltf *g, const char *list, uint32_t i, json_t **out);
 /* An index; GLTF_NONE where it isn't there. */
 int gltf_index(struct gltf *g, const json_t *of, const char *key, const char *at, uint32_t *out);
-/* A whole number up to 2^53; *out stays where it isn't there. */
+/* A whole number up to 2^53. Without the key *out keeps its value. */
 int gltf_whole(struct gltf *g, const json_t *of, const char *key, const char *at, uint64_t *out);
-/* n numbers; *out stays where they are not there. */
+/* n numbers. Without the key *out keeps its values. */
 int gltf_numbers(struct gltf *g, const json_t *of, const char *key, const char *at, size_t n, double *out);
 /* A list; NULL where it isn't there. */
 int gltf_list(struct gltf *g, const json_t *of, const char *key, const char *at, json_t **out);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Places above floors. */
+/* Finds the floors of a scene, and tries a viewpoint above each. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -16,7 +16,7 @@ static const double LEAST_SEEN_INSIDE = 0.8; /* a room, with windows and doors *
 struct floor {
     double at_m[3], room_m; /* room above it; INFINITY: the sky */
     double depth_m;         /* from it down to the last surface of its column */
-    int front;              /* seen from above it is a front */
+    int front;              /* rays from above hit the front of its triangle */
     uint32_t column;
 };
 
@@ -124,8 +124,9 @@ static int is_land(const struct survey *s, const struct floors *floors)
     return s->size_m[2] <= 0.25 * fmin(s->size_m[0], s->size_m[1]) && floors->covered >= 0.7 * N_COLUMNS;
 }
 
-/* Open ground is good enough where half of the view meets something, and where it is the ground: the top of a
- * body has the body below it. On land there is not much to see above the horizon. */
+/* Open ground is good enough where half of the rays hit something, and where there is no surface far below it: a floor
+ * on top of a body has the body's underside below it. On land there is not much to see above the horizon, so a fifth
+ * of the rays is enough. */
 static int is_good_ground(const struct survey *s, const struct floors *floors, const struct floor *f, double seen)
 {
     if (is_land(s, floors)) return seen >= 0.2;

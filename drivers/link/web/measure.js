@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This module measures between picked points. Each figure has its expected error (one sigma). It is pure.
+// This module measures between picked points. Each figure has its expected error (one sigma). The module
+// is pure: it needs no page and no network.
 //
 // The expected error of a point follows from the noise and the counts that the head reports (`expected` in /quality),
 // as in core/studio/deviation.h. Along the beam it is the error of the range; across the beam it is the error of the
@@ -11,7 +12,9 @@ import {headAxes} from './view_stations.js';
 import {isWithin} from './section.js';
 
 const STEP_M = 1e-4; // of the differences; figures are smooth over it
-const PLACED = 0.01; // a point is at its range from the station, to this share and 0.1 m; else the station was moved
+// A point's distance from its station may differ from its range by this share and 0.1 m. Beyond that the station was
+// moved after the scan.
+const PLACED = 0.01;
 
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const length = (v) => Math.hypot(...v);
@@ -20,7 +23,7 @@ export const placeOf = ({x, y, z}) => [x, y, z];
 
 function rangeVariance(t, range_m, amplitude_db) {
   let sigma_m = t.range_sigma_m;
-  if (t.range_jitter_m !== null) { // by the signal: the amplitude counts in units of the threshold
+  if (t.range_jitter_m !== null) { // the noise depends on the signal; a: the amplitude in units of the threshold
     const a = 10 ** (amplitude_db / 10);
     sigma_m = Math.hypot(t.range_floor_m, t.range_jitter_m / a);
   }
@@ -125,8 +128,8 @@ export function planeThrough(places) {
   return {middle, normal: smallestAxis(sums)};
 }
 
-// Returns whether a place of the plane is in a polygon [[u, v], ...], by the number of sides that lie to one side of
-// it.
+// Returns whether a place of the plane is in a polygon [[u, v], ...]: a ray from it then crosses an odd number of
+// sides.
 function isInPolygon(polygon, u, v) {
   let inside = false;
   for (let i = 0, j = polygon.length - 1; i < polygon.length; j = i++) {
@@ -136,7 +139,7 @@ function isInPolygon(polygon, u, v) {
   return inside;
 }
 
-const FURTHER = 4; // points up to so many depths from the plane are counted, as left out
+const FURTHER = 4; // points further than depth_m from the plane, up to this many times depth_m, count as left out
 
 // Steps through the points within `depth_m` of the plane through the corners, and within their outline. The last value
 // is {places (relative to the cloud's origin), plane, beyond}; `beyond` counts points a little further from the plane.
@@ -190,8 +193,8 @@ export function largestOf(n) {
   return n < 2 ? 0.8 : a - (Math.log(l) + Math.log(4 * Math.PI)) / (2 * a) + 0.5772 / a;
 }
 
-// Returns the flatness of places relative to `origin`: {n, rms, largest (signed: towards `eye` is more), at, sigma}.
-// sigma is the RMS that the corners' errors give.
+// Returns the flatness of places relative to `origin`: {n, rms, largest (positive towards `eye`), at (its place),
+// sigma}. sigma is the RMS that the corners' errors give.
 export function flatnessOf(places, corners, origin, eye) {
   const n = places.length / 3;
   if (n < 4) return null;
@@ -212,9 +215,9 @@ export function flatnessOf(places, corners, origin, eye) {
 
 const NEIGHBOURS = 8;
 
-// Steps towards the mean distance of the points around a place. It follows from the area of the k nearest points, which
-// has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m, or the cloud was
-// cleared.
+// A generator, whose last value is the mean distance of the points around a place. It follows from the area of the k
+// nearest points, which has (k - 1) points in the mean if they lie evenly at random. NaN: there are none within 2 m, or
+// the cloud was cleared.
 export function* spacingAround(cloud, place, first_m) {
   const {window, origin} = cloud;
   if (origin === null) return NaN;

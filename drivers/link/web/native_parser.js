@@ -31,7 +31,8 @@ class Frame {
 
 const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 
-/** Takes bytes as they come. It keeps what it has not understood yet: less than a frame, 64 KiB. */
+/** Takes bytes as they come. It keeps those of a frame or line that is not whole yet: fewer than the
+ * longest frame has, 64 KiB. */
 export class Parser {
   /** Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
    * n, t_ns}). A notice comes before the frame or text that follows the damage. kind is gap, repeated, late, restarted,
@@ -175,8 +176,8 @@ export class Parser {
     this.bad.n = n - own;
   }
 
-  // An item follows or, with atEnd, nothing. A frame that seemed to be cut by the end is a broken one if other frames
-  // stood within its length.
+  // Gives the notice of the bad bytes at hand. They are over, since a frame or line follows or, with atEnd, nothing. A
+  // frame that seemed to be cut by the end is a broken one if other frames stood within its length.
   #endBad(atEnd) {
     if (!this.bad) return;
     const {at_byte, n, seq, t_ns} = this.bad;

@@ -84,7 +84,8 @@ export class CellsPart {
     gl.bindVertexArray(null);
   }
 
-  // Draws only these pieces, because without a GPU each triangle costs as much as two points.
+  // Chooses the pieces to draw: those of cells for which isDrawn(cell) holds. All would cost too much: without a GPU
+  // each triangle costs as much as two points.
   #choose(isDrawn) {
     const {gl, cell} = this;
     const corners = new Uint32Array(6 * cell.length);

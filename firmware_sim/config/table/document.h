@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A file or a text as one YAML document, read into a struct; then --set over it. Diagnostics of values go to the
- * reader's list. */
+/* Reads a file or a text, which is one YAML document, into a struct. Then values of --set replace those of the file.
+ * Diagnostics of values go to the reader's list. */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_DOCUMENT_H
 #define FIRMWARE_SIM_CONFIG_TABLE_DOCUMENT_H
 
@@ -20,8 +20,8 @@ int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len,
 void cfg_close_file(struct cfg_document *doc);
 /* Reads the section `scanner` of rd->scanner over the values that were read before. */
 void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc);
-/* Applies the sets of the file's own keys, or, with in_scanner, those of the scanner. The others are skipped. doc: the
- * file's document, which keeps values that are YAML. */
+/* Applies the values of --set for the file's own keys or, where rd->in_scanner is 1, those for the scanner's. The
+ * others are skipped. doc: the file's document, which keeps values that are YAML. */
 void cfg_apply_sets(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets);
 /* Reads a list or a section from YAML in a --set. The key must have been forgotten before (cfg_forget). */
 void cfg_read_set_value(struct cfg_reader *rd, struct cfg_document *doc, const struct cfg_key *key, uint32_t item,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* All shards of a campaign together (batch.h). */
+/* Checks the files of all shards of a campaign, and writes manifest.json (batch.h). */
 #include <dirent.h>
 #include <limits.h>
 #include <stdio.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A client for each link: a thread with a recorder that does all that a good one does. */
+/* A client for each link: a thread that behaves like a good recorder (client.c). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_CLIENT_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_CLIENT_H
 

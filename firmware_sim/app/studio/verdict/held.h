@@ -7,7 +7,7 @@
 
 #include "firmware_sim/app/studio/verdict/watch.h"
 
-/* Looks at sessions after which nobody came back. */
+/* Returns whether there is such a connection, among those of sessions after which nobody came back. */
 int held_any(struct watch *watch);
 
 #endif
