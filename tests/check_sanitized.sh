@@ -1,9 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # Wire tests that use each command run once more, with the program that has sanitizers. So an error of memory in a command,
-# or a leak, fails here. Prints TAP. SANITIZED names the program, BUILD the folder of the tests.
+# or a leak, fails here. Prints TAP. SANITIZED_HEAD names the program, BUILD the folder of the tests.
 set -u
-export SCANHEAD=${SANITIZED:-build/asan/scanhead}
+export SCANHEAD=${SANITIZED_HEAD:-build/asan/scanhead}
 programs=${BUILD:-build}/test/tests/wire
 for needed in "$SCANHEAD" "$programs/test_status"; do
     [ -x "$needed" ] || { echo "1..0 # SKIP $needed is not built; make test builds it"; exit 0; }

@@ -54,7 +54,7 @@ if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_format.sh t
 if [ -z "$part" ]; then
     export FUZZ_BUILD="$build/asan" JOBS=1
     export TSAN_HEAD="$build/tsan_short/tsan_head"
-    export SANITIZED="$build/asan/scanhead"
+    export SANITIZED_HEAD="$build/asan/scanhead"
     set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan") tests/check/tsan_short.sh tests/check_sanitized.sh
 fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi

@@ -31,6 +31,7 @@ static double height_seen(enum georef_crs crs, uint32_t native_crs, double lon_d
     memcpy(t.info.station_m, STATION_M, sizeof STATION_M);
     georef_anchor(georef, t.info.anchor);
     georef_axes(georef, t.info.axes);
+    station_pose_of(&t.info, &t.pose);
     georef_forward(georef, 1, (struct vec3_in){&d_scene[0], &d_scene[1], &d_scene[2]},
                    (struct vec3_out){&d[0], &d[1], &d[2]});
     t.points.x[0] = t.info.anchor[0] + d[0];
