@@ -97,7 +97,7 @@ static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t
     cfg->noise.seed = 1;
     cfg->link[0].type = LINK_NULL;
     cfg->n_links = 1;
-    cfg->loop.tick_hz = 1000.0; /* this and the next are as by default (config/keys.c) */
+    cfg->loop.tick_hz = 1000.0; /* this and the next two are the defaults (config/keys.c) */
     cfg->loop.ahead_ms = 64.0;
     cfg->loop.queue_ms = 250.0;
     cfg->loop.threads = threads;
