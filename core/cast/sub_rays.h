@@ -77,8 +77,8 @@ void caster_sub_rays(struct caster *c, const struct chunk *k);
 /* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
 /* Adds sub-rays over the whole footprint. */
 void plan_whole(struct caster *c, const struct chunk *k, struct job *job);
-/* Adds the rays that a pulse needs, given the outlines up to limit_m. Returns 0 where these are as many as `known`: the
- * rays that were cast are then enough (known 0: the central ray). */
+/* Adds the rays that a pulse needs, given the outlines up to limit_m. known: the number of outlines that its rays were
+ * planned for so far; 0: it has only its central ray. Returns 0, and adds none, where no more outlines are found. */
 int plan_parts(struct caster *c, const struct chunk *k, struct job *job, double limit_m, uint32_t known);
 
 #endif

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The process that reads sets its limits, does the work, and writes the scene into the file of the task.
  *
- * For all but IFC it is a fork without exec. The parent may have threads; only this one is left in the fork. glibc lets
- * such a process use malloc and stdio; libraries are loaded before the fork. It ends by _exit, which runs
- * no destructors. */
+ * For all but IFC it is a fork without exec. The parent may have threads; the fork has only a copy of the thread that
+ * called fork. glibc lets such a process use malloc and stdio; libraries are loaded before the fork. It ends by _exit,
+ * which runs no destructors. */
 #include "core/import/import_child.h"
 
 #include <errno.h>
@@ -102,8 +102,8 @@ static void offer_to_the_oom_killer(void)
 }
 
 /* The parent watches the memory in use, and the clock. The kernel's limits also work while the parent is stopped:
- * processor time, and in a fork the address space. That limit is twice the one of memory, since a process has
- * more address space than memory. The address sanitizer takes terabytes of it. */
+ * processor time, and in a fork the address space. The address space may grow by twice the limit of memory, since a
+ * process has more address space than memory. The address sanitizer takes terabytes of it. */
 static int set_limits(const struct import_task *task)
 {
     const struct scene_import_limits *limits = &task->limits;
@@ -131,7 +131,7 @@ static int prepare(const struct import_task *task, struct sh_err *err)
     return SH_OK;
 }
 
-/* Returns only where there is no such program. */
+/* Returns only where the program can't be started. */
 static int run_program(const struct import_task *task, struct sh_err *err)
 {
     execvp(task->argv[0], (char *const *)(uintptr_t)task->argv);

@@ -192,7 +192,8 @@ static double detect_others(const struct finder *finder, const struct finder_mix
     return sum;
 }
 
-/* Returns the RMS about h, within an echo's width on both sides of its centroid, over its peak. */
+/* Returns the RMS of the samples minus h, divided by the echo's peak. The samples are those within the echo's width on
+ * both sides of its centroid. */
 static double detect_deviation(const struct finder_run *run, const struct finder_found *found,
                                const struct finder_mix *mix, uint32_t self)
 {

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* One term goes through the samples of one maximum. Nearly all echoes are found in this way, so it has to be cheap.
+/* Fits one term (a Gaussian, or h stretched; detect_inside.h) to the samples of one maximum. Nearly all echoes are
+ * found in this way, so it has to be cheap.
  *
  * The half maxima give a first term. Gauss's and Newton's steps then minimise the squares of the residual within
  * FINDER_NEAR sigma of its centre. Samples further out would lower the variance of the range by 0.6 % (the part of
- * the integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. At equal steps a Gaussian follows from
- * the sample before by two products, since the ratio of neighbours changes by a constant factor. */
+ * the integral of x^2 exp(-x^2) beyond 2.5), but they bring in neighbours. Samples are evenly spaced, so
+ * a Gaussian needs no exp after its first sample: from sample to sample the value is multiplied by a ratio, and the
+ * ratio by a constant factor. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -42,7 +44,7 @@ static void fit_sum(const struct finder_run *run, const struct finder_term *g, u
     *sums = (struct fit_sums){.n = hi - lo + 1};
     if (!run->finder->gaussian) {
         for (uint32_t i = lo; i <= hi; i++, d += step) {
-            /* Near its peak h needs no logarithm. */
+            /* This near to its peak, h itself is interpolated. Only far flanks need its logarithm (finder_value). */
             const double widths = run->finder->middle + d * (1.0 / FINDER_FWHM);
             const double value = finder_table(run->finder->shape, widths);
             const double fall = finder_table(run->finder->log_slope, widths) * (-1.0 / FINDER_FWHM) * value;

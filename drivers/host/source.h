@@ -65,7 +65,8 @@ void host_usb_watch_close(struct host_usb_watch *watch);
  * came. */
 int host_usb_watch_wait(struct host_usb_watch *watch, int rc, int64_t deadline_ns);
 
-/* Returns when timeout_ms are over, in ns of the monotonic clock; INT64_MAX for a negative timeout. */
+/* Returns the time at which timeout_ms from now are over, in ns of the monotonic clock; INT64_MAX for a negative
+ * timeout. */
 int64_t host_deadline_ns(int timeout_ms);
 
 #endif

@@ -7,7 +7,8 @@
 #include "drivers/host/usb_inside.h"
 
 /* No event reports a permission that comes late, a configuration that the kernel sets, or another program
- * that closes the device. So for HURRY_MS after a device has come, tries are frequent; else there is one a second. */
+ * that closes the device. So tries come every PAUSE_MS for HURRY_MS after a device has come, and as long as a head is
+ * there that can't be opened. Else they come every LOOK_MS. */
 enum { PAUSE_MS = 50, HURRY_MS = 2000, LOOK_MS = 1000 };
 
 struct host_usb_watch {

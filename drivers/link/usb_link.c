@@ -107,7 +107,7 @@ static int has_to_report(const struct usb_link *self, int i)
     return self->reported[i] != self->head.session[i].open;
 }
 
-/* Whether a host has got the device since the last report, and so has not enumerated it. */
+/* Whether a host has got the device since the last report. It can enumerate the device only once this is reported. */
 static int is_plugged_anew(const struct usb_link *self)
 {
     return self->plugged != usb_device_attaches(self->head.device);

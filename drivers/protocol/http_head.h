@@ -37,7 +37,8 @@ struct http_scan {
  * found as soon as its wrong byte is there. Returns an http_scan_result. */
 int http_scan_head(struct http_scan *scan, const char *bytes, size_t len);
 
-/* The line at *at of a whole head, without its end, and *at after it. Empty: the head's end. */
+/* Returns the line at *at of a whole head, without its line end, and moves *at to the next line. An empty line is the
+ * head's end. */
 struct http_text http_next_line(const char *head, size_t len, size_t *at);
 
 struct http_line {

@@ -23,8 +23,9 @@ static const uint8_t *bytes_of(const struct native_parser *parser)
 uint8_t *native_parser_room(struct native_parser *parser, size_t *room)
 {
     size_t pending = parser->end - parser->start;
-    /* Moving at most what was used up since the last move keeps the cost per byte constant. There is always
-     * room after NATIVE_MORE: pending is less than a frame, and where start < pending, end < 2 pending. */
+    /* A move copies the pending bytes. It is made only where at least as many bytes were parsed since the last move, so
+     * that the cost per byte is constant. After NATIVE_MORE there is always room: pending is less than a frame. Where
+     * start < pending, nothing is moved, but end < 2 pending, which is less than the buffer's two frames. */
     if (pending <= parser->start && sizeof parser->buf - parser->end < NATIVE_MAX_FRAME) {
         memmove(parser->buf, parser->buf + parser->start, pending);
         parser->start = 0;
@@ -66,15 +67,15 @@ static void give_notice(const struct native_parser *parser, const struct native_
 
 /* ---- bytes that belong to no item */
 
-/* Counts the frame that `bad` begins with. A LOCAL frame is not missed. */
+/* Counts the frame that `bad` begins with. A LOCAL frame has no number in the sequence: it does not count as lost. */
 static void count_bad_payload(struct native_parser *parser)
 {
     parser->stats.bad_payload++;
     parser->stats.bad_unseen += (uint64_t)!parser->bad.is_local;
 }
 
-/* Ends the run of bad bytes, because an item follows or (at_end) the bytes are over. A run that seemed to be a frame
- * cut by the end is a broken frame instead if an item stood within its length. */
+/* Ends the run of bad bytes, because an item follows or (at_end) the bytes are over. NATIVE_CUT means that the stream
+ * seemed to end within a frame. If an item follows after all, the frame is not cut but broken. */
 static void end_bad(struct native_parser *parser, int at_end)
 {
     struct native_bad *bad = &parser->bad;

@@ -101,7 +101,8 @@ struct protocol_host {
      * ahead may still change: asked again, the answer may be a later time. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
     /* Returns the state of the receiver's pulses per second at a device time. *hour_ns is the head's time since the top
-     * of the hour at that time. The part that pulses and sentences have not set counts from power-up. */
+     * of the hour at that time. Pulses set its fraction of a second, and sentences its minutes and seconds. Until they
+     * do, it counts from power-up. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
     /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has
      * set it, it is UTC, or the time since power-up. */
@@ -216,8 +217,8 @@ struct protocol_ops {
 /* Asks the head for its state (HEAD:STATe?). */
 enum protocol_head_state protocol_ask_state(const struct protocol_host *host);
 
-/* protocol_ops.input of a protocol that takes no bytes: counts them as lost. Its session begins with its struct
- * protocol_host. */
+/* protocol_ops.input of a protocol that takes no bytes: counts them as lost. The first member of the protocol's own
+ * struct has to be its struct protocol_host. */
 void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len);
 
 /* For protocol_ops.content: the bits of a hexadecimal digit that may change in any way. The character is then still a

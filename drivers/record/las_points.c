@@ -43,7 +43,7 @@ static int check_count(const struct las *las, int n, int *rc, struct sh_err *err
     return (int)room;
 }
 
-/* Points that have waited got their times before they waited. */
+/* Times of points that waited for later frames were set when the points came (track.h: waited). */
 static int set_times(struct las *las, int n, int *rc, struct sh_err *err)
 {
     const struct track *t = &las->base.track;
@@ -153,8 +153,8 @@ static void set_attributes(struct las *las, int n)
     }
 }
 
-/* The packets of the batch are written before its points, since a new descriptor goes into the records before all
- * points. */
+/* The packets of the batch are written before its points: where a packet needs a new descriptor, the bytes before all
+ * points are written again, with this descriptor. */
 static int put_packets(struct las *las, int n, struct sh_err *err)
 {
     const struct track *t = &las->base.track;

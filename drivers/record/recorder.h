@@ -47,7 +47,7 @@ struct recorder_options {
     struct colour_choice colour; /* for formats that hold a colour */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    uint32_t n_heads;            /* how often a head begins to scan after another one, the first included; 0: 1 */
+    uint32_t n_heads;            /* heads that scan in turn; one that scans again after another counts again. 0: 1 */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     int las_wdp;   /* waveforms of .las go to a .wdp beside it */

@@ -46,11 +46,11 @@ struct ffs_pipes {
     struct ffs_pipe pipe[FFS_MAX_PIPES];
 };
 
-/* Opens the endpoints of the part, in the order of its descriptors. */
+/* Opens the endpoints of gadget->part, in the order of its descriptors. */
 int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const struct gadget *gadget, struct sh_err *err);
 /* The configuration has come up: puts all slots to use. */
 void ffs_pipes_start(struct ffs_pipes *pipes);
-/* The configuration is over: slots that the kernel gives back rest. */
+/* The configuration is over: slots that the kernel gives back stay idle. */
 void ffs_pipes_stop(struct ffs_pipes *pipes);
 /* Takes one completion; 0: there is none. */
 int ffs_pipes_take(struct ffs_pipes *pipes);

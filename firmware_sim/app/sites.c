@@ -55,7 +55,8 @@ int sites_load_beside(const struct config *cfg, const struct site *first, const 
 struct site *sites_of(const struct sites *sites, uint32_t station)
 {
     const struct config *cfg = sites->first->cfg;
-    if (sites->n == 0 || config_serves(cfg, station)) return sites->first; /* stops have one scanner, and may be many */
+    /* All stops of a trajectory have the first scanner, though there may be more stops than stations. */
+    if (sites->n == 0 || config_serves(cfg, station)) return sites->first;
     for (uint32_t k = 0; k < sites->n; k++)
         if (sites->other[k].scanner == cfg->station[station % cfg->n_stations].scanner) return sites->other[k].site;
     return sites->first;

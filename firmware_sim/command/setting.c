@@ -99,7 +99,8 @@ uint32_t command_setting_values(const struct command_call *call, int64_t value[H
     return l->n_rates;
 }
 
-/* Moves the ends of a range inward to rates that the head has. The other setting leaves at least one. */
+/* Moves the ends of a range inward to rates that the head has. The range, which another setting may have narrowed,
+ * always has at least one of these rates. */
 static void narrow_to_rates(const struct command_call *call, int64_t *min, int64_t *max)
 {
     int64_t rate[HEAD_MAX_RATES];
@@ -340,8 +341,9 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
     return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || !can_vary));
 }
 
-/* Whether a step beyond MAX is that of DEF. The rates of power-up may give two different steps, in the line and of the
- * pan, and the coarser one may be beyond MAX. Such a number does what DEF does. */
+/* Whether a step outside MIN to MAX is the step that DEF sets. The rates of power-up may give one step in the line and
+ * another one of the pan, and the coarser one may be above MAX. A client may send it as a number: that does what DEF
+ * does. */
 static int is_default_beyond(const struct command_call *call, int64_t value)
 {
     struct head_settings then = call->dev->defaults;

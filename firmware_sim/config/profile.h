@@ -72,8 +72,8 @@ struct config_profile {
     /* These are the head's as a whole; they limit each program. */
     struct config_reach reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* at least 1: range_max_m on 90 % where the file has none */
-    /* One for each pulse rate, which rises. n_programs 0: any rate from prr_min to prr_max; program[0] then holds
-     * for all of them. */
+    /* One for each pulse rate, the lowest rate first. n_programs 0: any rate from prr_min to prr_max; program[0] then
+     * holds for all of them. */
     struct config_program program[HEAD_MAX_RATES];
     uint32_t n_programs;
     double accuracy_m, accuracy_ppm, angle_accuracy_deg; /* shown; noise is drawn from the sigmas alone. 0: not known */

@@ -84,7 +84,7 @@ static void open_server(struct time_client *c)
     time_client_say(c, "ASKING", NULL);
 }
 
-/* Takes the settings as they are now. A change of any of them, or of power, begins anew with them. */
+/* Takes the settings as they are now. Where any of them has changed, or power was cycled, the requests begin anew. */
 static void take_settings(struct time_client *c)
 {
     struct device_time_server now;
@@ -119,7 +119,7 @@ static void ask(struct time_client *c, int64_t now_ns)
     c->asked_ns = now_ns;
     c->t1_ns = utc_now_ns(c);
     ntp_write_request(packet, c->t1_ns);
-    (void)!send(c->fd, packet, sizeof packet, 0); /* one that is lost is missed as an answer */
+    (void)!send(c->fd, packet, sizeof packet, 0); /* if it is lost, no answer comes, which is reported */
     c->give_up_ns = now_ns + SECOND_NS;
     c->ask_ns += period_ns(c);
     if (c->ask_ns <= now_ns) c->ask_ns = now_ns + period_ns(c); /* the machine stood still */
@@ -172,7 +172,7 @@ static void take_answer(struct time_client *c)
     struct ntp_answer answer;
     const ssize_t len = recv(c->fd, packet, sizeof packet, 0);
     const int64_t t4_ns = utc_now_ns(c);
-    if (len < NTP_LEN || c->give_up_ns == INT64_MAX) return; /* one that comes too late is none */
+    if (len < NTP_LEN || c->give_up_ns == INT64_MAX) return; /* too short, or after the client gave up */
     /* Injected faults strike at answers to this request alone, and count them. */
     if (ntp_read_answer(packet, (size_t)len, c->t1_ns, t4_ns, &answer) == NTP_FOREIGN) return;
     if (device_change_time_answer(c->device, clock_now_ns() - c->epoch_ns, packet)) return;

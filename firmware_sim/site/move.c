@@ -37,8 +37,9 @@ static int move_is_same(const struct site_place *a, const struct site_place *b)
            a->pitch_deg == b->pitch_deg && a->roll_deg == b->roll_deg;
 }
 
-/* Without an anchor the station's own place gives the scene's place on the Earth. The scene stays where it is: as with
- * an anchor at the station's first place, and the scene's y axis to true north there. */
+/* Without an anchor the station's own place gives the scene's place on the Earth. The scene must keep its place when
+ * the station moves. So the new latitude and longitude are computed as if an anchor were at the station's first place,
+ * with the scene's y axis to true north there. */
 static int move_on_earth(const struct placement *was, const struct site_place *to, struct config_station *s,
                          struct sh_err *err)
 {

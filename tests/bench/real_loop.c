@@ -55,7 +55,7 @@ static double embree_rays_s(const struct bench_case *c, const struct bench_resul
     return begun == threads ? (double)c->rays->n * passes / s : 0.0;
 }
 
-/* Makes a head as configurations do, which fires as the bench's rays go. frames is the number of turns of the pan. */
+/* Fills a configuration. Its head fires pulses in the directions of the bench's rays. frames: turns of the pan. */
 static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t threads, uint32_t frames)
 {
     struct schedule_spec spec;
@@ -97,7 +97,7 @@ static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t
     cfg->noise.seed = 1;
     cfg->link[0].type = LINK_NULL;
     cfg->n_links = 1;
-    cfg->loop.tick_hz = 1000.0; /* this and the next are as by default (config/keys.c) */
+    cfg->loop.tick_hz = 1000.0; /* this and the next two are the defaults (config/keys.c) */
     cfg->loop.ahead_ms = 64.0;
     cfg->loop.queue_ms = 250.0;
     cfg->loop.threads = threads;

@@ -41,7 +41,8 @@ static void say_counts(const struct gltf *g)
                    g->n_odd, g->n_odd > 1 ? "s" : "", g->odd);
 }
 
-/* Warns of the error of whole numbers. The file is not refused for it, since its writer chose these steps. */
+/* Warns where positions were rounded to whole numbers (quantised). The file is not refused for it, since its writer
+ * chose the size of the steps. */
 static int say_errors(struct gltf *g)
 {
     struct scene_build *b = g->b;

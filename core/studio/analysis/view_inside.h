@@ -1,16 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/studio/analysis: the parts of the view. Points make places (view.c); places make an image
- * (view_draw.c, view_shade.c). */
+/* Private to core/studio/analysis: the parts of the view. Each pixel of the image has VIEW_SUB x VIEW_SUB places.
+ * Points are drawn into places, as discs (view.c). The image is made of the places (view_draw.c, view_shade.c). */
 #ifndef CORE_STUDIO_ANALYSIS_VIEW_INSIDE_H
 #define CORE_STUDIO_ANALYSIS_VIEW_INSIDE_H
 
 #include "core/studio/view.h"
 
-enum { VIEW_SUB = 2 }; /* places along a pixel's side: edges are even */
+enum { VIEW_SUB = 2 }; /* places along a pixel's side: a pixel is the mean of its places, so that edges are smooth */
 
 struct view_place {
-    float order_m; /* depth of the disc there with its bulge, which decides what is in front; INFINITY: no disc */
-    float depth_m; /* of its centre */
+    /* Depth of the disc at this place; a disc is deeper at its rim (view.h). Of several discs the one with the least is
+     * in front. INFINITY: there is no disc. */
+    float order_m;
+    float depth_m; /* of the disc's centre */
     union {
         float value;
         uint8_t rgb[4];
@@ -27,8 +29,9 @@ struct view {
     struct view_counts counts;
 };
 
-/* Smooths depths within surfaces and closes small holes: depth_m[height][width]; INFINITY: nothing is there. near: the
- * index of the place from which each place has its colour, for a closed hole another one. */
+/* Smooths depths within surfaces and closes small holes: depth_m[height][width]; INFINITY: nothing is there. near: for
+ * each place, the index of the place that gives its colour. This is the place itself, or a neighbour where a hole was
+ * closed. */
 int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct sh_err *err);
 /* Sets light to the brightness of each place, 0..1, from these depths. log_depth: working memory for as many figures.
  * SH_ESTOPPED where colours->report asks to stop. */

@@ -149,7 +149,7 @@ static int put_string(struct aiMaterial *to, struct aiMaterialProperty *at, cons
     return put_property(to, at, key, semantic, (struct property){aiPTI_String, &string, 4 + (size_t)string.length + 1});
 }
 
-/* Puts a PNG into the scene, which materials name by its number. Returns 0 where there is no memory. */
+/* Puts an image into the scene, as a PNG. A material names the PNG by its number. Returns 0 if there is no memory. */
 static int add_image(struct export_scene *s, const struct picture *image, struct aiTexture *texture, char name[16])
 {
     char *png = NULL;

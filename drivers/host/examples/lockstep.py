@@ -89,7 +89,7 @@ class Run:
 def main(source, steps):
     with scanhead.open(source) as head:
         run = Run(head)
-        while head.command("HEAD:STATe?") != "idle":  # it boots in its own time, too
+        while head.command("HEAD:STATe?") != "idle":  # it boots only while granted time passes
             run.grant()
         head.command("SCAN:STARt")
         start_s = time.monotonic()

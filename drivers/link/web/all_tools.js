@@ -21,7 +21,7 @@ class Expected {
   }
 }
 
-// Returns the tools by their names. names(mode, label) is as Display has it.
+// Returns the tools by their names. names(mode, label) returns the name of a surface or a station for people.
 export function startTools(view, names) {
   const tools = {sides: new SidesTool(view), section: new SectionTool(view), measure: new MeasureTool(view, names, new Expected()),
     panorama: new PanoramaTool(view, names)};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This module looks from the top, the front and the side without perspective, and back. A section that is turned gives
-// the directions. It is pure.
+// This module turns the camera to a flat view (no perspective) from the top, the front or the side, and returns to the
+// view before. Where a section is turned, these are the sides of the section. The module is pure.
 
 import {radians} from './view_camera.js';
 

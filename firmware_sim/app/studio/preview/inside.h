@@ -16,7 +16,7 @@ struct preview_section {
     double middle_m[3], half_m[3], heading_deg; /* half_m INFINITY: no limit in that direction */
 };
 
-/* Angles and lengths of a member that is INFINITY are those of the scanner at power-up. */
+/* far_m, line_deg and pan_deg: INFINITY stands for the scanner's value at power-up. */
 struct preview_request {
     enum preview_kind kind;
     uint32_t station; /* from 0; the scan has its scanner and its tripod */

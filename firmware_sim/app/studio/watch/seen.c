@@ -8,8 +8,8 @@
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/config/config.h"
 
-/* Limits of the number of cells, which is approximate, and of memory. A piece of a cell takes up to 144 bytes, and each
- * triangle has at least one piece (core/studio/coverage/cells.c). */
+/* Limits of the number of cells, which is approximate, and of memory. Each triangle has at least one piece of a cell.
+ * It is counted below with 148 bytes, a little more than it takes (PIECE_BYTES in core/studio/coverage/cells.c). */
 static const double MOST_CELLS = 20000.0, MOST_MIB = 160.0;
 enum { TRIES = 12 };
 
