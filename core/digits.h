@@ -6,7 +6,7 @@
 
 #include <math.h>
 
-/* The place of the last of so many digits. */
+/* Returns the power of ten that the last digit counts where x (above 0) is written with that many digits. */
 static inline double digits_place(double x, int digits)
 {
     return pow(10.0, floor(log10(x)) + 1.0 - digits);

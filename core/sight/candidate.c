@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The figures of a triangle as seen from the station: its directions, its distance, and the doubts of
- * both. */
+/* The figures of a triangle as seen from the station: in which directions it lies, how far away, and bounds of the
+ * rounding errors of both (doubts, sight_inside.h). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +15,7 @@ void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
         vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], sight->station_m, v[i]);
 }
 
-/* Takes a function linear in the direction to the coordinates of a face. */
+/* Rewrites a linear function of the direction as one of a face's coordinates: out[0] + out[1] u + out[2] v. */
 static void to_face(const double f[3], uint32_t face, double out[3])
 {
     const uint32_t axis = face / 2;
@@ -69,10 +69,10 @@ static int set_plane(const struct sight *sight, struct build_candidate *c)
 /* For a triangle where double precision can't say from which side the station sees it, the sides of its edges have no
  * certain sign. Two strips of directions each hold all rays that may hit it. The narrower one replaces the edges:
  * directions beside it are certainly outside, and none is inside.
- * - Directions along the plane. A ray at a larger angle hits the plane where the ray begins (SIGHT_NEAR).
- *   This also holds where the plane is at the station up to rounding.
- * - Directions past the longest edge by at most the triangle's width: inside, the sides of all three edges together
- *   are n . d, and have one sign. */
+ * - Directions at a small angle to the plane. A ray at a larger angle meets the plane so near to the station that it
+ *   does not count as a hit (SIGHT_NEAR). This also holds where the plane is at the station up to rounding.
+ * - Directions that pass the longest edge by at most the triangle's width. Inside of the triangle the sides of its
+ *   three edges have one sign, and their sum is n . d. So none of them is larger than that. */
 static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3])
 {
     const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);

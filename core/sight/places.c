@@ -9,8 +9,8 @@
 /* Finds the place of each ray's leaf: the number of its tile, and the cell within. Coordinates are those of
  * sight_inside.h in single precision, counted in cells from 0. With e = 2^-24, the error of b / |a| is 2 e of its value
  * for the rounded components, and 3 e more for the reciprocal and the products; values are 1 at most. The sum, 2 at
- * most, is rounded by e. Together 6 e and some e^2, less than half of SIGHT_PAD; so it also is where rounding chooses
- * another face. Vectors that are no direction belong to `nowhere`. */
+ * most, is rounded by e. Together the error is 6 e and some e^2, less than half of SIGHT_PAD. It also stays below that
+ * where rounding chooses another face. Vectors that are no direction belong to `nowhere`. */
 VEC_CLONES
 static void find_places(uint32_t cells, const struct vec3_in *dir, uint32_t n, int32_t nowhere, int32_t *restrict tile,
                         int32_t *restrict within)
@@ -38,7 +38,8 @@ static void find_places(uint32_t cells, const struct vec3_in *dir, uint32_t n, i
 }
 _Static_assert(SIGHT_TILE == 8, "shifts by 3");
 
-/* Rays whose tile is not that of the ray before them, as bytes of 1. Room is for eight more. */
+/* Sets changes[i] to 1 where ray i has another tile than the ray before it, else to 0. The eight bytes after the last
+ * ray become 1, so that next_change() finds an end. */
 VEC_CLONES
 static void find_changes(const int32_t *restrict tile, uint32_t n, uint8_t *restrict changes)
 {

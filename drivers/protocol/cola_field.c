@@ -246,7 +246,7 @@ static double farthest_um(const struct cola_shape *shape)
     return far_um;
 }
 
-/* Whole millimetres, at least one: counts of u16 then reach as far as the shape. */
+/* Returns millimetres per count: the least whole number with which counts of 16 bits reach as far as the shape. */
 static float scale_of(const struct cola_shape *shape)
 {
     return (float)fmax(1.0, ceil(farthest_um(shape) / MM_UM / MOST_COUNT));

@@ -86,7 +86,7 @@ static void take_emitter(struct planar_scan *s, const struct native_emitter *e)
     take_head(s);
 }
 
-/* The place that looks at a pan count. Pan counts grow clockwise, places counter-clockwise. */
+/* Returns the place of the step at a pan count. Pan counts grow clockwise, places counter-clockwise. */
 static uint32_t planar_scan_place_of(const struct planar_scan *s, uint32_t pan)
 {
     const uint64_t turned = (uint64_t)(pan * s->steps_per_count + 0.5);
@@ -110,7 +110,7 @@ static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, in
         if (!s->done) news->broken++;
         if (line > next) news->broken += line - next;
     }
-    /* Turns that are no loss are not counted as turns either. */
+    /* Where turns are missing at a scan's begin and are no loss (fresh), numbers go on without them. */
     if (s->seen && !same_scan) s->number0 += s->line + 1 - (s->fresh ? line : 0);
     s->done = s->fresh && !from_start;
     s->fresh = 0;

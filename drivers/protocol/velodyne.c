@@ -38,7 +38,7 @@ struct velodyne {
     int64_t t0_ns;      /* device time of its first one */
     uint64_t next_pulse;
     int in_step;      /* 1: next_pulse is the one that has to come */
-    int is_left_over; /* pulses up to the next firing sequence are unsent, since the head left out others before them */
+    int is_left_over; /* 1: pulses up to the next firing sequence count as unsent: pulses before them are missing */
     uint8_t packet[VELODYNE_DATA_LEN];
     uint8_t reflectivity[N_REFL];
 };
@@ -138,7 +138,8 @@ static void take_emitter(struct velodyne *v, const uint8_t *payload, size_t len)
     v->model = model;
 }
 
-/* Returns whether it is an echo whose range has no number. */
+/* Writes a point as range and reflectivity. Returns 1 if it is an echo whose range can't be written: it
+ * rounds to 0, or needs more than 16 bits. */
 static uint32_t put_entry(const struct velodyne *v, uint8_t *at, const struct native_point *p)
 {
     double units = p->echo == 0 ? 0.0 : p->a * v->range_units_per_count + 0.5;
@@ -318,7 +319,7 @@ static int64_t never(const void *protocol)
     return INT64_MAX;
 }
 
-/* Ranges and reflectivities. */
+/* Marks the bytes of ranges and reflectivities. */
 static void mark_entries(const uint8_t *packet, size_t len, uint8_t *mask)
 {
     (void)packet;

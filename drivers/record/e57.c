@@ -5,8 +5,8 @@
  *
  * A binary section is a header and packets (e57_packet.h). The XML section, which says where everything is, comes last.
  * Then headers are overwritten, the file's own as the last: a file with a header is whole. Until then a note before
- * each scan (e57_note.h) has what a repair needs. A packet spans no more than 0.1 s of device time, or 8 records. So
- * little is missing at any moment, and the same stream still gives the same bytes. */
+ * each scan (e57_note.h) has what a repair needs. A packet ends after 0.1 s of device time, but not before it has 8
+ * records. So little is missing at any moment, and the same stream still gives the same bytes. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -292,7 +292,7 @@ const struct app_command app_check = {
     .notes =
         "Prints the scanners, the memory that the scene takes, and the places of the scene and of each station in\n"
         "every known coordinate frame. Opens and closes the links except files, all at once, so a taken port, a wrong\n"
-        "path or a link that can't carry the stream shows. Of files it checks that there is a place for them.\n"
+        "path or a link that can't carry the stream shows. For files it checks that their folder exists.\n"
         "If the configuration is wrong, it shows all errors, up to 20, each with its line.\n"
         "\n"
         "--scene: an edge is open where only one triangle of the object has it, with corners at the same place, bit\n"

@@ -189,9 +189,9 @@ static void check_sight(struct cfg_reader *rd, const struct config *cfg)
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
 
-/* A footprint needs a beam that has one, and a pulse that is not too short: sub-rays that hit one oblique
- * surface have different ranges. Where the pulse is too short to join them, each would be an echo of its
- * own, or be lost because it is too weak. An adaptive beam needs the outlines that one place sees. */
+/* Modes with sub-rays need a head profile with a footprint, and a pulse that is not too short. Sub-rays that hit one
+ * oblique surface have different ranges: where the pulse is too short to join them, each would be an echo of its own,
+ * or be lost because it is too weak. An adaptive beam needs outlines, which are found from one place. */
 static void check_beam(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct config_profile *p = &cfg->profile;

@@ -9,7 +9,7 @@
 
 struct hasher;
 
-/* Before the pacing thread starts. */
+/* Starts the thread. To be called before the pacing thread starts. */
 int hasher_start(struct stream *stream, struct hasher **out, struct sh_err *err);
 /* Waits until the stream is over and read; frees the hasher. 1: hex is the hash; 0: the hasher was too slow. */
 int hasher_join(struct hasher *hasher, char hex[65]);

@@ -24,7 +24,7 @@ struct pose_feed;
 /* Listens at platform.address and platform.port. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
-/* "udp:127.0.0.1:4711" */
+/* Writes where it listens, such as "udp:127.0.0.1:4711". */
 void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len);
 /* Ends the thread; feed may be NULL. */
 void pose_feed_close(struct pose_feed *feed);

@@ -100,7 +100,8 @@ static int read_map(struct reader *r)
     if (rc == SH_OK && n < 8) rc = read_scale(r);
     if (rc != SH_OK) return rc;
     const double *m = r->map, *z = r->map + 8;
-    /* GDAL doesn't use the third row either. 0 0 0 0, which maps the plane alone, and 0 0 1 0 change no height. */
+    /* The third row is for heights. It is not applied, as in GDAL; a warning names it. Two rows change no height and
+     * need no warning: 0 0 0 0 (there are no heights) and 0 0 1 0 (heights as they are). */
     r->g->turns_heights = n >= 12 && (z[0] != 0.0 || z[1] != 0.0 || z[3] != 0.0 || (z[2] != 0.0 && z[2] != 1.0));
     const double area = m[0] * m[5] - m[1] * m[4];
     if (isfinite(area) && area != 0.0 && isfinite(m[3]) && isfinite(m[7])) return SH_OK;

@@ -58,7 +58,8 @@ static int open_targets(struct gltf *g, const json_t *node, const json_t *mesh, 
 
 /* ---- skins */
 
-/* Multiplies absolute values of matrices: the error by rounding to single precision is a share of the product. */
+/* Multiplies the absolute values of two matrices. Rounding to single precision causes an error in proportion to that
+ * product. */
 static void take_reach(const gltf_matrix world, const gltf_matrix bind, gltf_matrix out)
 {
     gltf_matrix a, b;
@@ -238,7 +239,8 @@ static double half_step(const struct gltf_pose *pose)
 void gltf_pose_error(struct gltf *g, const struct gltf_pose *pose, const gltf_matrix world)
 {
     const double half = half_step(pose), steps[3] = {half, half, half};
-    const double bent = 2.0 * BUILD_SINGLE_ROUNDING * pose->most_bent; /* the position, and its inverse bind matrices */
+    /* Twice: positions are rounded, and so are inverse bind matrices. */
+    const double bent = 2.0 * BUILD_SINGLE_ROUNDING * pose->most_bent;
     double error[3];
     for (uint32_t j = 0; j < pose->n_joints; j++)
         g->step_error = fmax(g->step_error, place_error(pose->joint[j], steps));

@@ -46,7 +46,7 @@ static void angle_effects(const double rotation[9], const double beam[3], const 
     vec3_cross(up, beam, by_pan);
     vec3_cross(beam, by_pan, by_mirror);
     const double flat = vec3_length(by_pan);
-    effect[0] = flat > 0.0 ? vec3_dot(normal, by_mirror) / flat : 1.0; /* straight up or down: at most that */
+    effect[0] = flat > 0.0 ? vec3_dot(normal, by_mirror) / flat : 1.0; /* straight up or down: the largest value */
     effect[1] = vec3_dot(normal, by_pan);
 }
 

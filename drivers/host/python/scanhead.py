@@ -55,7 +55,9 @@ HAS_ATTRIBUTES, HAS_COLOURS, HAS_WAVES, HAS_DEVIATIONS = 1, 2, 4, 8  # content o
 _HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COLOURS, WAVES)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
-_SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256  # how far back a jump is looked into, as libscanhead does
+# As in libscanhead: latest frames and gaps that are remembered, frames in such a gap at most, and late frames in a row
+# that are another sequence.
+_SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256
 _FRAME_BYTES = 512  # memory of a kept frame beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
 _ANSWERS_S = 0.2  # how long further answers to *IDN? may take after the first one
@@ -277,7 +279,8 @@ class Frame(NamedTuple):
 class Notice(NamedTuple):
     """Something wrong in the stream; each thing gives one. kind is one of
         gap          n frames are missing, from seq on
-        repeated     a frame came once more; late: it was missing, and comes after newer ones. Neither is given
+        repeated     a frame came once more
+        late         a frame that was missing came after newer ones; frames() gives neither this one nor a repeated one
         restarted    another sequence begins with seq: the head started again
         bad payload  a frame whose header is right, and whose payload is not; n bytes of it
         bad bytes    n bytes that belong to nothing
@@ -346,8 +349,8 @@ class _Sequence:
         return False
 
     def _is_run(self, seq: int) -> bool:
-        """Returns whether this late frame is one too many in a row: these are another sequence, whose numbers were all
-        missing."""
+        """Returns whether this is the _LATE_RUN-th late frame in a row. Then these frames are not late: they belong to
+        another sequence, whose numbers happened to be missing ones."""
         follows = self._late_run > 0 and seq == (self._last_late + 1) % 2**32
         self._late_run, self._last_late = self._late_run + 1 if follows else 1, seq
         return self._late_run == _LATE_RUN
@@ -726,7 +729,8 @@ def _scaled(column, scale: float, shift: float = 0.0):
 
 
 def _geo_points(p: Points, raw, a: Dict) -> None:
-    """range_m: from the anchor where that is the station; geodetic: straight through space."""
+    """Fills in the columns of the geo layout. range_m is the straight distance from the anchor, which is the station. A
+    head that moves has no such place, so its range_m is NaN."""
     d = [_scaled(_signed(c), s) for c, s in zip(raw[:3], a["scale"])]
     x, y, z = (_scaled(v, 1.0, shift) for v, shift in zip(d, a["anchor"]))
     if a["crs"] == CRS_GEODETIC:
@@ -1159,7 +1163,8 @@ class Head:
 
     @property
     def pulses_lost(self) -> int:
-        """Pulses that the head says it lost. Two kinds of events count the same; of either, some may be lost."""
+        """Pulses that the head says it lost. OVERRUN and SCAN_END both report them. Events of either kind may be
+        missing, so the larger sum counts."""
         return max(self._lost_told, self._lost_ended)
 
     @property
@@ -1276,9 +1281,10 @@ class Head:
         return reply
 
     def _settle(self, deadline_s: float) -> None:
-        """Comes into step: on a terminal, which may have echoed what the head sent, and after a command that was
-        given up. The head may have sent half a frame to the program before, and the rest of it may swallow the answer
-        to *IDN?. So the question is asked again."""
+        """Sends *IDN? and skips all replies up to its answer, so that the next reply is that of the next command. This
+        is needed on a terminal, which may have echoed what the head sent, and after a command that was given up. The
+        head may have sent half a frame to the program before, and the rest of it may swallow the answer. So the
+        question is asked again."""
         while True:
             self._asked += 1
             self._send("\n*IDN?\n", deadline_s)
@@ -1424,9 +1430,9 @@ class Head:
 
     def _follow_sequence(self, frame: Frame) -> None:
         """Forgets the state where the numbers of frames go back: the head has started again, or recordings were put
-        one after the other. The state is kept in two cases. If the new sequence began with frames equal to those
-        before, they said the same. If a descriptor for this reader alone (LOCAL) came just before, the state since
-        then is that of the new sequence."""
+        one after the other. The state is kept in two cases. If the new sequence began with frames equal to earlier
+        ones (repeated), the state from those holds for it, too. If a descriptor for this reader alone (LOCAL) came just
+        before, the state since then is that of the new sequence."""
         if frame.flags & LOCAL:
             return
         repeated = self.parser.repeated

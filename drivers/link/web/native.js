@@ -225,8 +225,8 @@ export class Decoder {
     c.dropNaN(from);
   }
 
-  // Returns the points frame that attributes or colours follow as number `after`. null: it was lost, or they belong to
-  // another one.
+  // Returns the last points frame, if a frame of attributes or colours belongs to it: `after` is how many frames after
+  // it this one comes. null: the points frame was lost, or this one belongs to another.
   #besidePoints(frame, beside, after) {
     const l = this.last;
     const isOfIt = l !== null && frame.seq === (l.seq + after) >>> 0 && beside.pulse0_low === l.low &&

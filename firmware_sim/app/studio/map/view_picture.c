@@ -137,7 +137,7 @@ static int by_points(const void *a, const void *b)
     return x->number < y->number ? -1 : 1;
 }
 
-/* Stations by number; labels by how many points they have. */
+/* Draws the names of stations in the order of their numbers, those of labels with the most points first. */
 static int draw_names(const struct picturing *p, struct picture *picture, struct sh_err *err)
 {
     const int stations = p->plan->colour == MAP_VIEW_STATION;

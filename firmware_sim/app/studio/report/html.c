@@ -25,7 +25,7 @@ static const char *frame_name(const struct report *r)
     return names[r->cfg->output.crs];
 }
 
-/* Names the scanner; where stations have several, each of them with the station from which on it is used. */
+/* Names the scanner. Where stations have different scanners, each is named with the first station that uses it. */
 static void put_scanners(FILE *out, const struct report *r)
 {
     char what[48] = "Scanner", text[256];
@@ -248,8 +248,8 @@ static void put_words(FILE *out, const struct report *r)
         "<dt>On smooth faces</dt><dd>Points whose nearest surface is the one that the beam meets, at an incidence up "
         "to 80\xc2\xb0. At an edge a small error across the beam is a large one along it, so there are distances "
         "alone.</dd>\n"
-        "<dt>Judged</dt><dd>Points on smooth faces whose noise alone decides about their deviation: nothing else is "
-        "as near to the face as eight times their noise. Up to about 400,000 are taken, evenly.</dd>\n"
+        "<dt>Judged</dt><dd>Points on smooth faces whose deviation is caused by noise alone: no other surface is "
+        "nearer than about eight times their expected noise. Up to about 400,000 are taken, evenly.</dd>\n"
         "<dt>Expected</dt><dd>The RMS deviation along the beam that follows from the configured noise (of ranges, angles "
         "and places) and from the counts of encoders and numbers. It is worked out for each judged point from its range "
         "and incidence.</dd>\n"

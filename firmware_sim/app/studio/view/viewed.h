@@ -41,8 +41,8 @@ struct viewed_points {
 
 /* The array of a column, or NULL; *size: bytes of one value, its components together. */
 const void *viewed_array(const struct viewed_points *points, enum viewed_column column, size_t *size);
-/* Makes room for n points in xyz_m and in the columns of `has` (bit c: column c), which are NULL at first. SH_ENOMEM:
- * points are as before, except for the room. */
+/* Makes room for n points in xyz_m and in the columns of `has` (bit c: column c). Columns are NULL before their first
+ * call. SH_ENOMEM: the points are unchanged; some arrays may have the new room. */
 int viewed_points_room(struct viewed_points *points, size_t n, unsigned has, struct sh_err *err);
 void viewed_points_free(struct viewed_points *points);
 
