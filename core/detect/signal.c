@@ -74,7 +74,7 @@ VEC_INLINE double log_least(const struct detect_signal *s, double range_m)
 VEC_INLINE double overlap(double per_overlap2, double range_m)
 {
     double x = range_m * range_m * per_overlap2, caught = 1.0 - vec_exp(-x);
-    caught = x < 1e-5 ? x : caught; /* x^2/2 is left out: 5e-6 of it */
+    caught = x < 1e-5 ? x : caught; /* x^2/2 is left out: at most 5e-6 of x */
     return per_overlap2 == 0.0 ? 1.0 : caught;
 }
 
@@ -96,7 +96,7 @@ double detect_extinction_1_m(double visibility_m, double wavelength_m)
     return 3.912 / visibility_m * pow(wavelength_m / 550e-9, -q);
 }
 
-/* g(R), piece by piece. */
+/* Computes g(R) (detect.h): each of its pieces adds the change of the slope. */
 VEC_CLONES
 static void sum_pieces(const struct detect_signal *s, uint32_t n, const double *restrict range_m, double *restrict g)
 {

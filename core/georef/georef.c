@@ -70,8 +70,9 @@ static int is_same_grid(const struct georef_spec *spec)
            (spec->side == 0 || (spec->side > 0) == spec->prcs_north) && spec->geoid == NULL;
 }
 
-/* Metres per degree of latitude and of longitude at the centre, and the distance from the axis. Latitude's is an upper
- * bound up to height_m above the centre: the meridian's radius of curvature is largest at the poles, a^2/b. */
+/* Sets metres per degree of latitude and of longitude at the centre, and the distance from the axis. *lat_m is an upper
+ * bound for places up to height_m above the centre: the meridian's radius of curvature is largest at the poles,
+ * a^2/b. */
 void georef_degrees(const struct georef *georef, double height_m, double *lat_m, double *lon_m, double *axis_m)
 {
     double place[3], p[3], rotation[9];
@@ -124,7 +125,7 @@ static int set_up_map(struct georef *georef, const struct georef_spec *spec, str
     return SH_OK;
 }
 
-/* Local, ECEF from a metric frame, and a grid that the scene is in. */
+/* Sets up the cases without a map: local, ECEF from a metric frame, and a grid that the scene is in. */
 static void set_up_linear(struct georef *georef, const struct georef_spec *spec)
 {
     memcpy(georef->anchor, spec->station_m, sizeof georef->anchor);
@@ -268,8 +269,8 @@ int georef_set_method(struct georef *georef, enum georef_method method, struct s
     return SH_OK;
 }
 
-/* Rounding of positions of 6.4e6 to 1e7 m, and of GeographicLib, which states 5 nm for transverse
- * Mercator. */
+/* These bound the rounding of positions of 6.4e6 to 1e7 m and, for maps, the error of GeographicLib, which states 5 nm
+ * for transverse Mercator. */
 #define EXACT_LINEAR_M 5e-9
 #define EXACT_MAP_M    2e-8
 

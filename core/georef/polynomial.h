@@ -38,7 +38,7 @@ struct polynomial {
 /* Fits within +-half_m about the map's centre. */
 void polynomial_fit(const struct shim_map *map, enum polynomial_form form, double half_m, struct polynomial *out);
 
-/* Whether there is this order: 1 to 3, and 5 where it is flat. */
+/* Returns whether the polynomial has this order: 1 to 3, and in the form POLYNOMIAL_FLAT also 5. */
 int polynomial_has_order(const struct polynomial *p, int order);
 
 /* A bound of the terms above `order`, within radius_m and height_m of the centre; weight: metres on the
@@ -46,7 +46,7 @@ int polynomial_has_order(const struct polynomial *p, int order);
 double polynomial_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                           const double weight[3]);
 
-/* In place is allowed. */
+/* Computes n differences from the anchor. out may be the arrays of d. */
 void polynomial_apply(const struct polynomial *p, int order, size_t n, struct vec3_in d, struct vec3_out out);
 
 #endif

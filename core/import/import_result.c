@@ -247,7 +247,7 @@ static int take_vertices(struct result *r)
     return rc;
 }
 
-/* As many triangles as are read at a time, in arrays as the file has them. */
+/* Holds the triangles that are read at a time, in the same arrays as the file. */
 struct triangles {
     uint32_t corner[AT_ONCE][3];
     uint16_t label[AT_ONCE];

@@ -13,8 +13,8 @@ int build_fail(struct scene_build *b, int code, struct sh_err *err, const char *
 /* Warns with "FILE: text". */
 void build_warn(const struct scene_build *b, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
-/* Reports "reading FILE" about four times a second, once the load takes longer than a second, and heeds the
- * stop: SH_ESTOPPED. build: a struct scene_build. */
+/* Reports "reading FILE" about four times a second, once the load takes longer than a second.
+ * Returns SH_ESTOPPED when the user has asked to stop. build: a struct scene_build. */
 int build_progress(void *build, double fraction, struct sh_err *err);
 
 /* Reports "reading FILE" with an unknown fraction, at once. */

@@ -19,7 +19,8 @@ void triangulate_free(struct triangulate *t)
     *t = (struct triangulate){0};
 }
 
-/* Differences from the first corner: at UTM coordinates the products would lose the polygon otherwise. */
+/* Projects the polygon along the largest component of its normal. Coordinates count from the first corner, since
+ * products of UTM coordinates would lose the polygon to rounding. */
 static void project(struct triangulate *t, uint32_t n)
 {
     double normal[3] = {0, 0, 0};
@@ -103,7 +104,7 @@ static uint32_t forced_corner(struct triangulate *t, uint32_t start)
     return convex;
 }
 
-/* Ears turn left; if what is left over at last turns right, by more than rounding, edges have crossed. */
+/* Ears turn left. If the last triangle turns right, by more than rounding, edges have crossed. */
 static bool is_turned_over(const struct triangulate *t, uint32_t a, uint32_t b, uint32_t c)
 {
     double u = t->at[b].uv[0] - t->at[a].uv[0], v = t->at[b].uv[1] - t->at[a].uv[1];

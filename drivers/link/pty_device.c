@@ -22,8 +22,8 @@ static int pair_open(int *master, char *slave, size_t slave_len)
 }
 
 /* The master's ioctls for settings act on the slave. TCOFLUSH drops what is still on its way to the slave's line
- * discipline, then TCSAFLUSH what that holds. Unlike tcflush on the slave they need no open slave. The settings are
- * read just before they are written, as the next client may set its own at any moment. */
+ * discipline. Then TCSAFLUSH drops what the line discipline holds. Unlike tcflush on the slave they need no open slave.
+ * The settings are read just before they are written, as the next client may set its own at any moment. */
 static int drop_output(int master, int makes_raw)
 {
     struct termios settings;

@@ -146,9 +146,10 @@ void web_speak(struct web_link *web, int resets);
  * connections whose request has not come whole or whose answer is out. */
 #define WEB_BARE "bare"
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
-/* Has lws_service wait for a descriptor. It is closed with the context, or at once if NULL is returned. */
+/* Makes lws_service wait for a descriptor. It is closed with the context, or at once if NULL is returned. */
 struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn);
-/* The answer is out. Takes the connection from libwebsockets' HTTP, and lets its client end. */
+/* Takes a connection whose answer is out from libwebsockets' HTTP. Ends its sending side, and gives the client some
+ * time to end its own. */
 void web_linger(struct web_link *web, struct web_conn *conn);
 
 /* web_request.c: judges a request. 0; the status of a refused request, with *words saying why; or WEB_FOREIGN. head:
@@ -159,7 +160,7 @@ int web_request_read(const struct web_link *web, const char *head, size_t len, s
 /* web_http.c. These two return as libwebsockets' callbacks do: 0, or -1 to close the connection. */
 int web_http_begin(struct web_link *web, struct web_conn *conn);
 int web_http_go_on(struct web_link *web, struct web_conn *conn);
-/* A whole answer in words, as snprintf. */
+/* Writes a whole answer whose content is `words`. Returns its length, as snprintf does. */
 int web_http_words(char *to, size_t room, int status, const char *words, int head_only);
 
 #endif

@@ -52,7 +52,7 @@ struct native_sequence {
     struct native_header local; /* the frame before, if it was LOCAL; else type 0 */
 };
 
-/* All zero: nothing has come yet. */
+/* A struct native_sequence begins as zeros: nothing has come yet. */
 
 /* Takes the next whole frame. NATIVE_NO_NOTICE: in order, or LOCAL. NATIVE_GAP: *n frames from *first on are missing
  * before it. NATIVE_RESTARTED: the sequence begins anew with it. NATIVE_REPEATED, NATIVE_LATE: it is to be dropped.

@@ -117,7 +117,7 @@ const char *scip_info_state(struct scip *s)
     return NULL;
 }
 
-/* Numbers as in MESM of a UTM-30LX-EW. */
+/* Answers %ST. A UTM-30LX-EW has the same numbers in MESM. */
 const char *scip_info_state_number(struct scip *s)
 {
     const enum protocol_head_state head = protocol_ask_state(&s->host);

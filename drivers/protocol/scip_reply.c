@@ -56,7 +56,7 @@ void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
 
 enum { MOST_CHARS = 4, TIME_US_CHARS = 11 };
 
-/* most: characters of dst; without that second limit gcc for ARM sees it write beyond them. */
+/* most: the size of dst. n_chars is never larger, but without this limit gcc for ARM warns of writes beyond dst. */
 static void encode(char *dst, int most, uint64_t value, int n_chars)
 {
     for (int i = 0; i < n_chars && i < most; i++)

@@ -46,8 +46,8 @@ void e57_packet_begin(struct e57_packet *packet, const struct e57_facts *facts)
     }
 }
 
-/* Packs eight records of `bits` each, which come a byte a record, side by side from the low end on. Fields of 8 bits
- * become fields of 16 with two records each, then of 32 with four. */
+/* Packs eight records of `bits` bits. In v each has a byte; in the result they lie side by side, the first one lowest.
+ * Fields of 8 bits become fields of 16 with two records each, then of 32 with four. */
 VEC_INLINE uint64_t pack_eight(uint64_t v, unsigned bits)
 {
     const uint64_t two = ((uint64_t)1 << 2 * bits) - 1, four = ((uint64_t)1 << 4 * bits) - 1;
@@ -196,7 +196,7 @@ static void count_points(struct e57_scan *scan, const uint8_t *const stream[E57_
     scan->n_points += n;
 }
 
-/* Counts the intensities of the records from `first` on, all modelled. */
+/* Counts the intensities of the records from `first` on. The caller has left out records without intensity. */
 static void count_intensities(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first,
                               unsigned n)
 {

@@ -23,7 +23,7 @@ struct stamped_socket {
 
 /* Opens a socket. host: an address of this machine, 0.0.0.0 or :: for all of them, a broadcast, or a group; a group may
  * have %INTERFACE where its route leads elsewhere. Other programs may read groups and 255.255.255.255 at the same time.
- * port 0: the system chooses. SH_EINPUT (the address, the port is taken), SH_EPERM, SH_EIO. */
+ * port 0: the system chooses. SH_EINPUT (the address is wrong, or the port is taken), SH_EPERM, SH_EIO. */
 int stamped_open(const char *host, int port, struct stamped_socket *out, struct sh_err *err);
 
 struct stamped_datagram {
@@ -50,7 +50,7 @@ void stamped_begin(struct stamped_socket *keeper);
 /* Connects. Waits for at most timeout_ms (0: as long as the system does), or until a signal comes. *fd does not block
  * from then on. */
 int stamped_connect(const char *host, int port, int timeout_ms, int *fd, struct sh_err *err);
-/* Has a socket of socket.h report times of what comes, from now on. */
+/* From now on the kernel stamps what a socket of socket.h receives, for stamped_read. */
 void stamped_enable(int fd);
 /* Returns how many bytes were read; *t_ns: when the last of them came. 0: none now. SH_ECLOSED: the end of the stream.
  * SH_ERESET: the connection broke. */

@@ -61,7 +61,8 @@ void app_warn_settings_file(const struct config *cfg, const char *why);
  * are those of the command line, those of cfg (NULL: there is none), with its links where the command opens them, and
  * what meshes name. app_with_config calls it; commands without a configuration call it themselves. */
 int app_check_files(const struct app_input *in, const struct config *cfg, struct sh_err *err);
-/* Whether `name` is STEM-N.ENDING of a file of scans, whose ending has n_ending bytes. */
+/* Returns whether `file` is STEM.ENDING and `name` is STEM-N.ENDING, where N is a number: the file of one scan of many.
+ * n_ending: bytes of .ENDING; 0: no file of scans. */
 int app_is_name_of_scan(const char *file, size_t n_ending, const char *name);
 
 /* From here on a thread writes all lines of app_say to standard error. So no thread of a head waits for its reader, and
@@ -70,8 +71,8 @@ int app_is_name_of_scan(const char *file, size_t n_ending, const char *name);
 int app_begin_messages(struct sh_err *err);
 void app_end_messages(void);
 
-/* Warnings and progress to standard error, each line with the program's name. Asks to stop once
- * interrupted. */
+/* Prints warnings and progress to standard error, each line with the program's name before it. Asks the work to stop
+ * after SIGINT or SIGTERM (app_interrupted). */
 extern const struct sh_report app_report_stderr;
 
 /* The same, but a line of progress a second at most: for work that reports every piece. */
@@ -80,7 +81,7 @@ extern const struct sh_report app_report_seconds;
 /* Warnings alone. */
 extern const struct sh_report app_report_quiet;
 
-/* 1: the others print no progress either. app_parse calls it, for --quiet. */
+/* 1: app_report_stderr and app_report_seconds print no progress either. app_parse calls it, for --quiet. */
 void app_set_quiet(int quiet);
 
 /* From now on warnings begin with `what`, the name of a part of the work, which must live on. A warning that several

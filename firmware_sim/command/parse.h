@@ -20,7 +20,7 @@ struct command_request {
     char *param; /* the rest without blanks around it; "" when there is none */
 };
 
-/* Returns 0, or the error number and its reason. A blank line gives header_len 0 and 0. */
+/* Returns 0, or the error number, with its reason in *why. A blank line is no error; its header_len is 0. */
 int command_split(const char *line, struct command_request *req, const char **why);
 
 /* Takes the next field of a list, without blanks around it; len is its length, also of one that is cut. Returns what

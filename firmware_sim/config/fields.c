@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Monitored fields: checks between their keys, and shapes of them. */
+/* Checks the keys of monitored fields against each other, and makes the fields' shapes. */
 #include <math.h>
 #include <string.h>
 

@@ -59,7 +59,7 @@ int journal_is_end(const struct journal_entry *entry);
 int journal_check_paths(const char *path, const char *replay, struct sh_err *err);
 
 /* Reads a whole file, sorted by tick; commands of one tick stay in the file's order. Errors name file:line;
- * a last line without its end is one, since its command may be cut. Lines have up to 1,023 bytes, a journal
+ * a last line without a newline is an error, since its command may be cut. Lines have up to 1,023 bytes, a journal
  * up to 10,000,000 commands. On failure *entries is NULL. The caller frees it. */
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err);
 

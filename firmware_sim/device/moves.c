@@ -79,8 +79,8 @@ static struct device_version *make_moved(struct device *device, const struct sit
     return version;
 }
 
-/* Whether the version that was planned ahead differs from the present site only in the station to be moved. It may not:
- * a replay with other options may refuse commands of its journal. */
+/* Returns whether the version that was planned ahead differs from the present site only in the station to be moved. A
+ * replay with other options may refuse commands of its journal. Then the version has moves that were not made. */
 static int is_next(const struct device_moves *moves)
 {
     const struct site *now = moves->current->site, *next = moves->ahead->site;

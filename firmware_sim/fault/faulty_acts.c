@@ -34,7 +34,8 @@ static int64_t in_ms(double ms)
 
 /* ---- acts at frames */
 
-/* The owner learns of it by its next write to a session that the act has ended: this one, or all of the link. */
+/* Marks the sessions that the act has ended: all of the link for an unplug or a bus reset, this one for a disconnect.
+ * The owner learns of it by its next write to such a session. */
 static void end_sessions(struct faulty_link *f, int session, enum link_fault what)
 {
     const int all = what == LINK_FAULT_UNPLUG || what == LINK_FAULT_BUS_RESET;

@@ -102,8 +102,8 @@ void recording_stats(const struct recording *r, struct scanhead_stats *stats)
     scanhead_get_stats(r->stream, stats);
 }
 
-/* A frame with a time of its own bounds the times of frames before it: they did not go out later. Where a scan was
- * stopped, the event after its last line went out with that line. */
+/* A frame with a time of its own bounds the times of frames before it: they did not go out later. The last line of a
+ * stopped scan went out together with the next event or telemetry, so it gets the time of that. */
 static void recording_settle(struct recording *r, const struct timing_moment *by, int is_event)
 {
     for (uint32_t i = 0; i < r->n; i++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Figures by group; times and echoes. */
+/* Computes figures of points by group, of their times, and of echoes per shot. */
 #include "core/studio/figures.h"
 
 #include <math.h>
@@ -74,7 +74,8 @@ struct groups {
     void *ctx;
 };
 
-/* Sorts distances by group, and finds the 95th percentile of each. at: [by->n + 1], for where each group goes on. */
+/* Sorts distances by group, and finds the 95th percentile of each. at: room for by->n + 1
+ * indices into by_group, where the next distance of each group is put. */
 static void find_p95(const struct figures_in *in, const struct groups *by, double *by_group, size_t *at,
                      struct figures *out)
 {

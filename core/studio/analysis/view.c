@@ -33,7 +33,7 @@ static int set_axes(struct view *view, struct sh_err *err)
         d[i] = c->look_at_m[i] - c->eye_m[i];
     const double length = sqrt(vec3_dot(d, d)), flat = hypot(d[0], d[1]);
     if (!(length > 0)) return sh_fail(err, SH_EINPUT, "view: the eye is at its target");
-    /* straight down or up: as a head that faces north and nods */
+    /* straight down or up: the right axis is that of an eye that faces +y */
     const int nods = !(flat > 1e-9 * length);
     const double right[3] = {nods ? 1 : d[1] / flat, nods ? 0 : -d[0] / flat, 0};
     for (int i = 0; i < 3; i++)
@@ -78,7 +78,7 @@ void view_free(struct view *view)
     free(view);
 }
 
-/* Sets `at` in places. Returns 0 where the point is behind the eye. */
+/* Sets `at`, in places: VIEW_SUB of them are a pixel wide. Returns 0 where the point is behind the eye. */
 static int project(const struct view *view, const double p_m[3], double at[2], double *depth_m)
 {
     const double *eye = view->spec.camera.eye_m;
@@ -98,7 +98,7 @@ int view_project(const struct view *view, const double p_m[3], double place_px[2
     return 1;
 }
 
-/* Draws the places whose middle is in the disc, and the one that has the point in any case. */
+/* Draws the places whose middle is in the disc. The place that has the point is always drawn. */
 static int draw_disc(struct view *view, const double at[2], double depth_m, const struct view_place *what)
 {
     const struct view_spec *spec = &view->spec;
@@ -110,7 +110,7 @@ static int draw_disc(struct view *view, const double at[2], double depth_m, cons
     const int right = (int)fmin(view->width - 1, floor(at[0] + radius));
     const int bottom = (int)fmin(view->height - 1, floor(at[1] + radius));
     const int column = (int)floor(at[0]), row = (int)floor(at[1]);
-    const float bulge = (float)(depth_m / view->focal / radius); /* at the rim as deep as the disc's radius */
+    const float bulge = (float)(depth_m / view->focal / radius); /* at the rim it adds the disc's radius, in metres */
     const float r2 = (float)(radius * radius), x0 = (float)at[0] - 0.5f, y0 = (float)at[1] - 0.5f;
     for (int y = top; y <= bottom; y++) {
         struct view_place *line = view->place + (size_t)y * view->width;

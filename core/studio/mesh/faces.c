@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Results from any triangles: normals, the points in use, points spread over them. */
+/* Computes from triangles: normals of points, which points are in use, and points spread evenly over the area. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

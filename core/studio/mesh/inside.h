@@ -42,7 +42,8 @@ int mesh_output_close(struct mesh_output *out, int keep, struct sh_err *err);
 /* Writes the images of parts into the mesh's folder. */
 int mesh_output_images(struct mesh_output *out, const struct mesh *mesh, struct sh_err *err);
 
-/* Copies a binary FBX file of Assimp's exporter, and adds the ends of lists that it lacks. SH_EIO: it is none. */
+/* Copies a binary FBX file of Assimp's exporter, and adds the ends of lists that it lacks. SH_EIO: raw is not
+ * such a file. */
 int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct sh_err *err);
 
 /* The progress of long work. mesh_work_step reports it, and asks whether to stop, every 65536 steps. */

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 // This module finds missing, repeated and late frames by their sequence numbers, as LOSSES.md defines them.
-const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256; // how far back a jump is looked into, as libscanhead does
+// The limits are libscanhead's: frames that are remembered, gaps that are remembered, frames in such a gap, and late
+// frames in a row that are another sequence.
+const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256;
 const LOCAL = 2;
 
 /** Returns whether number a comes before b, modulo 2^32. */

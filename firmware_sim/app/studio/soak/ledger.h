@@ -31,7 +31,8 @@ struct soak_fact {
     double for_ms;   /* delay, jitter and stall: the longest */
 };
 
-/* Bytes that belong to no frame, which the client noticed after the frame of that time. */
+/* Bytes that belong to no frame, or a frame with a wrong payload. t_ns: device time of that frame; for bytes, of the
+ * last whole frame before them. */
 struct soak_run {
     int64_t t_ns;
     uint64_t n;

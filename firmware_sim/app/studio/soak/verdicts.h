@@ -19,7 +19,7 @@ struct verdicts {
 
 /* Where sheets go: standard output, or standard error where --json or --truth has that. */
 FILE *verdicts_out(const struct verdicts *verdicts);
-/* SH_EINPUT where the configuration has no link of that number; 0 is none. */
+/* Returns SH_EINPUT where the configuration has no link of that number, from 1. 0 is allowed: none is named. */
 int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err);
 /* Prints the sheets. Returns the exit status: APP_FAILED where there are findings. */
 int verdicts_run(struct verdicts *verdicts, struct app_input *in);
