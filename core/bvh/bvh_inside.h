@@ -21,13 +21,13 @@
  * direction over the range, which is |o| + |h| at most. Embree's test of a box is the fast one for such geometry,
  * whatever the scene's flags say (3.13 and 4.4): with the reciprocal of a direction, its products and their difference
  * it errs by up to 7 units of the range. Together that is at most 9 |o| + 8 |h|. The boxes are larger than their
- * triangles by 8 (2 r + |h|), r being the radius of the scene. R is BVH_STRETCH_M. Where 9 R + 17 |h| is less, boxes
- * are larger by that, and float rays are at most R long: then |o| is at most |h| + R. A hit makes tfar the next float
- * above its range. At that range the real ray is at its triangle. So the float ray is in the triangle's box there, and
- * has entered that box at a shorter range. Rays begin at most 1.5 r from the scene's middle: a ray from further away is
- * moved along its direction until it is that near (hits.c). So nothing here depends on where rays begin. Large
- * triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that origin is where most
- * triangles are, else in the middle.
+ * triangles by 8 (2 r + |h|), r being the radius of the scene. R is BVH_STRETCH_M. Where 9 R + 17 |h| is less than
+ * that, boxes are larger by 9 R + 17 |h| instead, and float rays are at most R long: then |o| is at most |h| + R. A hit
+ * makes tfar the next float above its range. At that range the real ray is at its triangle. So the float ray is in the
+ * triangle's box there, and has entered that box at a shorter range. Rays begin at most 1.5 r from the scene's middle:
+ * a ray from further away is moved along its direction until it is that near (hits.c). So nothing here depends on where
+ * rays begin. Large triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that
+ * origin is where most triangles are, else in the middle.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast
@@ -58,8 +58,8 @@ struct bvh {
     uint32_t n_leaves;
     struct bvh **mesh;     /* [scene->n_copied] of those that have copies */
     struct bvh_copy *copy; /* [scene->n_copies] */
-    /* [n_triangles + 1]: twice the leaf that has a triangle's plane, plus which of its two it is. The last stands for a
-     * miss: its plane is all NaN. */
+    /* [n_triangles + 1]: twice the number of the leaf that has a triangle's plane, plus 0 or 1: which of the leaf's two
+     * planes it is. The last element stands for a miss: its plane is all NaN. */
     uint32_t *at_plane;
     double origin_m[3]; /* the middle of the scene, or where most of its triangles are (leaves.c) */
     double radius_m;    /* no vertex of the scene is further from there */
@@ -71,7 +71,7 @@ struct bvh {
 /* R: longer than most heads see. */
 #define BVH_STRETCH_M 8000.0
 
-/* bvh.c: as bvh_create; in_one: rays have any length (copies.c). */
+/* bvh.c: makes a BVH as bvh_create does. in_one 1: rays of any length are cast in one piece (copies.c). */
 int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, const struct sh_report *report,
                      struct bvh **out, struct sh_err *err);
 

@@ -66,7 +66,8 @@ static inline uint32_t bvh_leaf_triangle(const struct bvh_leaf *leaf, int which)
 int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
 /* Embree asks for the box of a leaf. */
 void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args);
-/* Sets the box around lo .. hi, from the BVH's origin, made larger for what Embree rounds. */
+/* Sets the box around lo .. hi, from the BVH's origin, made larger for what Embree rounds. far_m: how far the
+ * farthest corner in the box is from the origin. */
 void bvh_pad_box(const struct bvh *bvh, const double lo_m[3], const double hi_m[3], double far_m,
                  struct RTCBounds *box);
 

@@ -69,7 +69,8 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
     weigh_pool(c, s, first);
 }
 
-/* Outlines beyond the centre's hit count, too, where another part of the footprint sees past it. */
+/* Where a part of the footprint sees past the centre's hit, outlines beyond that hit cut the footprint, too. Plans the
+ * parts that they make, and casts rays for these. */
 static void look_secondary(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
@@ -174,7 +175,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     if (job->centre.energy > 0.0) add_centre(c, k->s, job);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
         add_hits(c, k, job, i);
-    /* Detection decides which of many are left out. */
+    /* With detection all echoes are kept here, since it chooses among them later. */
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;
@@ -184,7 +185,8 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     w->n_echoes += n;
 }
 
-/* Returns whether the returns of whole footprints have only ranges, labels, and energy that comes back. */
+/* Returns whether beam_merge_alike can merge the returns of whole footprints. It knows only ranges, labels and the
+ * energy that comes back: no waveforms, colours, sigma of ranges, silent surfaces, or hits beyond the first ones. */
 static int are_alike(const struct chunk *k)
 {
     const struct cast_setup *s = k->s;

@@ -44,12 +44,13 @@ struct ply {
 
 /* Before any row: finds the textures, and those that are missing. */
 int ply_begin_textures(struct ply *y, struct sh_err *err);
-void ply_begin_colours(struct ply *y); /* of the element */
+/* Before the rows of an element: sets has_face_rgb and face_scale for it. */
+void ply_begin_colours(struct ply *y);
 int ply_keep_vertex_colour(struct ply *y, struct sh_err *err);
 /* Sets the row's label, has_rgb and has_uv. */
 int ply_begin_face(struct ply *y, struct sh_err *err);
-/* Gives corner `to` of the polygon the colour and texture coordinates of the row's corner `from`, which is that
- * vertex. */
+/* Gives corner `to` of the polygon the colour and texture coordinates of the row's corner `from`. vertex: the
+ * number of the vertex at that corner. */
 void ply_set_corner_colour(struct ply *y, size_t to, size_t from, uint32_t vertex);
 void ply_end_textures(struct ply *y);
 void ply_free_colours(struct ply *y);

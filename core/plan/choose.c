@@ -67,7 +67,7 @@ uint32_t plan_choose(const struct plan_choice *choice, struct plan_row *row)
         chosen = i;
         holds = 1;
     }
-    /* Where options miss it equally, the last is taken, which is the most exact. */
+    /* Where options miss the tolerance equally, the last is taken, which is the most exact. */
     for (uint32_t i = 0; i < choice->n && !holds; i++) {
         double over = excess(&option[i], tolerance), least = excess(&option[chosen], tolerance);
         if (over < least || (over == least && over < 1e300)) chosen = i;

@@ -4,7 +4,8 @@
  * A body is closed where the edges of its triangles, each with its direction, cancel. By Stokes the sum of any field's
  * integrals along them is then 0, however the faces are divided: an edge whose other side has a corner in its middle
  * cancels, too, which a count of equal edges would miss. The fields are independent of the body: w cos(k x + p), with
- * directions, wave numbers and phases from a fixed table. Per missing area, the sum is about |k|. */
+ * directions, wave numbers and phases from a fixed table. Where a face is missing, each sum has the flux of the field's
+ * curl through that face, which grows with its area and with |k|. */
 #include "core/body.h"
 
 #include <math.h>
@@ -65,6 +66,7 @@ double body_open_m2(const struct body_sum *s)
     double squares = 0.0;
     for (int j = 0; j < BODY_FIELDS; j++)
         squares += s->field[j] * s->field[j];
-    /* A field turns by about |k| a metre, a third of it about a face's normal. */
+    /* The curl of a field is taken as |k|, and |k| as 1.8 times `wave`. A third of the curl's square is along a face's
+     * normal, so its part through a missing face is |k| / 1.7 times the area. */
     return s->wave > 0.0 ? sqrt(squares / BODY_FIELDS) * 1.7 / (1.8 * s->wave) : 0.0;
 }

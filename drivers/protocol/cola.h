@@ -109,15 +109,15 @@ void cola_put_scan(const struct cola *self, struct cola_out *out);
 
 /* cola_checksum.c: for protocol_ops of the same names */
 
-/* Distances and signals of LMDscandata. */
+/* Marks the bits of distances and signals of LMDscandata, which may be changed. */
 void cola_content(const uint8_t *unit, size_t len, uint8_t *mask);
-/* The check byte of CoLa-B. */
+/* Makes the check byte of CoLa-B right. */
 void cola_reseal(uint8_t *unit, size_t len);
 
 /* cola_settings.c: requests about the measurement. */
 
 void cola_settings_reset(struct cola *self);
-/* The beams that are sent: those of LMPoutputRange, of a head that is known. */
+/* The beams that are sent: those that LMPoutputRange selects. head->known must be 1. */
 struct cola_beams {
     uint32_t first, n;
 };
@@ -208,7 +208,7 @@ cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_lo
 /* Reads the value of an event's request: u8 1 on, 0 off. */
 enum cola_error cola_read_switch(struct cola_args *args, int *on);
 void cola_carry_out(struct cola *self, const struct cola_request *request);
-/* sFA with that error. */
+/* Answers sFA with that error. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error);
 
 #endif

@@ -240,7 +240,7 @@ static int is_scip(const uint8_t *bytes, size_t len)
     return 0;
 }
 
-/* A head of HTTP is several lines and one request. */
+/* Several lines of HTTP are one request. So a connection that begins with HTTP must not be taken for one of lines. */
 static int is_http(const uint8_t *bytes, size_t len)
 {
     static const char version[] = " HTTP/1.";

@@ -162,7 +162,7 @@ static int look_behind(struct left *l, struct sh_err *err)
 
 /* ---- the file's own header */
 
-/* 1: it is there, and says that all of the file is. */
+/* Returns 1 where the header is there, has the file's length, and all pages are right. */
 static int is_whole(struct left *l, struct sh_err *err)
 {
     uint8_t header[E57_FILE_HEADER_LEN];

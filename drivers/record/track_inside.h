@@ -39,7 +39,7 @@ static inline void track_set_point(struct track *track, int i, const struct scan
 
 /* Returns the columns that the library writes points to. */
 struct scanhead_columns track_columns_to(struct track *track);
-/* Numbers the rows of n points. `row` is the number of pulses of the line before them; returns that after them. */
+/* Numbers the rows of n points. row: how many pulses the line has before them. Returns how many it has after them. */
 uint64_t track_number_rows(struct track *track, uint64_t row, int n);
 /* Takes the points of a moving head to the scene. Returns as scanhead_to_scene does. */
 int track_to_scene(struct track *track, int n);
@@ -56,8 +56,8 @@ int track_begin_waiting(struct track *track, const struct scanhead_frame *frame,
 void track_keep(struct track *track, int n);
 /* Gives out the n points of the batch, with the colours that are computed here. */
 int track_give(struct track *track, int n, struct sh_err *err);
-/* Takes frames of attributes and of colours. With the last one that points wait for, these come out. Attributes and
- * colours of lost points are skipped. */
+/* Takes frames of attributes and of colours. Points are given out with the last frame that they wait for. Attributes
+ * and colours of lost points are skipped. */
 int track_attributes(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
 int track_colours(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
 

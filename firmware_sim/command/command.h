@@ -236,7 +236,7 @@ struct command_result {
     int have_pose;
     double pose[6];   /* of the platform at the end of the step: x, y, z (m), roll, pitch, heading (degrees) */
     uint32_t station; /* that is moved, from 1 */
-    int to_first;     /* it goes back to its place at power-up; else to `to` */
+    int to_first;     /* it goes back to its place at power-up; else to `place` */
     struct command_place place;
     struct command_replay_change replay;
     int error;                     /* 0, or the number that was queued */

@@ -63,7 +63,7 @@ static void add_numbers(struct command_call *call)
 {
     const int decimals = call->row->unit->decimals;
     const struct command_setting *setting = call->row->setting;
-    const int known = command_setting_is_known(call); /* a query of another one would put an error into the queue */
+    const int known = command_setting_is_known(call); /* a query of an unknown one queues an error */
     struct command_call ask = *call;
     struct command_result answer;
     char number[32];

@@ -34,7 +34,8 @@ static const char *const turn_names[] = {
 
 /* clang-format off */
 #define FIGURE .flags = CFG_FIGURE
-/* The default of a key that only some emitters have. They need it, so no value fits. */
+/* The default of a key that only some emitters have: no value. With NULL every head would need the key; NEEDED_BY names
+ * the emitters that need it. */
 #define OWNED ""
 #define NEEDED_BY(emitter) .of = CFG_KIND(emitter), .needed = 1
 static const struct cfg_key profile_keys[] = {

@@ -109,7 +109,8 @@ int64_t replay_next_fix_ns(void *self, int64_t t_ns)
     return since_ns == 0 ? t_ns : t_ns + UTC_SECOND_NS - since_ns;
 }
 
-/* Gives the station's place; none where the head moves, since the stream has its way in the scene alone. */
+/* Gives the station's place. Where the head moves, the fix is invalid: the stream has its path in the scene's frame
+ * alone. */
 int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
 {
     struct replay *r = self;

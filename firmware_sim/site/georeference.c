@@ -9,7 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Returns the largest distance of points from the place that they are relative to: a station, or a leg's middle. */
+/* Returns the largest distance of points from the place that they are relative to: a station, or the middle of a
+ * stretch of the path. */
 static double reach_m(const struct site *site, const struct site_stretch *stretch)
 {
     double way_m = stretch != NULL ? stretch->reach_m : site->live_reach_m;
@@ -45,8 +46,8 @@ static int plan_one(const struct site *site, struct georef *georef, const double
     return georef_set_method(georef, method, err);
 }
 
-/* Cuts the path into legs, each with a georeference of its own about its middle, so that counts and polynomials need
- * not reach further than a leg, however long the path is. */
+/* Gives each stretch of the path a leg: a georeference of its own about the stretch's middle. So counts and polynomials
+ * need not reach further than a stretch, however long the path is. */
 static int plan_legs(const struct site *site, struct site_station *s, struct sh_err *err)
 {
     struct plan_row row;
@@ -103,7 +104,8 @@ static double longest_m(const struct site *site)
     return (1.0 + 1e-6 * fabs(k->range_scale_ppm)) * range_m + fabs(k->range_offset_m) + site_range_noise_m(site);
 }
 
-/* Sets the scale of a station, or of its legs. Points that ball-shaped noise takes further are counted as unfit. */
+/* Sets the scale of a station, or of the stretches of its path. Points that ball-shaped noise takes further are counted
+ * as unfit. */
 static int scale_station(const struct site *site, struct site_station *s, double scale_m, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -149,7 +151,7 @@ static int choose_range_scale(struct site *site, double *scale_m, struct sh_err 
 }
 
 /* Chooses the finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale. In the polar
- * layout ranges must fit into 32 bits, in the geo layout coordinates from anywhere on the leg into 31. */
+ * layout ranges must fit into 32 bits, in the geo layout coordinates from anywhere on a stretch into 31. */
 static int choose_scale(struct site *site, struct sh_err *err)
 {
     const struct config *cfg = site->cfg;

@@ -53,8 +53,9 @@ static int find_ifc(const struct config *cfg, const struct config_mesh **out, st
     return sh_fail(err, SH_EINPUT, "%s: scene.anchor: source ifc, but no mesh is an .ifc file", cfg->file);
 }
 
-/* Returns a model's height. It counts from the sea, unless the configuration gives one. height_m: of the file; NaN: the
- * file has none. */
+/* Returns the height of a model above the ellipsoid: that of the configuration, else that of the file. The file's
+ * counts from the sea, and is taken as it is, with a warning. height_m: of the file; NaN: it has none, and 0 is
+ * returned. */
 static double ifc_height(const struct config *cfg, const struct sh_report *report, const char *file, const char *what,
                          double height_m)
 {
@@ -217,7 +218,7 @@ static int site_placement_find(const struct config_station *s, const struct plac
     if (rc == SH_OK) rc = placement_level(anchor, out->position_m, level, err);
     if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, bvh, out, err);
     if (rc == SH_OK && anchor->known) rc = geoframe_locate(&anchor->frame, out->position_m, &at, err);
-    if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* both began at the search's start */
+    if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* as far as stand_on_floor moved it */
     if (rc != SH_OK) return rc;
     out->on_earth = anchor->known || s->place != PLACE_NONE;
     out->place = at;

@@ -106,7 +106,7 @@ static int has_mask_beside(const struct raster *r)
     return is_there;
 }
 
-/* Checks the other images of the file: smaller copies are ignored, a mask would be holes, others are not read. */
+/* Checks the other images of the file: smaller copies are ignored, a mask is refused, others give a warning. */
 static int look_at_others(struct raster *r, struct sh_err *err)
 {
     unsigned n = 0, n_masks = has_mask_beside(r) ? 1 : 0;
@@ -158,7 +158,8 @@ static int check_band(struct raster *r, struct sh_err *err)
         r->bits, r->format);
 }
 
-/* Refuses a raster whose vertices, triangles and labels may take too much memory, with the copy that goes back. */
+/* Refuses a raster whose vertices, triangles and labels may take too much memory. They count twice: the head's process
+ * gets a copy of them. */
 static int check_memory(struct raster *r, struct sh_err *err)
 {
     const struct scene *s = NULL;

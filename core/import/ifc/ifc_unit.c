@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The unit of length of an IFC file's project. Readers of bodies apply it themselves; here it scales figures of the
- * records, and those of an anchor. */
+/* The unit of length of an IFC file's project. The readers of bodies apply this unit themselves. Callers of this file
+ * apply it to figures that they take from the records, such as those of an anchor. */
 #include "core/import/ifc/ifc_unit.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Makes an image of the places: colour, light, and the mean of a pixel's places. */
+/* Makes an image of the view's places, which are samples: VIEW_SUB x VIEW_SUB in each pixel. A place gets a colour and
+ * light, and a pixel the mean of its places. */
 #include <math.h>
 #include <stdlib.h>
 

@@ -32,7 +32,8 @@ export class Keeper {
     this.#front.clear();
   }
 
-  /** Keeps frames from now on. A recording begins as a reader does that joins late: with what its points need. */
+  /** Keeps frames from now on. A recording begins like the stream of a client that joins late: with the frames that say
+   * what its points mean. */
   begin() {
     Object.assign(this, {bytes: 0, isOn: true, isFull: false});
     this.#parts = [];

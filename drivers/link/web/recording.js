@@ -5,7 +5,7 @@ import {atMostEvery, bodyOf, byId, figureList, grouped, make, metres, say, short
 import {batchesOf, countWithin, fetchCloud, fetchMesh} from './recording_files.js';
 
 const MOST_POINTS = 10e6;
-const SLIDER_OFF = 100; // a factor above 100 means no filter
+const SLIDER_OFF = 100; // at this end of the slider there is no filter
 const factorOf = (slider) => (slider >= SLIDER_OFF ? 0 : 10 ** (slider / 50));
 const sliderOf = (factor) => Math.round(50 * Math.log10(factor));
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A completion for bash: commands, options, their words, configuration keys with theirs, files and folders. */
+/* A completion for bash: commands, options and the words that they take, configuration keys and the words that these
+ * take, files and folders. */
 #include <ctype.h>
 #include <string.h>
 

@@ -21,8 +21,8 @@ static int is_wanted(const struct run_options *o, const struct capture_place *pl
     return o->device_port == 0 || o->device_port == place->port;
 }
 
-/* A link for each port of the capture, in YAML. TCP ports are the system's choice, as that of the device may need a
- * right. */
+/* A link for each port of the capture, in YAML. The system chooses TCP ports, as the device's own port may need a
+ * privilege. */
 static void default_links(const struct capture_run *run, char *text, size_t cap)
 {
     size_t n = 0;
@@ -60,7 +60,8 @@ static void name_places(const struct capture_run *run, char *text, size_t cap)
     }
 }
 
-/* Returns the place that a link serves: one with its port, else the first one that no link has. */
+/* Returns the place (a port of a device in the capture) that a link serves: one with the link's port, else the first
+ * one that no link has. */
 static const struct capture_place *place_for(const struct capture_run *run, const struct link_spec *spec)
 {
     const struct capture_place *found = NULL;

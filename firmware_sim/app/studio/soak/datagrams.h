@@ -21,7 +21,7 @@ void soak_datagrams_step(struct soak_link *link);
 /* Waits for datagrams that are still on their way, and takes them. */
 void soak_datagrams_finish(struct soak_link *link);
 uint64_t soak_datagrams_top(struct soak_link *link);
-/* The number in the ledger of the datagram that has this number on its link, from 1. */
+/* Returns a datagram's number in the ledger. number: its number on its link, from 1. */
 soak_seq soak_unit(uint64_t number);
 
 #endif

@@ -87,7 +87,8 @@ static int row_of(const struct fault_note *note)
     return note->kind == FAULT_FLIP && strcmp(note->text, "resealed") == 0 ? SOAK_RESEALED : (int)note->kind;
 }
 
-/* An act of the link itself is noted once it is done. So the client may have seen it already. */
+/* An act is a fault that ends or refuses a connection. The link reports it once it is done. So the client may have seen
+ * it already. */
 static int was_just_seen(struct soak_link *link, enum fault_kind kind)
 {
     const int64_t now_ns = clock_now_ns();
@@ -353,7 +354,7 @@ static void forget_acts(struct soak_link *link, uint32_t from)
     link->n_acts = 0;
 }
 
-/* The oldest act ended it. */
+/* The session was ended by the oldest act. */
 static void end_by_act(struct soak_link *link)
 {
     link->row[link->act[0].kind].noticed++;

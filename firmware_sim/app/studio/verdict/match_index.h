@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The head's points, sorted into cells, so that those near a point are found fast. Points at the same place are one
- * entry. */
+ * entry. Entries that agree with the same point of a client are one group (match.c says why). */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_INDEX_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_INDEX_H
 
@@ -29,7 +29,7 @@ size_t match_index_near(const struct match_index *index, const double p[3], void
                         void *ctx);
 /* The root of an entry's group. */
 size_t match_index_root(struct match_index *index, size_t i);
-/* Makes one group of two. */
+/* Makes one group of the groups of entries a and b. */
 void match_index_join(struct match_index *index, size_t a, size_t b);
 
 #endif
