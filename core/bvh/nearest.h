@@ -24,8 +24,8 @@ VEC_INLINE float tfar_of(double nearest_m, double start_m)
     return float_above(nearest_m + BVH_SAME * nearest_m - start_m);
 }
 
-/* Takes a hit that is as near as the nearest: the lowest number wins. Where the hit so far turns out to be
- * further, its low number may have kept out hits that are as near: the ray is cast again. */
+/* Takes a hit that counts as equal to the nearest: the lowest number wins. The stored hit may turn out to be too far
+ * from the nearest to count as equal. Then its low number may have kept out hits that do: the ray is cast again. */
 static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
     const double nearest_m = query->range_m[lane];

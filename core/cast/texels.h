@@ -7,8 +7,9 @@
 
 struct ray_hits;
 
-/* Labels of hits get the reflectance there, as surface_texel has it, and hits->colour gets the colour. Does nothing
- * where surfaces have no textures and no colours are asked for. */
+/* Looks up reflectance and colour at each hit. The reflectance goes into the high bits of the hit's label, as
+ * surface_texel defines them, and the colour into hits->colour. Does nothing where surfaces have no textures and no
+ * colours are asked for. */
 void caster_texels(const struct cast_setup *s, const struct ray_hits *hits);
 
 #endif

@@ -98,7 +98,7 @@ static enum cola_error set_scan_event(struct cola *self, struct cola_args *args,
     return COLA_OK;
 }
 
-/* It has a buffer of its own: where polls from before are refused, self->unit may hold an unfinished answer. */
+/* Sends an error. It is made in a buffer of its own: self->unit may hold the unfinished answer to another request. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error)
 {
     uint8_t unit[32];

@@ -103,8 +103,8 @@ static void scip_take_frame(void *protocol, const uint8_t *bytes, size_t len)
     if (news.whole || news.broken != 0) scip_scans_came(s, news);
 }
 
-/* Reboots a second after the second RB. The head's power cycle ends this session, too. Where there can't be one, as
- * with a recording, only this session ends and begins anew. */
+/* Reboots the head at once; scip_pass_time calls it a second after the second RB. The head's power cycle ends this
+ * session, too. Where there can't be one, as with a recording, only this session ends and begins anew. */
 static void scip_reboot(struct scip *s)
 {
     const int refused = s->host.command(s->host.ctx, "HEAD:REBOOT", NULL, 0) != 0;

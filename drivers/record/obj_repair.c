@@ -20,7 +20,8 @@ static int are_numbers(const char *text)
     return *text != '\0' && strspn(text, "0123456789+-.eE ") == strlen(text);
 }
 
-/* Each corner is a vertex that is there; texture coordinate and normal have its number. */
+/* Returns whether each corner is a vertex that was read before. Only the vertex is checked: in our files the texture
+ * coordinate and the normal of a corner have the vertex's number. */
 static int is_face(const struct obj_lines *o, const char *text)
 {
     if (*text == '\0' || strspn(text, "0123456789/ ") != strlen(text)) return 0;

@@ -2,7 +2,8 @@
 /* Rows of the section `ntp`. Private to keys.c. */
 /* clang-format off */
     {"ntp", .type = CFG_MAP,
-     .help = "The time server that a SICK scanner (protocol: cola) asks, at power-up; clients change it by telegrams."},
+     .help = "The time server that a SICK scanner (protocol: cola) asks. Clients change these values by telegrams; at "
+             "power-up they are those given here."},
     {KEY(ntp.role), CFG_ENUM, .def = "none",
      WORDS([NTP_ROLE_NONE] = "none", [NTP_ROLE_CLIENT] = "client", [NTP_ROLE_SERVER] = "server"),
      .help = "TSCRole. client: the scanner's clock begins with 1970 at power-up, and answers of the server set it; it "

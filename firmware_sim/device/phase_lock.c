@@ -6,7 +6,8 @@
  *     pulses not locked  the rotor runs free: at the speed that is set, with the error of its motor
  *
  * Speeds are whole micro-hertz, so an error of half of one is left after a second: 0.00018 degree. The wire has steps
- * of 0.01. The rotor needs at most half a turn, so one second is enough for any phase. */
+ * of 0.01. The rotor turns at most half a turn more or less in that second. Where more would exceed its highest speed,
+ * it turns up to one turn less. So one second is enough for any phase. */
 #include <math.h>
 
 #include "firmware_sim/config/profile.h"

@@ -57,7 +57,8 @@ void pps_take(struct pps *pps, struct pps_moment edge)
     const struct pps_state *last = last_of(pps);
     struct pps_state next = {.from = edge, .pulse = edge, .has_pulse = 1, .hour_ns = hour_at(last, edge.head_ns)};
     compare(last, &next);
-    /* The manual says nothing of the seconds there. The nearest full one changes the counter least. */
+    /* At a locked pulse the counter's part of a second becomes 0. The manual does not say which second that is: the
+     * nearest one changes the counter least. */
     if (next.state == PROTOCOL_PPS_LOCKED)
         next.hour_ns = in_hour((next.hour_ns + SECOND_NS / 2) / SECOND_NS * SECOND_NS);
     pps_keep(pps, &next);

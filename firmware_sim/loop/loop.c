@@ -12,7 +12,8 @@
 #include "firmware_sim/loop/pump.h"
 #include "firmware_sim/site/waves.h"
 
-static const double SPARE_MS = 250.0; /* a reader may be interrupted so long within a copy before a claim waits */
+/* The time that an interrupted reader has to finish its copy of a tick, before a caster's claim of that slot waits. */
+static const double SPARE_MS = 250.0;
 
 static int create_stream(struct loop *loop, struct sh_err *err)
 {

@@ -105,11 +105,12 @@ void session_open(struct pump *pump, struct session *s, const char *peer);
 void session_close(struct pump *pump, struct session *s);
 /* Its client sends nothing more. It still gets answers to what it sent, and the stream. */
 void session_shut(struct pump *pump, struct session *s);
-/* The same when power goes: the device knows that already. */
+/* As session_close, but when power goes. Neither the protocol is told that the client went, nor does the session give
+ * back its control: the device does that itself. */
 void session_cut(struct pump *pump, struct session *s);
 /* Returns the first tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
 uint64_t session_off_tick(const struct pump *pump, const struct session *s);
-/* Begins a session anew with a tick: one that no client can end, such as a file's. */
+/* Begins a session anew when power goes with a tick. For sessions that outlast it, such as that of a file. */
 void session_restart(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes released ticks and replies, and writes until the link is full (1) or nothing is left (0). index: of the session
  * on its link. */
@@ -140,8 +141,9 @@ int pump_power(struct pump *pump, uint32_t full);
 /* Learns the number of the next frame from the tick before the cursor, if the ring still has it. So a loss shows even
  * if it is that of the session's first frames. */
 void session_know_next(struct pump *pump, struct session *s);
-/* Moves the cursor, whose tick the ring no longer has: to the oldest tick if nothing is lost before it, else with room
- * to recover; not beyond off_tick. */
+/* Moves the cursor on, since the ring no longer has its tick. The cursor goes to the oldest tick of the queue if no
+ * frame is lost before that, else to the middle of the queue, so that the reader has time to recover. It does not go
+ * beyond off_tick. */
 void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick);
 /* Compares the number of a tick's first frame with the expected one, and counts a gap. A native reader gets an event
  * frame before the tick's frames. These lie at the end of its buffer, with REPLY_ROOM / 8 bytes free after them.

@@ -97,7 +97,7 @@ struct stream {
     /* of the pacing thread alone */
     uint64_t held_tick;    /* the tick that readers held back last, once the run is to end; 0: none */
     int64_t held_until_ns; /* clock: when they no longer do */
-    uint64_t unsaid;       /* ticks released since casters, or in the paces that wait any thread, were woken */
+    uint64_t unsaid;       /* ticks released since casters were woken; in the paces that wait, since any thread was */
     uint64_t say_ticks;    /* casters are woken after so many */
     uint64_t lazy_ticks;   /* an eighth of the queue */
     uint32_t n_casters;
@@ -169,8 +169,8 @@ uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor);
 uint64_t stream_power_tick(const struct stream *stream, uint32_t i);
 /* A peer grants time. Returns the sum of all grants, ns. */
 uint64_t stream_grant(struct stream *stream, uint64_t ns);
-/* Lets device time pass up to that sum, if it may not pass farther already. Returns the tick before which all may pass
- * by this grant. */
+/* Lets device time pass up to a sum of grants, if it may not pass farther already. Returns the first tick that this sum
+ * does not let pass. */
 uint64_t stream_pass(struct stream *stream, uint64_t total_ns);
 /* Something happened that casters or the pacing thread may wait for: a command, a grant, the end. Any
  * thread. */

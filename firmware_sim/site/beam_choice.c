@@ -140,8 +140,9 @@ struct beam_choices {
     uint32_t n;
 };
 
-/* Measures the beams that are possible, up to those that cost more than one that holds. Finding outlines
- * takes time: the adaptive beam is measured only where single rays don't hold. *holds: one of them does. */
+/* Measures the errors of the beams that are possible. Once one keeps the tolerance, those that cost more are left out.
+ * Finding outlines takes time: the adaptive beam is measured only where single rays don't keep the tolerance. Sets
+ * *holds to 1 if a beam keeps it. */
 static int measure_beams(struct trial *trial, struct beam_choices *c, const struct sh_report *report,
                          struct sh_err *err, int *holds)
 {

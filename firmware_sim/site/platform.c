@@ -44,7 +44,8 @@ static int check_part(const struct site *site, double length_s, struct sh_err *e
     const struct config_platform *p = &site->cfg->platform;
     const struct times times = times_of(p);
     const int wrong_end = p->has_end && p->end_s > length_s + ROUNDING_S;
-    /* A scan that stops at the end has no pulse if it begins there. One stop may be there, or a platform that waits. */
+    /* A scan that ends with the trajectory has no pulse if it begins at the trajectory's end. A head that scans at
+     * stops may begin there: it has one stop. So may a platform that waits at the end. */
     const int must_go = p->kind == PLATFORM_TRAJECTORY && p->at_end == PLATFORM_STOP;
     if (!wrong_end && must_go && p->start_s >= length_s - ROUNDING_S)
         return sh_fail(err, SH_EINPUT,
@@ -157,7 +158,8 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     return SH_OK;
 }
 
-/* A stretch ends between two poses. The head goes on in it for up to a millisecond; 100 ms cover that. */
+/* Cuts the path into stretches. A stretch ends at the time of its last pose, rounded up to a millisecond. So the head
+ * may go on in it for that long: the reach covers the poses of 100 ms more. */
 static int cover_path(struct site *site, struct sh_err *err)
 {
     int rc = SH_OK;
@@ -250,7 +252,8 @@ static void platform_describe(const struct pose *head, uint32_t i, struct config
     out->roll_deg = angle_deg(roll);
 }
 
-/* Sets the k-th time: after the first sample, and as a frame number where frames are counted. */
+/* Sets the k-th time of the stops, from the trajectory's first sample on. Where the configuration counts in frames, the
+ * frame number is set, too. */
 static void set_time(const struct site *site, uint32_t k, struct site_station *s)
 {
     const struct config_platform *p = &site->cfg->platform;

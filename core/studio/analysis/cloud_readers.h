@@ -16,11 +16,12 @@ enum { CLOUD_HAS_STATION = 256, CLOUD_HAS_LABEL = 512, CLOUD_HAS_ECHO = 1024 };
 /* Allocates arrays for n points: positions, and those named in `has`. */
 int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
 
-/* Sets count_m to what single precision rounds to. Warns where that is coarse. */
+/* Notes that the file has coordinates in single precision: count_m becomes the step that the largest one is rounded to,
+ * if it was smaller. Warns where the error may be above 0.1 mm. */
 void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_report *report);
 /* Whether these are three finite numbers, or three times NaN: a shot without echo. */
 bool cloud_is_position(const double p[3]);
-/* Fails with the place in the file where they are not. line 0: the file has no lines. */
+/* Fails if p is no such position, with the line of the file in the message. line 0: the file has no lines. */
 int cloud_check_position(const struct text *t, uint64_t line, const double p[3], struct sh_err *err);
 
 /* As cloud_read_columns; on failure the caller frees out. */

@@ -34,8 +34,8 @@ static void close_hole(const struct view *view, int x, int y, float *depth_m, ui
     near[i] = (uint32_t)found;
 }
 
-/* Takes means along one axis, over depths that change evenly: weights fall with their second difference, as a share of
- * the depth. */
+/* Takes means along one axis, over depths that change evenly and little. Weights fall with the second difference of the
+ * depths and with their slope, both as shares of the depth. */
 static void smooth_line(const float *in, float *out, size_t n, size_t step)
 {
     for (size_t i = 0; i < n; i++) {

@@ -137,7 +137,7 @@ export class Panorama {
     return [(azimuth - this.from[0]) / this.span[0], 1 - (elevation - this.from[1]) / this.span[1]];
   }
 
-  // Returns null for a point that came since the limits were found.
+  // Returns null for angles outside of the panorama: a point may have come after its limits were found.
   #pixel(azimuth, elevation, {width, height} = this) {
     const [x, y] = this.shareOf([azimuth, elevation]);
     if (!(x >= 0 && x <= 1 && y >= 0 && y <= 1)) return null;

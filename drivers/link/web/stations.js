@@ -55,7 +55,7 @@ export class Stations extends EventTarget {
     if (!this.trial) this.#view?.setStations(this.list.filter((s) => s.x_m !== null));
   }
 
-  // Stations are tried from now on, or, with null, no longer.
+  // From now on `trial` has the stations in the picture, where the user tries places. null: the trial is over.
   setTrial(trial) {
     this.trial = trial;
     this.#place();

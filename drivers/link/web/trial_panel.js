@@ -219,7 +219,7 @@ export class TrialPanel {
     }
     says.hidden = station.error === '';
     say(says, station.error);
-    say(mark, station.error && (station.seen || station.points > 0 ? 'Open for the error' : 'Nothing is seen from here'));
+    say(mark, station.error && (station.seen || station.points > 0 ? 'Open to see the error' : 'Nothing is seen from here'));
   }
 
   #edit(number, key, input) {

@@ -81,7 +81,8 @@ int batch_check_files(const struct batch *b, uint32_t job, struct sh_err *err);
 /* ---- run.c: the jobs of a shard that aren't done. Returns the exit status, with what failed printed. */
 int batch_run(struct batch *b);
 
-/* ---- merge.c: checks all jobs, and writes manifest.json where all are whole. Likewise. */
+/* ---- merge.c: checks all jobs, and writes manifest.json where all are whole. Returns the exit status, with what
+ * failed printed. */
 int batch_merge(struct batch *b);
 
 /* Writes number, name, station and settings of job i as members of the open object. */

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Both links speak the same protocol and begin at power-up. So datagram n of the clean one is unit n of the other,
- * before faults hit it. Datagrams have no numbers: each is found among the clean ones by its content, near the place
- * where it is expected. Datagrams wait a moment here, so that the clean one is there first. */
+/* Compares the datagrams of a link that has faults with those of a second link, the clean one, which has none. Both
+ * links speak the same protocol and begin at power-up. So datagram n of the clean link is unit n of the other, before
+ * faults hit it. Datagrams have no numbers: each is found among the clean ones by its content, near the place where it
+ * is expected. Datagrams of the link with faults wait for WAIT_NS here, so that the clean ones are there first. */
 #include <netinet/in.h>
 #include <poll.h>
 #include <stdio.h>
