@@ -62,7 +62,7 @@ static double ratio_of(double db)
     return pow(10.0, 0.1 * db);
 }
 
-/* Quotients by 1e9 are the nearest doubles: limits in ns are those in s. */
+/* A quotient by 1e9 is rounded once. So a key at its limit in ns is exactly at the limit in s of core/waveform.h. */
 static void fill_spec(const struct config *cfg, const struct pulse_table *table, struct waveform_spec *spec)
 {
     const struct config_waveform *w = &cfg->waveform;
@@ -245,8 +245,8 @@ void site_free_waves(struct site *site)
 
 /* ---- room */
 
-/* A block has room for this many windows a pulse, on average, and for this many samples, so that its bytes are
- * counted in 32 bits: 9000 of a pulse at 10 MHz and 100 ticks a second. */
+/* A block has room for this many windows a pulse, on average, and for this many samples, so that 32 bits can count its
+ * bytes. At 10 MHz and 100 ticks a second there is room for 9000 samples a pulse. */
 enum { MOST_WINDOWS = 4, MOST_SAMPLES = 1 << 30 };
 
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)
