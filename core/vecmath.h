@@ -47,7 +47,8 @@ VEC_INLINE double vec_from_u64(uint64_t whole)
     return x - 0x1p52;
 }
 
-/* The lower terms of Taylor's series of (sin y - y) / y^3, z = y^2: s is the sum of those beyond. */
+/* Adds the lower terms of the Taylor series of (sin y - y) / y^3, where z = y^2. In s come the higher terms, summed by
+ * the caller. */
 VEC_INLINE double vec_sine_series(double s, double z)
 {
     s = s * z + 1.0 / 6227020800.0;
