@@ -20,7 +20,7 @@
 #define VEC_CLONES
 #endif
 #define VEC_INLINE static inline __attribute__((always_inline))
-/* Stands before a loop whose arrays don't overlap, where they came in a struct, so that restrict can't say it. */
+/* Stands before a loop over arrays that don't overlap, where `restrict` can't say so, since a struct has them. */
 #ifdef __clang__
 #define VEC_LOOP _Pragma("clang loop vectorize(assume_safety)")
 #else
@@ -47,7 +47,8 @@ VEC_INLINE double vec_from_u64(uint64_t whole)
     return x - 0x1p52;
 }
 
-/* The lower terms of Taylor's series of (sin y - y) / y^3, z = y^2: s is the sum of those beyond. */
+/* Adds the lower terms of the Taylor series of (sin y - y) / y^3, where z = y^2. In s come the higher terms, summed by
+ * the caller. */
 VEC_INLINE double vec_sine_series(double s, double z)
 {
     s = s * z + 1.0 / 6227020800.0;
@@ -107,9 +108,9 @@ VEC_INLINE double vec_sum_rest(double x, double y, double sum)
     return (x - (sum - t)) + (y - t);
 }
 
-/* Sine and cosine of turn + rest beyond the last bit: s[0] + s[1] and c[0] + c[1], where the second is at most half
- * the last bit of the first. |rest| is at most a last bit of turn. Sine to y^17. Error below 4e-17
- * (tests/unit/test_vecmath.c). */
+/* Sine and cosine of the angle turn + rest, where |rest| is at most the last bit of turn. Each result is a sum of two
+ * doubles, [0] + [1], and [1] is at most half the last bit of [0]. The series of the sine goes to y^17. Error below
+ * 4e-17 (tests/unit/test_vecmath.c). */
 VEC_INLINE void vec_sincos_turn_fine(double turn, double rest, double sine[2], double cosine[2])
 {
     const double two_pi = 6.283185307179586477, two_pi_rest = 2.4492935982947064e-16;

@@ -26,7 +26,8 @@ struct search {
 /* Points and edges from here on are relative to the query point, which is the origin: nothing of the large
  * coordinates is left in the products. */
 
-/* The point nearest to the origin on the edge from a along ab. Measured from whichever end is nearer. */
+/* Finds the point nearest to the origin on the edge from a along ab. It is measured from the end that is nearer to it,
+ * so that less is rounded. */
 static void nearest_on_edge(const double a[3], const double b[3], const double ab[3], double out[3])
 {
     double along_a = -vec3_dot(a, ab), along_b = vec3_dot(b, ab), length2 = along_a + along_b;
@@ -51,10 +52,11 @@ static int is_inside(double corner[3][3], double edge[3][3], const double normal
     return 1;
 }
 
-/* The point of the triangle nearest to the origin. First come the edges: their points are exact even on a needle. Then
- * comes the face, whose plane is taken through the edges' nearest point. The error of a needle's normal is an angle of
- * about 2^-53 l / h (length, height). Over the distance d this error moves the foot by d times the angle, so the
- * foot only stays inside where the angle is below h / d. Then the error of the distance is below 2^-53 l. */
+/* Finds the point of the triangle nearest to the origin, and returns its distance. First come the edges: their points
+ * are exact even on a needle. Then comes the face, whose plane is taken through the edges' nearest point. The error of
+ * a needle's normal is an angle of about 2^-53 l / h (length, height). Over the distance d this error moves the foot by
+ * d times the angle, so the foot only stays inside where the angle is below h / d. The edges' nearest point lies within
+ * about h of the foot, so the error of the distance is about h times the angle, which is 2^-53 l. */
 static double nearest_on_triangle(double corner[3][3], double nearest[3])
 {
     double edge[3][3], normal[3], best2 = INFINITY;
@@ -93,7 +95,7 @@ static void visit_triangle(struct search *s, uint32_t triangle)
     for (int i = 0; i < 3; i++)
         vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], s->p, corner[i]);
     const double d = nearest_on_triangle(corner, nearest);
-    /* The lower number of two that are as near: an answer that doesn't depend on Embree's order. */
+    /* Where two triangles are as near, the one with the lower number is taken, in whatever order Embree asks. */
     if (d > s->best_m || (s->found && d == s->best_m && triangle > s->hit->triangle)) return;
     s->found = 1;
     s->best_m = s->hit->distance_m = d;

@@ -8,7 +8,8 @@
 
 #define WIDE __attribute__((target("avx512f,avx512vl"), always_inline)) static inline
 
-/* Rays that are inside of a triangle for certain, and those of which that is in doubt. */
+/* Rays of a packet, a bit each: those that are inside of a triangle for certain, and those for which this is in
+ * doubt. */
 struct judged {
     unsigned in, doubt;
 };
@@ -66,8 +67,9 @@ struct plane {
     uint32_t triangle;
 };
 
-/* Takes the triangle as the hit of those rays for which it is the nearest so far, among the eight from `at` on; `in`
- * are inside of it for certain. Returns those to which it is as near as another one. */
+/* Takes the triangle as the hit of those rays for which it is clearly the nearest so far, among the eight from `at` on.
+ * `in` has the rays that are inside of it for certain. Returns the rays that bvh_note_hit has to decide: for them the
+ * triangle is as near as another one. With may_pass the triangle may have holes, so no ray is decided here. */
 WIDE __mmask8 take_8(struct bvh_query *query, float *tfar, const struct plane *p, int at, __mmask8 in,
                      double range_m[8], int own)
 {
@@ -116,7 +118,7 @@ WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_l
     if ((others | judged.doubt) != 0) look_closer(query, tfar, leaf, which, others, judged.doubt, range_m);
 }
 
-/* Adds what rays from points of their own add to each edge's side. */
+/* Adds the term of each edge's side that rays have if each begins at its own point. */
 WIDE void add_own(const struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES])
 {
     __m512 turned[3], more[BVH_EDGES];
@@ -139,8 +141,8 @@ WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf
     struct sides sides[BVH_EDGES];
     __m512 dir[3], side[BVH_EDGES];
     bvh_find_edges(query, leaf, &edges);
-    /* Each number of the edges fills a vector. That costs less by loads from memory, which this makes the compiler
-     * take, than by shuffles. */
+    /* Each number of the edges fills a vector. Loads from memory cost less for this than shuffles. The next line makes
+     * the compiler use loads. */
     __asm__ volatile("" ::: "memory");
     const __m512 doubt = _mm512_set1_ps(edges.doubt);
     for (int j = 0; j < 3; j++)

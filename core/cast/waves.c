@@ -2,8 +2,9 @@
 /* This stage samples the light that comes back of each pulse, over time. It takes a pulse's returns before merging:
  *
  *     one ray for the whole footprint    a disc on the plane that it hits: the closed form
- *     parts of a footprint that is cut   a bell each, as wide as the part is deep
- *     sub-rays                           bells, as deep as the area around each; many are joined first
+ *     parts of a footprint that is cut   a bell (Gaussian) each, as wide as the part is deep
+ *     sub-rays                           a bell each, as wide as the ray's share of the footprint is deep; where there
+ *                                        are many, neighbours are joined first
  *
  * Echoes that are found in the samples have the noise of the samples; no other noise is added. */
 #include "core/cast/waves.h"
@@ -90,9 +91,9 @@ static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apar
 /* With this many returns or fewer, none are joined. */
 enum { FEW = 16 };
 
-/* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. With d a fifteenth of a
- * pulse's width, which is a sixteenth of its area, the signal changes by 1e-4 of its peak: less than half a count of
- * 12 bits. */
+/* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. Here d is a sixteenth of the
+ * pulse's area (its integral over time, in s), about a fifteenth of its width. So the signal changes by 1e-4 of its
+ * peak: less than half a count of 12 bits. */
 static double least_apart_m(const struct cast_waves *waves)
 {
     return 0.5 * LIGHT_SPEED_M_S * waveform_pulse_area_s(waves->waveform) / 16.0;
@@ -247,7 +248,8 @@ static void bend_beams(const struct caster *c, const struct chunk *k, struct lin
     }
 }
 
-/* Sets the beams of the block's windows from `first` on, as its points have them. */
+/* Sets the beams of the block's windows from `first` on, in the layout of its points: directions in the CRS, or counts
+ * of the encoders. */
 static void set_beams(const struct caster *c, const struct chunk *k, uint32_t first)
 {
     const struct cast_setup *s = k->s;
@@ -347,7 +349,8 @@ static void find_echoes(struct caster *c, const struct chunk *k, const struct wa
     const uint32_t rest = n > 1 ? echoes_secondary(l, i, n - 1) : 0, all = n + crowded;
     c->counters.crowded += crowded;
     const uint32_t missed = c->waves->merged[i] > all ? c->waves->merged[i] - all : 0, outside = found - n;
-    c->counters.faint += missed > outside ? missed : outside; /* one out of range is among the missed: once */
+    /* An echo out of range is among the missed, too. It counts once. */
+    c->counters.faint += missed > outside ? missed : outside;
     if (n == 0) l->range_m[i] = (double)NAN;
     for (uint32_t j = 0; j < n; j++) {
         const uint32_t at = j == 0 ? i : rest + j - 1;

@@ -156,7 +156,7 @@ static int read_property(struct ply_header *h, struct text *t, struct sh_err *er
         if (p->use == PLY_SKIP || h->property[i].use != p->use) continue;
         if (p->use < PLY_TIME || p->use >= PLY_SCALARS)
             return ply_read_header_fail(t, err, "a property is given twice:", word);
-        p->use = PLY_SKIP; /* of two times, ranges, colours and the like the first one counts */
+        p->use = PLY_SKIP; /* where there are two times, ranges, colours and the like, the first one counts */
     }
     return SH_OK;
 }

@@ -24,9 +24,9 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* Returns the height of a top that stays above the limit for `span` samples: the level sinks on both sides of h's
- * peak until h is above it for that long. *centroid: how long after reaching the limit the pulse has its
- * centroid, in samples. */
+/* Returns the height of a top that stays above the limit for `span` samples. It widens an interval of the pulse's shape
+ * h around its peak, at the higher end first, until the interval is that long. At its ends h then has the limit's share
+ * of the peak. *centroid: samples from where the limit is reached to the pulse's centroid. */
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
     const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
@@ -110,7 +110,7 @@ static int decompose_begin(const struct finder_run *run, const struct finder_pea
     return n == 1 && blind;
 }
 
-/* Returns the sum of squares that terms leave on planes, since a plane's echo has another shape than a term. */
+/* Returns the sum of squares that remains without noise, since the echo of a plane has another shape than a term. */
 static double decompose_shapes(const struct finder_task *task, const struct finder_mix *mix)
 {
     double sum = 0.0;

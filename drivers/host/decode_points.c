@@ -10,7 +10,8 @@
 
 enum { BLOCK = HOST_BLOCK };
 
-/* It holds the rows of the wire as columns, and columns that the caller doesn't want but others are computed from. */
+/* A block has the words of its rows as columns. It also has room for columns that the caller does not ask for, since
+ * others are computed from them. */
 struct block {
     uint32_t a[BLOCK], b[BLOCK], c[BLOCK], middle[BLOCK], tail[BLOCK];
     double sin_m[BLOCK], cos_m[BLOCK], sin_pan[BLOCK], cos_pan[BLOCK];

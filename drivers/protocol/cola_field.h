@@ -67,8 +67,8 @@ uint32_t cola_inputs_at(const struct cola_fields *fields, int64_t t_ns, int64_t 
  * counted from the first beam, in others from 0. */
 void cola_field_describe(const struct cola_field *field, const struct planar_head *head, int from_first,
                          struct cola_record *out);
-/* Reads a record of a request. COLA_INVALID_DATA: radial and dynamic fields, comments, a part that is not its
- * type's. */
+/* Reads a record of a request. COLA_INVALID_DATA: the record is of a radial or dynamic field, has a comment, or has the
+ * part of another type than its own. */
 enum cola_error cola_record_take(struct cola_args *args, struct cola_record *record);
 void cola_record_put(const struct cola_record *record, struct cola_out *out);
 /* The shape of a record. A record on the head's own grid has the exact directions of beams. COLA_INVALID_DATA:

@@ -62,8 +62,8 @@ static int check_place(const char *path, int moves, const double place_m[3], dou
     return mesh_check_box(path, low, high, err);
 }
 
-/* Looks at a scan by itself. Whether it fits after the earlier scans is known when it begins, since shots without echo
- * take no room. */
+/* Checks a scan by itself, as if every shot had an echo. Whether it fits after the earlier scans can't be known yet:
+ * shots without echo take no room. So that is checked when the scan begins (check_size). */
 static int mesh_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
                      const struct recorder_scan *scan, struct sh_err *err)
 {

@@ -13,7 +13,7 @@
 /* A peer confirms after 40 ms at most, if it reads. After 200 ms (TCP_RTO_MIN) the system begins to repeat. */
 enum { CONFIRM_MS = 200, MOST_HOPS = 255 };
 
-/* A socket of IPv6 may have a peer of IPv4, so there both are needed. */
+/* A socket of IPv6 may have a peer of IPv4, so it needs the options of both. */
 static int take_from(int fd, int least_ttl)
 {
     int family = AF_INET;

@@ -118,7 +118,8 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
     rows[n] = (struct app_option)OPTION_END;
 }
 
-/* A descriptor that is not open gets the number of a file that is opened later. The line would go into that file. */
+/* Where the descriptor is not open, a file that is opened later gets its number. The line for the descriptor would then
+ * go into that file. */
 static int check_output(const struct app_command *command, const struct app_option *row, int fd)
 {
     const int flags = fcntl(fd, F_GETFL);

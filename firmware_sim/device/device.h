@@ -125,7 +125,7 @@ int device_replay_ends(const struct device *device);
 int device_replays(const struct device *device);
 /* Ends and closes the journal and the file of the truth, if there are any; warns where the head refused commands of the
  * journal that was replayed. Returns the first error in writing them; the lines that they lack are counted. A file that
- * takes nothing for 2 s is given up. After the loop is joined. */
+ * takes nothing for 2 s is given up. Call it after the loop is joined. */
 int device_close_journal(void *self, struct sh_err *err);
 /* 1: one of these files is behind; callers that can wait should. Any thread; takes no lock. */
 int device_files_fill(const void *self);
@@ -206,7 +206,7 @@ int device_stored(const void *self, const char *name, char text[SETTINGS_FILE_TE
 void device_report(void *self, int number, const char *text);
 
 /* Device time begins now, at this time of clock_now_ns(). The time of day is read from the system where
- * time.epoch says so. Before the first tick is claimed. *warning: a warning for the user, or NULL; it
+ * time.epoch says so. Call it before the first tick is claimed. *warning: a warning for the user, or NULL; it
  * belongs to the device. */
 int device_power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
 

@@ -23,7 +23,7 @@ struct lateness {
     _Atomic uint64_t max_ns;
 };
 
-/* Notes one lateness. What is early (negative) counts as 0. */
+/* Notes one lateness. A negative one (early) counts as 0. */
 void lateness_note(struct lateness *lateness, int64_t late_ns);
 uint64_t lateness_count(const struct lateness *lateness);
 /* Returns the quantile q (0 to 1) in microseconds; never more than the latest. 0 when nothing was noted. */

@@ -7,7 +7,8 @@ static void note_event(struct replay *r, const uint8_t *frame, uint64_t tick)
     struct native_event event;
     if (native_decode_event(frame + NATIVE_HEADER_LEN, native_frame_len(frame) - NATIVE_HEADER_LEN, &event) != SH_OK)
         return;
-    const int has_state = event.code == NATIVE_EV_STATE && !r->is_device; /* a device scans while it is played */
+    /* With another protocol than the native one, the head scans while the recording plays, whatever its states say. */
+    const int has_state = event.code == NATIVE_EV_STATE && !r->is_device;
     if (has_state && event.a < HEAD_N_STATES) replay_set_state(r, tick, (enum head_state)event.a);
     if (event.code == NATIVE_EV_SCAN_START) {
         r->scans++;

@@ -62,7 +62,7 @@ static double ratio_of(double db)
     return pow(10.0, 0.1 * db);
 }
 
-/* Quotients by 1e9 are the nearest doubles: limits in ns are those in s. */
+/* A quotient by 1e9 is rounded once. So a key at its limit in ns is exactly at the limit in s of core/waveform.h. */
 static void fill_spec(const struct config *cfg, const struct pulse_table *table, struct waveform_spec *spec)
 {
     const struct config_waveform *w = &cfg->waveform;
@@ -136,8 +136,8 @@ static void warn_noise(const struct config *cfg, const struct waveform *waveform
     if (enough_hz > 0.0)
         snprintf(advice, sizeof advice, "; waveform.bandwidth_mhz=%.0f is enough", ceil(1e-6 * enough_hz));
     sh_warn(report,
-            "%s: waveform.echoes: the level of an echo is %.2g times the noise (threshold_snr %.3g, times the pulse's "
-            "peak of %.2g behind the receiver), so many echoes are of noise alone; from %g times on few are%s",
+            "%s: waveform.echoes: the level of an echo is %.2g times the noise (threshold_snr %.3g, times %.2g, the "
+            "peak of a pulse after the receiver), so many echoes are of noise alone; at %g times or more, few are%s",
             cfg->file, peak / spec->noise, 1.0 / spec->noise, peak, LEAST_SNR, advice);
 }
 
@@ -245,8 +245,8 @@ void site_free_waves(struct site *site)
 
 /* ---- room */
 
-/* A block has room for this many windows a pulse, on average, and for this many samples, so that its bytes are
- * counted in 32 bits: 9000 of a pulse at 10 MHz and 100 ticks a second. */
+/* A block has room for this many windows a pulse, on average, and for this many samples, so that 32 bits can count its
+ * bytes. At 10 MHz and 100 ticks a second there is room for 9000 samples a pulse. */
 enum { MOST_WINDOWS = 4, MOST_SAMPLES = 1 << 30 };
 
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses)

@@ -24,7 +24,7 @@ struct aiFile *assimp_open(struct aiFileIO *io, const char *path, const char *mo
 void assimp_close(struct aiFileIO *io, struct aiFile *handle);
 /* After the export: fails where something could not be written, and says why. */
 int assimp_check_files(struct exporter *exporter, struct sh_err *err);
-/* After that, with is_raw: makes the file from the exporter's. */
+/* After assimp_check_files, with is_raw: makes the output's file from the raw one that the exporter wrote. */
 int assimp_copy_raw(struct exporter *exporter, struct sh_err *err);
 
 #endif

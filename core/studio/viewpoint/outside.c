@@ -25,7 +25,8 @@ static double distance_m(const struct survey *s, const double toward[3])
     return fmin(far_m, half_m + 0.3 * v->range_max_m + v->range_min_m);
 }
 
-/* Sets the part of the view that holds the bounds, as seen from the place with the azimuth `ahead` in its middle. */
+/* Sets heading, pan and lines of a place, so that its view just holds the survey's bounds, with a margin. ahead_rad is
+ * the azimuth from the place to their centre. */
 static void frame(const struct survey *s, double ahead_rad, struct viewpoint *at)
 {
     const double *p = at->position_m;

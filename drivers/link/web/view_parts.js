@@ -29,7 +29,7 @@ class BlockPart {
     this.value = gl.createBuffer();
   }
 
-  // Shows only points of some times. These go to the GPU, too, from the first such picture on.
+  // Shows only points of the cloud's time window. The times of points go to the GPU only when a window is set.
   #times(stride) {
     const {gl, cloud: {window}} = this.points, {block} = this;
     if (window === null) {
@@ -200,7 +200,8 @@ export class Points {
   }
 }
 
-// These uniforms of the mesh program have a usual value. A section does not cut what has `section: null`.
+// Makes the mesh program current. Its uniforms have the defaults that are listed here. With `section: null`, the
+// camera's section does not cut the mesh.
 export function useMesh(gl, programs, camera, origin, {colour, edge = 0, push = 1, faint = 1, flat = false, behind = null,
   shift = [0, 0, 0], heading = 0, section}) {
   const program = programs.use('mesh', camera, origin, section);

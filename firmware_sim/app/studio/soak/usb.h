@@ -27,7 +27,8 @@ struct soak_plugs {
 /* In all three, `row` has the rows of the link, and the caller has the link's lock. */
 /* Notes a fault of an enumeration that begins. */
 void soak_usb_plugged(struct soak_plugs *plugs, struct soak_row *row, const struct fault_note *note);
-/* The client has opened the device, `source`. Notes what it noticed of the enumeration, by the time that this took. */
+/* The client has opened the device, `source`, which took opened_ms. Notes which faults of the enumeration it noticed: a
+ * slow one by this time, others by the descriptors that the system has read. */
 void soak_usb_opened(struct soak_plugs *plugs, struct soak_row *row, const char *source, double opened_ms);
 /* Hides the faults so far: no client will notice them. */
 void soak_usb_forget(struct soak_plugs *plugs, struct soak_row *row, const char *why);
