@@ -134,6 +134,8 @@ static void wrong_lines_give_one_error(void **ctx)
     /* A query says what it takes. */
     expect_error(&dev, 1, "HEAD:STAT? MAX", CMD_E_NOT_ALLOWED, "HEAD:STATe? takes no parameter\"");
     expect_error(&dev, 1, "HEAD:PRR? 5", CMD_E_NOT_ALLOWED, "HEAD:PRR? takes no parameter but MIN, MAX or DEF\"");
+    expect_error(&dev, 1, "TIME:STEP?", CMD_E_HEADER, "TIME:STEP has no query form");
+    expect_error(&dev, 1, "HEAD:PRR 300000 DEG", CMD_E_SUFFIX, "'DEG'; HEAD:PRR takes ");
     /* A number without a setting has no MIN, MAX or DEF, and the error does not offer them. */
     expect_error(&dev, 1, "TIME:STEP MAX", CMD_E_DATA_TYPE, "TIME:STEP takes a number, not 'MAX'");
     expect_error(&dev, 1, "HEAD:PRR fast", CMD_E_DATA_TYPE, "HEAD:PRR takes a number, MIN, MAX or DEF, not 'fast'");

@@ -269,12 +269,14 @@ static void a_footprint_needs_a_head_that_has_one(void **state)
         write_in("heads/mine.yaml", parts[2]);
         for (int k = 0; k < 3; k++)
             free(parts[k]);
-        snprintf(beam, sizeof beam, "beam:\n  mode: %s\n", is[i].mode);
+        snprintf(beam, sizeof beam, "beam:\n  mode: %s\n%s", is[i].mode,
+                 is[i].says != NULL ? "cast: {sight: on}\n" : "");
         const int code = load_with_head("mine", PRR LINES, beam);
         if ((code == SH_OK) != (is[i].says == NULL)) fail_msg("case %zu: %s", i, err.text);
         if (is[i].says == NULL) continue;
         snprintf(want, sizeof want, "%s:17: beam.mode: %s", config_path, is[i].says); /* the line of the key */
         assert_string_equal(err.text, want);
+        assert_int_equal(diagnostics.n, 1); /* cast.sight, which rings refuse, follows from it */
     }
     free(text);
 }

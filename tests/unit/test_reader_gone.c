@@ -250,6 +250,80 @@ static void what_was_not_written_is_not_received(void **state)
     expect_lost(0, 0);
 }
 
+/* The number of the next frame comes from the last tick before the cursor that has one, if the ring still has it. */
+static void a_session_learns_the_next_number(void **state)
+{
+    (void)state;
+    stream.first_seq = 7;
+    session_know_next(&pump, s); /* at the beginning */
+    assert_true(s->lost.have_seq && s->lost.next_seq == 7 && s->lost.next_pulse == 0);
+    release_all(RELEASED - 3, RELEASED - 1); /* the last tick but two is the 18th frame */
+    static const struct {
+        uint64_t cursor;
+        uint32_t n;
+    } at[] = {{RELEASED, RELEASED - 2},
+              {RELEASED - 1, RELEASED - 3},
+              {RELEASED - 2, RELEASED - 3},
+              {RELEASED - 3, RELEASED - 3},
+              {OLDEST + 1, OLDEST + 1}};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
+        s->cursor = at[i].cursor;
+        session_know_next(&pump, s);
+        assert_int_equal(s->lost.have_seq, 1);
+        assert_int_equal(s->lost.next_seq, FIRST_SEQ + at[i].n);
+        assert_int_equal(s->lost.next_pulse, at[i].n * PULSES);
+        assert_looks_at_nothing();
+    }
+    s->cursor = OLDEST; /* the ring no longer has the tick before */
+    session_know_next(&pump, s);
+    assert_int_equal(s->lost.have_seq, 0);
+}
+
+/* A reader has caught up when it is behind by one tick and an eighth of the queue at most. */
+static void an_episode_ends_near_the_end(void **state)
+{
+    (void)state;
+    static const struct ring_copy tick = {.first_seq = FIRST_SEQ, .pulses_before = 0};
+    stand_at(10, 0);
+    s->lost.lagging = 1;
+    session_check_lost(&pump, s, &tick, s->cursor + 1 + QUEUE / 8 + 1);
+    assert_int_equal(s->lost.lagging, 1);
+    s->units.n = 1; /* of another protocol: a unit still waits */
+    session_check_lost(&pump, s, &tick, s->cursor);
+    assert_int_equal(s->lost.lagging, 1);
+    s->units.n = 0;
+    session_check_lost(&pump, s, &tick, s->cursor + 1 + QUEUE / 8);
+    assert_int_equal(s->lost.lagging, 0);
+}
+
+static int n_destroyed;
+
+static void destroy(void *protocol)
+{
+    assert_null(protocol);
+    n_destroyed++;
+}
+
+/* Units of another protocol that still wait at the end are lost, too. What lies in the buffer is no frame then. */
+static void units_that_wait_at_the_end_are_lost(void **state)
+{
+    (void)state;
+    static const struct protocol_ops other = {.name = "other", .destroy = destroy};
+    pump.protocol = &other;
+    pump.counts.sent_units = 50;
+    n_destroyed = 0;
+    s->units.n = 4;
+    session_leave(&pump, s); /* the run goes on */
+    assert_int_equal(pump.counts.lost_units, 0);
+    atomic_store(&stream.over, 1);
+    session_leave(&pump, s); /* nothing waits any more */
+    assert_true(pump.counts.lost_units == 0 && n_reports == 0 && n_destroyed == 2);
+    s->units.n = 1;
+    session_leave(&pump, s);
+    assert_true(pump.counts.lost_units == 1 && n_reports == 1 && counters.reader_lost_frames == 1);
+    assert_true(pump.counts.sent_units == 50 && s->units.n == 0);
+}
+
 /* Once the run is over, what the reader has not got is lost: frames in its buffer, and those that it has not taken. */
 static void the_end_counts_what_is_left(void **state)
 {
@@ -285,6 +359,9 @@ int main(void)
         cmocka_unit_test_setup_teardown(numbers_come_from_the_first_tick_that_has_some, open_stream, close_stream),
         cmocka_unit_test_setup_teardown(without_numbers_nothing_is_counted, open_stream, close_stream),
         cmocka_unit_test_setup_teardown(what_was_not_written_is_not_received, open_stream, close_stream),
+        cmocka_unit_test_setup_teardown(a_session_learns_the_next_number, open_stream, close_stream),
+        cmocka_unit_test_setup_teardown(an_episode_ends_near_the_end, open_stream, close_stream),
+        cmocka_unit_test_setup_teardown(units_that_wait_at_the_end_are_lost, open_stream, close_stream),
         cmocka_unit_test_setup_teardown(the_end_counts_what_is_left, open_stream, close_stream),
     };
     return cmocka_run_group_tests_name("readers that are gone", tests, NULL, NULL);
