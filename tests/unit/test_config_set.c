@@ -85,6 +85,8 @@ static void set_refuses(void **state)
         {"stations[0].scanner={links: []}", "stations[0].scanner.links", "the same for all scanners"},
         {"stations[0].scanner.noise={}", "stations[0].scanner.noise", "is a section of a scanner; set one of its keys"},
         {"stations[0].scanner.surfaces.0.gloss=1", "stations[0].scanner.surfaces.0.gloss", "are set as one list"},
+        {"stations[0].scanner.loop.tick_hz=500", "stations[0].scanner.loop.tick_hz",
+         "the same for all scanners; allowed "},
         {"stations[2].heading_deg=0", "stations[2].heading_deg", "allowed indices 0 to 1, the last appends one"},
         {"links[99999999999999999999].type=tcp", "links[99999999999999999999].type", "allowed indices 0 to 1"},
         {"links[500].typ=tcp", "links[500].typ", "allowed indices 0 to 1"},
