@@ -257,7 +257,7 @@ static void a_session_learns_the_next_number(void **state)
     stream.first_seq = 7;
     session_know_next(&pump, s); /* at the beginning */
     assert_true(s->lost.have_seq && s->lost.next_seq == 7 && s->lost.next_pulse == 0);
-    release_all(RELEASED - 3, RELEASED - 1); /* the last tick but two is the 18th frame */
+    release_all(RELEASED - 3, RELEASED - 1); /* the head lost the two ticks before the last */
     static const struct {
         uint64_t cursor;
         uint32_t n;
