@@ -131,6 +131,14 @@ static void wrong_lines_give_one_error(void **ctx)
     };
     struct command_device dev = command_test_device();
     expect_errors(&dev, wrong, N_OF(wrong));
+    /* A query says what it takes. */
+    expect_error(&dev, 1, "HEAD:STAT? MAX", CMD_E_NOT_ALLOWED, "HEAD:STATe? takes no parameter\"");
+    expect_error(&dev, 1, "HEAD:PRR? 5", CMD_E_NOT_ALLOWED, "HEAD:PRR? takes no parameter but MIN, MAX or DEF\"");
+    expect_error(&dev, 1, "TIME:STEP?", CMD_E_HEADER, "TIME:STEP has no query form");
+    expect_error(&dev, 1, "HEAD:PRR 300000 DEG", CMD_E_SUFFIX, "'DEG'; HEAD:PRR takes ");
+    /* A number without a setting has no MIN, MAX or DEF, and the error does not offer them. */
+    expect_error(&dev, 1, "TIME:STEP MAX", CMD_E_DATA_TYPE, "TIME:STEP takes a number, not 'MAX'");
+    expect_error(&dev, 1, "HEAD:PRR fast", CMD_E_DATA_TYPE, "HEAD:PRR takes a number, MIN, MAX or DEF, not 'fast'");
 }
 
 static void a_line_too_long_is_dropped_whole(void **ctx)

@@ -238,6 +238,49 @@ static void profiles_are_listed(void **state)
     assert_says("/nonexistent");
 }
 
+/* Rays of a footprint need one, and a pulse of 0.1 ns or more: 15 mm of range. A single ray always goes. */
+static void a_footprint_needs_a_head_that_has_one(void **state)
+{
+    (void)state;
+    static const char exit[] = "beam_exit_m: { value: 0.007,", narrow[] = "beam_divergence_rad: { value: 0.00035,";
+    static const struct {
+        const char *pulse, *exit, *divergence, *mode, *says; /* says NULL: it is taken */
+    } is[] = {
+        {"4", "0", "0", "rings", "head profile mine has no footprint; allowed single"},
+        {"4", "0", "0", "adaptive", "head profile mine has no footprint; allowed single"},
+        {"4", "0", "0", "single", NULL},
+        {"4", "0", "0", "auto", NULL},
+        {"4", "0.007", "0", "rings", NULL},
+        {"4", "0", "0.00035", "rings", NULL},
+        {"0.1", "0.007", "0.00035", "rings", NULL},
+        {"0.099", "0.007", "0.00035", "single", NULL},
+        {"0.099", "0.007", "0.00035", "rings",
+         "pulse_width_ns of head profile mine is 0.099: too short to separate echoes of a footprint; allowed single, or "
+         "a pulse_width_ns of at least 0.1"},
+    };
+    char *text = read_source("config/heads/any-rate.yaml"), *parts[3], with[64], beam[64], want[320];
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        snprintf(with, sizeof with, "beam_exit_m: { value: %s,", is[i].exit);
+        parts[0] = replaced(text, exit, with);
+        snprintf(with, sizeof with, "beam_divergence_rad: { value: %s,", is[i].divergence);
+        parts[1] = replaced(parts[0], narrow, with);
+        snprintf(with, sizeof with, "pulse_width_ns: { value: %s,", is[i].pulse);
+        parts[2] = replaced(parts[1], "pulse_width_ns: { value: 4,", with);
+        write_in("heads/mine.yaml", parts[2]);
+        for (int k = 0; k < 3; k++)
+            free(parts[k]);
+        snprintf(beam, sizeof beam, "beam:\n  mode: %s\n%s", is[i].mode,
+                 is[i].says != NULL ? "cast: {sight: on}\n" : "");
+        const int code = load_with_head("mine", PRR LINES, beam);
+        if ((code == SH_OK) != (is[i].says == NULL)) fail_msg("case %zu: %s", i, err.text);
+        if (is[i].says == NULL) continue;
+        snprintf(want, sizeof want, "%s:17: beam.mode: %s", config_path, is[i].says); /* the line of the key */
+        assert_string_equal(err.text, want);
+        assert_int_equal(diagnostics.n, 1); /* cast.sight, which rings refuse, follows from it */
+    }
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -246,6 +289,7 @@ int main(void)
         cmocka_unit_test(malformed_profiles_are_refused),
         cmocka_unit_test(a_range_beyond_its_bits_is_refused),
         cmocka_unit_test(a_slow_pulse_rate_needs_slow_lines),
+        cmocka_unit_test(a_footprint_needs_a_head_that_has_one),
         cmocka_unit_test(profiles_are_looked_up_in_order),
         cmocka_unit_test(an_error_without_profiles_says_where_to_look),
         cmocka_unit_test(profiles_are_listed),

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* --set: values changed and elements added on the command line. */
+#include "firmware_sim/config/table/row.h"
 #include "tests/unit/config_rig.h"
 
 #include <math.h>
@@ -84,6 +85,8 @@ static void set_refuses(void **state)
         {"stations[0].scanner={links: []}", "stations[0].scanner.links", "the same for all scanners"},
         {"stations[0].scanner.noise={}", "stations[0].scanner.noise", "is a section of a scanner; set one of its keys"},
         {"stations[0].scanner.surfaces.0.gloss=1", "stations[0].scanner.surfaces.0.gloss", "are set as one list"},
+        {"stations[0].scanner.loop.tick_hz=500", "stations[0].scanner.loop.tick_hz",
+         "the same for all scanners; allowed "},
         {"stations[2].heading_deg=0", "stations[2].heading_deg", "allowed indices 0 to 1, the last appends one"},
         {"links[99999999999999999999].type=tcp", "links[99999999999999999999].type", "allowed indices 0 to 1"},
         {"links[500].typ=tcp", "links[500].typ", "allowed indices 0 to 1"},
@@ -121,6 +124,27 @@ static void set_refuses(void **state)
         assert_says(wrong[i].fragment);
         assert_says(wrong[i].key);
     }
+}
+
+/* Names up to the length that the error says are compared with the keys; longer ones are not. */
+static void a_name_has_a_longest_length(void **state)
+{
+    (void)state;
+    enum { LONGEST = 120 };
+    static const char says[] = "unknown key; allowed up to ";
+    char name[LONGEST + 1], set[LONGEST + 3];
+    unsigned most = 0;
+    for (unsigned len = LONGEST; len > 60; len--) {
+        memset(name, 'a', len);
+        memcpy(name, "links.0.", 8);
+        name[len] = '\0';
+        snprintf(set, sizeof set, "%s=1", name);
+        assert_int_equal(load_set(set), SH_EINPUT);
+        const char *at = strstr(err.text, says);
+        if (at != NULL && most == 0) most = (unsigned)strtoul(at + strlen(says), NULL, 10);
+        if ((at != NULL) != (len > most)) fail_msg("%u characters: %s", len, err.text);
+    }
+    assert_true(most > 60 && most < CFG_PATH_MAX); /* one that is taken has room, its end included */
 }
 
 /* YAML replaces the file's list or section, and earlier --set within it. Later --set changes it. */
@@ -301,17 +325,12 @@ static void all_stations_are_checked(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(set_changes_values),
-        cmocka_unit_test(set_takes_long_names),
-        cmocka_unit_test(set_appends_elements),
-        cmocka_unit_test(set_refuses),
-        cmocka_unit_test(yaml_replaces),
-        cmocka_unit_test(yaml_replaces_scanners),
-        cmocka_unit_test(tolerances_follow_the_plan),
-        cmocka_unit_test(settings_become_lengths),
-        cmocka_unit_test(stations_take_the_grid_of_the_anchor),
-        cmocka_unit_test(a_full_list_takes_no_more),
-        cmocka_unit_test(all_stations_are_checked),
+        cmocka_unit_test(set_changes_values),          cmocka_unit_test(set_takes_long_names),
+        cmocka_unit_test(set_appends_elements),        cmocka_unit_test(set_refuses),
+        cmocka_unit_test(a_name_has_a_longest_length), cmocka_unit_test(yaml_replaces),
+        cmocka_unit_test(yaml_replaces_scanners),      cmocka_unit_test(tolerances_follow_the_plan),
+        cmocka_unit_test(settings_become_lengths),     cmocka_unit_test(stations_take_the_grid_of_the_anchor),
+        cmocka_unit_test(a_full_list_takes_no_more),   cmocka_unit_test(all_stations_are_checked),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -114,6 +114,34 @@ static void a_kind_has_its_keys_and_no_others(void **state)
         }
 }
 
+/* The keys that say when, of fault/README.md: each place has its own, and a refusal says which. */
+static void a_place_has_its_keys_and_no_others(void **state)
+{
+    (void)state;
+    static const char counted[] = "link, at, from, until, every, probability, count, seed, from_s, until_s";
+    static const char moment[] = "from_s, until_s, from_pulse, until_pulse";
+    static const struct {
+        const char *key, *value, *places; /* f: of a stream frame, r: of a reply, c: of a connection, m: a moment */
+    } when[] = {{"link", "1", "frc"},          {"of", "notices", "f"},     {"at", "3", "frc"},
+                {"from", "2", "frc"},          {"until", "4", "frc"},      {"every", "2", "frc"},
+                {"probability", "0.5", "frc"}, {"count", "2", "frc"},      {"seed", "7", "frc"},
+                {"from_pulse", "5", "fm"},     {"until_pulse", "9", "fm"}, {"from_s", "1", "frcm"},
+                {"until_s", "2", "frcm"}};
+    static const char *const kind[] = {"drop", "no_reply", "refuse", "counters_high"};
+    load_base();
+    for (size_t i = 0; i < sizeof when / sizeof *when; i++)
+        for (size_t k = 0; k < sizeof kind / sizeof *kind; k++) {
+            char text[100], want[200];
+            const int allowed = strchr(when[i].places, "frcm"[k]) != NULL;
+            snprintf(text, sizeof text, "{kind: %s, %s: %s}", kind[k], when[i].key, when[i].value);
+            const int code = read_fault(text);
+            if ((code == SH_OK) != allowed) fail_msg("%s: %s", text, err.text);
+            snprintf(want, sizeof want, "faults[0].%s: %s has no such key; allowed %s", when[i].key, kind[k],
+                     k == 3 ? moment : counted);
+            if (!allowed) assert_says(want);
+        }
+}
+
 static void what_is_not_given_is_as_said(void **state)
 {
     (void)state;
@@ -301,6 +329,7 @@ int main(void)
         cmocka_unit_test(a_time_server_needs_dates),
         cmocka_unit_test(its_faults_need_somebody_who_asks),
         cmocka_unit_test(a_kind_has_its_keys_and_no_others),
+        cmocka_unit_test(a_place_has_its_keys_and_no_others),
         cmocka_unit_test(what_is_not_given_is_as_said),
         cmocka_unit_test(wrong_ones_are_refused_with_what_is_allowed),
         cmocka_unit_test(a_follower_has_its_own_faults),
