@@ -239,7 +239,7 @@ struct beam_part {
 /* The parts that lines cut the footprint into. Each lies on one surface, and is convex, so that its centre of energy
  * is in it. */
 struct beam_parts {
-    uint32_t n, centre; /* the part with the centre of the disc */
+    uint32_t n, centre; /* the part with the centre of the disc; BEAM_MAX_PARTS: it is left out */
     struct beam_part part[BEAM_MAX_PARTS];
 };
 /* Cuts a footprint by n lines. fine: the pattern of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than

@@ -66,6 +66,38 @@ static void one_of_a_pulse_s_echoes(void **state)
     close_optics(&o);
 }
 
+/* Each echo of a pulse has noise of its own, keyed by the pulse and the echo's number, whether near ones are merged or
+ * not. */
+static void echoes_have_their_own_noise(void **state)
+{
+    (void)state;
+    static const double y[] = {2.0, 2.004, 5.0};
+    struct optics o;
+    struct schedule_line line;
+    open_optics(&o, window());
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o.table.has_optics = 1;
+    o.rig->setup.noise_on = 1;
+    o.rig->setup.range_sigma_m = 0.01;
+    o.rig->setup.range_sigma_ppm = 100.0;
+    o.rig->setup.noise_key = rng_key(7, RNG_RANGE);
+    o.rig->setup.scan_key = rng_scan(0, 3);
+    for (int merges = 0; merges < 2; merges++) {
+        o.detect.separation_m = merges ? 1e-6 : 0.0;
+        schedule_get_line(&o.rig->segment, 0, &line);
+        assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, 20), 60);
+        for (uint32_t i = 0; i < 60; i++) {
+            const uint64_t key = rng_echo(line.cast0 + 10 + i / 3, i % 3);
+            long double d[3];
+            direction(o.rig, &line, 10 + i / 3, d);
+            double range_m = (double)(((long double)y[i % 3] - (long double)STATION[1]) / d[1]);
+            detect_fixed_noise(0.01, 1e-4, o.rig->setup.noise_key ^ o.rig->setup.scan_key, 1, &key, &range_m);
+            near_range(o.rig, i, (long double)range_m);
+        }
+    }
+    close_optics(&o);
+}
+
 /* An echo that does not fit into 31 bits of counts is dropped and counted. Here the wall does not fit, while the pane's
  * two sides do and are numbered as two. If no echo fits, one entry stays, without echo. */
 static void echoes_that_do_not_fit(void **state)
@@ -196,6 +228,7 @@ int main(void)
         cmocka_unit_test(glass_in_a_mirror),           cmocka_unit_test(one_of_a_pulse_s_echoes),
         cmocka_unit_test(echoes_that_do_not_fit),      cmocka_unit_test(echoes_of_a_moving_head),
         cmocka_unit_test(which_side_of_a_body_is_met), cmocka_unit_test(what_is_too_faint_is_not_met),
+        cmocka_unit_test(echoes_have_their_own_noise),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
