@@ -100,6 +100,26 @@ static void a_lobe_ends_beside_the_surface(void **state)
     surface_table_free(&table);
 }
 
+/* Equal surfaces have one number, wherever they stand among the others. Numbers count from 0. */
+static void equal_surfaces_are_of_one_kind(void **state)
+{
+    (void)state;
+    static const double reflectance[] = {0.5, 0.2, 0.5, 0.7, 0.2, 0.5};
+    uint16_t kind[6];
+    struct surface_table table;
+    struct sh_err err;
+    assert_int_equal(surface_table_alloc(6, &table, &err), SH_OK);
+    for (int i = 0; i < 6; i++)
+        table.surface[i].reflectance = reflectance[i];
+    assert_int_equal(surface_kinds(&table, kind, &err), SH_OK);
+    for (int i = 0; i < 6; i++) {
+        assert_true(kind[i] < 3);
+        for (int k = 0; k < 6; k++)
+            assert_true((kind[i] == kind[k]) == (reflectance[i] == reflectance[k]));
+    }
+    surface_table_free(&table);
+}
+
 /* Names choose the first rule that fits. Values that it lacks come from the colour. sRGB 0.5 is 0.2140 of the light
  * (IEC 61966-2-1). */
 static void names_and_colours_choose(void **state)
@@ -406,6 +426,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_surfaces_send_back),
         cmocka_unit_test(names_and_colours_choose),
+        cmocka_unit_test(equal_surfaces_are_of_one_kind),
         cmocka_unit_test(reflectance_is_the_targets),
         cmocka_unit_test(amplitude_follows_the_range_equation),
         cmocka_unit_test(a_lobe_ends_beside_the_surface),
