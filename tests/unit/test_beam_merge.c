@@ -51,6 +51,20 @@ static void test_surface_of_many_returns(void **state)
     }
 }
 
+/* The last return counts, too: two of a quarter each are more than one of 0.4. */
+static void test_surface_of_the_last_return(void **state)
+{
+    (void)state;
+    for (uint32_t nearest = 0; nearest < 2; nearest++) {
+        struct beam_return r[3] = {{.range_m = nearest ? 20.0 : 20.2, .energy = 0.4, .label = 7},
+                                   {.range_m = 20.1, .energy = 0.25, .label = 9},
+                                   {.range_m = 20.15, .energy = 0.25, .label = 9}};
+        merge(r, 3);
+        assert_int_equal(n_echoes, 1);
+        assert_int_equal(echo[0].label, 9);
+    }
+}
+
 /* A gap above the resolution begins a new echo, and less than 1 % is none. Returns that are each within the resolution
  * of the next stay together, however far the first is from the last. */
 static void test_gaps(void **state)
@@ -263,6 +277,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_surface_of_many_returns),
+        cmocka_unit_test(test_surface_of_the_last_return),
         cmocka_unit_test(test_gaps),
         cmocka_unit_test(test_two_caps),
         cmocka_unit_test(test_crowd),

@@ -222,13 +222,39 @@ static void what_is_too_faint_is_not_met(void **state)
     close_optics(&o);
 }
 
+/* A pulse leaves each 10/3 us, so a zone is 1e-5 c / 6 long. The end of a long room lies in the second one. */
+static void zones_follow_the_pulse_rate(void **state)
+{
+    (void)state;
+    static const double far[3] = {6, 700, 3};
+    const long double zone_m = 299792458.0L * 1e-5L / 6;
+    struct optics o;
+    struct schedule_line line;
+    struct cast_counters before, after;
+    open_optics(&o, box_scene(LO, far));
+    o.rig->spec.pan_udeg_s = 0;
+    schedule_start(&o.rig->segment, &o.rig->spec);
+    schedule_get_line(&o.rig->segment, 0, &line);
+    const uint64_t level = line.pulse0 + (line.pulse_end - line.pulse0) * 40 / 240;
+    for (int zones = 0; zones <= 2; zones++) { /* 0: folded */
+        o.detect.ambiguity = zones == 0 ? DETECT_FOLDED : DETECT_RESOLVED;
+        o.detect.zones = (uint32_t)zones;
+        caster_get_counters(o.rig->caster, &before);
+        assert_int_equal(cast_some(o.rig, &line, level, 1), zones != 1);
+        caster_get_counters(o.rig->caster, &after);
+        assert_int_equal(after.faint - before.faint, zones == 1);
+        if (zones != 1) near_range(o.rig, 0, 699.75L - (zones == 0 ? zone_m : 0));
+    }
+    close_optics(&o);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(glass_in_a_mirror),           cmocka_unit_test(one_of_a_pulse_s_echoes),
         cmocka_unit_test(echoes_that_do_not_fit),      cmocka_unit_test(echoes_of_a_moving_head),
         cmocka_unit_test(which_side_of_a_body_is_met), cmocka_unit_test(what_is_too_faint_is_not_met),
-        cmocka_unit_test(echoes_have_their_own_noise),
+        cmocka_unit_test(echoes_have_their_own_noise), cmocka_unit_test(zones_follow_the_pulse_rate),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
