@@ -112,6 +112,33 @@ static void test_definitions(void **state)
     assert_true(beam_widening(BEAM_HALF_AT_1_E2) == 2.0);
 }
 
+/* By core/footprint.h ring k has 6 k sub-rays, even steps apart, where half of its annulus's energy is inside. Odd rings
+ * are turned by half a step. With what each stands for, sub-rays spread as the whole footprint does: x^2 has a mean of
+ * half of t's, for t distributed as exp(-2 t) on 0 .. 1. */
+static void test_rings(void **state)
+{
+    (void)state;
+    const double all = 1.0 - exp(-2.0), mean_t = (0.5 - 1.5 * exp(-2.0)) / all;
+    static struct beam_pattern pattern;
+    for (uint32_t rings = 0; rings <= 6; rings++) {
+        const uint32_t n = 1 + 3 * rings * (rings + 1);
+        double xx = 0.0;
+        beam_rings(rings, &pattern);
+        assert_int_equal(pattern.n, n);
+        assert_true(pattern.x[0] == 0.0f && pattern.y[0] == 0.0f);
+        for (uint32_t k = 1, at = 1; k <= rings; k++)
+            for (uint32_t i = 0; i < 6 * k; i++, at++) {
+                const double x = (double)pattern.x[at], y = (double)pattern.y[at];
+                const double within = (1.0 - exp(-2.0 * (x * x + y * y))) / all * n; /* sub-rays' shares */
+                const double steps = 6.0 * k * atan2(y, x) / (2.0 * M_PI) - 0.5 * (k % 2);
+                assert_true(fabs(within - (1.0 + 3.0 * k * (k - 1) + 3.0 * k)) < 1e-6 * n);
+                assert_true(fabs(remainder(steps - i, 6.0 * k)) < 1e-5);
+                xx += x * x / n;
+            }
+        assert_true(fabs(xx + pattern.rest - 0.5 * mean_t) < 1e-6);
+    }
+}
+
 /* Axes across a beam are unit vectors, at right angles, and right-handed with the beam, also just above and below
  * level. */
 static void test_axes(void **state)
@@ -284,6 +311,7 @@ int main(void)
         cmocka_unit_test(test_at_the_resolution),
         cmocka_unit_test(test_definitions),
         cmocka_unit_test(test_axes),
+        cmocka_unit_test(test_rings),
         cmocka_unit_test(test_alike),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
