@@ -401,31 +401,6 @@ static void what_a_ray_begins_on_is_no_hit(void **state)
     }
 }
 
-/* Counts on the wire have 31 bits and a sign. What is beyond them has none, and is counted; a shot without echo is
- * not. */
-static void coordinates_fit_31_bits(void **state)
-{
-    (void)state;
-    static const double most = 2147483647.0;
-    const double x[] = {most - 1.0, 1.0 - most, most + 0.5, -most - 1.0, 1.2 * most, -1.2 * most, (double)NAN};
-    const int32_t count[] = {INT32_MAX - 1, -INT32_MAX + 1, LINE_XYZ_NONE, LINE_XYZ_NONE,
-                             LINE_XYZ_NONE, LINE_XYZ_NONE,  LINE_XYZ_NONE};
-    const double none[7] = {0.0}, scale[3] = {1e-3, 1e-2, 1.0};
-    for (int axis = 0; axis < 3; axis++) {
-        double p[3][7];
-        uint32_t wire[3][7];
-        for (int k = 0; k < 3; k++)
-            for (int i = 0; i < 7; i++)
-                p[k][i] = k == axis ? x[i] * scale[k] : none[i];
-        assert_int_equal(
-            kernel_geo(&(struct vec3_in){p[0], p[1], p[2]}, scale, 7, &(struct kernel_wire){wire[0], wire[1], wire[2]}),
-            4);
-        for (int k = 0; k < 3; k++)
-            for (int i = 0; i < 7; i++)
-                assert_int_equal((int32_t)wire[k][i], k == axis ? count[i] : 0);
-    }
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -438,7 +413,6 @@ int main(void)
         cmocka_unit_test(limits_are_allowed_ranges),
         cmocka_unit_test(limits_block_or_swallow_the_echo),
         cmocka_unit_test(noise_has_its_sigma),
-        cmocka_unit_test(coordinates_fit_31_bits),
     };
     return cmocka_run_group_tests_name("cast", tests, NULL, NULL);
 }
