@@ -16,7 +16,7 @@
  * exit plane.
  * Rings: one sub-ray in the centre and 6 k on ring k = 1 .. N, 1 + 3 N (N + 1) in all, each with the same
  * energy: ring k lies where half of the energy of its annulus is inside. (Energy within rho, from the
- * irradiance: (1 - exp(-2 rho^2)) / (1 - exp(-2)).)
+ * irradiance: (1 - exp(-2 rho^2)) / (1 - exp(-2)).) Odd rings are turned by half a step.
  *
  * Echoes. Each sub-ray that hits something is a return. Returns of a pulse are sorted by range; a gap larger
  * than the range resolution (c tau / 2 of the pulse width tau) begins a new echo. An echo's range is the
@@ -239,7 +239,7 @@ struct beam_part {
 /* The parts that lines cut the footprint into. Each lies on one surface, and is convex, so that its centre of energy
  * is in it. */
 struct beam_parts {
-    uint32_t n, centre; /* the part with the centre of the disc */
+    uint32_t n, centre; /* the part with the centre of the disc; BEAM_MAX_PARTS: it is left out */
     struct beam_part part[BEAM_MAX_PARTS];
 };
 /* Cuts a footprint by n lines. fine: the pattern of BEAM_FINE_RINGS. Returns 0, or 1 where there are more than

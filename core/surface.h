@@ -95,6 +95,7 @@ struct surface_colours {
     uint8_t *by_vertex;           /* [n] 1: some of its triangles have colours at their corners */
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
+/* Leaves no entries. It may be called again, and after an alloc that failed. */
 void surface_colours_free(struct surface_colours *colours);
 /* Sets an entry. This comes before its image. */
 void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named);

@@ -78,6 +78,20 @@ static void test_colour_of_the_strongest(void **state)
         }
 }
 
+/* The last return counts, too: two of a quarter each are more than one of 0.4. */
+static void test_surface_of_the_last_return(void **state)
+{
+    (void)state;
+    for (uint32_t nearest = 0; nearest < 2; nearest++) {
+        struct beam_return r[3] = {{.range_m = nearest ? 20.0 : 20.2, .energy = 0.4, .label = 7},
+                                   {.range_m = 20.1, .energy = 0.25, .label = 9},
+                                   {.range_m = 20.15, .energy = 0.25, .label = 9}};
+        merge(r, 3);
+        assert_int_equal(n_echoes, 1);
+        assert_int_equal(echo[0].label, 9);
+    }
+}
+
 /* A gap above the resolution begins a new echo, and less than 1 % is none. Returns that are each within the resolution
  * of the next stay together, however far the first is from the last. */
 static void test_gaps(void **state)
@@ -123,6 +137,33 @@ static void test_definitions(void **state)
         if (d != BEAM_HALF_AT_1_E2) assert_true(fabs(exp(-2.0 * r * r) - share[d]) < 1e-15);
     }
     assert_true(beam_widening(BEAM_HALF_AT_1_E2) == 2.0);
+}
+
+/* By core/footprint.h ring k has 6 k sub-rays, even steps apart, where half of its annulus's energy is inside. Odd rings
+ * are turned by half a step. With what each stands for, sub-rays spread as the whole footprint does: x^2 has a mean of
+ * half of t's, for t distributed as exp(-2 t) on 0 .. 1. */
+static void test_rings(void **state)
+{
+    (void)state;
+    const double all = 1.0 - exp(-2.0), mean_t = (0.5 - 1.5 * exp(-2.0)) / all;
+    static struct beam_pattern pattern;
+    for (uint32_t rings = 0; rings <= 6; rings++) {
+        const uint32_t n = 1 + 3 * rings * (rings + 1);
+        double xx = 0.0;
+        beam_rings(rings, &pattern);
+        assert_int_equal(pattern.n, n);
+        assert_true(pattern.x[0] == 0.0f && pattern.y[0] == 0.0f);
+        for (uint32_t k = 1, at = 1; k <= rings; k++)
+            for (uint32_t i = 0; i < 6 * k; i++, at++) {
+                const double x = (double)pattern.x[at], y = (double)pattern.y[at];
+                const double within = (1.0 - exp(-2.0 * (x * x + y * y))) / all * n; /* sub-rays' shares */
+                const double steps = 6.0 * k * atan2(y, x) / (2.0 * M_PI) - 0.5 * (k % 2);
+                assert_true(fabs(within - (1.0 + 3.0 * k * (k - 1) + 3.0 * k)) < 1e-6 * n);
+                assert_true(fabs(remainder(steps - i, 6.0 * k)) < 1e-5);
+                xx += x * x / n;
+            }
+        assert_true(fabs(xx + pattern.rest - 0.5 * mean_t) < 1e-6);
+    }
 }
 
 /* Axes across a beam are unit vectors, at right angles, and right-handed with the beam, also just above and below
@@ -291,12 +332,14 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_surface_of_many_returns),
         cmocka_unit_test(test_colour_of_the_strongest),
+        cmocka_unit_test(test_surface_of_the_last_return),
         cmocka_unit_test(test_gaps),
         cmocka_unit_test(test_two_caps),
         cmocka_unit_test(test_crowd),
         cmocka_unit_test(test_at_the_resolution),
         cmocka_unit_test(test_definitions),
         cmocka_unit_test(test_axes),
+        cmocka_unit_test(test_rings),
         cmocka_unit_test(test_alike),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);

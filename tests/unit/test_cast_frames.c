@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Casting: the meaning of the counts on the wire. Angles, senses of rotation, encoders, positions, and frames far from
  * the origin. */
+#include "core/cast/kernels_points.h"
 #include "tests/common/hits.h"
 #include "tests/common/made.h"
 #include "tests/unit/cast_rig.h"
@@ -368,6 +369,53 @@ static void a_station_far_from_the_bvh_s_origin_is_as_exact(void **state)
     scene_free(scene);
 }
 
+/* Counts on the wire have 31 bits and a sign. What is beyond them has none, and is counted; a shot without echo is
+ * not. */
+static void coordinates_fit_31_bits(void **state)
+{
+    (void)state;
+    static const double most = 2147483647.0;
+    const double x[] = {most - 1.0, 1.0 - most, most + 0.5, -most - 1.0, 1.2 * most, -1.2 * most, (double)NAN};
+    const int32_t count[] = {INT32_MAX - 1, -INT32_MAX + 1, LINE_XYZ_NONE, LINE_XYZ_NONE,
+                             LINE_XYZ_NONE, LINE_XYZ_NONE,  LINE_XYZ_NONE};
+    const double none[7] = {0.0}, scale[3] = {1e-3, 1e-2, 1.0};
+    for (int axis = 0; axis < 3; axis++) {
+        double p[3][7];
+        uint32_t wire[3][7];
+        for (int k = 0; k < 3; k++)
+            for (int i = 0; i < 7; i++)
+                p[k][i] = k == axis ? x[i] * scale[k] : none[i];
+        assert_int_equal(
+            kernel_geo(&(struct vec3_in){p[0], p[1], p[2]}, scale, 7, &(struct kernel_wire){wire[0], wire[1], wire[2]}),
+            4);
+        for (int k = 0; k < 3; k++)
+            for (int i = 0; i < 7; i++)
+                assert_int_equal((int32_t)wire[k][i], k == axis ? count[i] : 0);
+    }
+}
+
+/* The same for a direction and a range: a point has all three coordinates or none. Nothing is written beyond it. */
+static void points_fit_31_bits(void **state)
+{
+    (void)state;
+    static const double range_m[] = {2.0, 2147483646.0, 2147483648.0, 2147483648.0, 3e9, (double)NAN};
+    static const double along[3] = {1, -1, 1}, scale[3] = {1.0, 0.5, 0.25};
+    for (int axis = 0; axis < 3; axis++)
+        for (int i = 0; i < 6; i++) {
+            double d[3];
+            uint32_t wire[3][2] = {{7, 7}, {7, 7}, {7, 7}};
+            for (int k = 0; k < 3; k++)
+                d[k] = (k == axis ? along[k] : 0x1p-4) * scale[k];
+            const uint32_t unfit = kernel_place(&(struct vec3_in){&d[0], &d[1], &d[2]}, &range_m[i], scale, 1,
+                                                &(struct kernel_wire){wire[0], wire[1], wire[2]});
+            assert_int_equal(unfit, i >= 2 && i <= 4);
+            for (int k = 0; k < 3; k++) {
+                const double want = i < 2 ? rint((k == axis ? along[k] : 0x1p-4) * range_m[i]) : LINE_XYZ_NONE;
+                assert_true((double)(int32_t)wire[k][0] == want && wire[k][1] == 7);
+            }
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -381,6 +429,8 @@ int main(void)
         cmocka_unit_test(a_room_at_utm_coordinates_is_the_room_at_the_origin),
         cmocka_unit_test(rounded_coordinates_cost_no_more_than_their_rounding),
         cmocka_unit_test(a_station_far_from_the_bvh_s_origin_is_as_exact),
+        cmocka_unit_test(coordinates_fit_31_bits),
+        cmocka_unit_test(points_fit_31_bits),
     };
     return cmocka_run_group_tests_name("cast frames", tests, NULL, NULL);
 }

@@ -346,6 +346,35 @@ static void test_nearer_of_wall_and_body(void **state)
     scene_free(body);
 }
 
+/* The frame scalar changes evenly between two knots, and stays as at the first and the last beyond them. A channel of
+ * the colour is rounded, so that it may differ by one. */
+static void colours_follow_the_frame_scalar(void **state)
+{
+    (void)state;
+    static const struct pose_knot knot[3] = {{.t_ns = 3000000, .pose.quat = {1, 0, 0, 0}, .frame = 2.0},
+                                             {.t_ns = 4000000, .pose.quat = {1, 0, 0, 0}, .frame = 5.0},
+                                             {.t_ns = 8000000, .pose.quat = {1, 0, 0, 0}, .frame = 3.0}};
+    const struct cast_colour colour = {.scale = {.mode = COLOUR_FRAME, .low = 1.5, .high = 5.5}};
+    struct cast_rig *rig = cast_rig_open(box_scene(LO, HI), CENTRE);
+    struct schedule_line line;
+    struct sh_err err;
+    rig->setup.knot = knot;
+    rig->setup.n_knots = 3;
+    rig->setup.colour = &colour;
+    assert_int_equal(line_block_alloc_colours(&rig->block, &err), SH_OK);
+    cast_line(rig, 0, &line);
+    assert_true(rig->block.n_points > 1900); /* 240 of 360 degrees of 3000 pulses, in 10 ms */
+    for (uint32_t j = 0; j < rig->block.n_points; j++) {
+        const double ms = 1e-6 * (double)schedule_time_ns(&rig->segment, line.cast0 + j);
+        const double frame = ms < 3.0 ? 2.0 : ms < 4.0 ? 3.0 * ms - 7.0 : ms < 8.0 ? 7.0 - 0.5 * ms : 3.0;
+        uint8_t rgb[3];
+        colour_ramp((frame - 1.5) / 4.0, rgb);
+        for (int k = 0; k < 3; k++)
+            assert_true(abs(rgb[k] - rig->block.rgb[j][k]) <= 1);
+    }
+    cast_rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -355,6 +384,7 @@ int main(void)
         cmocka_unit_test(test_moving_body),
         cmocka_unit_test(test_inside_a_body_s_sphere),
         cmocka_unit_test(test_nearer_of_wall_and_body),
+        cmocka_unit_test(colours_follow_the_frame_scalar),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -104,6 +104,49 @@ static void what_is_none_is_refused(void **state)
     }
 }
 
+/* Units by their definitions: the US survey foot is 1200 / 3937 m, the international one 0.3048 m. */
+static void units_of_systems(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name;
+        int is_vertical;
+        double unit_m; /* 0: refused */
+    } at[] = {{"EPSG:2056", 0, 1.0}, {"EPSG:2263", 0, 1200.0 / 3937.0},   {"EPSG:2222", 0, 0.3048},
+              {"EPSG:5773", 1, 1.0}, {"EPSG:6360", 1, 1200.0 / 3937.0},   {"EPSG:5773", 0, 0.0},
+              {"EPSG:2056", 1, 0.0}, {"EPSG:5706", 1, 0.0} /* a depth */, {"EPSG:1", 1, 0.0}};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
+        double unit_m = 0.0;
+        const int code = crs_unit(at[i].name, at[i].is_vertical, &unit_m, &err);
+        assert_int_equal(code, at[i].unit_m > 0.0 ? SH_OK : SH_EINPUT);
+        if (code == SH_OK) assert_near(unit_m, at[i].unit_m, 1e-12);
+        if (code != SH_OK && at[i].is_vertical && strstr(err.text, "not a vertical system with heights upward") == NULL)
+            fail_msg("case %zu: \"%s\"", i, err.text);
+    }
+}
+
+/* UTM's zone 32 is used from 6 to 12 deg E and from 0 to 84 deg N, and places up to 2 degrees beyond are taken. A meridian
+ * is 110.57 km a degree at the equator and 10,001.97 km to the pole, where a degree has 111.69 km; its scale is 0.9996. A
+ * degree of longitude on the equator is 111.32 km, and Mercator's projection lengthens 5 degrees of it by 0.12 %. */
+static void areas_of_use_have_a_margin(void **state)
+{
+    (void)state;
+    static const double in_m[][2] = {{5e5, -220e3}, {5e5, 9550e3}, {5e5 - 556e3, 5e3}, {5e5 + 556e3, 5e3}};
+    static const double out_m[][2] = {{5e5, -222e3}, {5e5, 9553e3}, {5e5 - 559e3, 5e3}, {5e5 + 559e3, 5e3}};
+    struct crs_place place;
+    for (int i = 0; i < 4; i++) {
+        located("EPSG:32632", in_m[i][0], in_m[i][1]);
+        assert_int_equal(crs_locate("EPSG:32632", out_m[i][0], out_m[i][1], 0.0, &place, &err), SH_EINPUT);
+    }
+    /* Fiji's grid has its origin at 17 deg S, 178.75 deg E, and is used on both sides of 180 deg. Datums there differ
+     * by some hundreds of metres. */
+    const struct crs_place fiji = located("EPSG:3460", 2000000.0, 4000000.0);
+    assert_near(fiji.at.lat_deg, -17.0, 0.01);
+    assert_near(fiji.at.lon_deg, 178.75, 0.01);
+    located("EPSG:3460", 2300000.0, 4000000.0); /* 2.8 degrees farther east, 178.4 deg W */
+    assert_int_equal(crs_locate("EPSG:3460", 1400000.0, 4000000.0, 0.0, &place, &err), SH_EINPUT); /* 173.1 deg E */
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -111,6 +154,8 @@ int main(void)
         cmocka_unit_test(the_swiss_grid),
         cmocka_unit_test(a_grid_in_feet),
         cmocka_unit_test(what_is_none_is_refused),
+        cmocka_unit_test(units_of_systems),
+        cmocka_unit_test(areas_of_use_have_a_margin),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -100,6 +100,26 @@ static void a_lobe_ends_beside_the_surface(void **state)
     surface_table_free(&table);
 }
 
+/* Equal surfaces have one number, wherever they stand among the others. Numbers count from 0. */
+static void equal_surfaces_are_of_one_kind(void **state)
+{
+    (void)state;
+    static const double reflectance[] = {0.5, 0.2, 0.5, 0.7, 0.2, 0.5};
+    uint16_t kind[6];
+    struct surface_table table;
+    struct sh_err err;
+    assert_int_equal(surface_table_alloc(6, &table, &err), SH_OK);
+    for (int i = 0; i < 6; i++)
+        table.surface[i].reflectance = reflectance[i];
+    assert_int_equal(surface_kinds(&table, kind, &err), SH_OK);
+    for (int i = 0; i < 6; i++) {
+        assert_true(kind[i] < 3);
+        for (int k = 0; k < 6; k++)
+            assert_true((kind[i] == kind[k]) == (reflectance[i] == reflectance[k]));
+    }
+    surface_table_free(&table);
+}
+
 /* Names choose the first rule that fits. Values that it lacks come from the colour. sRGB 0.5 is 0.2140 of the light
  * (IEC 61966-2-1). */
 static void names_and_colours_choose(void **state)
@@ -189,6 +209,39 @@ static void extinction_by_visibility(void **state)
     assert_true(fabs(detect_extinction_1_m(23000.0, 905e-9) - 3.912 / 23000.0 * pow(905.0 / 550.0, -1.3)) < 1e-12);
 }
 
+/* Returns log g of three reaches: linear between them, and beyond them as in the nearest piece. */
+static double log_least_of(const struct detect_reach reach[3], double range_m)
+{
+    const struct detect_reach *a = range_m < reach[1].range_m ? &reach[0] : &reach[1], *b = a + 1;
+    const double ga = log(a->reflectance / (a->range_m * a->range_m));
+    const double gb = log(b->reflectance / (b->range_m * b->range_m));
+    return ga + (gb - ga) * (range_m - a->range_m) / (b->range_m - a->range_m) + 2.0 * log(range_m);
+}
+
+/* The least reflectance passes through three reaches, in whatever order they come. Amplitudes, reflectances and what is
+ * detected agree on it before, between and beyond them. */
+static void signal_passes_through_reaches(void **state)
+{
+    (void)state;
+    static const struct detect_reach reach[3] = {{0.1, 500.0}, {0.2, 650.0}, {0.8, 1000.0}};
+    static const double range_m[] = {10.0, 300.0, 500.0, 600.0, 650.0, 800.0, 1000.0, 1300.0};
+    struct detect_signal_spec spec = spec_of(0.0, 0.0);
+    struct detect_signal signal;
+    spec.n_reaches = 3;
+    for (int turn = 0; turn < 3; turn++) {
+        for (int i = 0; i < 3; i++)
+            spec.reach[(i + turn) % 3] = reach[turn == 2 ? 2 - i : i];
+        set_up(&spec, &signal);
+        for (int i = 0; i < 8; i++) {
+            const double least = exp(log_least_of(reach, range_m[i]));
+            assert_true(fabs(detect_amplitude(&signal, range_m[i], least) - 1.0) < 1e-12);
+            assert_true(fabs(detect_reflectance(&signal, range_m[i], 3.0) / least - 3.0) < 1e-12);
+            assert_int_equal(told(&signal, range_m[i], least * 1.0001) == LINE_REFL_NONE, 0);
+            assert_int_equal(told(&signal, range_m[i], least * 0.9999) == LINE_REFL_NONE, 1);
+        }
+    }
+}
+
 static void reaches_that_contradict_are_refused(void **state)
 {
     (void)state;
@@ -198,12 +251,22 @@ static void reaches_that_contradict_are_refused(void **state)
     spec.n_reaches = 2;
     spec.reach[1] = (struct detect_reach){0.2, 300.0}; /* 900 sqrt(0.2 / 0.9) = 424 m without any air */
     assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_EINPUT);
+    assert_string_equal(err.text,
+                        "300 m on 0.2 and 900 m on 0.9: a signal must fall at least with the square of the range");
     spec.reach[1] = (struct detect_reach){0.2, 900.0};
     assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_EINPUT);
+    /* Deviations of up to a tenth, in the logarithm, are rounding: 900 sqrt(0.2 / 0.9) m times exp(-0.05). */
+    spec.reach[1] = (struct detect_reach){0.2, 900.0 * sqrt(0.2 / 0.9) * exp(-0.0501)};
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_EINPUT);
+    spec.reach[1] = (struct detect_reach){0.2, 900.0 * sqrt(0.2 / 0.9) * exp(-0.0499)};
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
     spec.reach[1] = (struct detect_reach){0.2, 424.0};
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
+    spec.sigma_floor_m = spec.sigma_m;
     assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
     spec.sigma_floor_m = 0.004;
     assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_EINPUT);
+    assert_string_equal(err.text, "a floor of the range noise of 0.004 m is above the noise itself, 0.003 m");
 }
 
 /* 1.2 MHz: zones of 124.9135 m. */
@@ -363,6 +426,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_surfaces_send_back),
         cmocka_unit_test(names_and_colours_choose),
+        cmocka_unit_test(equal_surfaces_are_of_one_kind),
         cmocka_unit_test(reflectance_is_the_targets),
         cmocka_unit_test(amplitude_follows_the_range_equation),
         cmocka_unit_test(a_lobe_ends_beside_the_surface),
@@ -370,6 +434,7 @@ int main(void)
         cmocka_unit_test(extinction_by_visibility),
         cmocka_unit_test(range_noise_has_a_floor),
         cmocka_unit_test(noise_alone_has_a_range),
+        cmocka_unit_test(signal_passes_through_reaches),
         cmocka_unit_test(reaches_that_contradict_are_refused),
         cmocka_unit_test(zones_fold),
         cmocka_unit_test(the_ball_is_full),

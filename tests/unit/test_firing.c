@@ -5,6 +5,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/cast/kernels_times.h"
+
 static const int64_t HOUR_NS = INT64_C(3600000000000), DAY_NS = 24 * INT64_C(3600000000000);
 
 /* ---- a VLP-16: 16 firings 2304 ns apart, a sequence each 55296 ns */
@@ -94,6 +96,28 @@ static void rational_sequences_are_exact(void **state)
             assert_int_equal(schedule_time_ns(&seg, k), (int64_t)(ps / 1000));
             assert_int_equal(schedule_line_of(&seg, k), (uint64_t)(ps * 7 / 1000000000000));
         }
+    }
+}
+
+/* A run may begin at any beam of the sequence: its pulses fire when they are scheduled. */
+static void runs_begin_at_any_beam(void **state)
+{
+    (void)state;
+    enum { N = 40 };
+    struct emitter e;
+    struct schedule_segment seg;
+    struct schedule_line line;
+    vlp16(&e);
+    const struct schedule_spec spec = turning(&e, 10 * HZ);
+    schedule_start(&seg, &spec);
+    schedule_get_line(&seg, 1, &line);
+    for (uint64_t k = line.cast0; k < line.cast0 + 16; k++) {
+        struct schedule_run run;
+        uint32_t dt_ns[N];
+        schedule_get_run(&seg, &line, k, N, &run);
+        kernel_times(&run, dt_ns);
+        for (uint32_t j = 0; j < N; j++)
+            assert_int_equal(run.t0_ns + dt_ns[j], vlp16_ns(k + j));
     }
 }
 
@@ -268,6 +292,7 @@ int main(void)
         cmocka_unit_test(the_rate_is_no_whole_number),
         cmocka_unit_test(an_hour_and_a_day_are_exact),
         cmocka_unit_test(rational_sequences_are_exact),
+        cmocka_unit_test(runs_begin_at_any_beam),
         cmocka_unit_test(turns_take_all_pulses),
         cmocka_unit_test(turn_rates_change_anywhere),
         cmocka_unit_test(a_window_cuts_turns),

@@ -66,6 +66,38 @@ static void one_of_a_pulse_s_echoes(void **state)
     close_optics(&o);
 }
 
+/* Each echo of a pulse has noise of its own, keyed by the pulse and the echo's number, whether near ones are merged or
+ * not. */
+static void echoes_have_their_own_noise(void **state)
+{
+    (void)state;
+    static const double y[] = {2.0, 2.004, 5.0};
+    struct optics o;
+    struct schedule_line line;
+    open_optics(&o, window());
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o.table.has_optics = 1;
+    o.rig->setup.noise_on = 1;
+    o.rig->setup.range_sigma_m = 0.01;
+    o.rig->setup.range_sigma_ppm = 100.0;
+    o.rig->setup.noise_key = rng_key(7, RNG_RANGE);
+    o.rig->setup.scan_key = rng_scan(0, 3);
+    for (int merges = 0; merges < 2; merges++) {
+        o.detect.separation_m = merges ? 1e-6 : 0.0;
+        schedule_get_line(&o.rig->segment, 0, &line);
+        assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, 20), 60);
+        for (uint32_t i = 0; i < 60; i++) {
+            const uint64_t key = rng_echo(line.cast0 + 10 + i / 3, i % 3);
+            long double d[3];
+            direction(o.rig, &line, 10 + i / 3, d);
+            double range_m = (double)(((long double)y[i % 3] - (long double)STATION[1]) / d[1]);
+            detect_fixed_noise(0.01, 1e-4, o.rig->setup.noise_key ^ o.rig->setup.scan_key, 1, &key, &range_m);
+            near_range(o.rig, i, (long double)range_m);
+        }
+    }
+    close_optics(&o);
+}
+
 /* An echo that does not fit into 31 bits of counts is dropped and counted. Here the wall does not fit, while the pane's
  * two sides do and are numbered as two. If no echo fits, one entry stays, without echo. */
 static void echoes_that_do_not_fit(void **state)
@@ -190,12 +222,39 @@ static void what_is_too_faint_is_not_met(void **state)
     close_optics(&o);
 }
 
+/* A pulse leaves each 10/3 us, so a zone is 1e-5 c / 6 long. The end of a long room lies in the second one. */
+static void zones_follow_the_pulse_rate(void **state)
+{
+    (void)state;
+    static const double far[3] = {6, 700, 3};
+    const long double zone_m = 299792458.0L * 1e-5L / 6;
+    struct optics o;
+    struct schedule_line line;
+    struct cast_counters before, after;
+    open_optics(&o, box_scene(LO, far));
+    o.rig->spec.pan_udeg_s = 0;
+    schedule_start(&o.rig->segment, &o.rig->spec);
+    schedule_get_line(&o.rig->segment, 0, &line);
+    const uint64_t level = line.pulse0 + (line.pulse_end - line.pulse0) * 40 / 240;
+    for (int zones = 0; zones <= 2; zones++) { /* 0: folded */
+        o.detect.ambiguity = zones == 0 ? DETECT_FOLDED : DETECT_RESOLVED;
+        o.detect.zones = (uint32_t)zones;
+        caster_get_counters(o.rig->caster, &before);
+        assert_int_equal(cast_some(o.rig, &line, level, 1), zones != 1);
+        caster_get_counters(o.rig->caster, &after);
+        assert_int_equal(after.faint - before.faint, zones == 1);
+        if (zones != 1) near_range(o.rig, 0, 699.75L - (zones == 0 ? zone_m : 0));
+    }
+    close_optics(&o);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(glass_in_a_mirror),           cmocka_unit_test(one_of_a_pulse_s_echoes),
         cmocka_unit_test(echoes_that_do_not_fit),      cmocka_unit_test(echoes_of_a_moving_head),
         cmocka_unit_test(which_side_of_a_body_is_met), cmocka_unit_test(what_is_too_faint_is_not_met),
+        cmocka_unit_test(echoes_have_their_own_noise), cmocka_unit_test(zones_follow_the_pulse_rate),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "core/footprint.h"
+#include "tests/common/beam_reference.h"
 #include "tests/common/made.h"
 
 static const double STATION[3] = {0.0, 0.0, 0.0};
@@ -165,12 +166,57 @@ static void a_step_may_lead_to_an_edge(void **state)
     beam_outlines_free(outlines);
 }
 
+/* Two lines through the middle that take a half each leave nothing: the disc's centre is in no part. */
+static void halves_leave_no_centre(void **state)
+{
+    (void)state;
+    static const struct beam_line line[2] = {{.n = {0.6, 0.8}}, {.n = {-0.6, -0.8}}};
+    struct beam_parts parts = {.centre = 0};
+    struct beam_pattern fine;
+    struct beam beam;
+    beam_init(&beam, 0.0, 0.0004, 4e-9);
+    beam_rings(BEAM_FINE_RINGS, &fine);
+    assert_int_equal(beam_cut(&beam, &fine, line, 2, 0, &parts), 0);
+    assert_true(parts.n == 2 && parts.centre >= parts.n);
+    for (int i = 0; i < 2; i++) {
+        assert_true(fabs(parts.part[i].energy - 0.5) < 1e-9);
+        assert_true(parts.part[i].x * line[i].n[0] > 0.0 && parts.part[i].y * line[i].n[1] > 0.0);
+    }
+    assert_int_equal(beam_cut(&beam, &fine, line, 1, 0, &parts), 0);
+    assert_true(parts.n == 2 && parts.centre == 1 && parts.part[1].x < 0.0);
+}
+
+/* A plate ends at x = 0, 10 m ahead, and the sky is beside it. The part with the centre needs no ray of its own, on
+ * the plate as in the sky: an outlined pulse costs one sub-ray, for its other part. */
+static void the_centres_part_needs_no_ray(void **state)
+{
+    (void)state;
+    static const double corner_m[4][3] = {{0, 10, -5}, {5, 10, -5}, {5, 10, 5}, {0, 10, 5}};
+    static const uint32_t triangle[2][3] = {{0, 1, 2}, {0, 2, 3}};
+    for (int side = -1; side <= 1; side += 2) { /* 0.5 to 2 mm from the edge, in a footprint of 7.8 mm */
+        const double from_deg = side < 0 ? -0.0115 : 0.003;
+        const struct beam_view view = {-0.02, 0.02, from_deg, from_deg + 0.0085, 4, 64};
+        struct beam_rig rig;
+        struct cast_counters counters;
+        uint32_t echoes = 0;
+        made_beam_rig(&rig, made_scene(&(struct scene_arrays){corner_m, 4, triangle, 2, NULL, NULL, 0}), &view);
+        beam_rig_mode(&rig, BEAM_ADAPTIVE, 4);
+        for (uint32_t l = 0; l < view.lines; l++)
+            echoes += beam_rig_line(&rig, l);
+        caster_get_counters(rig.caster, &counters);
+        assert_int_equal(counters.outlined, view.lines * view.pulses);
+        assert_int_equal(counters.sub_rays, counters.outlined);
+        assert_int_equal(echoes, counters.outlined);
+        beam_rig_close(&rig);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(edges_are_found_in_any_direction),
-        cmocka_unit_test(groups_are_looked_up_to_their_ends),
-        cmocka_unit_test(a_step_may_lead_to_an_edge),
+        cmocka_unit_test(edges_are_found_in_any_direction), cmocka_unit_test(groups_are_looked_up_to_their_ends),
+        cmocka_unit_test(a_step_may_lead_to_an_edge),       cmocka_unit_test(halves_leave_no_centre),
+        cmocka_unit_test(the_centres_part_needs_no_ray),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -6,6 +6,7 @@
 
 #include "core/plan.h"
 #include "core/plan/cost.h"
+#include "core/sight.h"
 #include "tests/common/cases.h"
 
 static const struct plan_tolerance TOLERANCE = {1e-3, 1e-2};
@@ -162,6 +163,37 @@ static void test_sight_packets(void **state)
     assert_true(saved_ns[0] < saved_ns[1] && saved_ns[1] < saved_ns[2] && saved_ns[3] == saved_ns[1]);
 }
 
+/* A map saves the cost of the BVH, and costs its own look-up, by the kinds of cells that pulses go to (core/plan/cost.h).
+ * Its making is shared by all pulses: 60 ns for each cell of several triangles, and what triangles cost. */
+static void test_sight_costs(void **state)
+{
+    (void)state;
+    const struct plan_ray_cost *ray = &plan_ray_costs[2];
+    const double plane_ns = PLAN_COST_MILLION * 0.5; /* the root of a quarter of a million */
+    const struct {
+        struct plan_sight_found found;
+        double map_ns, bvh_ns;
+    } is[] = {{{.one = 1.0}, PLAN_COST_SIGHT_ONE + plane_ns, ray->hit + plane_ns},
+              {{.few = 1.0}, PLAN_COST_SIGHT_FEW, ray->hit + plane_ns + ray->border},
+              {{.ask = 1.0}, PLAN_COST_SIGHT_ASK, 0.0},
+              {{.small = 1.0, .examined = 1e6}, PLAN_COST_SIGHT_SMALL, 0.0}};
+    struct plan_sight_need need = SIGHT;
+    need.n_triangles = 250000;
+    need.memory_bytes = (uint64_t)1 << 40;
+    need.forced = 1;
+    const double edge = sight_cells(need.pulses / need.share, need.memory_bytes);
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        const struct plan_sight_found *f = &is[i].found;
+        const double made_ns = PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * 250000 +
+                               PLAN_COST_SIGHT_EXAMINED * f->examined +
+                               PLAN_COST_SIGHT_CELL * (f->few + f->ask) * need.share * 6.0 * edge * edge;
+        const double want_ns = is[i].map_ns - is[i].bvh_ns + made_ns / need.pulses;
+        struct plan_row row;
+        assert_int_equal(plan_sight_choose(&need, f, &row), 1);
+        if (fabs(row.cost_ns - want_ns) > 1e-9) fail_msg("case %zu: %g instead of %g", i, row.cost_ns, want_ns);
+    }
+}
+
 static void test_sight_forced(void **state)
 {
     (void)state;
@@ -186,6 +218,7 @@ int main(void)
         cmocka_unit_test(test_cast),
         cmocka_unit_test(test_sight_pays),
         cmocka_unit_test(test_sight_packets),
+        cmocka_unit_test(test_sight_costs),
         cmocka_unit_test(test_sight_forced),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -331,6 +331,10 @@ static void the_order_of_colours(void **state)
     assert_int_equal(surface_colour(&colours, 0, NULL, rgb), 0x010203);
     assert_int_equal(surface_colour(&colours, 0, NULL, NULL), 0x0000ff);
     assert_int_equal(surface_colour(&colours, 1, NULL, NULL), 0x808080);
+    assert_int_equal(surface_colour(&colours, 2, NULL, NULL), 0x808080);
+    surface_colours_free(&colours);
+    /* A second call is harmless, and no surface has a colour then. */
+    assert_true(colours.n == 0 && colours.own == NULL && colours.image == NULL && colours.by_vertex == NULL);
     surface_colours_free(&colours);
 }
 
