@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The result: part of one scan line as arrays. Nothing else leaves core.
+/* A block is the result of casting: a part of one scan line, as arrays. The points of a scan leave core in no other
+ * form.
  *
  * A line is one mirror sweep. It leaves in blocks, so that packets are not late where the mirror is slow;
  * each block is a run of consecutive cast pulses of one line, with one entry per echo, and one entry for a
@@ -70,7 +71,7 @@ struct line_block {
     int16_t *refl_cdb;   /* 0.01 dB relative to a white Lambertian target; LINE_REFL_NONE */
     uint8_t *echo;       /* number (1..15) in the low nibble, count in the high one; 0: shot without echo */
     uint16_t *label;     /* surface label; LINE_LABEL_NONE */
-    /* Attributes: both, or both NULL: not asked for, and not computed. */
+    /* The two attributes. Where they were not asked for, both are NULL and are not computed. */
     int16_t *amplitude_cdb; /* 0.01 dB above the detection threshold, with the detector's noise; LINE_AMPLITUDE_NONE */
     uint16_t *width_cns;    /* width of the echo, full at half maximum, 0.01 ns; LINE_WIDTH_NONE, LINE_WIDTH_MOST */
     uint8_t (*rgb)[3];      /* colour, sRGB; NULL: not asked for */
@@ -99,7 +100,8 @@ enum {
 };
 
 int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err *err);
-/* For a block that has its other arrays. */
+/* These four add optional arrays to a block that line_block_alloc has made. After an error line_block_free releases the
+ * block as usual. */
 int line_block_alloc_attributes(struct line_block *block, struct sh_err *err);
 int line_block_alloc_colours(struct line_block *block, struct sh_err *err);
 int line_block_alloc_deviations(struct line_block *block, struct sh_err *err);

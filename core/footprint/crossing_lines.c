@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Outlines across a footprint. */
+/* Finds the outlines that cross a footprint, as lines in its unit disc. */
 #include <math.h>
 
 #include "core/footprint/outlines.h"
@@ -108,7 +108,7 @@ uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam,
         turn_in(edge->a, sight, e.a);
         turn_in(edge->b, sight, e.b);
         if (!clip_to_beam(beam, &e)) continue;
-        if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* only other parts of the edge are nearer */
+        if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* what lies inside the beam is too far */
         if (!make_line(beam, &e, &one) || is_known(line, n, &one)) continue;
         if (n == BEAM_MAX_LINES) return n + 1;
         line[n++] = one;

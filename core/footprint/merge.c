@@ -30,8 +30,8 @@ void beam_sort(struct beam_return *r, uint32_t n)
         }
 }
 
-/* The weight of a return: the power that comes back, or its energy where nothing comes back of any
- * return. */
+/* Returns the weight of a return: the power that comes back from it. If no power comes back from any of the returns
+ * (by_back 0), it is the energy of the return. */
 static double weight_of(const struct beam_return *r, int by_back)
 {
     return by_back ? r->back : r->energy;

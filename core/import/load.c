@@ -65,7 +65,8 @@ static int look_for_cutouts(struct scene *scene, const struct scene_mesh_spec *s
     return rc;
 }
 
-/* Whether the mesh is one of the scene's own. */
+/* Whether the mesh becomes part of the scene itself. A mesh with a list of places does not: the scene gets copies of
+ * it. */
 static int is_own(const struct scene_mesh_spec *spec)
 {
     return spec->places.place == NULL;

@@ -58,7 +58,7 @@ int scene_rgb_at(const struct scene *scene, uint32_t triangle, const double *con
     weights(corner, p, w);
     for (int k = 0; k < 3; k++) {
         const double v = w[0] * at[0][k] + w[1] * at[1][k] + w[2] * at[2][k];
-        rgb[k] = (uint8_t)lrint(fmin(255.0, fmax(0.0, v))); /* at a border p lies a rounding outside */
+        rgb[k] = (uint8_t)lrint(fmin(255.0, fmax(0.0, v))); /* p may lie outside by rounding */
     }
     return 1;
 }
@@ -101,7 +101,7 @@ static int cut_out(struct scene *s, uint32_t number, const struct texture_image 
     for (uint32_t i = 0; i < s->n_surfaces && rc == SH_OK; i++) {
         if (image_of(&s->surface[i]) != number || (s->cutout != NULL && s->cutout[i] != NULL)) continue;
         if (last == NULL || !same_holes(last, &s->surface[i])) rc = add_mask(s, i, image, err);
-        last = &s->surface[i]; /* it has no holes, nor have surfaces of the same kind */
+        last = &s->surface[i]; /* if it got no mask, surfaces of the same kind get none either */
     }
     return rc;
 }
@@ -120,7 +120,7 @@ int scene_find_cutouts(struct scene *s, const struct sh_report *report, struct s
     struct sh_err why, first = {0};
     uint32_t failed = 0;
     int rc = SH_OK;
-    if (s->uv == NULL) return SH_OK; /* no image lies anywhere */
+    if (s->uv == NULL) return SH_OK; /* without texture coordinates no image is used */
     for (uint32_t number = 1; number <= s->n_textures && rc == SH_OK; number++) {
         struct texture_image image = {0};
         struct scene_texture *texture = &s->texture[number - 1];

@@ -34,8 +34,8 @@ char *build_join(struct text_span folder, struct text_span name)
     return path;
 }
 
-/* Replaces the part of the path at `part`, a string of its own, by the entry of `folder` that differs in case only.
- * Of several entries, the first in byte order is taken. */
+/* Looks in `folder` for an entry whose name differs from `part` in case only, and writes that name over `part`. `part`
+ * is one name of a path and ends with a zero byte. Of several entries, the first in byte order is taken. */
 static bool match_part(const char *folder, char *part)
 {
     DIR *dir = opendir(folder[0] != '\0' ? folder : ".");

@@ -7,8 +7,8 @@
 
 #include "core/colour.h"
 
-/* Its rows go from the top down, and a texel is as in the high bits of a label. Labels with the same image and colour
- * share it. */
+/* An image as reflectances. Its rows go from the top down. A texel is 1 + 65534 times the reflectance, as it stands in
+ * the high 16 bits of a hit's label (surface_texel). Labels with the same image and colour share one texture. */
 struct surface_texture {
     struct texture_frame frame;
     uint32_t users;

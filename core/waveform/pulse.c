@@ -16,8 +16,9 @@
 
 enum { MIN_PHASES = 4, STEPS_PER_SCALE = 16, EDGE_STEPS = 4, FINEST = 64 };
 
-/* This is the outgoing pulse from .. to, s after its peak. Sums over it take as many steps, of at most fine_s, in
- * each of its pieces. */
+/* The outgoing pulse, which lasts from from_s to to_s, in seconds after its peak (a table: after its first value). It
+ * consists of pieces of equal length. Sums over it take the same number of steps in each piece, and a step is at most
+ * fine_s long. */
 struct outgoing {
     const struct waveform_spec *spec;
     double from_s, to_s, fine_s, pieces;
@@ -102,9 +103,9 @@ static double scale_of(const struct outgoing *o, double sigma_s)
     return scale_s;
 }
 
-/* Fills h on n steps, the first of them at from_s: the pulse convolved with the impulse response, which lies within
- * them. The pulse is summed finely enough for both. A response shorter than 1/64 of a step would change h by less than
- * 1e-6. */
+/* Fills h, which is the pulse convolved with the receiver's impulse response, on n steps. The first step is at from_s,
+ * and the whole of h lies within the n steps. The sum over the pulse is fine enough for the pulse and for the response.
+ * A response shorter than 1/64 of a step would change h by less than 1e-6, and is left out. */
 static void fill_steps(const struct outgoing *o, double from_s, double step_s, double sigma_s, uint32_t n, double *h)
 {
     const double fine_s = fmin(o->fine_s, sigma_s), reach_s = GAUSSIAN_END * sigma_s;

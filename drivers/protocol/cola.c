@@ -168,7 +168,7 @@ static void take_input(void *protocol, const uint8_t *bytes, size_t len)
         len -= n;
         for (int found; (found = cola_input_next(&self->input, &request, &lost)) != 0;)
             if (!cola_understands(self, found < 0 ? COLA_A : request.form))
-                lost += self->input.used; /* as any other garbage; 0 for an overlong one, which is counted already */
+                lost += self->input.used; /* 0 for a telegram that is too long: its bytes are counted already */
             else if (found < 0)
                 cola_refuse(self, COLA_A, COLA_TOO_LONG);
             else
@@ -199,7 +199,7 @@ const struct protocol_ops protocol_cola = {
     .create = cola_create,
     .destroy = free,
     .open = open_at,
-    .frame = take_frame, /* and no gap: the scan itself shows what is missing in it */
+    .frame = take_frame, /* it needs no .gap: a scan shows by itself what it lacks */
     .time = pass_time,
     .input = take_input,
     .owes = owes,

@@ -59,7 +59,7 @@ static size_t put_length(uint8_t *block, uint8_t *to)
     return len;
 }
 
-/* The end of the options, and of their block. */
+/* Writes what ends the options and their block. Returns the block's length. */
 static size_t end_block(uint8_t *block, uint8_t *to)
 {
     return put_length(block, put_option(to, OPTION_END, "", 0));
@@ -130,8 +130,8 @@ static int pcapng_fail(const struct pcapng_reader *reader, struct sh_err *err, c
     return sh_fail(err, SH_EFORMAT, "at byte %llu: %s", (unsigned long long)reader->at_byte, what);
 }
 
-/* if_tsresol: 10^-n s, or with the top bit 2^-n s. if_tsoffset: whole seconds more, from 1970 on. Times farther than 292
- * years from it are INT64_MAX or INT64_MIN. */
+/* if_tsresol: 10^-n s, or with the top bit 2^-n s. if_tsoffset: whole seconds more, from 1970 on. Times farther than
+ * 292 years from it are INT64_MAX or INT64_MIN. */
 static int64_t to_ns(uint64_t time, const struct pcapng_interface *interface)
 {
     const int n = interface->resolution & 0x7f;
@@ -210,7 +210,7 @@ static int read_simple(struct pcapng_reader *reader, const uint8_t *block, size_
     return PCAPNG_PACKET;
 }
 
-/* 0; or why there is no block. */
+/* Checks that a block may begin at bytes. Returns NULL if it may, else what is wrong. */
 static const char *check_front(const struct pcapng_reader *reader, const uint8_t *bytes, size_t len)
 {
     if (le_get32(bytes) == BLOCK_SECTION) {

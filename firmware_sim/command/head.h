@@ -48,7 +48,7 @@ enum { HEAD_MAX_FRAMES = 1000000 };
 
 struct head_settings {
     int64_t prr_uhz, lines_uhz, pan_udeg_s;
-    int64_t line_start_udeg, line_stop_udeg; /* start < stop, with `round` only unequal; within the field of view */
+    int64_t line_start_udeg, line_stop_udeg; /* within the field of view; start < stop, or != with head_limits.round */
     int64_t pan_start_udeg, pan_stop_udeg;   /* start <= stop, at most a turn apart */
     uint32_t frames;                         /* frames per scan; 0: until stopped */
     uint32_t station;                        /* from 1 */
@@ -58,7 +58,7 @@ struct head_settings {
     uint32_t phase_lock;                     /* 1: the rotor's phase is held to the pulses per second */
     int64_t phase_udeg;                      /* its azimuth at a pulse */
     int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
-    int64_t sigma_nm, ball_nm;               /* one sigma of that noise, its fixed part; radius of the ball noise */
+    int64_t sigma_nm, ball_nm;               /* fixed part of the range noise, one sigma; radius of the ball noise */
     int64_t step_udeg;                       /* of a sphere, as it was set; of a planar head with geometries; else 0 */
     uint32_t waves;                          /* 1: waveforms are sent */
 };
@@ -96,9 +96,9 @@ struct head_limits {
     int64_t sequence_ps; /* a head with beams: from firing sequence to firing sequence */
     int step_fixed;      /* a head on a platform that moves keeps its step */
     int64_t range_min_nm, range_max_nm;
-    int64_t near_most_nm, far_least_nm; /* largest range_min, smallest range_max: each rate still measures */
-    /* The largest number of a kind of range noise, of angle noise. noise_most is 0 where echoes are found in samples.
-     * */
+    /* range_min may be at most near_most, and range_max at least far_least: then some range is left at each rate. */
+    int64_t near_most_nm, far_least_nm;
+    /* The largest head_settings.noise and angle_noise. noise_most is 0 where echoes are found in samples. */
     uint32_t noise_most, angle_most;
     uint32_t phase_lock_most; /* 1: it has a rotor whose phase can be held */
     uint32_t waves_most;      /* 1: it samples waveforms, and may send them */

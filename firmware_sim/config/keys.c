@@ -196,8 +196,8 @@ static const struct cfg_key config_keys[] = {
              "say where packets to other addresses go: binding a socket to an interface needs a privilege."},
     {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP),
      .help = "udp: numeric address of this machine that packets come from, so that receivers can distinguish heads. "
-             "When not given: the interface's, or as the system chooses. Where it would be the receiver's own address "
-             "and port, on the IPv4 loopback, it is the next address."},
+             "When not given: the interface's, or as the system chooses. If that is the receiver's own address and "
+             "port on the IPv4 loopback, packets come from the next address, such as 127.0.0.2 after 127.0.0.1."},
     {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP),
      .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, "
              "velodyne-position 8308, as the device's. If that port is taken, another one is used, with a warning. For "

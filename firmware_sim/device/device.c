@@ -13,7 +13,8 @@
 #include "firmware_sim/device/limits.h"
 #include "firmware_sim/site/plan_rows.h"
 
-/* A live head needs a pose for the first pulse of a tick, which may be 15 periods old. */
+/* With platform.kind live the head needs a pose for the first pulse of a tick. Pulses are cast in packets of 16, so
+ * that pulse may be 15 pulse periods old. */
 static int check_live(const struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
@@ -333,9 +334,9 @@ void device_lost(struct device *device, const struct device_work *work)
     device_count_lost(&device->overrun, work, device->power.off_tick);
     if (work->describe && work->describe_flags == 0 && device->scan.on) device->scan.describe = 1;
     if (work->scanning && work->stretch != device->scan.stretch)
-        device->scan.anchor_lost = 1; /* the anchor may be in this tick, or in another */
+        device->scan.anchor_lost = 1; /* a new anchor was due in this tick, or in a later one */
     if (work->describe && work->describe_flags != 0)
-        device->scan.anchor_lost = 1; /* this may have been the repetition of a lost one */
+        device->scan.anchor_lost = 1; /* the tick had a repetition, maybe of a lost anchor */
     pthread_mutex_unlock(&device->lock);
 }
 

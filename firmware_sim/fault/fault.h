@@ -87,7 +87,8 @@ enum fault_place {
     FAULT_AT_MOMENT      /* in the head, in device time */
 };
 
-/* The countings: which frames are counted, and may be hit. */
+/* Frames of the stream, notices (telemetry, events, repetitions) and replies are numbered separately. A fault counts
+ * those of one kind: struct fault, of. */
 enum fault_of { FAULT_OF_STREAM, FAULT_OF_NOTICES, FAULT_OF_REPLIES, FAULT_N_OF };
 
 struct fault {
@@ -99,7 +100,9 @@ struct fault {
     uint64_t from, until; /* numbers; until 0: no end */
     uint64_t every;       /* from `from` on */
     double probability;
-    uint64_t count; /* it strikes at most so often: in a session, or, as an act of the link, on the link; 0: no limit */
+    /* It strikes at most so often; 0: no limit. This counts in each session. For acts of the link (fault_is_act), and
+     * for faults at connections, it counts on the link. */
+    uint64_t count;
     uint64_t from_pulse, until_pulse; /* of a scan, from 0; until UINT64_MAX: no end. Other frames have no pulses */
     double from_s, until_s;           /* until 0: no end */
     uint64_t seed;
@@ -133,7 +136,7 @@ int fault_is_act(enum fault_kind kind);
 /* The kind by which a link carries out an act. acts: those that it can do; bit 0 is FAULT_DISCONNECT, and so on. For a
  * link that can't fall silent, a pulled cable is an unplugging. */
 enum fault_kind fault_act_of(enum fault_kind kind, uint32_t acts);
-/* n, or what the kind takes without it. */
+/* Returns n; if that is 0, the default of the kind. */
 uint32_t fault_n(const struct fault *fault);
 
 /* Whether it strikes there, without regard to its count. index: in the list; link: the spot's. */

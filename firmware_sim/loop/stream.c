@@ -11,9 +11,9 @@ static const int64_t PATIENCE_NS = 2000000000;
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err)
 {
     stream->tick_ns = tick_ns;
-    /* In real time casters are woken early, so that most of the time ahead is left if they have to wait for a
-     * processor. Fewer ticks a wake-up would cost more, since caches are cold each time. In the paces that wait, some
-     * threads fill the queue while others empty it. */
+    /* In real time casters are woken when a quarter of the ticks ahead is free. They then have three quarters of that
+     * time left if they have to wait for a processor. Fewer ticks per wake-up would cost more, since caches are cold
+     * each time. In the paces that wait, some threads fill the queue while others empty it. */
     stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 4);
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);

@@ -28,7 +28,7 @@ void wakeup_signal(struct wakeup *wakeup, uint32_t n)
 
 void wakeup_sleep(struct wakeup *wakeup)
 {
-    sem_wait(&wakeup->signals); /* a signal may end it: then it returns without one */
+    sem_wait(&wakeup->signals); /* it may also return, without a wake-up, after a POSIX signal (EINTR) */
     atomic_thread_fence(memory_order_seq_cst);
 }
 

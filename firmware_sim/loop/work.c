@@ -17,9 +17,9 @@ struct worker {
     int no_memory;           /* the slot has no room for the rest of the tick */
     struct ring_mark mark[RING_MAX_MARKS];
     struct caster *caster;
-    struct cast_counters counted; /* the caster's counters, as far as slots have them */
+    struct cast_counters counted; /* the caster's counters when count_hits last added them to a slot */
     struct line_block block;
-    struct line_waves *waves; /* the block's, which has none while they are not sent */
+    struct line_waves *waves; /* the block's; block.waves is NULL while they are not sent */
     struct cast_setup setup;
     uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
     uint32_t setup_scan;    /* the scan that it is for */

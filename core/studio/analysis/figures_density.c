@@ -14,7 +14,7 @@ struct table {
     size_t used;
 };
 
-/* The scene and the size by which a place gets its cell. */
+/* Divides a scene into cells of one size, which are counted from the corner low_m. */
 struct cutter {
     const struct scene *scene;
     double low_m[3], cell_m;
@@ -41,8 +41,10 @@ static int figures_density_make_room(struct table *t)
     return 1;
 }
 
-/* Returns the key of a place on a triangle, and sets the area of its cell. Triangles in one plane give the same height
- * at the middle of a cell, but for rounding. So heights are shifted: round ones don't lie on a border of two steps. */
+/* Returns the key of the cell that the point p of a triangle lies in, and sets the area of that cell. The key has the
+ * height of the triangle's plane at the cell's middle, in steps of cell_m. Triangles in one plane must get the same
+ * step, but rounding makes their heights differ a little. So PLANES_SHIFT / 1000 of a step is added: planes at round
+ * heights then don't lie on the border of two steps. */
 static uint64_t key_of(const struct cutter *cut, uint32_t triangle, const double p[3], unsigned station,
                        double *area_m2)
 {
@@ -137,7 +139,7 @@ int figures_density_of(const struct figures_on_scene *in, double cell_m, const s
         longest_m = fmax(longest_m, scene->max_m[k] - scene->min_m[k]);
         cut.low_m[k] = scene->min_m[k];
     }
-    const double reach_m = most_m < longest_m ? most_m : longest_m; /* of points outside the scene's bounds */
+    const double reach_m = most_m < longest_m ? most_m : longest_m; /* points may lie this far outside the scene */
     while ((longest_m + 2.0 * reach_m) / cut.cell_m > (double)((1 << KEY_BITS) - 2))
         cut.cell_m *= 2.0;
     for (int rc = 1; rc != 0; cut.cell_m *= 2.0) {

@@ -26,7 +26,8 @@ static int choose_base(const double corner[3][3], struct cut *cut)
     return longest2 > 0.0;
 }
 
-/* Columns and rows, before they are rounded up; the first is 0 where there is no such part. */
+/* This has the columns of a part, and the rows of its last column (across), before they are rounded up. columns is 0
+ * where the triangle has no such part. */
 struct count {
     double base_m, columns, across;
     int from_apex;
@@ -130,8 +131,8 @@ static uint32_t step_of(double part, uint32_t n)
     return at > 0.0 ? (at < n ? (uint32_t)at : n - 1) : 0; /* NaN: 0 */
 }
 
-/* With E the part's end of the base, a point is e E + g F + t T. u and v count from the tip: u along the longer leg, v
- * along the other one. */
+/* Letters are those of cut.h; E is A in the first part, and B in the second. A point of a part is e E + g F + t T. u
+ * and v count from the tip: u along the longer leg, v along the other one. */
 void cut_find(const struct cut *cut, const double weight[3], uint32_t *column, uint32_t *row)
 {
     const double sum = weight[0] + weight[1] + weight[2];

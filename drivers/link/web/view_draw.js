@@ -30,7 +30,8 @@ export class Budget {
   }
 }
 
-// Returns how many elements of each part are to be drawn, for `more` in all: the same share of each. It is pure.
+// Returns for each part how many of its elements are to be in the picture after `more` further points were drawn. It is
+// the same share of each part. The function is pure.
 export function shares(parts, more) {
   let all = 0, done = 0;
   for (const part of parts) {
@@ -43,7 +44,7 @@ export function shares(parts, more) {
 }
 
 // Does the same for a view that rests: first a share of each, then one part after the other. A part that is `whole` is
-// drawn at once, since later it is not known which of its elements a share has left out.
+// drawn at once. If a share of it were drawn, nobody would know later which of its elements are still missing.
 export function restShares(parts, more) {
   if (progress(parts).drawn < EVENLY) {
     return shares(parts, more).map((upTo, i) => (parts[i].whole && !parts[i].skip && more > 0 ? parts[i].n : upTo));
@@ -99,7 +100,7 @@ export class Painter {
   // Returns a target for the page, of the same scale as the shown one.
   pageTarget() {
     const target = this.#take(this.#shown.scale);
-    this.#spare.push(target); // nobody else takes one before it is on the page
+    this.#spare.push(target); // it counts as free already: no target is taken before this one is on the page
     return target;
   }
 

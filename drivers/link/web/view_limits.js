@@ -13,7 +13,7 @@ export class Scale {
   limits = null; // heights are relative to the cloud's origin
   #cloud;
   #fixed = null; // the user set these, in the scene frame
-  #at = 0; // it is the total when they were found
+  #at = 0; // the points that the cloud had when the limits were found
   #sample = [];
   #legend = null;
 
@@ -92,8 +92,8 @@ function robustBox({blocks, origin}) {
   return {min: limits.map((l, a) => l[0] + origin[a]), max: limits.map((l, a) => l[1] + origin[a])};
 }
 
-// Returns the box of a view of everything: the points (or the scene, before there are any) and the stations.
-// sceneFirst takes the scene even if there are points.
+// Returns the box of a view of everything: the points and the stations. As long as there are at most 500 points, the
+// scene takes the place of the points. With sceneFirst it always does.
 export function boxOf(cloud, stations, solids, sceneFirst = false) {
   const scene = sceneFirst || cloud.count <= 500 ? solids.bounds() : null;
   const box = scene ?? (cloud.count > 500 ? robustBox(cloud) : cloud.bounds);

@@ -135,12 +135,12 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     o->device.one_scan = app_is_given(&o->in, "frames") && o->device.start;
     int rc = run_complete_links(o, cfg, err);
     if (rc != SH_OK) return rc;
-    /* The page looks at triangles. */
+    /* The page looks at triangles one by one, so copies of meshes are written out as triangles for it. */
     rc = site_load_for(cfg, has_page(cfg) ? SITE_WRITTEN_OUT : SITE_FOR_SCANS, NULL, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->surfaces != NULL) rc = surfaces_write(o->surfaces, site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
-    /* After the plan, which is made for the configuration: a replayed journal gives the same stream without
-     * --start. */
+    /* The plan above is made with the frames of the configuration, and only now they change. So a journal of this run
+     * gives the same stream when it is replayed without --start. */
     if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = open_settings(o, cfg, err);
@@ -162,7 +162,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-/* By --frames, or by --set. */
+/* Whether the command line gives head.frames, by --frames or by --set. */
 static int gives_frames(const struct app_sets *sets)
 {
     static const char key[] = "head.frames=";

@@ -22,8 +22,8 @@ static uint32_t heads_find(const struct heads *heads, uint32_t i)
     return k;
 }
 
-/* The number of the head that scans from station s, from 1. Stops without a trajectory go through all stations, again
- * and again. */
+/* Returns the number of the head, from 0, that scans from station s. s counts from 1 and may be larger than the number
+ * of stations: stops without a trajectory go through all stations again and again. */
 static uint32_t head_of(const struct heads *heads, uint32_t s)
 {
     return heads->head_of[(s - 1) % heads->one[0].cfg->n_stations];
@@ -181,8 +181,8 @@ static int check_fits(const struct heads *heads, uint32_t k, const struct site *
 }
 
 /* Opens the first head that is due. The other scanners are set up once and freed again, so that their errors come
- * before the first scan, and a warning of several of them comes once. Their BVHs stay in the world, where they are
- * found when their turn comes. */
+ * before the first scan, and a warning of several of them comes once. Their BVHs stay in struct site_world, which
+ * the sites share, and are found there when their turn comes. */
 static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct sh_err *err)
 {
     uint8_t is_known[CONFIG_MAX_STATIONS] = {1};
