@@ -202,7 +202,8 @@ static int check_place(const struct named *file, struct sh_err *err)
     return sh_fail(err, SH_EINPUT, "%s %s: %s", file->who, file->path, strerror(errno));
 }
 
-/* A scenario that comes with the program has a bare name, which is no file here: only what is there is read. */
+/* Refuses a file that is written twice, or read and written. A name that is read counts only if the file exists: a
+ * scenario that comes with the program is named without a folder, and there may be no such file. */
 static int check(const struct files *f, struct sh_err *err)
 {
     for (size_t i = 0; i < f->n; i++) {

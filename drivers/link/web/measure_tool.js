@@ -244,7 +244,7 @@ export class MeasureTool {
 // Writes a length in millimetres, with two significant digits.
 const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
 
-// Flatness stands beside the flatness that noise alone gives.
+// Returns the rows of a flatness figure. Each figure is shown with the one that noise alone would give.
 function flatRows({flat, beyond, depth_m}) {
   const {n, rms, largest, sigma} = flat, isKnown = sigma > 0;
   const beside = (v, expected) => (isKnown ? `${millimetres(v)}; noise gives ${millimetres(expected)}` : millimetres(v));

@@ -406,7 +406,7 @@ local function fills_gap(s, seq)
     if gap and before < gap.n then
       local n = gap.n
       gap.n = before
-      if s.n_gaps % GAPS == i then s.n_gaps = s.n_gaps + 1 end -- the next place is that of the first part, which stays
+      if s.n_gaps % GAPS == i then s.n_gaps = s.n_gaps + 1 end -- entry i holds the first part
       add_gap(s, (seq + 1) % MODULUS, n - before - 1)
       return true
     end
@@ -818,7 +818,8 @@ local function put_geo(item, wanted, m, tvb, at, a, b, c)
   return string.format(anchor.crs == 3 and "%.8f° %.8f° %.4f m" or "%.4f %.4f %.4f m", x, y, z)
 end
 
--- The line angle is that of the turn around the middle of the line; of other heads it is an elevation.
+-- The line angle lies within half a turn of the middle of the line. If the emitter is of another kind than `line`
+-- (m.emitter), it is an elevation, within half a turn of zero.
 local function angles_of(m, b, c)
   local d = m.descriptor
   local mirror, pan = b / d.mirror_counts, c / d.pan_counts
