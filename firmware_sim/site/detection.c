@@ -65,8 +65,8 @@ static void set_up_instrument(const struct config *cfg, struct instrument *out)
     out->pan_sigma_rad = angle_rad(cfg->profile.pan_sigma_deg);
 }
 
-/* Adds the textures and vertex colours of surfaces whose reflectance no entry of `surfaces` gives. Warns of textures that
- * can't be read. */
+/* Adds the textures and vertex colours of surfaces whose reflectance no entry of `surfaces` gives. Warns of textures
+ * that can't be read. */
 static int set_up_textures(struct site *site, const uint8_t *is_given, const struct sh_report *report,
                            struct sh_err *err)
 {
@@ -162,8 +162,8 @@ static int casts_footprints(const struct site *site)
     return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
 }
 
-/* Sets three kinds of noise: the instrument's, which is that of the angles; that of the range; and the ball within which
- * each point is moved (noise.ball). */
+/* Sets three kinds of noise: the instrument's, which is that of the angles; that of the range; and the ball within
+ * which each point is moved (noise.ball). */
 static void set_up_noise(const struct config *cfg, struct site_detect *d)
 {
     set_up_instrument(cfg, &d->instrument);

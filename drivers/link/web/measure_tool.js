@@ -70,7 +70,7 @@ export class MeasureTool {
 
   // ---- picking
 
-  // The view asks these two for a click and a key on the picture.
+  // The view calls tap() for a click on the picture, and key() for a key.
   tap(p) {
     this.#expected.ask(); // a newer scan may have other errors
     this.#stop?.();
