@@ -9,7 +9,7 @@
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
  *     waves      waves.c          the light of a pulse over time, and echoes found in it, where the setup has
- *                                 waveforms; within echoes
+ *                                 waveforms; the echoes stage calls it
  *     disturb    disturbance.c    where the head has a disturbance: wobbles and a slipped pan within aim, a dark
  *                                 laser after it, a soiled window within echoes
  *     echoes     echoes.c         which returns are echoes, how they merge, their noise, which of them are sent

@@ -92,7 +92,7 @@ static uint32_t in_cells(const struct beam_outlines *o, const struct vec3_floats
     return found;
 }
 
-/* Prefetches the data that the search for lines will read, step by step for all pulses at once. */
+/* Prefetches the data that beam_find_lines will read, step by step for all pulses at once. */
 static void look_up(const struct beam_outlines *o, struct beam_near *near, uint32_t n)
 {
     for (uint32_t k = 0; k < n; k++)

@@ -66,9 +66,10 @@ static void forget(struct scanhead *sh)
 }
 
 /* Forgets the state where another sequence of numbers begins: the head has started again, or recordings were put one
- * after the other. The parser hands out a number that goes back only there. The state is kept in two cases. If the new
- * sequence began with frames equal to those before, they were dropped as repeated, and said the same. If a descriptor
- * for this reader alone (LOCAL) came just before, the state since then is that of the new sequence. */
+ * after the other. The parser hands out a number that goes back only there. The state is kept in two cases. First, the
+ * new sequence may have begun with frames equal to earlier ones. The parser dropped them as repeated, and the state
+ * already has what they say. Second, a descriptor for this reader alone (LOCAL) may have come just before. The state
+ * since then is that of the new sequence. */
 static void follow_sequence(struct scanhead *sh, const struct native_header *header)
 {
     const uint64_t repeated = sh->parser.stats.repeated;

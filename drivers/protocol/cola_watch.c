@@ -45,7 +45,7 @@ static uint32_t measure(const struct planar_head *head, const struct planar_turn
     for (uint32_t k = first; k < first + n; k++) {
         const double range_m = turn->echo[beam][k].range * head->m_per_count;
         if (range_m * 1e6 > COLA_SHAPE_REACH_UM || turn->echo[beam][k].range == 0) continue;
-        /* Half a count: ranges of the stream are rounded, and the limit itself counts. */
+        /* A range equal to the minimum counts. Rounded for the stream, it may be half a count lower. */
         if (range_m < head->range_min_m - 0.5 * head->m_per_count) continue;
         out[n_out++] = cola_measured_at(step, steps, (int32_t)lround(range_m * 1e6));
     }
@@ -96,7 +96,7 @@ static int conclude(struct cola_slot *slot, const struct cola_field *field, cons
     return changed;
 }
 
-/* The nearest number of scans. */
+/* Returns the number of scans nearest to the response time, at least 1. */
 static uint32_t scans_of(uint32_t response_ms, const struct planar_head *head)
 {
     const uint64_t n = ((uint64_t)response_ms * head->lines_uhz + UINT64_C(500000000)) / UINT64_C(1000000000);

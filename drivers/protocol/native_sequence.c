@@ -32,7 +32,7 @@ static int fills_gap(struct native_sequence *s, uint32_t seq)
         const uint32_t first = s->gap[i].first, n = s->gap[i].n, before = seq - first;
         if (before >= n) continue;
         s->gap[i].n = before;
-        if (s->n_gaps % NATIVE_GAPS == i) s->n_gaps++; /* the next place is that of the first part, which stays */
+        if (s->n_gaps % NATIVE_GAPS == i) s->n_gaps++; /* entry i has the first part: add_gap must not overwrite it */
         add_gap(s, seq + 1, n - before - 1);
         return 1;
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks the files that a command names: it writes none twice, and none that it reads, so that none is destroyed. The
- * folder of each file that it writes is there. */
+/* Checks the files that a command names: it writes none twice, and none that it reads, so that none is destroyed.
+ * It also checks that a file that an option or a link writes has a folder. */
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -202,7 +202,8 @@ static int check_place(const struct named *file, struct sh_err *err)
     return sh_fail(err, SH_EINPUT, "%s %s: %s", file->who, file->path, strerror(errno));
 }
 
-/* A scenario that comes with the program has a bare name, which is no file here: only what is there is read. */
+/* Refuses a file that is written twice, or read and written. A name that is read counts only if the file exists: a
+ * scenario that comes with the program is named without a folder, and there may be no such file. */
 static int check(const struct files *f, struct sh_err *err)
 {
     for (size_t i = 0; i < f->n; i++) {

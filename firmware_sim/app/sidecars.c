@@ -114,7 +114,7 @@ static int try_names(struct search *s, const char *first, const char *end, int d
     return SH_OK;
 }
 
-/* Names end at quotes, angles, tabs and control characters. */
+/* Returns whether a character may be part of a name. Control characters, tabs, quotes and any of < > | * ? may not. */
 static int is_inside(char c)
 {
     return (unsigned char)c >= 0x20 && c != 0x7f && strchr("\"'<>|*?", c) == NULL;

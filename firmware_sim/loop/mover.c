@@ -12,7 +12,8 @@ void mover_create(struct mover *mover, struct device *device, struct stream *str
     pthread_cond_init(&mover->changed, NULL);
 }
 
-/* The ticket is compared since the session may have gone meanwhile: its box then waits for another move or for none. */
+/* Puts the reply into the box of the session that commanded the move. The session may have gone meanwhile. The box then
+ * waits for another move or for none, so the tickets are compared. */
 static void deliver(struct mover *mover, const struct move_job *job, const struct command_result *result)
 {
     pthread_mutex_lock(&mover->lock);

@@ -65,7 +65,8 @@ static void set_up_instrument(const struct config *cfg, struct instrument *out)
     out->pan_sigma_rad = angle_rad(cfg->profile.pan_sigma_deg);
 }
 
-/* For surfaces whose reflectance no entry of `surfaces` gives. Warns of textures that can't be read. */
+/* Adds the textures and vertex colours of surfaces whose reflectance no entry of `surfaces` gives. Warns of textures
+ * that can't be read. */
 static int set_up_textures(struct site *site, const uint8_t *is_given, const struct sh_report *report,
                            struct sh_err *err)
 {
@@ -161,7 +162,8 @@ static int casts_footprints(const struct site *site)
     return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
 }
 
-/* Sets the instrument, which has the angle noise; the kind of the range noise; the ball. */
+/* Sets three kinds of noise: the instrument's, which is that of the angles; that of the range; and the ball within
+ * which each point is moved (noise.ball). */
 static void set_up_noise(const struct config *cfg, struct site_detect *d)
 {
     set_up_instrument(cfg, &d->instrument);
@@ -249,7 +251,7 @@ static double ten_sigma_m(const struct site *site)
 {
     const struct config_profile *p = &site->cfg->profile;
     double sigma_m = p->range_sigma_m + 1e-6 * p->range_sigma_ppm * p->range_max_m;
-    double jitter2 = 0.0; /* at the threshold, of the program where it is largest */
+    double jitter2 = 0.0; /* range variance at the threshold; the largest of all programs */
     for (uint32_t i = 0; i < n_programs(site); i++)
         jitter2 = fmax(jitter2, site->detect.signal[i].jitter2);
     if (site->cfg->noise.range == RANGE_NOISE_SIGNAL) sigma_m += sqrt(jitter2);

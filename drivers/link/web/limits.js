@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This class has the rows of the display for colour scales and their limits. Limits leave out a share of the points, or
-// are set by hand.
+// This class makes the rows in which a user chooses the colour scale and its limits. Limits leave out a share of the
+// points, or are set by hand.
 import {kept, make, markField, numberOf, say} from './page.js';
 import {MODES} from './view_colours.js';
 import {SCALES} from './view_ramps.js';

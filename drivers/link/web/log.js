@@ -6,7 +6,7 @@ import {sessionWords, stateName, stateWord} from './session.js';
 
 const MOST = 200; // so many entries are stored
 
-// These errors have no command as their cause (COMMANDS.md, *Errors*): their text says who or how many.
+// No command causes these errors (COMMANDS.md, *Errors*). The words here stand before the text of the error.
 const HEADS_OWN = {101: 'Client lost (101):', 102: 'Reader too slow (102):', 103: 'Pulses lost (103):', 104: 'Client refused (104):',
   105: 'Incomplete command (105):', 106: 'Lines lost (106):', 107: 'Time server (107):'};
 

@@ -70,7 +70,7 @@ export class MeasureTool {
 
   // ---- picking
 
-  // The view asks these two for a click and a key on the picture.
+  // The view calls tap() for a click on the picture, and key() for a key.
   tap(p) {
     this.#expected.ask(); // a newer scan may have other errors
     this.#stop?.();
@@ -244,7 +244,7 @@ export class MeasureTool {
 // Writes a length in millimetres, with two significant digits.
 const millimetres = (v) => `${Number((1e3 * v).toPrecision(2))}\u00a0mm`.replace('-', '−');
 
-// Flatness stands beside the flatness that noise alone gives.
+// Returns the rows of a flatness figure. Each figure is shown with the one that noise alone would give.
 function flatRows({flat, beyond, depth_m}) {
   const {n, rms, largest, sigma} = flat, isKnown = sigma > 0;
   const beside = (v, expected) => (isKnown ? `${millimetres(v)}; noise gives ${millimetres(expected)}` : millimetres(v));

@@ -243,7 +243,7 @@ export class View extends EventTarget {
       this.#fitted = 0;
       this.#frames.ask('restart');
     }
-    if (cloud.replaced !== this.#replaced) { // it is done at once, since the old points are elsewhere
+    if (cloud.replaced !== this.#replaced) { // drawn anew at once: points of a repeated scan are gone
       this.#replaced = cloud.replaced;
       this.#frames.ask('restart');
     }

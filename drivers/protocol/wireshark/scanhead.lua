@@ -9,7 +9,8 @@
 -- Facts from earlier packets (sequence, scales, anchor, replies) are found when a packet is seen for the first time,
 -- and kept by packet. So the same packet always shows the same. Written for Lua 5.2 and later.
 
--- The script may be loaded twice: installed, and named on the command line. An unknown name is nil here, or an error.
+-- The script may be loaded twice: installed, and named on the command line. Only the first one registers the protocol.
+-- For a name that it does not know, Dissector.get returns nil or raises an error.
 local is_asked, known = pcall(Dissector.get, "scanhead")
 if is_asked and known then return end
 
@@ -406,7 +407,7 @@ local function fills_gap(s, seq)
     if gap and before < gap.n then
       local n = gap.n
       gap.n = before
-      if s.n_gaps % GAPS == i then s.n_gaps = s.n_gaps + 1 end -- the next place is that of the first part, which stays
+      if s.n_gaps % GAPS == i then s.n_gaps = s.n_gaps + 1 end -- entry i holds the first part
       add_gap(s, (seq + 1) % MODULUS, n - before - 1)
       return true
     end
@@ -452,8 +453,8 @@ local function take_sequence(s, h)
   return kind, first, n
 end
 
--- ---- payloads: errors in one, as native_decode.c finds them, and values that later frames need. Positions count from
--- 0, payloads begin at `at`.
+-- ---- payloads: this finds errors in a payload, as native_decode.c does, and values that later frames need. Positions
+-- count from 0, payloads begin at `at`.
 
 local function number_at(bytes, at, format) return (unpack_bytes(format or "<I4", bytes, at + 1)) end
 -- Exact up to 2^53.
@@ -818,7 +819,8 @@ local function put_geo(item, wanted, m, tvb, at, a, b, c)
   return string.format(anchor.crs == 3 and "%.8f° %.8f° %.4f m" or "%.4f %.4f %.4f m", x, y, z)
 end
 
--- The line angle is that of the turn around the middle of the line; of other heads it is an elevation.
+-- The line angle lies within half a turn of the middle of the line. If the emitter is of another kind than `line`
+-- (m.emitter), it is an elevation, within half a turn of zero.
 local function angles_of(m, b, c)
   local d = m.descriptor
   local mirror, pan = b / d.mirror_counts, c / d.pan_counts
@@ -1157,8 +1159,8 @@ local function header_at(bytes, at)
           is_repeat = flags % 2 == 1, is_local = floor(flags / 2) % 2 == 1, raw = bytes:sub(at + 2, at + 24)}
 end
 
--- Where the next correct header begins, from `at` on and before `last`. A sync byte counts, too, if too few bytes
--- follow it to know.
+-- Where the next correct header begins, from `at` on and before `last`. A sync byte counts, too, if the bytes
+-- after it are too few for a header.
 local function next_header(bytes, at, last)
   while true do
     local found = bytes:find("\xd5", at + 1, true)

@@ -251,7 +251,7 @@ double match_unit_m(const struct cloud *cloud, double limit_m)
 }
 
 /* Two programs that compute the same coordinate in double precision, by rotation and sum, differ by some units in the
- * last place of the largest one. A nanometre more is less than any link resolves. */
+ * last place of the largest one. At least a nanometre is allowed, since no link resolves less. */
 static double rounding_m(double limit_m)
 {
     return fmax(4.0 * DBL_EPSILON * limit_m, 1e-9);
