@@ -239,6 +239,21 @@ static uint32_t u32_at(const char *bytes)
     return v;
 }
 
+/* The list has these items in this order, and no others. Each begins with `head`, and then has its text. */
+static void check_list(const char *json, const char *list, const char *head, const char *const *items)
+{
+    const char *at = strstr(json, list);
+    assert_non_null(at);
+    for (at += strlen(list); *items != NULL; items++) {
+        assert_memory_equal(at, head, strlen(head));
+        assert_memory_equal(at + strlen(head), *items, strlen(*items));
+        at += strlen(head);
+        at += strcspn(at, "}") + 1;
+        at += *at == ',';
+    }
+    assert_int_equal(*at, ']');
+}
+
 /* The scene has 7 corners and 6 triangles, as in the file, relative to the middle of the bounds. */
 static void scene_is_the_scene(void **state)
 {
@@ -269,7 +284,13 @@ static void scene_is_the_scene(void **state)
     same("x", number(json, "\"name\":\"second\"", "x_m"), -2.2, 0);
     same("heading", number(json, "\"name\":\"second\"", "heading_deg"), 200, 1e-9);
     assert_non_null(strstr(json, "\"pace\":\"fast\""));
-    assert_non_null(strstr(json, "{\"label\":1,\"object\":\"east\""));
+    same("y", number(json, "\"name\":\"second\"", "y_m"), 1.3, 0);
+    same("z", number(json, "\"name\":\"second\"", "z_m"), 1.5, 0);
+    check_list(json, "\"stations\":[",
+               "{\"number\":", (const char *const[]){"1,\"name\":\"first\"", "2,\"name\":\"second\"", NULL});
+    check_list(
+        json, "\"surfaces\":[", "{\"label\":",
+        (const char *const[]){"0,\"object\":\"floor\"", "1,\"object\":\"east\"", "2,\"object\":\"north\"", NULL});
     assert_non_null(strstr(json, "\"bounds\":{\"min\":[-4,-4,0],\"max\":[4,4,3]}"));
     free(json);
     json = watch_get(&head, "/plan", &len);
