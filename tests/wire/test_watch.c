@@ -254,6 +254,19 @@ static void check_list(const char *json, const char *list, const char *head, con
     assert_int_equal(*at, ']');
 }
 
+/* The head of the configuration, by its profile (config/heads/full-sweep.yaml) and the defaults. */
+static void expect_keys(const char *json)
+{
+    static const char *const keys[] = {"\"maker\":\"scanhead\",\"model\":\"full sweep\"",
+                                       "\"profile\":\"full-sweep\"",
+                                       "\"config\":\"config.yaml\"",
+                                       "\"previews\":true",
+                                       "\"tripod\":null",
+                                       "\"served\":true"};
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        if (strstr(json, keys[i]) == NULL) fail_msg("no %s in %s", keys[i], json);
+}
+
 /* The scene has 7 corners and 6 triangles, as in the file, relative to the middle of the bounds. */
 static void scene_is_the_scene(void **state)
 {
@@ -283,6 +296,7 @@ static void scene_is_the_scene(void **state)
     char *json = watch_get(&head, "/head", &len);
     same("x", number(json, "\"name\":\"second\"", "x_m"), -2.2, 0);
     same("heading", number(json, "\"name\":\"second\"", "heading_deg"), 200, 1e-9);
+    expect_keys(json);
     assert_non_null(strstr(json, "\"pace\":\"fast\""));
     same("y", number(json, "\"name\":\"second\"", "y_m"), 1.3, 0);
     same("z", number(json, "\"name\":\"second\"", "z_m"), 1.5, 0);
