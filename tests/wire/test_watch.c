@@ -247,8 +247,10 @@ static void check_list(const char *json, const char *list, const char *head, con
     for (at += strlen(list); *items != NULL; items++) {
         assert_memory_equal(at, head, strlen(head));
         assert_memory_equal(at + strlen(head), *items, strlen(*items));
-        at += strlen(head);
-        at += strcspn(at, "}") + 1;
+        int depth = 0; /* an item may have objects of its own */
+        do {
+            depth += (*at == '{') - (*at == '}');
+        } while (*at++ != '\0' && depth > 0);
         at += *at == ',';
     }
     assert_int_equal(*at, ']');
@@ -276,7 +278,10 @@ static void scene_is_the_scene(void **state)
     char config[256];
     size_t len;
     watch_prepare(wire, config);
-    struct head head = head_start(wire, config, NULL);
+    struct head head =
+        head_start(wire, config,
+                   (const char *const[]){
+                       "--set", "stations.1.tripod={leg_m: 1.8, head_above_m: 0.2, legs_heading_deg: 40}", NULL});
     char *scene = watch_get(&head, "/scene", &len);
     double origin_m[3];
     assert_memory_equal(scene, "SHSC", 4);
@@ -297,6 +302,12 @@ static void scene_is_the_scene(void **state)
     same("x", number(json, "\"name\":\"second\"", "x_m"), -2.2, 0);
     same("heading", number(json, "\"name\":\"second\"", "heading_deg"), 200, 1e-9);
     expect_keys(json);
+    /* Its top is 1.3 m above the floor, and each leg is the longest side of a right triangle. */
+    same("leg", number(json, "\"tripod\":{", "leg_m"), 1.8, 0);
+    same("head above", number(json, "\"tripod\":{", "head_above_m"), 0.2, 0);
+    same("top", number(json, "\"tripod\":{", "height_m"), 1.3, 1e-9);
+    same("feet", number(json, "\"tripod\":{", "foot_radius_m"), sqrt(1.8 * 1.8 - 1.3 * 1.3), 1e-9);
+    same("legs", number(json, "\"tripod\":{", "legs_heading_deg"), 40, 1e-9);
     assert_non_null(strstr(json, "\"pace\":\"fast\""));
     same("y", number(json, "\"name\":\"second\"", "y_m"), 1.3, 0);
     same("z", number(json, "\"name\":\"second\"", "z_m"), 1.5, 0);
