@@ -207,6 +207,11 @@ static void noise_is_expected(void **state)
     assert_true(isnan(number(quality, "\"verdict\"", "bound_m")));
     assert_non_null(strstr(quality, "\"judgement\":\"within\""));
     assert_non_null(strstr(quality, "\"along_beam\":{\"from_m\":"));
+    /* A second scan from the same place has the same pulses, and is counted by itself. */
+    const double points = number(quality, "{", "points");
+    free(quality);
+    quality = watch_scan(&head, sh, 1, 2);
+    same("points of the second scan", number(quality, "{", "points"), points, 0);
     free(quality);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
