@@ -275,6 +275,14 @@ static const char *said(struct replay *r, const char *line)
     return result.reply;
 }
 
+static struct replay *open_replay(struct config *cfg, const struct replay_options *options)
+{
+    struct replay *r;
+    struct sh_err err;
+    if (replay_open(cfg, options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    return r;
+}
+
 /* SCAN:REPLay: another time, another speed, a pause, a loop. */
 static void a_command_seeks_paces_and_loops(void **state)
 {
@@ -294,11 +302,9 @@ static void a_command_seeks_paces_and_loops(void **state)
                 {9, "SCAN:REPL ,1", "0 "}, /* anew, by the loop */
                 {10, "SCAN:REPL ,,OFF", "1 "}};
     struct config *cfg = config_new();
-    struct replay *r;
-    struct sh_err err;
     event_recording_write(path, 20);
     const struct replay_options options = {.path = path, .speed = 1, .start = 1};
-    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    struct replay *r = open_replay(cfg, &options);
     assert_string_equal(said(r, "SCAN:REPL?"), "PLAYING,0.000000,0.019000,1,OFF");
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         if (rows[i].line[0] != '\0') assert_string_equal(said(r, rows[i].line), "OK");
@@ -315,19 +321,32 @@ static void a_command_seeks_paces_and_loops(void **state)
     free(cfg);
 }
 
+/* A part ends 0.5 ms after its last frame. A seek to between them is to its end, where a loop begins anew. */
+static void a_seek_to_the_end_of_a_part_is_its_end(void **state)
+{
+    (void)state;
+    struct config *cfg = config_new();
+    event_recording_write(path, 20);
+    const struct replay_options options = {.path = path, .speed = 1, .to_s = 0.0125};
+    struct replay *r = open_replay(cfg, &options);
+    assert_string_equal(said(r, "SCAN:REPL 0.0124,1,ON"), "OK");
+    assert_string_equal(tick_of_replay(r, 0), "");
+    assert_string_equal(tick_of_replay(r, 1), "0 ");
+    replay_free(r);
+    free(cfg);
+}
+
 /* A recording may have any bytes as the head's name: a line end, or 0xd5, which begins a frame. */
 static void its_name_is_a_line(void **state)
 {
     (void)state;
     struct config *cfg = config_new();
-    struct replay *r;
-    struct sh_err err;
     FILE *f = begin_file();
     put_head(f, "Maker,Mo\r\ndel,\xd5,1");
     put_event(f, NATIVE_EV_CONTROL, 0);
     assert_int_equal(fclose(f), 0);
     const struct replay_options options = {.path = path, .speed = 1};
-    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    struct replay *r = open_replay(cfg, &options);
     assert_string_equal(said(r, "*IDN?"), "Maker,Mo~~del,~,1");
     assert_string_equal(cfg->profile.model, "Mo~~del");
     replay_free(r);
@@ -352,11 +371,9 @@ static void what_a_replay_refuses(void **state)
                 {"SCAN:REPL 0,1,ON,1", "ERR -108", "takes a time"},
                 {"SCAN:REPL? 1", "ERR -108", ""}};
     struct config *cfg = config_new();
-    struct replay *r;
-    struct sh_err err;
     event_recording_write(path, 3);
     struct replay_options options = {.path = path, .speed = 1};
-    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    struct replay *r = open_replay(cfg, &options);
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const char *reply = said(r, rows[i].line);
         if (strncmp(reply, rows[i].error, strlen(rows[i].error)) != 0 || strstr(reply, rows[i].words) == NULL)
@@ -365,7 +382,7 @@ static void what_a_replay_refuses(void **state)
     assert_string_equal(said(r, "SCAN:REPL?"), "IDLE,0.000000,0.002000,1,OFF");
     replay_free(r);
     cfg->loop.pace = PACE_FAST;
-    if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
+    r = open_replay(cfg, &options);
     assert_int_equal(strncmp(said(r, "SCAN:REPL ,0"), "ERR -221", 8), 0); /* such a pace has one speed */
     assert_string_equal(said(r, "SCAN:REPL ,1"), "OK");
     replay_free(r);
@@ -427,7 +444,7 @@ int main(void)
         cmocka_unit_test(frames_go_out_in_their_ticks),    cmocka_unit_test(each_time_has_its_numbers),
         cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(its_name_is_a_line),
         cmocka_unit_test(a_command_seeks_paces_and_loops), cmocka_unit_test(what_a_replay_refuses),
-        cmocka_unit_test(a_state_holds_from_its_tick_on),
+        cmocka_unit_test(a_state_holds_from_its_tick_on),  cmocka_unit_test(a_seek_to_the_end_of_a_part_is_its_end),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }

@@ -174,6 +174,71 @@ static void test_loop_has_no_end(void **state)
     head_end(&head, SIGTERM);
 }
 
+/* Counts the lines of the head's messages that have a text. */
+static int lines_with(const char *text, const char *part)
+{
+    int n = 0;
+    while ((text = strstr(text, part)) != NULL) {
+        n++;
+        text += strcspn(text, "\n");
+    }
+    return n;
+}
+
+/* Writes a capture of two ports and of packets that can't be served: two requests and an answer over TCP, three
+ * datagrams, a packet of link type 147, one without an IP header, one fragment (RFC 791: an offset of 1), and a datagram
+ * 2 s earlier than the others. A segment of 5 bytes is missing. */
+static const char *make_mixed(struct wire *wire)
+{
+    const struct ethernet_end client = {.address = {10, 0, 0, 2}, .port = 40000},
+                              device = {.address = {10, 0, 0, 1}, .port = 2112},
+                              sender = {.address = {10, 0, 0, 1}, .port = 2368};
+    struct tcp_talk talk = {.end = {client, device}};
+    uint8_t frame[ETHERNET_MAX_FRAME];
+    struct capture capture = {.n_packets = 3000000}; /* its clock: a packet is a microsecond */
+    capture_begin(&capture);
+    const uint32_t at = capture_interface(&capture, CAPTURE_ETHERNET),
+                   other = capture_interface(&capture, CAPTURE_USER0);
+    capture_packet(&capture, at, frame, tcp_put_syn(&talk, 0, frame));
+    capture_packet(&capture, at, frame, tcp_put_data(&talk, 0, "a\n", 2, frame));
+    capture_packet(&capture, at, frame, tcp_put_data(&talk, 1, "b\n", 2, frame));
+    tcp_put_data(&talk, 0, "lost\n", 5, frame);
+    capture_packet(&capture, at, frame, tcp_put_data(&talk, 0, "c\n", 2, frame));
+    for (int i = 0; i < 3; i++)
+        capture_packet(&capture, at, frame, ethernet_put_udp(frame, &sender, &client, "d", 1));
+    capture_packet(&capture, other, "e", 1);
+    capture_packet(&capture, at, frame, 14);
+    const size_t len = ethernet_put_udp(frame, &sender, &client, "f", 1);
+    frame[14 + 7] = 1;
+    capture_packet(&capture, at, frame, len);
+    capture.n_packets -= 2000000;
+    capture_packet(&capture, at, frame, ethernet_put_udp(frame, &sender, &client, "g", 1));
+    const char *path = wire_write(wire, "mixed.pcapng", capture.bytes, capture.len);
+    free(capture.bytes);
+    return path;
+}
+
+static void test_messages(void **state)
+{
+    static const char *const says[] = {
+        "tcp port 2112 of 10.0.0.1: lines, 2 different requests, 1 messages\n",
+        "udp port 40000 of 10.0.0.1: datagrams, 0 different requests, 4 messages\n",
+        "udp port 40000 of 10.0.0.1 is not served: no link is left for it\n",
+        ": 5 bytes are missing in it; ",
+        ": the times of 1 packets go back, and 0 packets have none; ",
+        ": left out 1 packets of other link types, such as 147\n",
+        ": left out 1 fragments of datagrams, and 1 packets with damaged headers\n",
+    };
+    struct wire *wire = *state;
+    struct head head = head_start(wire, make_mixed(wire), (const char *const[]){"--link", "type: tcp", NULL});
+    head_end(&head, SIGTERM);
+    char *text = wire_read(wire_path(wire, "head.err"), NULL);
+    for (size_t i = 0; i < sizeof says / sizeof *says; i++)
+        if (lines_with(text, says[i]) != 1) fail_msg("not once '%s' in: %s", says[i], text);
+    assert_int_equal(lines_with(text, " port "), 3); /* no other port is named */
+    free(text);
+}
+
 static void test_refused(void **state)
 {
     struct wire *wire = *state;
@@ -200,6 +265,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_tcp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_udp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_loop_has_no_end, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_messages, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -345,6 +345,25 @@ static void test_files_that_do_not_go_together(void **state)
     assert_int_equal(access(wire_path(wire, "configuration.log"), F_OK), -1);
 }
 
+/* The client's file may be {out}, written out. A name that no run writes is free: a sheet may have that of the
+ * client's output where the client's file is another. */
+static void test_files_that_go_together(void **state)
+{
+    struct wire *wire = *state;
+    char c[352], printed[352], points[352];
+    write_files(wire);
+    snprintf(c, sizeof c, "%s", wire_path(wire, "config.yaml"));
+    snprintf(printed, sizeof printed, "%s", wire_path(wire, "configuration.stdout"));
+    snprintf(points, sizeof points, "%s", wire_path(wire, "configuration.points"));
+    const char *const args[] = {
+        "soak",   c,       "--client",   "true {out}", "--client-folder",   wire->dir, "--client-file", points,
+        "--json", printed, "--duration", "0.1",        "--reconnect-limit", "0.1",     "--quiet",       NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "out", "err", -1)), 1); /* the client never connects */
+    char *text = wire_read(printed, NULL);
+    assert_int_equal(count_of(text, "\"scenario\": \"configuration\""), 1);
+    free(text);
+}
+
 static void need_python(void)
 {
     if (access("/usr/bin/python3", X_OK) == 0) return;
@@ -377,6 +396,7 @@ int main(int argc, char **argv)
         cmocka_unit_test_setup_teardown(test_a_stop_in_the_second_scenario, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_wrong_usage, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_files_that_do_not_go_together, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_files_that_go_together, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_in_python, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_client_of_scip, wire_setup, wire_teardown),
     };

@@ -207,6 +207,11 @@ static void noise_is_expected(void **state)
     assert_true(isnan(number(quality, "\"verdict\"", "bound_m")));
     assert_non_null(strstr(quality, "\"judgement\":\"within\""));
     assert_non_null(strstr(quality, "\"along_beam\":{\"from_m\":"));
+    /* A second scan from the same place has the same pulses, and is counted by itself. */
+    const double points = number(quality, "{", "points");
+    free(quality);
+    quality = watch_scan(&head, sh, 1, 2);
+    same("points of the second scan", number(quality, "{", "points"), points, 0);
     free(quality);
     scanhead_close(sh);
     head_end(&head, SIGTERM);
@@ -239,6 +244,36 @@ static uint32_t u32_at(const char *bytes)
     return v;
 }
 
+/* The list has these items in this order, and no others. Each begins with `head`, and then has its text. */
+static void check_list(const char *json, const char *list, const char *head, const char *const *items)
+{
+    const char *at = strstr(json, list);
+    assert_non_null(at);
+    for (at += strlen(list); *items != NULL; items++) {
+        assert_memory_equal(at, head, strlen(head));
+        assert_memory_equal(at + strlen(head), *items, strlen(*items));
+        int depth = 0; /* an item may have objects of its own */
+        do {
+            depth += (*at == '{') - (*at == '}');
+        } while (*at++ != '\0' && depth > 0);
+        at += *at == ',';
+    }
+    assert_int_equal(*at, ']');
+}
+
+/* The head of the configuration, by its profile (config/heads/full-sweep.yaml) and the defaults. */
+static void expect_keys(const char *json)
+{
+    static const char *const keys[] = {"\"maker\":\"scanhead\",\"model\":\"full sweep\"",
+                                       "\"profile\":\"full-sweep\"",
+                                       "\"config\":\"config.yaml\"",
+                                       "\"previews\":true",
+                                       "\"tripod\":null",
+                                       "\"served\":true"};
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        if (strstr(json, keys[i]) == NULL) fail_msg("no %s in %s", keys[i], json);
+}
+
 /* The scene has 7 corners and 6 triangles, as in the file, relative to the middle of the bounds. */
 static void scene_is_the_scene(void **state)
 {
@@ -248,7 +283,10 @@ static void scene_is_the_scene(void **state)
     char config[256];
     size_t len;
     watch_prepare(wire, config);
-    struct head head = head_start(wire, config, NULL);
+    struct head head =
+        head_start(wire, config,
+                   (const char *const[]){
+                       "--set", "stations.1.tripod={leg_m: 1.8, head_above_m: 0.2, legs_heading_deg: 40}", NULL});
     char *scene = watch_get(&head, "/scene", &len);
     double origin_m[3];
     assert_memory_equal(scene, "SHSC", 4);
@@ -268,8 +306,21 @@ static void scene_is_the_scene(void **state)
     char *json = watch_get(&head, "/head", &len);
     same("x", number(json, "\"name\":\"second\"", "x_m"), -2.2, 0);
     same("heading", number(json, "\"name\":\"second\"", "heading_deg"), 200, 1e-9);
+    expect_keys(json);
+    /* Its top is 1.3 m above the floor, and each leg is the longest side of a right triangle. */
+    same("leg", number(json, "\"tripod\":{", "leg_m"), 1.8, 0);
+    same("head above", number(json, "\"tripod\":{", "head_above_m"), 0.2, 0);
+    same("top", number(json, "\"tripod\":{", "height_m"), 1.3, 1e-9);
+    same("feet", number(json, "\"tripod\":{", "foot_radius_m"), sqrt(1.8 * 1.8 - 1.3 * 1.3), 1e-9);
+    same("legs", number(json, "\"tripod\":{", "legs_heading_deg"), 40, 1e-9);
     assert_non_null(strstr(json, "\"pace\":\"fast\""));
-    assert_non_null(strstr(json, "{\"label\":1,\"object\":\"east\""));
+    same("y", number(json, "\"name\":\"second\"", "y_m"), 1.3, 0);
+    same("z", number(json, "\"name\":\"second\"", "z_m"), 1.5, 0);
+    check_list(json, "\"stations\":[",
+               "{\"number\":", (const char *const[]){"1,\"name\":\"first\"", "2,\"name\":\"second\"", NULL});
+    check_list(
+        json, "\"surfaces\":[", "{\"label\":",
+        (const char *const[]){"0,\"object\":\"floor\"", "1,\"object\":\"east\"", "2,\"object\":\"north\"", NULL});
     assert_non_null(strstr(json, "\"bounds\":{\"min\":[-4,-4,0],\"max\":[4,4,3]}"));
     free(json);
     json = watch_get(&head, "/plan", &len);

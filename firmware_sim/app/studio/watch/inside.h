@@ -84,8 +84,7 @@ struct watch {
     struct georef *now_georef;   /* of the scan at hand; NULL: its points are in the scene's frame, or nowhere */
     struct watch_sample sample;
     struct watch_seen seen;
-    struct watch_scan at; /* the scan at hand */
-    int fresh;            /* a scan began, and none of its points has come */
+    struct watch_scan at; /* the scan at hand; a head never gives a number to two scans */
     int missed;           /* frames were lost on the way here: a scan's end may be among them */
     int dirty;            /* something came since the last figures */
     int64_t began_ns, began_thread_ns, published_ns, publish_ns;

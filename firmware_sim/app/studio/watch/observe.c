@@ -63,7 +63,6 @@ static void begin_unknown(struct watch *w, uint32_t scan, uint32_t station)
     let_go(w);
     w->at = (struct watch_scan){.scan = scan, .station = station};
     w->now = w->head[station - 1];
-    w->fresh = 0;
     watch_sample_begin(w);
     watch_seen_begin(&w->seen, station);
 }
@@ -95,7 +94,7 @@ static int follow_scan(struct watch *w)
     struct scanhead_info info;
     if (scanhead_get_info(w->sh, &info) != SCANHEAD_OK) return 0;
     if (info.station < 1 || info.station > w->site->n_stations) return 0;
-    if (w->fresh || info.scan != w->at.scan || info.station != w->at.station) {
+    if (info.scan != w->at.scan || info.station != w->at.station) {
         end_scan(w);
         begin_scan(w, &info);
     }
@@ -169,7 +168,7 @@ static void take_telemetry(struct watch *w, const struct scanhead_frame *frame)
     struct native_telemetry t;
     if (native_decode_telemetry(frame->payload, frame->payload_len, &t) != SH_OK || t.scan == 0) return;
     if (t.state == HEAD_SCANNING || t.state == HEAD_SPIN_DOWN) return;
-    if ((w->fresh || t.scan != w->at.scan) && !follow_scan(w)) return;
+    if (t.scan != w->at.scan && !follow_scan(w)) return;
     if (t.scan == w->at.scan) end_scan(w);
 }
 
@@ -185,11 +184,7 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
     if (frame->type == SCANHEAD_TELEMETRY) take_telemetry(w, frame);
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_READER_LOST) w->missed = 1;
-    if (frame->event == SCANHEAD_EV_SCAN_END) end_scan(w);
-    if (frame->event == SCANHEAD_EV_SCAN_START) {
-        end_scan(w);
-        w->fresh = 1;
-    }
+    if (frame->event == SCANHEAD_EV_SCAN_END || frame->event == SCANHEAD_EV_SCAN_START) end_scan(w);
 }
 
 /* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no
@@ -200,7 +195,7 @@ static void rest(struct watch *w)
     const uint32_t scan = device_last_scan(w->options.device, &station);
     if (!w->missed || scan == 0 || device_rests_from(w->options.device) == UINT64_MAX) return;
     w->missed = 0;
-    if ((w->fresh || w->at.scan != scan) && !(follow_scan(w) && w->at.scan == scan)) begin_unknown(w, scan, station);
+    if (w->at.scan != scan && !(follow_scan(w) && w->at.scan == scan)) begin_unknown(w, scan, station);
     end_scan(w);
 }
 
