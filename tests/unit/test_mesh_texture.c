@@ -15,7 +15,7 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/record/mesh_texture.h"
 
-enum { OTHERS = 3, RINGS = 5, STEPS = 8, N = 2 + 3 * STEPS };
+enum { OTHERS = 100, RINGS = 5, STEPS = 8, N = 2 + 3 * STEPS };
 
 static struct mesh_grid grid;
 static struct mesh_points points;

@@ -236,6 +236,10 @@ static void test_line_coding(void **state)
     assert_int_equal(control(&rig, 0x00, 9, 1, 0, 0), 0);
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
     assert_memory_equal(rig.in, at_rest, 7);
+    memset(rig.in, 0xff, 7);
+    assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 2), 2); /* a host may read a part, or ask for more */
+    assert_memory_equal(rig.in, ((const uint8_t[]){0x00, 0xc2, 0xff, 0xff, 0xff, 0xff, 0xff}), 7);
+    assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 64), 7);
     usb_device_free(rig.head.device);
 }
 
