@@ -19,6 +19,7 @@
 enum { WAIT_MS = 60000 };
 
 static struct stamped_socket keeper;
+static int has_stamps; /* QEMU's user mode has none, so bytes have the time at which they were read */
 
 static struct sockaddr_in v4(const char *host, int port)
 {
@@ -64,7 +65,7 @@ static int64_t wait_ns(int fd)
 {
     struct pollfd slot = {.fd = fd, .events = POLLIN};
     assert_int_equal(poll(&slot, 1, WAIT_MS), 1);
-    return stamped_now_ns();
+    return has_stamps ? stamped_now_ns() : INT64_MAX;
 }
 
 static struct stamped_datagram take(const struct stamped_socket *s, const char *text)
@@ -137,6 +138,7 @@ static void lost_datagrams_are_counted(void **state)
     struct stamped_datagram d;
     struct sh_err err;
     char text[500] = "";
+    if (!has_stamps) skip(); /* nor has it counts of losses */
     const int least = 0, sender = bound(SOCK_DGRAM, "127.0.0.1");
     unsigned taken = 0;
     open_ok("127.0.0.1", 0, &s);
@@ -220,7 +222,8 @@ static void a_stream_has_times_and_an_end(void **state)
         assert_in_range(t_ns, before_ns, there_ns);
         if (is_reset) assert_int_equal(setsockopt(peer, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once), 0);
         close(peer);
-        const int64_t ended_ns = wait_ns(fd);
+        const int64_t ended_ns = stamped_now_ns();
+        wait_ns(fd);
         assert_int_equal(stamped_read(fd, got, sizeof got, &t_ns), is_reset ? SH_ERESET : SH_ECLOSED);
         assert_in_range(t_ns, ended_ns, stamped_now_ns());
         close(fd);
@@ -235,6 +238,8 @@ static int set_up(void **state)
 {
     (void)state;
     stamped_begin(&keeper);
+    socklen_t len = sizeof has_stamps;
+    if (getsockopt(keeper.fd, SOL_SOCKET, SO_TIMESTAMPNS, &has_stamps, &len) != 0) has_stamps = 0;
     return keeper.fd >= 0 ? 0 : -1;
 }
 
