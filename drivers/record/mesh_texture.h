@@ -22,7 +22,7 @@ int mesh_texture_draw(const struct mesh_grid *grid, struct mesh_points *points, 
                       struct sh_err *err);
 
 /* Doubles points where faces cross the seam. The new points stand at the end of `points` and have texture coordinates
- * beyond 1, where the image is repeated. Faces from first_face on belong to this grid; its points are all points from
+ * beyond 1, where the image is repeated. All of these faces belong to this grid; its points are all points from
  * grid->first on, in their order. */
 int mesh_texture_unwrap(const struct mesh_grid *grid, struct mesh_points *points, uint32_t (*face)[3], uint32_t n_faces,
                         struct sh_err *err);

@@ -34,7 +34,7 @@ static void control(struct port *port, unsigned type, unsigned request, unsigned
     assert_int_equal(usb_device_control(port->head.device, &setup, NULL, 0), 0);
 }
 
-static int open_port(void **state)
+static int open_port_of(void **state, int type)
 {
     static struct port port;
     const struct usb_identity id = {.vid = 1, .pid = 1, .highest = USB_RATE_HIGH};
@@ -44,7 +44,7 @@ static int open_port(void **state)
     *state = &port;
     if (scanhead_usb_create(usb_personality_get(USB_PERSONALITY_NATIVE), &id, &port.head, &err) != SH_OK)
         fail_msg("%s", err.text);
-    assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, pair), 0);
+    assert_int_equal(socketpair(AF_UNIX, type | SOCK_NONBLOCK, 0, pair), 0);
     port.console.device = port.head.device;
     port.console.fd = pair[0];
     port.host = pair[1];
@@ -54,6 +54,17 @@ static int open_port(void **state)
     control(&port, 0x00, USB_REQ_SET_CONFIGURATION, 1);
     port.console.number = -1; /* so that nothing is looked for below /dev */
     return 0;
+}
+
+static int open_port(void **state)
+{
+    return open_port_of(state, SOCK_STREAM);
+}
+
+/* Here each write is a packet of its own, as it is a request of its own in the kernel's tty. */
+static int open_port_of_packets(void **state)
+{
+    return open_port_of(state, SOCK_SEQPACKET);
 }
 
 static int close_port(void **state)
@@ -164,11 +175,56 @@ static void a_slow_client_keeps_its_session(void **state)
     assert_int_equal(client_reads(port, bytes, sizeof bytes), 3); /* nothing else goes before it */
 }
 
+/* The tty has 16 requests, and shows that nobody reads only when all are in use. So texts use them up, byte by byte if
+ * they are short. A KiB and more go out at once. */
+static void a_short_text_takes_all_requests(void **state)
+{
+    struct port *port = *state;
+    static const size_t len[] = {1, 15, 16, 17, 100, 1023, 1024, 1025, 4000};
+    enum { REQUESTS = 16 };
+    char text[4000];
+    for (size_t i = 0; i < sizeof text; i++)
+        text[i] = (char)('a' + i % 23);
+    client_says(port, "SCAN:STAR\n");
+    for (size_t i = 0; i < sizeof len / sizeof len[0]; i++) {
+        size_t got = 0, writes = 0;
+        ssize_t n;
+        assert_int_equal(head_says(port, text, len[i]), len[i]);
+        for (; (n = recv(port->host, bytes + got, sizeof bytes - got, MSG_DONTWAIT)) > 0; writes++)
+            got += (size_t)n;
+        assert_int_equal(got, len[i]);
+        assert_memory_equal(bytes, text, len[i]);
+        if (len[i] < 1024)
+            assert_true(writes >= (len[i] < REQUESTS ? len[i] : REQUESTS));
+        else
+            assert_int_equal(writes, 1);
+        assert_int_equal(ffs_console_events(&port->console), POLLIN); /* nothing waits */
+    }
+}
+
+static void a_missing_tty_is_reported(void **state)
+{
+    (void)state;
+    struct ffs_console console;
+    struct sh_err err = {0, ""};
+    assert_int_equal(ffs_console_open(&console, NULL, 987654, &err), SH_EIO);
+    assert_string_equal(err.text,
+                        "functionfs: console /dev/ttyGS987654: No such file or directory; is devtmpfs mounted "
+                        "on /dev?");
+    ffs_console_close(&console);
+    assert_int_equal(ffs_console_open(&console, NULL, -1, &err), SH_OK); /* a device without a console */
+    ffs_console_start(&console);
+    assert_int_equal(console.fd, -1);
+    ffs_console_close(&console);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(what_waits_at_a_close_is_void, open_port, close_port),
         cmocka_unit_test_setup_teardown(a_slow_client_keeps_its_session, open_port, close_port),
+        cmocka_unit_test_setup_teardown(a_short_text_takes_all_requests, open_port_of_packets, close_port),
+        cmocka_unit_test(a_missing_tty_is_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -84,6 +84,7 @@ static void test_frames(void **state)
     assert_string_equal(info.profile, "model");
     assert_true(info.geo == 1 && info.crs == 1 && info.epsg == 4978 && info.station == 2 && info.scan == 3);
     assert_true(info.prr_hz == 300000 && info.lines_hz == 100.5 && info.pan_deg_s == 18);
+    assert_true(info.lat_deg == 49 && info.lon_deg == 11 && info.height_m == 400);
     assert_true(info.anchor[2] == 4.8e6 && info.station_m[1] == 2 && info.rotation[3] == -1 && info.scale_m == 1e-5);
     assert_true(info.range_min_m == 1.5 && info.range_max_m == 600 && info.n_surfaces == 2 && info.frames == 9);
     close(head);

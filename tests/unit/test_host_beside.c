@@ -103,6 +103,9 @@ static void test_parts(void **state)
     expect_same(attribute[2].width_ns, 0);
     assert_int_equal(scanhead_attributes(sh, &frame, N, attribute, 2), 0);
     assert_int_equal(scanhead_deviations(sh, &frame, N + 1, deviation, 2), 0);
+    deviation[0] = deviation[1] = -1; /* which is no deviation */
+    assert_int_equal(scanhead_deviations(sh, &frame, N - 1, deviation, 2), 1);
+    assert_true(!(deviation[0] < 0) && deviation[1] < 0);
     expect_frame(sh, SCANHEAD_COLOURS, &frame);
     assert_int_equal(scanhead_attributes(sh, &frame, 0, attribute, 2), SCANHEAD_EINPUT);
     assert_int_equal(scanhead_colours(sh, &frame, N, colour, 2), 0);

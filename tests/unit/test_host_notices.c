@@ -154,6 +154,25 @@ static void test_late_reply(void **state)
     scanhead_close(sh);
 }
 
+/* Lines that nobody asked for stand before the reply. They are no reply, and each is reported. */
+static void test_before_a_command(void **state)
+{
+    (void)state;
+    int head;
+    char reply[64];
+    struct scanhead *sh = open_pair(&head);
+    listen_to(sh);
+    put_all(head, "77\r\n5\r\n", 7);
+    struct play p = {.fd = head, .turn = {{"TIME?", SAYS("9\r\n")}}};
+    assert_int_equal(command_played(sh, &p, "TIME?", reply, WAIT_MS), 0);
+    assert_string_equal(reply, "9");
+    assert_int_equal(n_noticed, 2);
+    expect_notice(0, SCANHEAD_NOTICE_UNASKED, 0, 0, 2);
+    expect_notice(1, SCANHEAD_NOTICE_UNASKED, 4, 0, 1);
+    close(head);
+    scanhead_close(sh);
+}
+
 /* The command that was given up asked for the identity. One of two equal answers is late. */
 static void test_late_identity(void **state)
 {
@@ -233,9 +252,11 @@ static void test_names(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stream),     cmocka_unit_test(test_file),          cmocka_unit_test(test_echo),
-        cmocka_unit_test(test_late_reply), cmocka_unit_test(test_late_identity), cmocka_unit_test(test_late_list),
-        cmocka_unit_test(test_names),      cmocka_unit_test(test_never_sent),
+        cmocka_unit_test(test_stream),        cmocka_unit_test(test_file),
+        cmocka_unit_test(test_echo),          cmocka_unit_test(test_late_reply),
+        cmocka_unit_test(test_late_identity), cmocka_unit_test(test_before_a_command),
+        cmocka_unit_test(test_late_list),     cmocka_unit_test(test_names),
+        cmocka_unit_test(test_never_sent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

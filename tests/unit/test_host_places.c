@@ -227,11 +227,89 @@ static void test_short_turn(void **state)
     }
 }
 
+/* A client reads the poses of a frame as they were sent: all, some from one on, or none beyond the last. */
+static void test_poses(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_pose is[4];
+    const struct native_pose pose[3] = {
+        {.t_ns = 5, .position_m = {1, 2, 3}, .quat = {1, 0, 0, 0}, .frame = 0.5},
+        {.t_ns = 7, .position_m = {4, 5, 6}, .quat = {0, 1, 0, 0}, .frame = 1.5, .flags = 1},
+        {.t_ns = 9, .position_m = {7, 8, 9}, .quat = {0, 0, 0, 1}, .frame = 2.5}};
+    put_descriptor(head, 0, 1, 0);
+    put_anchor(head, 0);
+    put(head, native_encode_poses(out, sizeof out, pose, 3, 1, 0), 0);
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
+    assert_int_equal(f.type, SCANHEAD_POSES);
+    for (uint32_t first = 0; first < 5; first++)
+        for (uint32_t max = 0; max < 5; max++) {
+            const uint32_t left = first < 3 ? 3 - first : 0, n = max < left ? max : left;
+            memset(is, 0, sizeof is);
+            assert_int_equal(scanhead_poses(sh, &f, first, is, max), n);
+            for (uint32_t i = 0; i < n; i++) {
+                const struct native_pose *want = &pose[first + i];
+                assert_true(is[i].t_ns == want->t_ns && is[i].frame == want->frame);
+                assert_int_equal(is[i].flags, want->flags);
+                assert_memory_equal(is[i].position_m, want->position_m, sizeof want->position_m);
+                assert_memory_equal(is[i].quat, want->quat, sizeof want->quat);
+            }
+            if (n < 4) assert_int_equal(is[n].t_ns, 0);
+        }
+    put_anchor(head, 0);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
+    assert_int_equal(scanhead_poses(sh, &f, 0, is, 4), SCANHEAD_EINPUT); /* no frame of poses */
+    close(head);
+    scanhead_close(sh);
+}
+
+/* A client reads each figure of the end of a line, and no other frame for one. */
+static void test_line_end(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_line_end is;
+    const struct line_end end = {.frame = 2,
+                                 .line = 3,
+                                 .pulse0 = 4000000000000,
+                                 .t0_ns = 5000,
+                                 .t1_ns = 6000,
+                                 .n_fired = 70,
+                                 .n_cast = 60,
+                                 .n_echoes = 90,
+                                 .mirror_count = 10,
+                                 .pan_count = 11,
+                                 .status = 12,
+                                 .n_crowded = 13,
+                                 .n_faint = 14,
+                                 .n_unfit = 15};
+    put_descriptor(head, 0, 1, 0);
+    put(head, native_encode_line_end(out, sizeof out, &end, 1), 0);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
+    assert_int_equal(scanhead_line_end(sh, &f, &is), SCANHEAD_EINPUT);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
+    assert_int_equal(f.type, SCANHEAD_LINE_END);
+    assert_int_equal(scanhead_line_end(sh, &f, &is), 0);
+    assert_true(is.scan_frame == 2 && is.scan_line == 3 && is.pulse0 == 4000000000000);
+    assert_true(is.t0_ns == 5000 && is.t1_ns == 6000);
+    assert_true(is.n_fired == 70 && is.n_cast == 60 && is.n_echoes == 90);
+    assert_true(is.mirror_count == 10 && is.pan_count == 11 && is.status == 12);
+    assert_true(is.n_crowded == 13 && is.n_faint == 14 && is.n_unfit == 15);
+    close(head);
+    scanhead_close(sh);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_antimeridian), cmocka_unit_test(test_until), cmocka_unit_test(test_followers),
-        cmocka_unit_test(test_emitter),      cmocka_unit_test(test_clock), cmocka_unit_test(test_short_turn),
+        cmocka_unit_test(test_antimeridian), cmocka_unit_test(test_until),    cmocka_unit_test(test_followers),
+        cmocka_unit_test(test_emitter),      cmocka_unit_test(test_clock),    cmocka_unit_test(test_short_turn),
+        cmocka_unit_test(test_poses),        cmocka_unit_test(test_line_end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

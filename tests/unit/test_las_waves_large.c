@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Packets beyond 4 GiB of a .wdp, which is a file with a hole here: their places have 64 bits everywhere. */
+/* The file of packets by itself: places beyond 4 GiB of a .wdp, which is a file with a hole here, and the kinds of
+ * packets. */
 #include "core/bytes.h"
 #include "drivers/record/las_columns.h"
 #include "tests/unit/waves_rig.h"
@@ -35,8 +36,46 @@ static void test_large(void **state)
     assert_int_equal(access(rig_path("a.wdp.part"), F_OK), -1);
 }
 
+/* The first 128 lengths have kinds of their own. Those after them are rounded up to four an octave, so the kinds of all
+ * lengths up to 600 are 128 and 160, 192, 224, 256, 320, 384, 448, 512, 640. Samples without light fill the rest. */
+static void test_kinds(void **state)
+{
+    (void)state;
+    enum { EXACT = 128, LONGEST = 600, LARGE = 1024 };
+    static const uint32_t rounded[] = {160, 192, 224, 256, 320, 384, 448, 512, 640};
+    static uint8_t sample[2 * LARGE];
+    struct scanhead_wave wave = {.sample = sample, .sample_ps = 1000, .bits = 12, .count_signal = 1};
+    struct las_waves waves = {.n_kinds = 0};
+    struct las_packet packet;
+    struct sh_err err = {0};
+    uint64_t n_fill = 0;
+    int is_new;
+    assert_int_equal(las_waves_open(&waves, rig_path("a.las"), &err), 0);
+    for (uint32_t n = 1, k = 0; n <= LONGEST; n++) {
+        wave.n = (uint16_t)n;
+        wave.pulse = n;
+        if (n > EXACT && n > rounded[k] && k + 1 < sizeof rounded / sizeof rounded[0]) k++;
+        const uint32_t want = n <= EXACT ? n : rounded[k], before = waves.n_kinds;
+        assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+        assert_int_equal(packet.len, 2 * want);
+        assert_int_equal(packet.kind, n <= EXACT ? n : EXACT + 1 + k);
+        assert_int_equal(is_new, waves.n_kinds > before);
+        assert_int_equal(waves.kind[packet.kind - 1].n, want);
+        n_fill += want - n;
+    }
+    assert_int_equal(waves.n_kinds, EXACT + sizeof rounded / sizeof rounded[0]);
+    assert_true(waves.n_fill == n_fill);
+    assert_int_equal(waves.n_kindless, 0);
+    wave.pulse = LARGE;
+    wave.n = LARGE; /* it is a step itself: it needs no fill */
+    assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+    assert_int_equal(packet.len, 2 * LARGE);
+    assert_int_equal(is_new, 1);
+    las_waves_close(&waves);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_large)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_large), cmocka_unit_test(test_kinds)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -4,11 +4,18 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <pthread.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <sys/eventfd.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <termios.h>
+
+#include "drivers/link/link_poll.h"
 
 static void test_table(void **state)
 {
@@ -57,6 +64,71 @@ static void test_wake(void **state)
         close(bench.wake);
         bench_close(&bench);
     }
+}
+
+static atomic_int is_waited;
+
+static void on_signal(int number)
+{
+    (void)number;
+}
+
+/* Signals come until the wait has ended, so at least one of them comes in it. */
+static void *interrupt(void *waiter)
+{
+    while (!is_waited) {
+        pthread_kill(*(pthread_t *)waiter, SIGUSR1);
+        sched_yield();
+    }
+    return NULL;
+}
+
+/* A signal is no event and no error. What poll(2) refuses is one: here more descriptors than a process may have. */
+static void test_wait(void **state)
+{
+    (void)state;
+    struct sigaction act = {.sa_handler = on_signal}, before;
+    struct rlimit limit, low;
+    pthread_t self = pthread_self(), other;
+    struct pollfd fds[2] = {{.fd = eventfd(0, EFD_CLOEXEC), .events = POLLIN, .revents = POLLIN},
+                            {.fd = -1, .revents = POLLIN}};
+    is_waited = 0;
+    assert_int_equal(sigaction(SIGUSR1, &act, &before), 0);
+    assert_int_equal(pthread_create(&other, NULL, interrupt, &self), 0);
+    const int rc = link_wait(fds, 2, -1);
+    is_waited = 1;
+    pthread_join(other, NULL);
+    sigaction(SIGUSR1, &before, NULL);
+    assert_int_equal(rc, SH_OK);
+    assert_int_equal(fds[0].revents | fds[1].revents, 0);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &limit), 0);
+    low = limit;
+    low.rlim_cur = 1;
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &low), 0);
+    const int refused = link_wait(fds, 2, 0);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
+    assert_int_equal(refused, SH_EIO);
+    close(fds[0].fd);
+}
+
+/* Where there is no room, nothing is reported and a wake-up is not drained: it comes with the next call. */
+static void test_no_room(void **state)
+{
+    (void)state;
+    struct link_event event[2];
+    struct link_events none = {event, 0, 0}, one = {event, 0, 1}, two = {event, 0, 2};
+    const int wake = eventfd(1, EFD_CLOEXEC | EFD_NONBLOCK);
+    assert_int_equal(link_poll_sink(wake, 1, 0, &none), 0);
+    assert_int_equal(link_poll_sink(wake, 1, 0, &one), 1);
+    assert_int_equal(event[0].kind, LINK_WRITABLE);
+    assert_int_equal(link_poll_sink(wake, 1, -1, &two), 2); /* it does not wait where there is an event */
+    assert_int_equal(event[0].kind, LINK_WRITABLE);
+    assert_int_equal(event[0].session, 0);
+    assert_string_equal(event[0].peer, "");
+    assert_int_equal(event[1].kind, LINK_WOKEN);
+    two.n = 0;
+    assert_int_equal(link_poll_sink(wake, 0, 0, &two), 0);
+    close(wake);
 }
 
 static void test_file(void **state)
@@ -201,6 +273,7 @@ int main(void)
         cmocka_unit_test(test_wake),          cmocka_unit_test(test_file),
         cmocka_unit_test(test_file_refusals), cmocka_unit_test(test_file_full),
         cmocka_unit_test(test_file_device),   cmocka_unit_test(test_fd),
+        cmocka_unit_test(test_wait),          cmocka_unit_test(test_no_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

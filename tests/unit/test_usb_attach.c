@@ -2,8 +2,11 @@
 /* A device plugs itself in (`attach: on`), and its host lets go of it. It comes back by itself, and reports that. */
 #include "tests/unit/usbip_client.h"
 
+#include <fcntl.h>
 #include <poll.h>
+#include <sys/timerfd.h>
 
+#include "drivers/usb/retry.h"
 #include "drivers/usb/vhci.h"
 
 /* It replaces the kernel's virtual host controller, and the module that talks to it: it takes the other end of the
@@ -124,13 +127,60 @@ static void test_pace(void **state)
     bench_close(&bench);
 }
 
+static void hear(void *ctx, const char *text)
+{
+    char *heard = ctx;
+    strcat(strcat(heard, text), "\n");
+}
+
+/* The timer has the pace that was asked for, or one second, until the device is plugged in. Only the first failure is
+ * reported, after each start anew. */
+static void test_retry(void **state)
+{
+    (void)state;
+    static const struct {
+        int ms;
+        struct timespec pace;
+    } cases[] = {{0, {1, 0}}, {-1, {1, 0}}, {1, {0, 1000000}}, {2999, {2, 999000000}}, {60000, {60, 0}}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct usb_retry retry;
+        struct itimerspec set;
+        char heard[1000] = "";
+        const struct usb_owner owner = {.say = hear, .ctx = heard};
+        struct sh_err err;
+        assert_int_equal(usb_retry_open(&retry, "usbip", cases[i].ms, &err), SH_OK);
+        assert_int_equal(usb_retry_is_due(&retry, 0), 0);
+        assert_int_equal(usb_retry_is_due(&retry, POLLIN), 0); /* it has not been started */
+        for (int k = 0; k < 2; k++) {
+            assert_int_equal(usb_retry_start(&retry, &owner), SH_OK);
+            assert_int_equal(timerfd_gettime(retry.timer, &set), 0);
+            assert_int_equal(set.it_interval.tv_sec, cases[i].pace.tv_sec);
+            assert_int_equal(set.it_interval.tv_nsec, cases[i].pace.tv_nsec);
+            usb_retry_failed(&retry, "no host", &owner);
+            usb_retry_failed(&retry, "no host yet", &owner);
+        }
+        assert_int_equal(usb_retry_done(&retry, &owner), SH_OK);
+        assert_int_equal(timerfd_gettime(retry.timer, &set), 0);
+        assert_int_equal(set.it_interval.tv_sec | set.it_interval.tv_nsec | set.it_value.tv_sec | set.it_value.tv_nsec,
+                         0);
+        assert_string_equal(heard, "the host has detached the device; it will plug itself in again\n"
+                                   "not plugged in, will try again: no host\n"
+                                   "the host has detached the device; it will plug itself in again\n"
+                                   "not plugged in, will try again: no host\n"
+                                   "plugged in again\n");
+        const int fd = retry.timer;
+        usb_retry_close(&retry);
+        assert_int_equal(retry.timer, -1);
+        assert_int_equal(fcntl(fd, F_GETFD), -1);
+        usb_retry_close(&retry);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_usbip),
-        cmocka_unit_test(test_usbip_refused),
-        cmocka_unit_test(test_unplugged_meanwhile),
-        cmocka_unit_test(test_pace),
+        cmocka_unit_test(test_usbip), cmocka_unit_test(test_usbip_refused), cmocka_unit_test(test_unplugged_meanwhile),
+        cmocka_unit_test(test_pace),  cmocka_unit_test(test_retry),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

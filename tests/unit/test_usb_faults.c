@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* USB faults on request, in the device core and over USB/IP, as a host sees them. No byte is lost. */
+#include <errno.h>
+#include <fcntl.h>
 #include <netinet/tcp.h>
 
 #include "tests/unit/usb_host.h"
@@ -76,6 +78,34 @@ static void test_descriptor_length(void **state)
     usb_device_lengthen(host->device, 0);
     host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, USB_DT_CONFIG << 8, 0, 9, NULL);
     assert_int_equal(le_get16(host_in + 2), len);
+    host_free(host);
+}
+
+/* Slow requests are answered one after the other, each after the time that one takes, and one may be withdrawn. */
+static void test_slow_requests(void **state)
+{
+    (void)state;
+    struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+    struct usb_transfer request[3] = {{.id = 7}, {.id = 8}, {.id = 9}}, *held = NULL;
+    assert_int_equal(usb_has_to_wait(host->device, NULL), 0);
+    assert_true(usb_due_ns(NULL) == INT64_MAX);
+    usb_device_set_slow(host->device, 3.6e6); /* an hour: none of them is due while this test runs */
+    assert_int_equal(usb_has_to_wait(host->device, NULL), 1);
+    for (int i = 0; i < 3; i++)
+        usb_hold(host->device, &held, &request[i]);
+    const int64_t hour_ns = INT64_C(3600000000000);
+    assert_true(request[1].due_ns - request[0].due_ns == hour_ns);
+    assert_true(request[2].due_ns - request[1].due_ns == hour_ns);
+    assert_true(usb_due_ns(held) == request[0].due_ns);
+    assert_null(usb_take_due(&held));
+    assert_null(usb_let_go(&held, 6));
+    assert_ptr_equal(usb_let_go(&held, 8), &request[1]);
+    usb_device_set_slow(host->device, 0.0);
+    assert_int_equal(usb_has_to_wait(host->device, held), 1); /* a quick one does not overtake those */
+    request[0].due_ns = request[2].due_ns = 0;
+    assert_ptr_equal(usb_take_due(&held), &request[0]);
+    assert_ptr_equal(usb_take_due(&held), &request[2]);
+    assert_null(held);
     host_free(host);
 }
 
@@ -250,13 +280,46 @@ static void test_enumeration(void **state)
     bench_close(&bench);
 }
 
+/* Returns how many descriptors are open. */
+static int n_open(void)
+{
+    int n = 0;
+    for (int fd = 0; fd < 256; fd++)
+        n += fcntl(fd, F_GETFD) >= 0;
+    return n;
+}
+
+/* The end of the link is the end of each of its connections, whether that has the device or not. */
+static void test_close(void **state)
+{
+    (void)state;
+    const int before = n_open();
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    char byte;
+    client_import(&c, &bench);
+    const int idle = dial(bench_port(&bench));
+    assert_true(idle >= 0);
+    bench_poll(&bench, 0, 0);
+    assert_int_equal(shutdown(c.fd, SHUT_WR), 0); /* so that the end waits for neither of them */
+    assert_int_equal(shutdown(idle, SHUT_WR), 0);
+    bench_close(&bench);
+    errno = 0;
+    assert_true(recv(c.fd, &byte, 1, MSG_DONTWAIT) <= 0 && errno != EAGAIN);
+    assert_true(recv(idle, &byte, 1, MSG_DONTWAIT) <= 0 && errno != EAGAIN);
+    close(c.fd);
+    close(idle);
+    assert_int_equal(n_open(), before);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_short_packets), cmocka_unit_test(test_descriptor_length),
         cmocka_unit_test(test_stall),         cmocka_unit_test(test_reset),
         cmocka_unit_test(test_unplug),        cmocka_unit_test(test_enumeration),
-        cmocka_unit_test(test_reset_of_idle),
+        cmocka_unit_test(test_reset_of_idle), cmocka_unit_test(test_slow_requests),
+        cmocka_unit_test(test_close),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -236,6 +236,10 @@ static void test_line_coding(void **state)
     assert_int_equal(control(&rig, 0x00, 9, 1, 0, 0), 0);
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
     assert_memory_equal(rig.in, at_rest, 7);
+    memset(rig.in, 0xff, 7);
+    assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 2), 2); /* a host may read a part, or ask for more */
+    assert_memory_equal(rig.in, ((const uint8_t[]){0x00, 0xc2, 0xff, 0xff, 0xff, 0xff, 0xff}), 7);
+    assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 64), 7);
     usb_device_free(rig.head.device);
 }
 
@@ -258,11 +262,36 @@ static void test_foreign_requests(void **state)
     usb_device_free(rig.head.device);
 }
 
+/* Each interface is in one function, which has the interface's class, in the order of the numbers. */
+static void test_functions(void **state)
+{
+    (void)state;
+    for (int id = 0; id < USB_N_PERSONALITIES; id++) {
+        const struct usb_personality *personality = usb_personality_get((enum usb_personality_id)id);
+        const struct usb_model *model = personality->model;
+        unsigned next = 0;
+        for (unsigned i = 0; i < model->n_functions; i++) {
+            const struct usb_function_row *f = &model->function[i];
+            assert_int_equal(f->first, next);
+            assert_true(f->count >= 1 && next + f->count <= model->n_interfaces);
+            assert_int_equal(f->class, model->interface[next].class);
+            assert_int_equal(f->subclass, model->interface[next].subclass);
+            assert_int_equal(f->protocol, model->interface[next].protocol);
+            next += f->count;
+        }
+        assert_int_equal(next, model->n_interfaces);
+        for (unsigned i = 0; i < model->n_interfaces; i++)
+            assert_int_equal(model->interface[i].number, i);
+    }
+    assert_null(usb_personality_get(USB_N_PERSONALITIES));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_descriptors), cmocka_unit_test(test_strings),     cmocka_unit_test(test_status),
         cmocka_unit_test(test_port),        cmocka_unit_test(test_line_coding), cmocka_unit_test(test_foreign_requests),
+        cmocka_unit_test(test_functions),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -98,6 +98,31 @@ static const struct {
     CASE("GET /ws HTTP/1.0\r\n" HOST UPGRADE "\r\n", 426),
 };
 
+/* Words of a status are those of RFC 9110, section 15. */
+static void expect_words(int status, const char *answer)
+{
+    static const struct {
+        int status;
+        const char *words;
+    } of[] = {{200, "OK"},
+              {400, "Bad Request"},
+              {404, "Not Found"},
+              {405, "Method Not Allowed"},
+              {408, "Request Timeout"},
+              {413, "Content Too Large"},
+              {417, "Expectation Failed"},
+              {421, "Misdirected Request"},
+              {426, "Upgrade Required"},
+              {503, "Service Unavailable"},
+              {505, "HTTP Version Not Supported"}};
+    char line[80];
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+        if (of[i].status != status) continue;
+        snprintf(line, sizeof line, "HTTP/1.1 %d %s\r\n", status, of[i].words);
+        if (strncmp(answer, line, strlen(line)) != 0) fail_msg("%.60s", answer);
+    }
+}
+
 static void test_requests(void **state)
 {
     (void)state;
@@ -108,6 +133,7 @@ static void test_requests(void **state)
         const int status = send_raw(&bench, place, requests[i].text, requests[i].len, answer, sizeof answer);
         if (status != requests[i].status) fail_msg("%s: %d, not %d", requests[i].text, status, requests[i].status);
         if (status != 0) assert_non_null(strstr(answer, "connection: close"));
+        expect_words(status, answer);
         if (status == 405) assert_non_null(strstr(answer, "\r\nallow: GET, HEAD\r\n"));
         if (status == 426) assert_non_null(strstr(answer, "\r\nsec-websocket-version: 13\r\n"));
     }
