@@ -109,8 +109,8 @@ static void the_last_point_counts(void **state)
     static double xyz[MOST][3], distance_m[MOST];
     static uint32_t triangle[MOST];
     struct scene *s = make_plate();
-    struct distance *d = make_index(s);
-    const struct cloud_site site = {.index = d, .n_stations = 1, .max_m = 10, .threads = 1};
+    struct bvh *bvh = make_bvh(s);
+    const struct cloud_site site = {.bvh = bvh, .n_stations = 1, .max_m = 10, .threads = 1};
     for (size_t n = 4095; n <= MOST; n += n == 4097 ? 4096 - 2 : 1) {
         for (size_t i = 0; i < n; i++) {
             xyz[i][0] = xyz[i][1] = 1.0;
@@ -122,7 +122,7 @@ static void the_last_point_counts(void **state)
         for (size_t i = 0; i < n; i++)
             assert_true(distance_m[i] == 0.25);
     }
-    distance_free(d);
+    bvh_free(bvh);
     scene_free(s);
 }
 

@@ -15,7 +15,6 @@ static struct cloud cloud;
 static struct cloud_site site;
 static const struct cloud_compared compared = {&cloud, &site, distance_m, triangle};
 static struct scene *scene;
-static struct distance *scene_index;
 static struct bvh *scene_bvh;
 static struct deviation_points out;
 static struct deviation_head head[2];
@@ -26,7 +25,6 @@ static struct sh_err err;
 static void open_scene(const char *text)
 {
     scene = load_text("scene.obj", text);
-    assert_int_equal(distance_create(scene, &scene_index, &err), SH_OK);
     assert_int_equal(bvh_create(scene, 1, NULL, &scene_bvh, &err), SH_OK);
     assert_int_equal(deviation_points_create(MOST, &out, &err), SH_OK);
     memset(head, 0, sizeof head);
@@ -37,14 +35,13 @@ static void open_scene(const char *text)
         head[i].setup.bvh = scene_bvh;
     }
     cloud = (struct cloud){.xyz_m = xyz};
-    site = (struct cloud_site){.index = scene_index, .n_stations = 1, .max_m = 10, .threads = 1};
+    site = (struct cloud_site){.bvh = scene_bvh, .n_stations = 1, .max_m = 10, .threads = 1};
 }
 
 static void close_scene(void)
 {
     deviation_points_free(&out);
     bvh_free(scene_bvh);
-    distance_free(scene_index);
     scene_free(scene);
 }
 
