@@ -35,7 +35,8 @@ enum {
 };
 #define SCENE_MAX_COORDINATE_M 1e9
 
-/* Bodies of IFC are read by two readers, by Assimp where they are not installed, or by one alone. */
+/* The readers of IFC bodies. AUTO: web and lite both read, and Assimp where they are not installed. The others: this
+ * one reader alone. */
 enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
 
 /* Limits for readers in processes of their own: Assimp, and the readers of glTF, GeoTIFF and IFC. */
@@ -45,7 +46,7 @@ struct scene_import_limits {
     uint32_t files;      /* open at a time in such a process; the programs of IFC have a limit of their own */
     enum scene_ifc_reader ifc_reader;
     int ifc_strict;         /* 1: a difference between the readers of IFC is an error */
-    const char *ifc_folder; /* where they are; NULL: installed, or built, beside the program */
+    const char *ifc_folder; /* with the IFC readers; NULL: installed, or built, beside the program */
 };
 extern const struct scene_import_limits scene_import_defaults;
 
@@ -85,7 +86,7 @@ enum scene_vertex_colours { SCENE_COLOURS_NONE, SCENE_COLOURS_SOME, SCENE_COLOUR
 /* One surface label: an object of the file with one material.
  * Object: .obj the last o or g, .stl the name of the solid, else (and for .ply) the file's name without folder and
  * ending; for the others the node's name, or the mesh's where that is empty.
- * Material: of a .ply with several textures, the name of its own. */
+ * Material: for a .ply with several textures, the name of the surface's texture. */
 struct scene_surface {
     char object[SCENE_NAME_LEN];
     char material[SCENE_NAME_LEN];
@@ -172,9 +173,9 @@ struct scene {
 };
 
 /* Loads all meshes into one scene.
- * tolerance_m: the largest error of a vertex that is allowed. A file read in single precision (all
- *   but .obj, .ply, .stl and .tif) is refused where 6e-8 of its coordinates, and of the numbers that place them, is
- *   more. The error names the figure.
+ * tolerance_m: the largest error of a vertex that is allowed. All files but .obj, .ply, .stl and .tif are read in
+ *   single precision. Their error is 6e-8 of their coordinates, and of the numbers that place them. A file whose error
+ *   is larger than tolerance_m is refused. The message names the error.
  *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates, and of a binary .stl.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
@@ -200,10 +201,10 @@ struct scene_arrays {
 /* Builds a scene from arrays, all copied, with the checks of scene_load. */
 int scene_from_arrays(const struct scene_arrays *arrays, struct scene **out, struct sh_err *err);
 
-/* Leaves out all surfaces but those that are to be kept: keep[n_surfaces], by label. The rest has new labels and
- * vertices, in the old order, and bounds of its own; there may be nothing left (n_all 0). SH_EINPUT where copies of a
- * mesh would keep different surfaces of it. After an error the scene is only to be freed. To be called before anyone
- * uses the scene, and before label0 is set. */
+/* Keeps the surfaces that keep[n_surfaces] marks, by label, and leaves out all others. The kept surfaces get new labels
+ * and vertices, in the old order, and the scene new bounds. There may be nothing left (n_all 0). SH_EINPUT where copies
+ * of a mesh would keep different surfaces of it. After an error the scene is only to be freed. To be called before
+ * anyone uses the scene, and before label0 is set. */
 int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 
 /* Marks duplicate faces: triangles that have the same three corners, in any order, and the same holes as one with a

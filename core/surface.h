@@ -65,7 +65,7 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
 /* Gives labels of equal surfaces the same number: kind[n], the caller's array. */
 int surface_kinds(const struct surface_table *table, uint16_t *kind, struct sh_err *err);
 
-/* Entry `label` gets its reflectance from a texture (core/texture.h), its gamma taken for that of sRGB. Beyond a
+/* Entry `label` gets its reflectance from a texture (core/texture.h), whose gamma counts as that of sRGB. Beyond a
  * decal the entry's own reflectance counts. SH_EINPUT, naming the file: can't be read. Then, and for glass and
  * mirrors, the entry stays unchanged. */
 int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
@@ -75,8 +75,8 @@ int surface_table_texture(struct surface_table *table, uint32_t label, const str
  * unchanged. */
 int surface_table_by_vertex(struct surface_table *table, uint32_t label, struct sh_err *err);
 
-/* Labels of hits hold the surface in their low 16 bits. Where a texture holds the reflectance, the
- * high ones are 1 + 65534 times that, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
+/* Labels of hits hold the surface in their low 16 bits. Where a texture holds the reflectance, the high
+ * 16 bits are 1 + 65534 times the reflectance, else 0. uv: of the hit, finite. Only for surfaces with a texture. */
 uint32_t surface_texel(const struct surface_table *table, uint32_t label, const double uv[2]);
 /* The same for a hit with that colour, sRGB, in place of a texel. */
 uint32_t surface_texel_of(uint32_t label, const uint8_t rgb[3]);

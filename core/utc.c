@@ -114,7 +114,7 @@ void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time
     int64_t tai_s = floor_div(tai_ns, UTC_SECOND_NS);
     uint32_t i = entry_at(table, tai_s, 1);
     int64_t posix_s = tai_s - table->leap[i].tai_minus_utc;
-    /* The inserted second: the next entry's midnight by the old offset. */
+    /* In an inserted second, the old offset already gives the midnight of the next entry. */
     int leap = i + 1 < table->n && posix_s >= table->leap[i + 1].posix_s;
     posix_s -= leap;
     int64_t days = floor_div(posix_s, DAY_S);

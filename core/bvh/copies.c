@@ -100,7 +100,7 @@ static void find_origins(const struct bvh_query *query, const struct bvh_copy *c
     }
 }
 
-/* The float rays begin at start_m. Fields are those of `width` rays. */
+/* The float rays begin at start_m. nested->rays has the layout of `width` rays. */
 VEC_INLINE void set_floats(const struct bvh_query *in, struct bvh_nested *nested, uint32_t width)
 {
     float *org = bvh_field(&nested->rays, width, org_x), *dir = bvh_field(&nested->rays, width, dir_x);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Planes of triangles in double: ranges and steepness from them; labels of rays. Loops over arrays that compilers turn
- * into vectors. */
+/* Computes the planes of triangles in double, and from them the ranges and the steepness of hits. Also finds the labels
+ * of hits. Compilers turn the loops over arrays into vector code. */
 #include <math.h>
 
 #include "core/bvh/leaves.h"
@@ -17,7 +17,7 @@ static double difference(double a, double b, double c, double d)
     return (ab - cd) + (vec_product_rest(a, b, ab) - vec_product_rest(c, d, cd));
 }
 
-/* It passes through the triangle's centre. */
+/* Sets the triangle's plane so that it passes through the triangle's centre. */
 void bvh_set_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane)
 {
     const struct scene *scene = bvh->scene;
@@ -57,7 +57,7 @@ const struct bvh_plane *bvh_plane(const struct bvh *bvh, uint32_t triangle)
     return &bvh->leaf[at / 2].plane[at % 2];
 }
 
-/* Where a triangle's plane begins in the leaves, as an array of doubles. */
+/* Returns the index at which a triangle's plane begins, when the leaves are read as one array of doubles. */
 VEC_INLINE int64_t doubles_before(const uint32_t *at_plane, uint32_t triangle, uint32_t n_triangles)
 {
     _Static_assert(sizeof(struct bvh_leaf) == 16 * sizeof(double), "four planes");
@@ -121,7 +121,7 @@ typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
 typedef float float_lanes __attribute__((vector_size(LANES * sizeof(float))));
 typedef uint32_t number_lanes __attribute__((vector_size(LANES * sizeof(uint32_t))));
 
-/* A plane, and where rays meet it. */
+/* A plane, with the figures that are the same for all rays from the point o. */
 struct one_plane {
     double nx, ny, nz, nn, above; /* above: d - n . o */
     uint32_t triangle, label;
@@ -198,7 +198,7 @@ void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_ra
     }
     vec3_sub(rays->from.at_m, bvh->origin_m, o);
     set_one(&p, bvh, triangle, o);
-    const struct bvh_rays r = *rays; /* what is written may not change it */
+    const struct bvh_rays r = *rays; /* a copy: writing to the arrays cannot change it */
     for (; from < to && r.n - from >= LANES; from += LANES)
         ranges_of_lanes(&p, &r, from);
     for (; from < to; from++)

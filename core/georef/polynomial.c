@@ -24,7 +24,7 @@
 
 enum { NODES = POLYNOMIAL_DEGREE + 1, CUBE = NODES * NODES * NODES };
 
-/* GeographicLib's 5 nm for transverse Mercator, 1 nm for geocentric coordinates, and as much again. */
+/* Twice GeographicLib's error for transverse Mercator, 5 nm. Its error for geocentric coordinates is 1 nm. */
 static const double FLOOR_M = 1e-8;
 
 /* lagrange[i][a]: coefficient of t^a in the polynomial that is 1 at node i of -1..1 and 0 at the others. */
@@ -77,8 +77,8 @@ static void next_power(int power[3])
     }
 }
 
-/* Replaces the nodes in the meridian's plane, whose n and u are in value[1] and value[2], by the map there. Beyond the
- * pole, latitude counts on beyond 90 degrees, so that it stays smooth. */
+/* On entry value[1] and value[2] hold n and u of the nodes in the meridian's plane. They are replaced by the map's
+ * values at these nodes. Beyond the pole, latitude counts on beyond 90 degrees, so that it stays smooth. */
 static void sample_meridian(const struct shim_map *map, const struct polynomial *p, double value[3][CUBE])
 {
     double place[3], pole;
@@ -184,8 +184,8 @@ static double series_bound_m(const struct polynomial *p, int order, double radiu
     return bound_m + 10.0 * whole_m[POLYNOMIAL_DEGREE] * ratio * reach_m / p->half_m;
 }
 
-/* Where prcs z is not up at the centre, a point may be as far up as it is away. Turning a point into the meridian moves
- * it by s - a, which is at most radius^2 / 2a. */
+/* Where the z axis of prcs is not vertical at the centre, a point may be as high above the centre as it is far from it.
+ * Turning a point into the meridian moves it by s - a (polynomial.h), which is at most radius^2 / 2a. */
 static double meridian_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                                const double weight[3])
 {

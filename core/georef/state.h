@@ -10,8 +10,8 @@
 struct georef {
     enum georef_crs crs;
     enum georef_method method;
-    double station_m[3]; /* prcs, and ... */
-    double origin[3];    /* ... there in the CRS where there is no map */
+    double station_m[3]; /* prcs */
+    double origin[3];    /* the station in the CRS; only where there is no map */
     double centre_m[3];  /* prcs */
     double anchor[3];
     double rotation[9];   /* where there is no map: prcs -> CRS, row by row */

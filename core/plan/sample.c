@@ -22,7 +22,7 @@ enum {
     PLAIN_EVERY = 8,    /* one of this many other pulses is taken */
     PROBE_RINGS = 4,
     OPTICS_DRAWN = 8192,
-    TRIES = 1 << 23, /* of drawing, a second or two in all: with a narrow field of view most are not cast */
+    TRIES = 1 << 23, /* the most draws, a second or two in all: a narrow field of view rejects most */
     ROOM = 64,       /* in the block; more than LINE_MAX_ECHOES */
     SIGHT_DRAWN = 1024,
     SIGHT_RAYS = 5, /* to the middle of a cell, and to its corners */
@@ -37,7 +37,9 @@ struct echoes {
 
 struct look {
     uint32_t place;
-    int mixed; /* meets more than one smooth surface; optics: the way is longer than what is followed */
+    /* The pulse hits more than one smooth surface. In the sample of the optics: its light goes on beyond
+     * CAST_MAX_DEPTH surfaces. */
+    int mixed;
     uint64_t pulse;
     struct echoes reference;
 };
@@ -52,7 +54,7 @@ struct plan_sample {
     struct look *look; /* of the beam */
     uint32_t n_looks;
     uint64_t drawn, plain, mixed_looks, plain_looks;
-    /* of the optics: with CAST_MAX_DEPTH */
+    /* The sample of the optics. Its references follow light through up to CAST_MAX_DEPTH surfaces. */
     struct look *way;
     uint32_t n_ways;
 };
@@ -405,7 +407,7 @@ void plan_sample_sight(struct plan_sample *s, double cell_rad, double all_rays, 
         count_cell(p->setup.bvh, &rays, all_rays, found);
     }
     if (n == 0) found->ask = n = 1; /* without a sample the map must not seem to pay */
-    found->few += 0.5 * found->ask; /* about half of the cells that seem to ask are decided by lists */
+    found->few += 0.5 * found->ask; /* lists decide about half of the cells that seem to need the BVH */
     found->ask *= 0.5;
     *found = (struct plan_sight_found){found->one / n,   found->nothing / n,   found->few / n,       found->ask / n,
                                        found->small / n, found->per_pulse / n, examined(s, all_rays)};

@@ -42,8 +42,9 @@ size_t nmea_encode_all(char *dst, size_t cap, const struct nmea_fix *fix);
 /* XOR of len characters. */
 uint8_t nmea_checksum(const char *text, size_t len);
 
-/* For protocol_ops of the same names: content marks the decimals after a point, reseal corrects the checksums of the
- * sentences. A changed decimal is another decimal, so that each field stays a number. */
+/* The members `content` and `reseal` of protocol_ops: nmea_content marks the bits that an injected fault may change in
+ * decimals after a point. A changed decimal is still a digit, so each field stays a number. nmea_reseal corrects the
+ * checksums of the sentences. */
 void nmea_content(const uint8_t *bytes, size_t len, uint8_t *mask);
 void nmea_reseal(uint8_t *bytes, size_t len);
 

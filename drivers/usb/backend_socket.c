@@ -105,7 +105,7 @@ int usb_backend_accept(int listener, int *reserve, const struct usb_owner *owner
 
 void usb_backend_hang_up(int fd, int timeout_ms)
 {
-    enum { READS = 8 }; /* a peer that goes on sending is waited for no longer */
+    enum { READS = 8 }; /* the most reads: a peer may go on sending for ever */
     char waste[65536];
     struct pollfd slot = {.fd = fd, .events = POLLIN};
     if (shutdown(fd, SHUT_WR) != 0) return;

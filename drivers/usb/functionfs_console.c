@@ -99,7 +99,7 @@ static void look_at_host(struct ffs_console *console)
 }
 
 /* Sends an event frame before the replies of a new session of the native protocol. The tty may still hold half a stream
- * frame of the session before, and after that a reader takes text only once a whole frame has come (LOSSES.md,
+ * frame of the session before, and after half a frame a reader takes text only once a whole one has come (LOSSES.md,
  * Resynchronisation). */
 static void lead_in(struct ffs_console *console)
 {

@@ -136,8 +136,8 @@ static int query_state(struct command_call *call)
     return command_reply(call, "%s", head_state_name(call->dev->state));
 }
 
-/* Replies with whether the lock holds the rotor, and its azimuth at the last pulse per second. It is no error where no
- * such pulse has come since the rotor turns. */
+/* Replies with whether the lock holds the rotor, and its azimuth at the last pulse per second. Where no such
+ * pulse has come since the rotor began to turn, the reply is NONE, and no error. */
 static int query_phase_edge(struct command_call *call)
 {
     const struct command_phase *phase = &call->dev->phase;
@@ -274,7 +274,7 @@ static int act_store(struct command_call *call)
 static int act_step(struct command_call *call)
 {
     int64_t step_ns;
-    const int64_t day_ns = 86400000000000; /* a grant cannot be taken back */
+    const int64_t day_ns = 86400000000000; /* the most of one step: it cannot be taken back */
     if (command_value_in_range(call, 1, day_ns, &step_ns) != 0) return -1;
     if (call->pose != NULL && command_take_pose(call) != 0) return -1;
     if (!call->dev->step_allowed)

@@ -30,7 +30,7 @@ int fault_board_create(const struct fault_list *list, const char *truth_path, _A
 /* Closes the file of the truth, once nothing is injected any more. Returns the first error in writing it. board may be
  * NULL. */
 int fault_board_close(struct fault_board *board, struct sh_err *err);
-/* 1: the truth's file is behind; callers that can wait should. */
+/* 1: the queue of lines for the truth's file is filling; callers that can wait should, so that no line is dropped. */
 int fault_board_is_filling(const struct fault_board *board);
 void fault_board_free(struct fault_board *board);
 

@@ -28,8 +28,8 @@ static int64_t device_time_ns(void *owner)
     return (int64_t)stream_released(pump->stream) * pump->stream->tick_ns;
 }
 
-/* In the pace step links are there while power is not. A client that knows of the change from another link may come
- * before this link's thread has carried it out (pump_power), so the stream is asked. */
+/* In the pace `step`, links stay open while the head has no power. A client may learn from another link that power has
+ * changed, and come before this link's thread has carried that out (pump_power). So the stream is asked. */
 static int has_no_power(void *owner)
 {
     const struct pump *pump = owner;

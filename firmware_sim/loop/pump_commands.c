@@ -122,8 +122,8 @@ void pump_read_commands(struct pump *pump, struct session *s, int index)
     struct session_commands *c = &s->commands;
     pump_read(pump, s, index);
     pump_take_lines(pump, s);
-    /* Lines wait for a step or a move, and no more fit. Without a rest, poll() would report further ones over and
-     * over. */
+    /* Lines wait for a step or a move, and no more fit. The link rests, since otherwise poll() would report the
+     * bytes still in the system over and over. */
     if (c->in_len - c->in_pos == READ_BYTES) c->wrong = WRONG_AT_ONCE;
     if (c->replies_dropped != 0) {
         source_report(pump->links->source, CMD_E_OVERRUN,

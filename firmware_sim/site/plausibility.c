@@ -13,8 +13,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/steps.h"
 
-/* Hardly any scene for such a head is smaller or larger than this. One that is probably has a scale that is wrong by a
- * thousand. */
+/* Hardly any scene for such a head is smaller or larger than this. The scale of a scene beyond these limits is probably
+ * wrong by a factor of a thousand. */
 static const double SMALL_M = 0.05, LARGE_M = 10000.0;
 
 /* A scan is called mostly empty where a smaller share of its pulses hits a surface. */
@@ -44,8 +44,8 @@ static void check_size(const struct site *site, const struct sh_report *report)
         cfg->file, size_m, program_of(site)->range_min_m, program_of(site)->range_max_m, cfg->scene.mesh[0].scale);
 }
 
-/* Warns of lines without a pulse. Each line has the same window; unless the pulse rate is a multiple of the line rate,
- * some lines may still have a pulse in it. */
+/* Warns of lines without a pulse. Each line has the same window. Unless the pulse rate is a multiple of the line rate,
+ * pulses shift from line to line, so some lines may have a pulse in the window and others none. */
 static void check_lines(const struct site *site, const struct sh_report *report)
 {
     const struct head_settings *s = &site->cfg->head.settings;

@@ -75,8 +75,8 @@ double site_range_noise_m(const struct site *site);
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops) */
 /* Replaces the stations, once they are placed, by the stops. Without a trajectory these are all stations at the first
  * time, then all at the next. Along a trajectory there is one station, and the head stops on the way. Without an anchor
- * that station gives the scene's place on the Earth, as an anchor at its position with the scene's y axis to true north
- * would. */
+ * that station gives the scene's place on the Earth: it counts as an anchor at its position, with the scene's y axis to
+ * true north. */
 int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 /* Reads the trajectory, and cuts the path into stretches. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
@@ -108,7 +108,8 @@ int site_choose_methods(struct site *site, const struct sh_report *report, struc
 /* After beam and optics are chosen. Sets site->plan.methods.sight and the row. */
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_close_sights(struct site *site);
-/* Takes over the maps of another site's stations that stand as they did. Then site_open_sights makes the others. */
+/* Takes over another site's maps for stations that have the same position, attitude and BVH there. Then
+ * site_open_sights makes the others. */
 void site_share_sights(struct site *site, const struct site *from);
 
 #endif

@@ -112,7 +112,8 @@ static float reflectance_db(unsigned intensity)
     return intensity == 0 ? (float)NAN : (float)(((double)intensity - 32768.0) / 100.0);
 }
 
-/* LAS has no shots without echo: writers that know of no returns leave 0, and then the point is the only one. */
+/* A point in a LAS file is an echo, so its shot has at least one. Writers that do not know the number of returns leave
+ * 0: then the point counts as the only echo of its shot. */
 static uint8_t known_return(int number)
 {
     return number > 0 ? (uint8_t)number : 1;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool shows the panorama of a station under the picture, by range, intensity or surface. Pointing at it shows the
-// point in the picture, and back. A click turns the picture to the point, or picks it while something is measured.
+// point in the picture. Pointing at the picture shows the point in the panorama. A click turns the picture to the
+// point, or picks it while something is measured.
 import {atMostEvery, byId, make, say, short} from './page.js';
 import {MODES} from './view_colours.js';
 import {Panorama} from './panorama.js';
@@ -22,7 +23,7 @@ export class PanoramaTool {
   #timer = 0;
   #began = 0;
   #rests_until = 0;
-  #cursor = null; // the pixel of the keys
+  #cursor = null; // the pixel that arrow keys move; null before the first key
   #box = byId('panorama');
   #canvas = make('canvas', {tabindex: 0, role: 'application', 'aria-roledescription': 'panorama', 'aria-label':
     'The points as seen from the head. Arrow keys move a cursor, Enter turns the picture to its point.'});

@@ -45,9 +45,9 @@ export class Camera {
   azimuth = radians(-35); // it is the heading of the line of sight, clockwise from north
   elevation = radians(-25);
   fov = radians(50); // it is the angle across the shorter side
-  inside = false; // the eye stays, as in a head: turning looks round
+  inside = false; // the eye is in the place of a head: it stays there when the camera turns
   flat = false; // it is orthographic
-  before = null; // it has the direction from before the flat views (view_sides.js)
+  before = null; // the direction that the camera had before the flat views (view_sides.js)
   section = null; // only what is in this Section (section.js) is seen
   width = 1;
   height = 1;
@@ -118,8 +118,8 @@ export class Camera {
     this.target = add(add(this.target, this.right, -dx * k), this.up, dy * k);
   }
 
-  // With factor < 1 the eye comes nearer; the place p stays where it is on the screen. From inside the field of view
-  // changes instead.
+  // With factor < 1 the eye comes nearer; the place p stays where it is on the screen. Where `inside` is set, the
+  // field of view changes instead.
   zoom(factor, p) {
     if (this.inside) {
       this.fov = clamp(this.fov * factor, radians(2), radians(110));

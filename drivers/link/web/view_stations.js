@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This module has the stations in the picture: tripods, the selected one, and its moves. It is dragged along the plane
-// at its height, and turned by its handle or by keys. During a move a ghost stays at its old place.
+// This module has the stations in the picture: tripods, the selected one, and its moves. A station is dragged along
+// the plane at its height, and turned by its handle or by keys. During a move a ghost stays at its old place.
 
 import {add, arrowStep, degrees, headingTo, onPlane, radians} from './view_camera.js';
 import {feetBelow} from './view_mesh.js';
@@ -211,8 +211,8 @@ export class Stations {
     this.#changed();
   }
 
-  // The points of a trial, which followed the dragged station, go back with it. The pointer may still be down: its
-  // further moves do nothing.
+  // The points of a trial (trial.js) followed the dragged station, and go back with it. The pointer may still be down:
+  // its further moves do nothing.
   cancel() {
     const station = this.moved && this.get(this.moved.number);
     const wasDragged = this.#hold !== null;
