@@ -55,7 +55,7 @@ if [ -z "$part" ]; then
     export FUZZ_BUILD="$build/asan" JOBS=1
     export TSAN_HEAD="$build/tsan_short/tsan_head"
     export SANITIZED_HEAD="$build/asan/scanhead"
-    set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan") tests/check/tsan_short.sh tests/check_sanitized.sh
+    set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan") tests/check/tsan_short.sh +tests/check_sanitized.sh
 fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
 if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh tests/check_lockstep.sh tests/check_scanheadd.sh tests/check_package.sh; fi # a browser beside them
