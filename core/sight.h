@@ -20,9 +20,8 @@
 
 struct sight;
 
-/* Triangles that follow each other in the scene's list make a group of up to 32. A map leaves a whole group to the BVH
- * where fewer rays than this, for each of its triangles, hit the box around the group. Examining a triangle costs as
- * much as it saves for this many rays. */
+/* A map leaves triangles to the BVH that fewer rays than this meet, unless larger ones are in their group. Examining a
+ * triangle costs as much as it saves for this many rays. */
 #define SIGHT_GROUP_RAYS 64.0
 
 struct sight_spec {
@@ -39,8 +38,10 @@ struct sight_spec {
 };
 
 struct sight_info {
-    uint32_t cells;             /* along an edge of the cube's faces */
-    uint64_t bytes, peak_bytes; /* memory now, and the most while it was made */
+    uint32_t cells;                /* along an edge of the cube's faces */
+    double one, nothing, few, ask; /* shares of the directions that were looked at */
+    uint64_t lists, records;       /* candidate lists; triangles in them, each counted once a region */
+    uint64_t bytes, peak_bytes;    /* kept; while it was made */
     double build_s;
 };
 
@@ -48,8 +49,8 @@ struct sight_info {
 int sight_possible(const struct scene *scene);
 /* Cells along an edge of the cube's faces, for rays and memory_bytes as of struct sight_spec. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes);
-/* Estimates how many triangles a sight would examine one by one: those whose group is not left to the BVH. At most
- * 1,024 of the groups are looked at. */
+/* Returns about how many triangles a sight would examine one by one: those that are not in a group for the BVH.
+ * It looks at a few thousand of them. */
 double sight_examined(const struct sight_spec *spec);
 /* Made by `threads` threads (0: all). SH_ESTOPPED where report asks to stop, SH_ENOMEM. */
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,
@@ -59,7 +60,7 @@ void sight_get_info(const struct sight *sight, struct sight_info *info);
 
 /* How often rays could not be decided by the map. */
 struct sight_counters {
-    uint64_t few;   /* rays decided among the triangles of a candidate list */
+    uint64_t few;   /* rays decided among a few triangles */
     uint64_t asked; /* the BVH was asked: the cell says so, or double precision can't separate two edges or planes */
 };
 

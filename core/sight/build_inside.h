@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to core/sight: how a sight is made.
  *
- * The map is a cube about the station (sight_inside.h). Triangles are sorted into regions, which are squares of cells
- * on its faces (bins.c). Each region is then divided as Warnock's algorithm does (J. Warnock, A hidden surface
- * algorithm, 1969): a square is a leaf where no triangle may be seen in it, or where one covers it and hides the
- * others. Else its quarters are examined, down to a cell (region.c).
+ * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as Warnock's
+ * algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square is a leaf where no triangle may be seen in
+ * it, or where one covers it and hides the others. Else its quarters are examined, down to a cell (region.c).
  *
  * Triangles that follow each other in the scene's list make a group. Where a group's triangles are so small that too
  * few rays meet each, the group is a candidate as a whole: the box around it says where it may be seen, and how near it
@@ -19,6 +18,7 @@
 enum {
     BUILD_REGIONS = 16, /* along an edge of a face, at most */
     BUILD_NO_RECORD = 0xffffffff,
+    BUILD_NOT_KEPT = 0xffffffff,
     BUILD_GROUP = 32, /* triangles of a group */
     BUILD_GROUP_BIT = 31,
 };
@@ -29,16 +29,16 @@ enum {
 #define BUILD_WIDER  (1.0 + 4.0 * SIGHT_PAD)
 #define BUILD_BESIDE (1e6 * SIGHT_TILT_DOUBT)
 
-/* The box around a group of triangles, or around one, from the station. */
+/* The box around a group, from the station. */
 struct build_group {
     double lo_m[3], hi_m[3];
     double far_m;   /* no coordinate is larger */
-    int8_t whole;   /* of a group: it is a candidate itself */
+    int8_t whole;   /* it is a candidate itself */
     uint8_t beside; /* a bit for each face that shows nothing of it */
 };
 
-/* A triangle in a region. Its functions are linear in u and v: f[0] + f[1] u + f[2] v. struct sight_record says what
- * they mean, and in which units they are. */
+/* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. What they
+ * mean and are scaled by: struct sight_record. */
 struct build_candidate {
     union {
         double edge[3][3];
@@ -62,28 +62,28 @@ struct build_shared {
     struct sight *sight;
     const struct sight_spec *spec;
     const struct sh_report *report;
-    uint32_t regions, region_cells; /* along an edge of a face; cells along an edge of a region */
-    uint8_t *seen;                  /* [regions of all faces] 0: no ray goes there */
-    uint64_t *bin;                  /* [regions of all faces + 1] of binned */
-    uint32_t *binned;               /* triangles and groups by region */
-    struct build_group *group;      /* [n_groups] */
+    uint32_t regions, region_cells;  /* along an edge of a face; cells along an edge of a region */
+    struct build_candidate *figures; /* of triangles in many regions, in prcs, without slopes */
+    uint32_t *kept;                  /* [of all triangles] place in figures, or BUILD_NOT_KEPT; NULL: none are kept */
+    uint8_t *seen;                   /* [regions of all faces] 0: no ray goes there */
+    uint64_t *bin;                   /* [regions of all faces + 1] of binned */
+    uint32_t *binned;                /* triangles and groups by region */
+    struct build_group *group;       /* [n_groups] */
     uint32_t n_groups;
-    _Atomic uint32_t next;  /* region to be divided */
-    _Atomic uint64_t bytes; /* taken, of spec->memory_bytes */
+    _Atomic uint32_t next;       /* region to be divided */
+    _Atomic uint64_t bytes;      /* taken, of spec->memory_bytes */
+    _Atomic uint64_t given_back; /* of these, freed at the end */
     struct build_arena leaf, list, record;
-    int may_coarsen;    /* 1: where the memory is full, the build begins again with larger cells */
-    _Atomic int full;   /* bytes would have become more than the memory */
-    _Atomic int failed; /* SH_ENOMEM, SH_ESTOPPED */
+    _Atomic uint64_t cells[4]; /* by what they say: one, nothing, few, ask */
+    int may_coarsen;           /* 1: where the memory is full, the build begins again with larger cells */
+    _Atomic int full;          /* bytes would have become more than the memory */
+    _Atomic int failed;        /* SH_ENOMEM, SH_ESTOPPED */
 };
 
 /* Takes n elements of `size` bytes. UINT64_MAX: there is no more room. */
 uint64_t build_take(struct build_shared *b, struct build_arena *arena, uint64_t n, uint64_t size);
 
 /* ---- groups.c */
-/* How many triangles a group has: BUILD_GROUP, but for the last one. */
-uint32_t build_group_size(const struct sight *sight, uint32_t group);
-/* Sets the box around n triangles: all members but `whole`. */
-void build_box(const struct sight *sight, uint32_t first, uint32_t n, struct build_group *g);
 int build_groups(struct build_shared *b, struct sh_err *err);
 /* Finds where a group is seen on a face: u from rect[0][0] to rect[0][1], v in rect[1]. Returns 0 where no bounds are
  * known. */
@@ -94,11 +94,12 @@ void build_group_candidate(const struct build_group *g, uint32_t face, struct bu
 int build_bins(struct build_shared *b, struct sh_err *err);
 
 /* ---- candidate.c */
-/* Sets v to a triangle's corners, from the station. */
+/* Corners relative to the station. */
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3]);
-/* The figures of a triangle as seen from the station, in the coordinates of a face. False where no ray meets it: it has
- * no area, or a corner is at the station. */
-int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c);
+/* Computes the figures of triangles in many regions in advance. */
+void build_figures(struct build_shared *b);
+/* False where no ray meets the triangle: it has no area, or a corner is at the station. */
+int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triangle, struct build_candidate *c);
 void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r);
 
 /* ---- region.c */

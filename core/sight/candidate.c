@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* The figures of a triangle as seen from the station: in which directions it lies, how far away, and bounds of the
- * rounding errors of both (doubts, sight_inside.h). */
+/* The figures of a triangle as seen from the station: its directions, its distance, and the doubts of
+ * both. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/sight/build_inside.h"
 #include "core/vec3.h"
+
+/* The figures of triangles in at least so many regions are kept, unless they take a larger share of the memory. */
+enum { MANY_REGIONS = 4, FIGURES_SHARE = 8 };
 
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
 {
@@ -15,7 +18,7 @@ void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
         vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], sight->station_m, v[i]);
 }
 
-/* Rewrites a linear function of the direction as one of a face's coordinates: out[0] + out[1] u + out[2] v. */
+/* Takes a function linear in the direction to the coordinates of a face. */
 static void to_face(const double f[3], uint32_t face, double out[3])
 {
     const uint32_t axis = face / 2;
@@ -32,7 +35,7 @@ static void from_face(const double f[3], uint32_t face, double out[3])
     out[(axis + 2) % 3] = f[2];
 }
 
-/* Sets the side of edge a-b, in units of its doubt (sight_inside.h). */
+/* The side of edge a-b, in units of its doubt (sight_inside.h). */
 static void set_edge(const double a[3], const double b[3], double sign, double side[3])
 {
     double e[3];
@@ -69,10 +72,10 @@ static int set_plane(const struct sight *sight, struct build_candidate *c)
 /* For a triangle where double precision can't say from which side the station sees it, the sides of its edges have no
  * certain sign. Two strips of directions each hold all rays that may hit it. The narrower one replaces the edges:
  * directions beside it are certainly outside, and none is inside.
- * - Directions at a small angle to the plane. A ray at a larger angle meets the plane so near to the station that it
- *   does not count as a hit (SIGHT_NEAR). This also holds where the plane is at the station up to rounding.
- * - Directions that pass the longest edge by at most the triangle's width. Inside of the triangle the sides of its
- *   three edges have one sign, and their sum is n . d. So none of them is larger than that. */
+ * - Directions along the plane. A ray at a larger angle hits the plane where the ray begins (SIGHT_NEAR).
+ *   This also holds where the plane is at the station up to rounding.
+ * - Directions past the longest edge by at most the triangle's width: inside, the sides of all three edges together
+ *   are n . d, and have one sign. */
 static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3])
 {
     const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);
@@ -124,18 +127,54 @@ static int find_figures(const struct sight *sight, uint32_t triangle, struct bui
     return 1;
 }
 
-int build_candidate(const struct sight *sight, uint32_t face, uint32_t triangle, struct build_candidate *c)
+/* The same in the coordinates of a face. */
+static void candidate_turn(const struct build_candidate *from, uint32_t face, struct build_candidate *c)
 {
-    struct build_candidate figures;
-    if (!find_figures(sight, triangle, &figures)) return 0;
-    *c = figures;
+    *c = *from;
     for (int i = 0; i < 3; i++) {
-        to_face(figures.edge[i], face, c->edge[i]);
+        to_face(from->edge[i], face, c->edge[i]);
         c->edge_slope[i] = fabs(c->edge[i][1]) + fabs(c->edge[i][2]);
     }
-    to_face(figures.plane, face, c->plane);
+    to_face(from->plane, face, c->plane);
     c->plane_slope = fabs(c->plane[1]) + fabs(c->plane[2]);
+}
+
+int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triangle, struct build_candidate *c)
+{
+    struct build_candidate figures;
+    const uint32_t kept = b->kept == NULL ? BUILD_NOT_KEPT : b->kept[triangle];
+    if (kept == BUILD_NOT_KEPT) {
+        if (!find_figures(b->sight, triangle, &figures)) return 0;
+        candidate_turn(&figures, face, c);
+        return 1;
+    }
+    if (b->figures[kept].triangle == BVH_NO_TRIANGLE) return 0;
+    candidate_turn(&b->figures[kept], face, c);
     return 1;
+}
+
+/* Before, kept[i] is the number of regions that triangle i lies in; afterwards it is its place in
+ * figures. */
+void build_figures(struct build_shared *b)
+{
+    const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles;
+    uint32_t places = 0;
+    for (uint32_t i = 0; i < n; i++)
+        b->kept[i] = b->kept[i] >= MANY_REGIONS ? places++ : BUILD_NOT_KEPT;
+    const uint64_t bytes = places * sizeof *b->figures;
+    if (bytes <= b->spec->memory_bytes / FIGURES_SHARE) b->figures = malloc(bytes + 1);
+    if (b->figures == NULL) {
+        free(b->kept);
+        b->kept = NULL;
+        return;
+    }
+    b->bytes += bytes;
+    b->given_back += bytes;
+    for (uint32_t i = 0; i < n; i++) {
+        const uint32_t at = b->kept[i];
+        if (at != BUILD_NOT_KEPT && !find_figures(b->sight, i, &b->figures[at]))
+            b->figures[at].triangle = BVH_NO_TRIANGLE;
+    }
 }
 
 void build_record(const struct build_candidate *c, uint32_t face, struct sight_record *r)

@@ -9,10 +9,24 @@
 
 enum { GROUPS_LOOKED_AT = 1024 };
 
-uint32_t build_group_size(const struct sight *sight, uint32_t group)
+static uint32_t triangles_of(const struct build_shared *b, uint32_t group)
 {
-    const uint32_t left = bvh_scene(sight->bvh)->n_triangles - group * BUILD_GROUP;
+    const uint32_t left = bvh_scene(b->sight->bvh)->n_triangles - group * BUILD_GROUP;
     return left < BUILD_GROUP ? left : BUILD_GROUP;
+}
+
+static void find_box(const struct build_shared *b, uint32_t group, uint32_t n, struct build_group *g)
+{
+    vec3_bound_nothing(g->lo_m, g->hi_m);
+    for (uint32_t i = 0; i < n; i++) {
+        double v[3][3];
+        sight_corners(b->sight, group * BUILD_GROUP + i, v);
+        for (int c = 0; c < 3; c++)
+            vec3_bound(g->lo_m, g->hi_m, v[c]);
+    }
+    g->far_m = 0.0;
+    for (int k = 0; k < 3; k++)
+        g->far_m = fmax(g->far_m, fmax(-g->lo_m[k], g->hi_m[k]));
 }
 
 /* The interval that a box takes along an axis of a face. */
@@ -28,10 +42,8 @@ static void to_face(const struct build_group *g, uint32_t face, struct reach at[
     if (face & 1) at[0] = (struct reach){-at[0].hi_m, -at[0].lo_m};
 }
 
-/* Returns whether the whole box lies beyond one side of the face's pyramid, or behind the station. Boxes that touch a
- * side count as within: a triangle seen edge-on may be hit a little beside its end. BUILD_BESIDE bounds that distance:
- * it is SIGHT_TILT_DOUBT over 1e-6. Where the sine of the angle to the plane is below 1e-6, core/bvh limits ranges to
- * those between the edges. */
+/* Returns whether the whole box lies beyond one side of the face's pyramid, or behind the station. bins.c asks the same
+ * of a triangle. */
 static int is_beside(const struct build_group *g, uint32_t face)
 {
     struct reach at[3];
@@ -39,23 +51,6 @@ static int is_beside(const struct build_group *g, uint32_t face)
     const double edge_m = BUILD_BESIDE * g->far_m, side_m = BUILD_WIDER * at[0].hi_m + edge_m;
     return at[0].hi_m < -edge_m || at[1].lo_m > side_m || -at[1].hi_m > side_m || at[2].lo_m > side_m ||
            -at[2].hi_m > side_m;
-}
-
-void build_box(const struct sight *sight, uint32_t first, uint32_t n, struct build_group *g)
-{
-    vec3_bound_nothing(g->lo_m, g->hi_m);
-    for (uint32_t i = 0; i < n; i++) {
-        double v[3][3];
-        sight_corners(sight, first + i, v);
-        for (int c = 0; c < 3; c++)
-            vec3_bound(g->lo_m, g->hi_m, v[c]);
-    }
-    g->far_m = 0.0;
-    for (int k = 0; k < 3; k++)
-        g->far_m = fmax(g->far_m, fmax(-g->lo_m[k], g->hi_m[k]));
-    g->beside = 0;
-    for (uint32_t face = 0; face < SIGHT_FACES; face++)
-        g->beside |= (uint8_t)(is_beside(g, face) << face);
 }
 
 int build_group_rect(const struct build_group *g, uint32_t face, double rect[2][2])
@@ -97,8 +92,11 @@ static int is_whole(const struct build_shared *b, const struct build_group *g, u
 
 static void set_group(const struct build_shared *b, uint32_t i, struct build_group *g)
 {
-    build_box(b->sight, i * BUILD_GROUP, build_group_size(b->sight, i), g);
-    g->whole = (int8_t)is_whole(b, g, build_group_size(b->sight, i));
+    find_box(b, i, triangles_of(b, i), g);
+    g->beside = 0;
+    for (uint32_t face = 0; face < SIGHT_FACES; face++)
+        g->beside |= (uint8_t)(is_beside(g, face) << face);
+    g->whole = (int8_t)is_whole(b, g, triangles_of(b, i));
 }
 
 static uint32_t groups_of(const struct build_shared *b)
@@ -117,8 +115,8 @@ double sight_examined(const struct sight_spec *spec)
     for (uint32_t i = 0; i < n; i += step) {
         struct build_group g;
         set_group(&b, i, &g);
-        all += build_group_size(&sight, i);
-        examined += g.whole ? 0.0 : build_group_size(&sight, i);
+        all += triangles_of(&b, i);
+        examined += g.whole ? 0.0 : triangles_of(&b, i);
     }
     return n != 0 ? bvh_scene(spec->bvh)->n_triangles * examined / all : 0.0;
 }
@@ -131,6 +129,7 @@ int build_groups(struct build_shared *b, struct sh_err *err)
     if (b->group == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory for %u groups", n);
     b->n_groups = n;
     b->bytes += bytes;
+    b->given_back += bytes;
     for (uint32_t i = 0; i < n; i++) {
         if ((i & 0xfff) == 0 && sh_check_stop(b->report, err) != SH_OK) return SH_ESTOPPED;
         set_group(b, i, &b->group[i]);
@@ -138,8 +137,7 @@ int build_groups(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* near_m becomes the distance of the box's nearest point. The factor 1 - 1e-12 makes up for the rounding of the
- * squares, so that no point is nearer. */
+/* near_m is that of the box's nearest point. The rounding of its squares loses less than 1e-12. */
 void build_group_candidate(const struct build_group *g, uint32_t face, struct build_candidate *c)
 {
     double rect[2][2], near2 = 0.0;

@@ -9,9 +9,10 @@
 
 enum { NO_CANDIDATE = 0xffffffff };
 
-/* A square of cells on the face, `size` cells wide. */
+/* A square of cells on the face, `size` cells wide, and its middle. */
 struct square {
     uint32_t u, v, size;
+    double mid_u, mid_v, half;
 };
 
 /* Candidates that may be seen in a square. */
@@ -32,14 +33,16 @@ struct division {
     struct build_work *w;
     uint32_t face;
     uint32_t *block; /* leaves of the tile at hand, where squares are smaller than a tile */
+    uint32_t block_u, block_v;
+    uint64_t cells[4];
 };
 
 /* Four quarters of a square at a time. */
 struct quarters {
     struct square square[4];
     struct seen seen[4];
-    quad u, v;   /* their middles, in the coordinates of the face */
-    double half; /* of each one's width, with the pad */
+    quad u, v;   /* their middles */
+    double half; /* of each, with the pad */
     /* The plane of the candidate that covers each quarter; cover is NO_CANDIDATE, and first 0, where none
      * does. */
     quad_mask cover;
@@ -84,8 +87,7 @@ VEC_INLINE uint16_t place_group(const struct build_candidate *c, const struct qu
 }
 
 /* Finds which candidates lie outside of each quarter, which cover it, and which of those comes first in its
- * middle. A doubt bounds a rounding error per unit length of a ray (sight_inside.h). Rays here are 1 to sqrt(3) long,
- * since a direction's largest component is 1. So twice each doubt is a bound. */
+ * middle. Rays here are 1 to sqrt(3) long, since a direction's largest component is 1. So doubts count twice. */
 VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
 {
     quad first = {0.0, 0.0, 0.0, 0.0};
@@ -184,12 +186,12 @@ static void region_look(const struct build_work *w, const struct seen *in, struc
     }
 }
 
-/* Sets a square's leaf: in each tile of the square or, where it is smaller than a tile, in the current block. */
+/* Sets a square's leaf: of whole tiles, or in the current block. */
 static void put_leaf(const struct division *d, const struct square *q, uint32_t leaf)
 {
     struct sight *s = d->b->sight;
     if (q->size < SIGHT_TILE) {
-        uint32_t *to = &d->block[q->v % SIGHT_TILE * SIGHT_TILE + q->u % SIGHT_TILE];
+        uint32_t *to = &d->block[(q->v - d->block_v) * SIGHT_TILE + q->u - d->block_u];
         for (uint32_t v = 0; v < q->size; v++)
             for (uint32_t u = 0; u < q->size; u++)
                 to[v * SIGHT_TILE + u] = leaf;
@@ -224,10 +226,18 @@ static uint32_t make_list(const struct division *d, const struct seen *seen)
     return (uint32_t)SIGHT_FEW << SIGHT_KIND_SHIFT | (uint32_t)at;
 }
 
-static void put_few(const struct division *d, const struct square *q, const struct seen *seen)
+enum { ONE, NOTHING, FEW, ASK };
+
+static void region_end(struct division *d, const struct square *q, uint32_t leaf, int what)
+{
+    put_leaf(d, q, leaf);
+    d->cells[what] += (uint64_t)q->size * q->size;
+}
+
+static void end_few(struct division *d, const struct square *q, const struct seen *seen)
 {
     if (*seen->leaf == NO_LEAF) *seen->leaf = make_list(d, seen);
-    put_leaf(d, q, *seen->leaf);
+    region_end(d, q, *seen->leaf, *seen->leaf == SIGHT_ASK ? ASK : FEW);
 }
 
 static int all_cover(const struct seen *seen)
@@ -240,18 +250,18 @@ static int all_cover(const struct seen *seen)
 
 static void divide(struct division *d, const struct square *q, const struct seen *seen);
 
-/* All numbers here are multiples of powers of two: they are exact. */
-static void make_quarters(const struct division *d, const struct square *q, const struct seen *seen,
-                          struct quarters *four)
+static void make_quarters(const struct square *q, const struct seen *seen, struct quarters *four)
 {
-    const double cell = 2.0 / d->b->sight->cells;
-    const uint32_t size = q->size / 2;
-    four->half = 0.5 * size * cell + SIGHT_PAD;
+    const double half = 0.5 * q->half;
     for (uint32_t k = 0; k < 4; k++) {
-        const struct square own = {q->u + (k & 1) * size, q->v + (k >> 1) * size, size};
-        four->square[k] = own;
-        four->u[k] = (own.u + 0.5 * size) * cell - 1.0;
-        four->v[k] = (own.v + 0.5 * size) * cell - 1.0;
+        four->square[k] = (struct square){.u = q->u + (k & 1) * (q->size / 2),
+                                          .v = q->v + (k >> 1) * (q->size / 2),
+                                          .size = q->size / 2,
+                                          .mid_u = q->mid_u + (k & 1 ? half : -half),
+                                          .mid_v = q->mid_v + (k & 2 ? half : -half),
+                                          .half = half};
+        four->u[k] = four->square[k].mid_u;
+        four->v[k] = four->square[k].mid_v;
         four->seen[k].list = seen->above + k * (size_t)seen->n;
         four->seen[k].above = seen->above + 4 * (size_t)seen->n;
     }
@@ -260,7 +270,8 @@ static void make_quarters(const struct division *d, const struct square *q, cons
 static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
 {
     struct quarters four;
-    make_quarters(d, q, seen, &four);
+    four.half = 0.5 * q->half + SIGHT_PAD;
+    make_quarters(q, seen, &four);
     region_look(d->w, seen, &four);
     for (uint32_t k = 0; k < 4; k++) {
         struct seen *mine = &four.seen[k];
@@ -275,6 +286,8 @@ static void divide_tile(struct division *d, const struct square *q, const struct
 {
     uint32_t block[SIGHT_BLOCK], same = 1;
     d->block = block;
+    d->block_u = q->u;
+    d->block_v = q->v;
     divide_quarters(d, q, seen);
     while (same < SIGHT_BLOCK && block[same] == block[0])
         same++;
@@ -296,13 +309,13 @@ static void divide_tile(struct division *d, const struct square *q, const struct
 static void divide(struct division *d, const struct square *q, const struct seen *seen)
 {
     if (seen->n == 0)
-        put_leaf(d, q, SIGHT_NOTHING);
+        region_end(d, q, SIGHT_NOTHING, NOTHING);
     else if (seen->n == 1 && seen->cover != NO_CANDIDATE)
-        put_leaf(d, q, d->w->candidate[seen->cover].triangle);
+        region_end(d, q, d->w->candidate[seen->cover].triangle, ONE);
     else if (seen->groups == seen->n && (seen->filled || q->size <= GROUPS_SIZE))
-        put_leaf(d, q, SIGHT_ASK);
+        region_end(d, q, SIGHT_ASK, ASK);
     else if (q->size == 1 || (seen->n <= SIGHT_MAX_LIST && seen->cover != NO_CANDIDATE && all_cover(seen)))
-        put_few(d, q, seen);
+        end_few(d, q, seen);
     else if (q->size == SIGHT_TILE)
         divide_tile(d, q, seen);
     else
@@ -355,7 +368,7 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
         const uint32_t number = b->binned[i];
         struct build_candidate *c = &w->candidate[w->n];
         if ((number & BUILD_IS_GROUP) == 0) {
-            w->n += (size_t)build_candidate(b->sight, face, number, c);
+            w->n += (size_t)build_candidate(b, face, number, c);
             continue;
         }
         build_group_candidate(&b->group[number & ~BUILD_IS_GROUP], face, c);
@@ -367,11 +380,21 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     return SH_OK;
 }
 
+static struct square square_of(const struct build_shared *b, uint32_t region)
+{
+    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
+    const double cell = 2.0 / b->sight->cells;
+    struct square q = {
+        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
+    q.mid_u = (q.u + 0.5 * size) * cell - 1.0;
+    q.mid_v = (q.v + 0.5 * size) * cell - 1.0;
+    return q;
+}
+
 int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
 {
     struct division d = {.b = b, .w = w, .face = region / (b->regions * b->regions)};
-    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
-    const struct square all = {at % b->regions * size, at / b->regions * size, size};
+    const struct square all = square_of(b, region);
     int fits;
     if (!b->seen[region]) return SH_OK;
     int rc = gather(b, w, region, d.face, &fits);
@@ -383,6 +406,11 @@ int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
                         .groups = (uint32_t)w->groups,
                         .own_leaf = NO_LEAF};
     seen.leaf = &seen.own_leaf;
-    if (fits) divide(&d, &all, &seen); /* else its tiles ask, as they did from the beginning */
+    if (fits)
+        divide(&d, &all, &seen);
+    else
+        region_end(&d, &all, SIGHT_ASK, ASK);
+    for (int i = 0; i < 4; i++)
+        atomic_fetch_add_explicit(&b->cells[i], d.cells[i], memory_order_relaxed);
     return SH_OK;
 }

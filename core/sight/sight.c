@@ -46,8 +46,8 @@ uint32_t sight_cells(double rays, uint64_t memory_bytes)
     return cells;
 }
 
-/* Arrays have their largest size: pages that are never touched take no memory. Large ones are in huge pages, since they
- * are filled at once and read at random. */
+/* Arrays have their largest size: pages that are never touched take no memory. They are in huge pages, since they are
+ * filled at once and read at random. */
 static void *take_array(struct build_shared *b, struct build_arena *arena, uint64_t most, uint64_t size)
 {
     const uint64_t within = b->spec->memory_bytes / size + 1;
@@ -72,8 +72,8 @@ static int take_arrays(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* Where the memory is full, rays of all further regions would ask the BVH. Cells of twice the width everywhere are
- * better than that. */
+/* Coarser cells everywhere are better than fine ones in some places, unless they have to be much
+ * coarser. */
 static int is_too_fine(const struct build_shared *b)
 {
     return b->may_coarsen && atomic_load_explicit(&b->full, memory_order_relaxed);
@@ -91,6 +91,7 @@ static void build_some(void *shared, int reports)
         const int rc = sh_stopped(b->report) ? SH_ESTOPPED : build_region(b, &w, region);
         if (rc != SH_OK) atomic_store(&b->failed, rc);
     }
+    atomic_fetch_add(&b->given_back, w.taken);
     build_work_free(&w);
 }
 
@@ -119,23 +120,40 @@ static int keep_records(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
+static void sight_finish(struct build_shared *b)
 {
     struct sight *s = b->sight;
+    struct sight_info *info = &s->info;
+    double all = 0.0;
+    /* Where an array can't shrink, it stays. */
+    resize(&s->leaf, b->leaf.used, sizeof *s->leaf);
+    resize(&s->list, b->list.used, sizeof *s->list);
+    for (int i = 0; i < 4; i++)
+        all += (double)b->cells[i];
+    all = all > 0.0 ? all : 1.0;
+    *info = (struct sight_info){.cells = s->cells,
+                                .one = (double)b->cells[0] / all,
+                                .nothing = (double)b->cells[1] / all,
+                                .few = (double)b->cells[2] / all,
+                                .ask = (double)b->cells[3] / all,
+                                .lists = b->list.used,
+                                .records = b->record.used,
+                                .bytes = b->bytes - b->given_back,
+                                .peak_bytes = b->bytes};
+}
+
+static int build(struct build_shared *b, unsigned threads, struct sh_err *err)
+{
     int rc = take_arrays(b, err);
     if (rc == SH_OK) rc = build_groups(b, err);
     if (rc == SH_OK) rc = build_bins(b, err);
+    if (rc == SH_OK) build_figures(b);
     if (rc == SH_OK) rc = build_all(b, threads, err);
     if (rc == SH_OK && !is_too_fine(b)) rc = keep_records(b, err);
-    if (rc == SH_OK) { /* where an array can't shrink, it stays */
-        resize(&s->leaf, b->leaf.used, sizeof *s->leaf);
-        resize(&s->list, b->list.used, sizeof *s->list);
-        s->info = (struct sight_info){.cells = s->cells,
-                                      .bytes = tiles_of(s->cells) * sizeof *s->tile + b->leaf.used * sizeof *s->leaf +
-                                               b->list.used * sizeof *s->list + b->record.used * sizeof *s->record,
-                                      .peak_bytes = b->bytes};
-    }
+    if (rc == SH_OK) sight_finish(b);
     free(b->seen);
+    free(b->figures);
+    free(b->kept);
     free(b->bin);
     free(b->binned);
     free(b->group);
@@ -152,8 +170,8 @@ static void free_arrays(struct sight *s)
     s->record = NULL;
 }
 
-/* Builds with the current number of cells. Returns TOO_FINE where the memory does not hold them and may_coarsen is
- * set. */
+/* Builds with the current number of cells. TOO_FINE where the memory does not hold them, and
+ * may_coarsen. */
 static int try_cells(struct sight *s, const struct sight_spec *spec, unsigned threads, const struct sh_report *report,
                      int may_coarsen, struct sh_err *err)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/sight: the map of directions, and the triangles among which the hits of its rays are.
+/* Private to core/sight: the map of directions, and the triangles that rays of it are decided among.
  *
  * A direction d belongs to the face of the cube that its largest component points through: face
  * 2 * axis + (d[axis] < 0). There it has the coordinates u = d[axis + 1] / |d[axis]| and
@@ -8,34 +8,33 @@
  * and takes its extremes over a square at the corners.
  *
  * Two kinds of such functions matter for a triangle a, b, c (corners relative to the station). The side of
- * an edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range. The *doubt* of such a function is a bound
- * of its rounding error, per unit length of a ray. A ray whose largest component is 1 is up to sqrt(3) long: over
- * squares doubts count twice.
+ * an edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range.
  *
  * A face has cells x cells squares, in tiles of SIGHT_TILE x SIGHT_TILE. A tile is one leaf, or a block of
  * leaves. A look-up may round a direction's coordinates: each leaf is valid for SIGHT_PAD beyond its own
  * borders.
  *
- * Why leaves are right. The hit of a ray, as core/bvh has it, depends on the triangles that the ray meets, or
- * misses by less than the rounding of doubles, and on where it meets their planes. So it is enough to show
+ * Why leaves are right. The hit of a ray, as core/bvh has it, depends on the triangles that the ray meets or
+ * misses by less than double precision tells, and on where it meets their planes. So it is enough to show
  * that all other triangles of the scene leave the hit as it is. A triangle is left out of a square only in
  * one of three ways:
  * - Beside it (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the square,
  *   pad included. It is linear, so it is below that everywhere in the square: all rays miss the triangle, by more
- *   than core/bvh takes for a near miss. Regions hold every triangle whose box may be seen in them, with a margin of
- *   some pads (groups.c).
+ *   than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side of the
+ *   region's pyramid, which is wider than the region by some pads.
  * - Behind (region.c): another one covers the square (all sides above their doubts at all corners, so every ray
  *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes
  *   to it first, in whatever way its ranges are rounded. An edge that is nearly hit lies in its triangle's plane,
  *   so it comes later as well.
  * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
  *   the square, the triangle's nearest point is further away than all of the triangle that covers the square.
- * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: it lies outside of the
- * box that holds them, with the margin of regions. Behind as a whole: the box's nearest point is further away than all
- * of the triangle that covers the square. Where a group is not left out of a square, the square asks core/bvh. The
- * leaf holds the triangles that are left: one that covers the square (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A
- * few are decided ray by ray with the same doubts (candidate_list.c). Where a doubt remains, core/bvh decides. Planes
- * seen at a sine below SIGHT_GRAZE neither cover nor hide. */
+ * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: it lies outside of the box
+ * that holds them, with the margin of regions. Behind as a whole: by the box's nearest point. Where a group is not left
+ * out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that covers the square
+ * (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A few are decided ray by ray with the same doubts (candidate_list.c).
+ * Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover nor hide. A doubt
+ * bounds the rounding error of such a function, per unit length of a ray. A ray whose largest component is 1 is up to
+ * sqrt(3) long: over squares they count twice. */
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 
@@ -67,7 +66,7 @@ static inline enum sight_kind sight_kind(uint32_t leaf)
     return (enum sight_kind)(leaf >> SIGHT_KIND_SHIFT);
 }
 
-/* A triangle of a list, and the numbers by which a ray is decided at it. d is the ray's unit vector, q = plane . d:
+/* A triangle of a list, as rays are decided. d is the ray's unit vector. Where q = plane . d:
  * - inside for certain: all of edge[k] . d >= 1. Outside for certain: one is <= -1. (Edges are divided by
  *   what double precision leaves in doubt, here and in core/bvh together.)
  * - certainly not hit, or not to be decided here: q < graze, or q > SIGHT_NEAR.
@@ -82,8 +81,8 @@ struct sight_record {
 } __attribute__((aligned(128)));
 
 /* The doubt of an edge's side, relative to the distance of its farther end times its length. It is 10 units
- * of 2^-53 here: the difference of the corners 1, the cross product 6, the product with a direction 3. The
- * same steps in core/bvh add 10, and core/bvh takes a missed edge for nearly hit within 8 more. 32 is above the sum. */
+ * of 2^-53 here: the difference of the corners 1, the cross product 6, the product with a direction 3. As
+ * many come from core/bvh, and 8 more within which core/bvh takes a missed edge for nearly hit. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
 /* The doubt of a . (b x c), relative to the product of their lengths, here and in core/bvh together. */
 #define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)
@@ -107,7 +106,7 @@ struct sight {
     const struct bvh *bvh;
     double station_m[3];
     uint32_t cells; /* power of two */
-    /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], by face, v and u; then one that is SIGHT_ASK */
+    /* [SIGHT_FACES][cells / SIGHT_TILE][cells / SIGHT_TILE], v outside, u inside; one more that says SIGHT_ASK */
     uint32_t *tile;
     uint32_t *leaf; /* blocks */
     uint32_t *list;

@@ -8,8 +8,8 @@
  * is that time by the single-ray cast of the same rounds, without sight. seen means with a sight (core/sight.h). count
  * is the share of pulses whose number of echoes differs from the reference: of all pulses, and of those with several
  * echoes or a partial hit. rms, p99.9 and max are the range errors of the pulses whose number agrees. off is how many
- * of their echoes are wrong by more than the resolution, and the rms without those: in a tree, a few echoes from
- * another leaf decide the rms. --chart prints rows of the chart's table, without the methods with a sight. --speed
+ * of their echoes are off by more than the resolution (say, on a different leaf, and a few such decide the rms of a
+ * tree), and the rms without those. --chart prints rows of the chart's table, without the methods with a sight. --speed
  * measures single and adaptive pulses alone, and only their ns and ratios. */
 #include <math.h>
 #include <stdio.h>
@@ -231,7 +231,9 @@ static struct sight *make_sight(const struct beam_rig *rig, const struct beam_vi
         exit(1);
     }
     sight_get_info(sight, &info);
-    if (!as_chart) printf("  sight: %u cells, built in %.1f ms\n", info.cells, 1e3 * info.build_s);
+    if (!as_chart)
+        printf("  sight: %u cells, one %.4f, nothing %.4f, few %.4f, ask %.4f; built in %.1f ms\n", info.cells,
+               info.one, info.nothing, info.few, info.ask, 1e3 * info.build_s);
     return sight;
 }
 

@@ -93,10 +93,18 @@ static void put_map(struct json *json, const struct bench_sight *s)
 {
     const struct sight_info *info = &s->info;
     json_uint(json, "cells", info->cells);
+    json_open_object(json, "directions"); /* shares of those that are looked at */
+    json_double(json, "one", info->one);
+    json_double(json, "nothing", info->nothing);
+    json_double(json, "few", info->few);
+    json_double(json, "ask", info->ask);
+    json_close_object(json);
     json_open_object(json, "of_pulses");
     json_double(json, "few", s->few);
     json_double(json, "asked", s->asked);
     json_close_object(json);
+    json_uint(json, "lists", info->lists);
+    json_uint(json, "records", info->records);
     json_double(json, "build_s", s->build_s);
     json_double(json, "mib", (double)info->bytes / 1048576.0);
     json_double(json, "peak_mib", peak_mib(s));
