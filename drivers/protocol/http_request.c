@@ -28,7 +28,7 @@ void http_reader_drop(struct http_reader *r)
     forget(r, r->head_len + r->request.body_len);
 }
 
-/* What read_head needs of the request line and of the fields: values, how often each field came, and flags. */
+/* read_head needs this of the request line and of the fields: values, how often each field came, and flags. */
 struct head {
     struct http_text host, origin, target_place; /* without one, s is NULL */
     int n_host, n_origin, n_length, n_coding, expects, expects_other, close, keep_alive;

@@ -286,7 +286,7 @@ static void a_stop_is_heard(void **state)
 
 /* ---- sigma by the signal */
 
-/* What comes back must be known: of a surface in the table, without texels and without colours of its vertices. */
+/* The reflectance must be known: the surface is in the table, without texels and without colours of its vertices. */
 static void sigma_by_the_signal(void **state)
 {
     (void)state;

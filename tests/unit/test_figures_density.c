@@ -70,7 +70,7 @@ static void cells_grow_until_they_hold_sixteen(void **state)
     scene_free(scene);
 }
 
-/* Of few points the cell is doubled as long as it stays within 50 m. */
+/* With few points the cell is doubled as long as it stays within 50 m. */
 static void cells_of_few_points(void **state)
 {
     (void)state;
@@ -103,7 +103,7 @@ static void cells_begin_at_the_scene_s_corner(void **state)
         struct scene *scene = load_text("corner.obj", faces[tilted]);
         struct figures_density d;
         cloud.n = 0;
-        /* Of each of the 4 x 4 cells of a square a point near its beginning, and one near its end. */
+        /* Each of the 4 x 4 cells of a square gets a point near its beginning, and one near its end. */
         for (int i = 0; i < 32 * (tilted ? 2 : 3); i++) {
             const double within = i % 2 ? 0.9 : 0.1, u = within + i / 2 % 4, v = within + (double)(i / 8 % 4);
             const uint32_t face = (uint32_t)(i / 32);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a reader of IFC hands back, byte by byte: products, their parts and figures; and each thing that may be wrong. */
+/* A reader of IFC hands back products, parts and figures: tests byte by byte, and each thing that may be wrong. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

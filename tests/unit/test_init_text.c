@@ -73,7 +73,7 @@ static void rates(void **state)
     p.prr_max_uhz = 1000000 * MICRO;
     p.prr_min_uhz = 500000 * MICRO;
     expect_rates(&p, 500000, 200, 30);
-    /* Of fixed rates it is the next one below, and 100,000 x 0.15 / 102.857 = 145.8 lines go with it. */
+    /* With fixed rates it is the next one below, and 100,000 x 0.15 / 102.857 = 145.8 lines go with it. */
     p = a_profile();
     p.n_programs = 3;
     p.program[0].prr_uhz = 50000 * MICRO;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What stands before the points of a LAS file, byte by byte: the header and its records by the tables of LAS 1.2 and of
+/* This compares the bytes before the points of a LAS file: the header and its records by the tables of LAS 1.2 and of
  * LAS 1.4 R15 (ASPRS), the keys of a CRS by OGC 19-008. */
 #include <setjmp.h>
 #include <stdarg.h>
