@@ -32,12 +32,10 @@ enum protocol_id {
 
 /* Requirements of a protocol on the stream. */
 enum protocol_needs {
-    PROTOCOL_NEEDS_POLAR = 1 << 0,      /* output.layout: polar */
-    PROTOCOL_NEEDS_ATTRIBUTES = 1 << 1, /* output.attributes: on; amplitudes are LINE_AMPLITUDE_NONE without
-                                         * signal.model */
-    PROTOCOL_NEEDS_TIME = 1 << 2,       /* time.epoch is not none */
-    PROTOCOL_NEEDS_PLACE = 1 << 3,      /* each station has a place on the Earth */
-    PROTOCOL_NEEDS_LAST = 1 << 4,       /* beam.echoes is not first */
+    PROTOCOL_NEEDS_POLAR = 1 << 0, /* output.layout: polar */
+    PROTOCOL_NEEDS_TIME = 1 << 1,  /* time.epoch is not none */
+    PROTOCOL_NEEDS_PLACE = 1 << 2, /* each station has a place on the Earth */
+    PROTOCOL_NEEDS_LAST = 1 << 3,  /* beam.echoes is not first */
 };
 
 /* States of the pulses per second that the head's clock follows. The values are those of a VLP-16. */

@@ -63,9 +63,9 @@ static void follow(void)
 
 static const char WALL[] = "v -50 10 -50\nv 50 10 -50\nv 50 10 50\nv -50 10 50\nf 1 2 3\nf 1 3 4\n";
 
-/* Twelve rays run around a footprint at 1.1 of its radius, 30 degrees apart. The farthest one towards a straight edge is
- * at most 15 degrees aside, so it reaches 1.1 cos 15 = 1.0625 radii or more, and 1.1 at most. The wall of 10 m ends at an
- * edge of any direction, so far from the point. */
+/* Twelve rays run around a footprint at 1.1 of its radius, 30 degrees apart. The farthest one towards a straight edge
+ * is at most 15 degrees aside, so it reaches 1.1 cos 15 = 1.0625 radii or more, and 1.1 at most. The wall of 10 m ends
+ * at an edge of any direction, so far from the point. */
 static void footprints_beside_an_edge(void **state)
 {
     (void)state;
