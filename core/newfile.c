@@ -187,7 +187,7 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
         struct stat st;
         const int n = number_of(path);
         if (n < 0) return fail_link(path, err);
-        /* A regular file, as of `>FILE`: a duplicate has the same offset as the other writers of that descriptor. */
+        /* A shell's `>FILE` is a regular file. A duplicate of its descriptor shares the offset with other writers. */
         is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode);
         fd = is_shared ? fcntl(n, F_DUPFD_CLOEXEC, 0) : open(path, flags, 0666);
     }

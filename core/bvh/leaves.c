@@ -57,7 +57,7 @@ static uint32_t find_corners(const struct bvh *bvh, uint32_t first, uint32_t sec
     return second != BVH_NO_TRIANGLE ? second - first : 0;
 }
 
-/* Sets base_m near corner 0, with the lowest bits of `rest`. */
+/* Sets base_m to corner 0 in single precision. The lowest bits of its three numbers hold `rest` instead. */
 static void set_base(struct bvh_leaf *leaf, const double corner0_m[3], uint32_t rest)
 {
     const uint32_t mask = (1U << BVH_LEAF_BITS) - 1;
@@ -113,9 +113,9 @@ static void mean_corner(const struct scene *scene, double mean_m[3])
         mean_m[i] = fmin(fmax(sum[i] / (3.0 * scene->n_triangles), scene->min_m[i]), scene->max_m[i]);
 }
 
-/* The origin is the middle of the scene. Where a long ray is cast piece by piece, none longer than stretch_m
- * (bvh_inside.h), and the scene has no copies, it is the mean of the triangles' corners. So it lies where most
- * triangles are. */
+/* The origin is the middle of the scene. In large scenes a long ray is cast in pieces, which are no longer than
+ * stretch_m (bvh_inside.h). The origin of such a scene without copies is the mean of the triangles' corners, so that it
+ * lies near most triangles. */
 static void measure(struct bvh *bvh)
 {
     const struct scene *scene = bvh->scene;

@@ -47,8 +47,8 @@ struct middles {
     double sine[ROOM], sine1[ROOM], cosine[ROOM], cosine1[ROOM];
 };
 
-/* Finds them at the turns zero + (count + b * more) * unit. The counts are whole numbers below 2^53, so that a block's
- * middle doesn't depend on which block comes first. */
+/* Finds the sines and cosines for block b at the turn zero + (count + b * more) * unit. The counts are whole numbers
+ * below 2^53, so that a block's middle doesn't depend on which block comes first. */
 VEC_INLINE void find_middles(double zero, double count, double more, double unit, uint32_t blocks, struct middles *m)
 {
     for (uint32_t b = 0; b < blocks; b++) {
@@ -65,7 +65,7 @@ VEC_INLINE void find_middles(double zero, double count, double more, double unit
 
 /* The part of a line that the kernels work on. */
 struct part {
-    uint32_t blocks, skip; /* blocks that the pulses lie in; places of the first one before the first pulse */
+    uint32_t blocks, skip; /* blocks that the pulses lie in; places in the first block before the first pulse */
     struct middles mirror, pan;
 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The figures of a triangle as seen from the station: its directions, its distance, and the doubts of
- * both. */
+/* The figures of a triangle as seen from the station: its edges, its plane and its distance. Doubts bound the rounding
+ * errors of edges and plane (sight_inside.h). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,7 +8,8 @@
 #include "core/sight/build_inside.h"
 #include "core/vec3.h"
 
-/* The figures of triangles in at least so many regions are kept, unless they take a larger share of the memory. */
+/* Figures of triangles that lie in MANY_REGIONS or more are kept, where they take at most 1 / FIGURES_SHARE of the
+ * memory that the map may take. */
 enum { MANY_REGIONS = 4, FIGURES_SHARE = 8 };
 
 void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
@@ -18,7 +19,7 @@ void sight_corners(const struct sight *sight, uint32_t triangle, double v[3][3])
         vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], sight->station_m, v[i]);
 }
 
-/* Takes a function linear in the direction to the coordinates of a face. */
+/* Turns the coefficients of a linear function of the direction from the axes of prcs to those of a face. */
 static void to_face(const double f[3], uint32_t face, double out[3])
 {
     const uint32_t axis = face / 2;
@@ -72,10 +73,10 @@ static int set_plane(const struct sight *sight, struct build_candidate *c)
 /* For a triangle where double precision can't say from which side the station sees it, the sides of its edges have no
  * certain sign. Two strips of directions each hold all rays that may hit it. The narrower one replaces the edges:
  * directions beside it are certainly outside, and none is inside.
- * - Directions along the plane. A ray at a larger angle hits the plane where the ray begins (SIGHT_NEAR).
- *   This also holds where the plane is at the station up to rounding.
- * - Directions past the longest edge by at most the triangle's width: inside, the sides of all three edges together
- *   are n . d, and have one sign. */
+ * - One strip holds directions at small angles to the plane. A ray at a larger angle hits the plane where the ray
+ *   begins (SIGHT_NEAR). This also holds where the plane is at the station up to rounding.
+ * - The other strip holds directions that pass the longest edge at most the triangle's width away. Inside the triangle
+ *   the sides of its three edges have one sign and add up to n . d, so no side is larger than that. */
 static void set_strip(const struct sight *sight, struct build_candidate *c, double v[3][3])
 {
     const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);

@@ -66,10 +66,10 @@ struct scanhead;
  *   PATH                                         a raw stream (.shs), or its frames as packets (.pcapng)
  * On failure *out is NULL, and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
-/* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in,
- * a device node without permissions yet. timeout_ms < 0: for ever. On USB the system's hot-plug events wake
- * it. A wrong source ends it at once, a signal ends it early. A try to connect by TCP may take 10 s, also beyond
- * timeout_ms or after a signal. err gets the reason of the last try. */
+/* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in, a device
+ * node without permissions yet. timeout_ms < 0: for ever. On USB the system's hot-plug events start the next try. A
+ * wrong source ends the tries at once, except a "tty:", which may still appear. A signal ends them early. One try to
+ * connect by TCP may take 10 s, also beyond timeout_ms or after a signal. err gets the reason of the last try. */
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
 /* sh may be NULL. */
 void scanhead_close(struct scanhead *sh);
@@ -96,11 +96,11 @@ struct scanhead_usb_head {
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
- * are kept, and scanhead_next() gives them later. It keeps at most 64 MiB of them; then it drops the oldest and counts
- * them (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
- * the first command on a "tty:" it sends an empty line and *IDN?. It skips all reply lines up to the answer, because
- * the terminal may have echoed the head's own bytes to the head. It does the same after a command that ended without
- * its reply, since that may still come. */
+ * are kept, and scanhead_next() gives them later. At most 64 MiB of frames are kept; then the oldest are dropped and
+ * counted (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
+ * the first command on a "tty:" the library sends an empty line and *IDN?. It skips all reply lines up to the answer,
+ * because the terminal may have echoed the head's own bytes to the head. It does the same after a command that ended
+ * without its reply, since that reply may still come. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */

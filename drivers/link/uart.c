@@ -3,8 +3,8 @@
 
 enum { START = 0, STOP = 9, BITS = 10 };
 
-/* Returns the bit of the sender that the receiver's sample number k lies in, counted from the falling edge: (k + 1/2)
- * times the ratio of the rates, without rounding. */
+/* Returns the number of the sender's bit in which the receiver's sample number k lies, counted from the falling edge.
+ * It is (k + 1/2) times the ratio of the rates, rounded down; whole numbers make it exact. */
 static uint64_t bit_at(const struct uart *uart, unsigned k)
 {
     return (2 * k + UINT64_C(1)) * uart->sender_baud / (2 * (uint64_t)uart->receiver_baud);
@@ -49,7 +49,7 @@ size_t uart_read(const struct uart *uart, const uint8_t *sent, size_t n, uint8_t
             bit++;
             continue;
         }
-        unsigned last = START; /* a start bit that is over by its middle is none */
+        unsigned last = START; /* a low level that ends before the middle of a bit is no start bit */
         uint8_t byte = 0;
         if (level_at(sent, n, bit + bit_at(uart, START)) == 0) {
             for (unsigned k = 1; k < STOP; k++)

@@ -37,7 +37,7 @@ static int set_clock(struct cola *self, int64_t ns)
     if (self->host.command(self->host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
         sscanf(reply, "%" SCNd64, &shift_ns) != 1)
         return 0;
-    /* In this order each difference has room: the second operand is the clock's time without a shift. */
+    /* In this order no difference overflows. The one in brackets is the clock's time without a shift. */
     shift_ns = ns - (cola_clock_ns(self, self->now_ns) - shift_ns);
     snprintf(line, sizeof line, "TIME:SHIFt %" PRId64, shift_ns);
     return self->host.command(self->host.ctx, line, NULL, 0) == 0;
@@ -87,7 +87,7 @@ static enum cola_error put_server(struct cola *self, const struct cola_server *s
     return error == 0 ? COLA_OK : error == -221 ? COLA_CONDITION : COLA_INVALID_DATA;
 }
 
-/* The variables of one number, or of four: a member of struct cola_server, how many it has, and the bytes of each. */
+/* Answers a variable of n numbers of `bytes` bytes each. member: their place in struct cola_server. */
 static enum cola_error read_numbers(struct cola *self, size_t member, int n, unsigned bytes, struct cola_args *args,
                                     struct cola_out *out)
 {

@@ -61,7 +61,7 @@ struct planar_scan {
     uint64_t pulse0;
     uint32_t n_waiting;             /* points that have no attributes yet */
     uint16_t at[NATIVE_MAX_POINTS]; /* place * PLANAR_ECHOES + echo; UINT16_MAX: no place */
-    struct planar_turn turn[2];     /* last: large, and not touched before a turn begins */
+    struct planar_turn turn[2];     /* the last member: large, and not touched before a turn begins */
 };
 
 /* The effects of one frame. `whole` and `broken` may concern different turns. */

@@ -93,7 +93,7 @@ static const char *adjust_time(struct scip *s)
     return NULL;
 }
 
-/* The % goes with TM1 alone. TM0 and TM2, without it, switch the time mode. */
+/* %TM takes only the code 1. The codes 0 and 2 switch the time mode, which only TM does. */
 static const char *tell_time_us(struct scip *s)
 {
     if (s->line[3] != '1') return "01";

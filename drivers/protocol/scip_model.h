@@ -31,7 +31,7 @@ struct scip_model {
     uint32_t bit_rate;                                    /* of power-up, bit/s */
     const char *link;                                     /* SBPS; NULL: the bit rate */
     const char *speed_before, *speed_after;               /* SCSP: around the number */
-    const char *at_default;                               /* after speed and bit rate, while as at power-up */
+    const char *at_default;                               /* printed after a speed or bit rate that is as at power-up */
     const char *mode_idle, *mode_single, *mode_streaming; /* MESM */
     const char *mode_booting, *mode_fault;
     const char *works;                     /* STAT in normal operation, as clients look for it */

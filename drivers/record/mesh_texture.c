@@ -90,7 +90,8 @@ static int cross_seam(struct unwrap *w, uint32_t face[3], const uint32_t place[3
     return SH_OK;
 }
 
-/* The pole gets a point for each face, between the two others; the first face has the pole itself. */
+/* Each face at a pole gets a pole point of its own, halfway between its other two corners in the image. The first face
+ * takes the pole itself, each further face a copy. */
 static int split_pole(struct unwrap *w, uint32_t face[3], int pole, struct sh_err *err)
 {
     float(*uv)[2] = w->points->uv;

@@ -54,7 +54,7 @@ struct usb_function_row {
 struct usb_model {
     uint8_t class, subclass, protocol; /* of the device */
     uint16_t bcd_device;
-    uint8_t self_powered; /* 1: also where max_power_ma is above 0. A device with max_power_ma 0 always is */
+    uint8_t self_powered; /* 1: self-powered, whatever max_power_ma is. With max_power_ma 0 a device always is so */
     uint16_t max_power_ma;
     const char *const *string;     /* by index from 1, UTF-8; NULL ends the list */
     uint8_t manufacturer, product; /* indices, 0 none; the serial number's is the one after the list */

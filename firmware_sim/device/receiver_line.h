@@ -3,9 +3,9 @@
  * the faults that it has.
  *
  * In: each tick, with the faults that are active in it. Out: the last sentence that had arrived by a device time. No
- * sentence overtakes another. The last RECEIVER_KEPT are kept, since sessions ask for past times; of times before
- * these, and of times that no tick has reached yet, the receiver's fixes answer as if nothing were wrong. Thread: with
- * the device's lock. */
+ * sentence overtakes another. The last RECEIVER_KEPT sentences are kept, since sessions ask for past times. For earlier
+ * times, and for times that no tick has reached yet, sentences follow from the receiver's fixes, without faults.
+ * Thread: with the device's lock. */
 #ifndef FIRMWARE_SIM_DEVICE_RECEIVER_LINE_H
 #define FIRMWARE_SIM_DEVICE_RECEIVER_LINE_H
 

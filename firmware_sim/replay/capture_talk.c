@@ -31,7 +31,7 @@ struct builder {
     size_t owner_room;
     struct asked *asked;                     /* of all flows */
     size_t n_asked, asked_room, first_asked; /* first_asked: of the flow at hand */
-    size_t streaming[MAX_STREAMS];           /* asked ones that a stream came for */
+    size_t streaming[MAX_STREAMS];           /* indices in asked: requests whose stream came */
     uint32_t n_streaming;
     struct talk_run connection;
     int has_connection;

@@ -194,7 +194,7 @@ static void results_that_are_wrong(void **state)
     put("shifc01", 8);
     put_product(7, 0, 0, "no line");
     put((const uint32_t[4]){0}, 16);
-    refused("a text without its line");
+    refused("a text without a line end");
     n_bytes = 0;
     put("shifc01", 8);
     put((const uint32_t[4]){0, 1, 0, 0}, 16);

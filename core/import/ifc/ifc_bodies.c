@@ -90,7 +90,7 @@ static int read_product(struct reading *r)
     const char *text = ifc_bodies_take(r, head.n_text);
     if (text == NULL) return wrong(r, "it is cut off");
     const char *line = memchr(text, '\n', head.n_text);
-    if (line == NULL) return wrong(r, "a text without its line");
+    if (line == NULL) return wrong(r, "a text without a line end");
     if (!grow(&r->b->body, &r->b->room, r->b->n + 1, sizeof *r->b->body))
         return sh_fail(r->err, SH_ENOMEM, "no memory for products");
     struct ifc_body *body = &r->b->body[r->b->n++];

@@ -78,7 +78,7 @@ void view_free(struct view *view)
     free(view);
 }
 
-/* Sets `at`, in places: VIEW_SUB of them are a pixel wide. Returns 0 where the point is behind the eye. */
+/* Sets `at` to the point's image, in places: a pixel is VIEW_SUB places wide. Returns 0 for a point behind the eye. */
 static int project(const struct view *view, const double p_m[3], double at[2], double *depth_m)
 {
     const double *eye = view->spec.camera.eye_m;

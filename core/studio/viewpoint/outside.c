@@ -53,7 +53,7 @@ static void frame(const struct survey *s, double ahead_rad, struct viewpoint *at
     at->line1_rad = fmin(atan2(up, up > 0.0 ? near : far_m) + margin, fmin(s->view->line_max_rad, M_PI_2));
 }
 
-/* Casts rays over the part of the view that a place has, and returns figures of their hits. */
+/* Casts rays over the pan and line angles of a viewpoint, and returns figures of their hits. */
 static struct survey_sight outside_look(struct survey *s, const struct viewpoint *at)
 {
     survey_clear(s);

@@ -8,8 +8,8 @@ const SYNC = 0xd5, HEADER = 28, MAX_PAYLOAD = 65536, MAX_TEXT = 512;
 export const REPEAT = 1, LOCAL = 2;
 const GOOD = 1, WAIT = 2, BAD = 3;
 
-/** A frame. `payload` and `t_ns` (BigInt, device time) read the parser's bytes: they are good until the call that
- * has handed on the frame returns. */
+/** A frame. `payload` and `t_ns` (BigInt, device time) read the parser's bytes: they are good until the parser's
+ * callback for the frame returns. */
 class Frame {
   #view;
   #at;
@@ -176,7 +176,7 @@ export class Parser {
     this.bad.n = n - own;
   }
 
-  // Gives the notice of the bad bytes at hand. They are over, since a frame or line follows or, with atEnd, nothing. A
+  // Gives the notice of the bad bytes at hand. A frame or a line follows them; with atEnd no more bytes follow. A
   // frame that seemed to be cut by the end is a broken one if other frames stood within its length.
   #endBad(atEnd) {
     if (!this.bad) return;

@@ -26,8 +26,8 @@ void coverage_put(struct json *json, const struct coverage_result *result);
 /* Returns 100 part / whole; 0 where whole is 0. */
 double coverage_percent(double part, double whole);
 
-/* The scan of a station with the settings at power-up; a scan without end is one frame. It must not be moved or
- * copied. */
+/* The scan of a station with the settings at power-up. A scan without end counts as one pan sweep. The struct points
+ * into itself, so it must not be moved or copied. */
 struct coverage_scan_at {
     const struct site *site;
     uint32_t station;

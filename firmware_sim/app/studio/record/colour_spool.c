@@ -63,7 +63,7 @@ int colour_spool_frame(struct colour_spool *spool, struct scanhead *sh, const st
                        struct sh_err *err)
 {
     const int rc = track_frame(&spool->track, sh, frame, err);
-    if (rc != SH_OK) return rc; /* the frames before it are good */
+    if (rc != SH_OK) return rc; /* the frames that were stored before can still be read */
     if (fwrite(frame->raw, frame->raw_len, 1, spool->file) != 1) return fail_spool(spool, err);
     spool->bytes += frame->raw_len;
     return SH_OK;

@@ -174,7 +174,7 @@ static const char HELP_NOTES[] =
     "\n"
     "  udp:ADDRESS:PORT,...     datagrams to an address of this machine, 0.0.0.0 (all of them), a\n"
     "                           broadcast or a group (GROUP%INTERFACE)\n"
-    "  tcp:HOST:PORT            a connection to it, or those of clients (--relay)\n"
+    "  tcp:HOST:PORT            a connection to this port; with --relay, one for each client\n"
     "\n"
     "Each packet is an Ethernet frame with the kernel's time. Headers are rebuilt: addresses, ports, lengths,\n"
     "checksums and sequence numbers are right, hardware addresses are invented.\n"

@@ -19,7 +19,8 @@
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/fault/fault.h"
 
-/* AHEAD_NS: blocks are computed at most this far ahead. JUST_NS: an act may be reported this long after it was seen. */
+/* AHEAD_NS: blocks are computed at most this far ahead. JUST_NS: a fault that ends or refuses a connection may be
+ * reported this long after the client saw it. */
 static const int64_t AHEAD_NS = 500000000, JUST_NS = 500000000;
 
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq)
@@ -102,7 +103,8 @@ static int was_just_seen(struct soak_link *link, enum fault_kind kind)
     return 1;
 }
 
-/* A cable that is pulled without a reset only holds up a connection; a terminal or a USB device goes with it. */
+/* A cable that is pulled without a reset only holds up a connection by TCP. A terminal or a USB device vanishes with
+ * its cable. */
 static int is_pause(const struct soak_link *link, const struct fault_note *note)
 {
     return note->kind == FAULT_CABLE && note->text[0] == '\0' && strcmp(link->type, "tcp") == 0;
@@ -217,7 +219,7 @@ static void ledger_begin(struct soak_link *link, soak_seq seq)
     if (link->begun)
         mark_away(link, link->last + 1, seq);
     else if (link->judged != 0)
-        mark_away(link, link->judged, seq); /* none, where the first fault is of a later frame */
+        mark_away(link, link->judged, seq); /* marks nothing if the first fault is of a later frame */
     if (!link->begun && (link->judged == 0 || link->judged > seq)) link->judged = seq;
     if (!link->begun) link->first = seq;
     link->begun = link->in_session = 1;

@@ -137,7 +137,7 @@ void watch_seen_mark(struct watch_seen *seen, uint32_t station, uint32_t triangl
 double watch_seen_count(struct watch_seen *seen, uint32_t station, uint32_t n_stations);
 
 /* ---- quality.c */
-/* The observer: works out figures, and shows them. */
+/* Works out the figures, and shows them. Only the observer's thread calls this. */
 void watch_publish(struct watch *w);
 int watch_get_quality(struct watch *w, struct web_body *out, struct sh_err *err);
 

@@ -33,7 +33,7 @@ struct placing {
 struct past {
     struct past_limits limits;
     uint64_t run; /* another one in each run of a head */
-    /* the taker's */
+    /* only for the thread that takes frames */
     struct placing placing[KINDS];
     int is_new;     /* one of `placing` is not in the last piece yet */
     int after_pose; /* the last frame had poses: the points that need them follow */
