@@ -325,7 +325,7 @@ static int fail_rename(const char *path, const char *part, struct sh_err *err)
 
 static int close_renamed(const char *path, int fd)
 {
-    close(fd); /* and with it the lock: from here on part is free for the next one */
+    close(fd); /* this also unlocks it: another writer may now use the name of part */
     sync_folder(path);
     return SH_OK;
 }

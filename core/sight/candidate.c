@@ -128,7 +128,7 @@ static int find_figures(const struct sight *sight, uint32_t triangle, struct bui
     return 1;
 }
 
-/* The same in the coordinates of a face. */
+/* Turns the figures of a candidate to the axes of a face, and computes its slopes there. */
 static void candidate_turn(const struct build_candidate *from, uint32_t face, struct build_candidate *c)
 {
     *c = *from;

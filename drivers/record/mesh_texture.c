@@ -59,7 +59,7 @@ int mesh_texture_draw(const struct mesh_grid *g, struct mesh_points *points, str
 struct unwrap {
     const struct mesh_grid *grid;
     struct mesh_points *points;
-    uint32_t *seam_copy; /* of each point of the grid: its double beyond the seam, or SCAN_MESH_NONE */
+    uint32_t *seam_copy; /* of each point of the grid: its copy beyond the seam, or SCAN_MESH_NONE */
 };
 
 static int add_seam_copy(struct unwrap *w, uint32_t point, float du, float dv, uint32_t *seam_copy, struct sh_err *err)

@@ -60,7 +60,7 @@ struct watch_seen {
     double *cell_m2; /* [n_cells] */
     uint64_t *bits;  /* [n_stations][words] cells that each has seen */
     uint64_t *all;   /* [words] while counting */
-    uint32_t n_seen; /* by any station ... */
+    uint32_t n_seen; /* cells that any station has seen */
     double seen_m2;
 };
 
