@@ -74,12 +74,12 @@ struct detect_signal {
     uint64_t signal_key, range_key;
 };
 
-/* SH_EINPUT, without the file's name: reaches that no air explains (a darker target seen further, or a signal
- * that falls less than with the square of the range), sigma_floor_m above sigma_m. Reaches may come in any
- * order. */
+/* Fails with SH_EINPUT where no air explains the reaches (a darker target is seen further, or the signal falls less
+ * than with the square of the range), or where sigma_floor_m is above sigma_m. The error's text does not name a file.
+ * Reaches may come in any order. */
 int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err);
 
-/* Returns A of a return E rho(i). */
+/* Returns the amplitude A of the light that comes back from range_m. rho: the product E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
 
 /* Returns the reflectance that a head reports for an amplitude at range_m, in the data sheet's air. */

@@ -12,7 +12,8 @@
  *     direction = Ry(trunnion) (sin c, cos c cos m, cos c sin m)      c: collimation
  *     origin    = (mirror_offset, transit_offset, 0)
  *
- * collimation: the beam leaves the plane across the mirror's axis, to the right; pan changes by c / cos m.
+ * collimation: the beam points to the right of the plane that is perpendicular to the mirror's axis, by the angle c;
+ * pan changes by c / cos m.
  * trunnion: the mirror's axis is not level, its right end sinks; pan changes by trunnion tan m.
  * transit offset: the mirror's axis passes this far ahead of the pan's axis; for each metre of it, range changes by
  * cos m, and line angle by -sin m / R.
@@ -65,11 +66,11 @@ void instrument_aim(const struct instrument *instrument, const struct instrument
 void instrument_read(const struct instrument *instrument, uint32_t n, double *mirror_turn, double *pan_turn);
 void instrument_range(const struct instrument *instrument, uint32_t n, double *range_m);
 
-/* Encoder reading of an angle: whole counts, modulo a turn. Points and the ends of lines both read by it. */
+/* Encoder reading of an angle: whole counts, modulo a turn. Points and line ends get their readings from here. */
 VEC_INLINE uint32_t instrument_encoder_count(double turn, double counts_per_turn)
 {
     uint64_t bits;
-    double below = vec_round(turn - 0.5, &bits); /* floor, up to a tie that the next line undoes */
+    double below = vec_round(turn - 0.5, &bits); /* floor; of a whole number it may be one less */
     double within = turn - below;
     within = within >= 1.0 ? within - 1.0 : within;
     double count = vec_round(within * counts_per_turn, &bits);

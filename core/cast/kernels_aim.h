@@ -20,11 +20,11 @@ struct kernel_turns {
 /* The directions as the encoders read them, in whole counts. They are turned by `rotation`, and written to e. */
 struct kernel_reading {
     const struct cast_setup *setup; /* has the counts */
-    const double *rotation;         /* to the frame of positions */
+    const double *rotation;         /* takes socs to the CRS or to prcs, or leaves it (aim.c) */
     struct vec3_out e;
 };
-/* Computes directions in prcs: rotation times (sin p cos m, cos p cos m, sin m). reading NULL: only those of the
- * beams. */
+/* Computes directions of beams in prcs: rotation times (sin p cos m, cos p cos m, sin m). With `reading` it
+ * computes the directions that the encoders read, too; NULL: it does not. */
 void kernel_directions(const struct kernel_turns *turns, const double rotation[9], const struct vec3_out *d,
                        const struct kernel_reading *reading);
 

@@ -98,7 +98,7 @@ struct shim_map {
         in.project(place[0], place[1], in_x0, in_y0);
     }
 
-    /* Sets the false northing of that hemisphere. UPS can't do it, as it has a projection for each hemisphere. */
+    /* Sets the false northing of the hemisphere `side` (georef.h). In UPS another hemisphere is another projection. */
     void force_side(int side)
     {
         if (crs != GEOREF_UTM || side == 0 || grid.north == (side > 0)) return;

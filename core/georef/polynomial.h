@@ -27,7 +27,7 @@ enum polynomial_form { POLYNOMIAL_SPACE, POLYNOMIAL_FLAT, POLYNOMIAL_MERIDIAN };
 
 struct polynomial {
     enum polynomial_form form;
-    double c[3][POLYNOMIAL_TERMS]; /* per output; units of the CRS per metre^degree; meridian: of 0, n, u */
+    double c[3][POLYNOMIAL_TERMS]; /* per output; units of the CRS per metre^degree; meridian: x, y, z are 0, n, u */
     double half_m;                 /* fitted within +-half_m on each axis; 0: there is none */
     /* Terms of degree 1 to 5 in two variables, p^d, p^(d-1) q, ..., q^d: flat, of x and y for both outputs;
      * meridian, of n and u for latitude and height. */

@@ -11,8 +11,8 @@ struct sight_work {
     struct sight_run run[HITS_ROOM];
     uint32_t triangle[HITS_ROOM]; /* of a run's rays */
     /* Rays that go to the BVH. */
-    uint8_t asks[HITS_ROOM]; /* 1: of the chunk's */
-    uint32_t ray[HITS_ROOM]; /* which ones they are */
+    uint8_t asks[HITS_ROOM]; /* 1: this ray of the chunk goes there */
+    uint32_t ray[HITS_ROOM]; /* their numbers in the chunk */
     double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
     uint32_t hit[HITS_ROOM], label[HITS_ROOM];
     float steep[HITS_ROOM];

@@ -17,9 +17,9 @@ struct square {
 
 /* Candidates that may be seen in a square. */
 struct seen {
-    uint32_t *list, n; /* numbers of candidates, with the bit COVERS where it does */
+    uint32_t *list, n; /* numbers of candidates; with the bit COVERS: this one covers the square */
     uint32_t *above;   /* where the stack is free */
-    uint32_t cover;    /* hides all others of the list; or NO_CANDIDATE */
+    uint32_t cover;    /* of those that cover the square, the nearest in its middle; or NO_CANDIDATE */
     uint32_t groups;   /* how many candidates are groups */
     int filled;        /* a group may be seen in all of the square */
     uint32_t *leaf;    /* the leaf of this list, once it has been made; squares with the same list share it */
@@ -281,7 +281,7 @@ static void divide_quarters(struct division *d, const struct square *q, const st
     }
 }
 
-/* Divides a tile whose leaves differ: they are made next to each other, and become a block. */
+/* Divides a tile. Leaves that differ become a block, where they lie next to each other; equal ones become one leaf. */
 static void divide_tile(struct division *d, const struct square *q, const struct seen *seen)
 {
     uint32_t block[SIGHT_BLOCK], same = 1;

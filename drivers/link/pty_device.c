@@ -39,7 +39,8 @@ void pty_device_drop_output(struct pty_device *device)
     drop_output(device->master, 0);
 }
 
-/* Opening and closing the slave once also makes the master report the hang-up from then on. */
+/* Brings the slave to rest (pty_device.h). This opens and closes the slave once, so that the master reports the hang-up
+ * from then on. */
 static int slave_rest(struct pty_device *device)
 {
     int fd = open(device->slave, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);

@@ -233,7 +233,7 @@ int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *u
     if (wsi == web->listening)
         accept_some(web);
     else if (wsi != web->wake)
-        return -1; /* it had to make room */
+        return -1; /* the connection of this wsi had to make room */
     else if (read(web->wake_fd, &count, sizeof count) == sizeof count)
         web->woken = 1;
     return 0;

@@ -178,7 +178,8 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
 static void reboot(struct cola *self)
 {
     const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", NULL, 0) != 0;
-    cola_power_up(self, NULL); /* what is stored was accepted before */
+    /* There can be no error: cola_keep wrote what is stored, or the session read it when it began. */
+    cola_power_up(self, NULL);
     if (refused) self->host.hang_up(self->host.ctx);
 }
 

@@ -56,7 +56,8 @@ int ptx_grid_open(struct ptx_grid *grid, const char *path, struct sh_err *err)
 void ptx_grid_close(struct ptx_grid *grid)
 {
     if (grid->spool != NULL) {
-        if (grid->is_empty || access(grid->part, F_OK) != 0) unlink(grid->path); /* ours as long as it is locked */
+        /* The file is ours until fclose unlocks it. */
+        if (grid->is_empty || access(grid->part, F_OK) != 0) unlink(grid->path);
         fclose(grid->spool);
     }
     free(grid->path);
@@ -117,7 +118,7 @@ int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err)
 
 /* Cells on their way back from the file. */
 struct drain {
-    uint64_t left; /* in the file, with those in `cell` from `at` on */
+    uint64_t left; /* not yet looked at: in the file, or in `cell` from `at` on */
     size_t at, n;
     struct ptx_cell cell[CELLS_AT_ONCE];
 };

@@ -67,7 +67,7 @@ static void put_programs(const struct config_profile *p, FILE *out)
 
 /* ---- beam and accuracy */
 
-/* Prints `3.5 mm FWHM (5.95 mm at 1/e2)`: the maker's width, then this program's. */
+/* Prints `3.5 mm FWHM (5.95 mm at 1/e2)`: the width by the maker's definition, then at 1/e2. */
 static void put_width(const struct cfg_reader *rd, const char *key, double given, double at_1_e2, FILE *out)
 {
     const struct cfg_key *row = cfg_find(&rd->table, key);

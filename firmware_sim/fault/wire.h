@@ -11,7 +11,7 @@
  * there does not strike: it is not noted, nor counted. One example is a flip of a byte beyond the end of a short frame.
  * Another is a dropped frame: only faults that act before the frame strike there.
  *
- * Thread: one, but for the board. Allocates. */
+ * Thread: one. Any thread may use the board. Allocates. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_H
 #define FIRMWARE_SIM_FAULT_WIRE_H
 
@@ -37,7 +37,7 @@ struct wire_spec {
     void (*content)(const uint8_t *unit, size_t len, uint8_t *mask);
     void (*reseal)(uint8_t *unit, size_t len);
     uint32_t acts;             /* acts that the link can do: bit 0 is FAULT_DISCONNECT, and so on; no others strike */
-    struct fault_tally *tally; /* of its acts, over all sessions of the link; outlives the wire. NULL: by session */
+    struct fault_tally *tally; /* counts acts, for all sessions of the link; it outlives them. NULL: each wire counts */
     struct wire_heard *heard;  /* what the client sent, for echoes; outlives the wire */
 };
 
@@ -61,7 +61,7 @@ int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len);
 /* An act that should have ended the session could not be carried out. Items that were put since then are lost. */
 void wire_go_on(struct wire *wire);
 /* A command of this session changed the list. The next `ahead` replies answer the lines up to that command: new faults
- * count only the replies after these. They count all other items from the next one. */
+ * count only the replies after these. Of all other items, new faults count from the next one. */
 void wire_renew(struct wire *wire, uint64_t ahead);
 /* All items from before device time t_ns were put. INT64_MAX: no more items come, so none is waited for. */
 int wire_time(struct wire *wire, int64_t t_ns);

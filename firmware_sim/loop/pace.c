@@ -36,7 +36,7 @@ enum pace_step pace_look(struct pace *pace, uint64_t tick, int ready, int64_t no
     }
     if (ready) return PACE_RELEASE;
     if (late_ns > pace->late_ns + pace->credit_ns) return PACE_GIVE_UP;
-    /* Looking again each time that a tick falls due shows how long it stood still. */
+    /* The thread looks again whenever a tick is due, so that note_look measures how long the machine stood still. */
     pace->expected_ns = *until_ns = now_ns + pace->tick_ns - (now_ns - pace->epoch_ns) % pace->tick_ns;
     return PACE_AWAIT;
 }

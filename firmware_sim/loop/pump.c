@@ -276,7 +276,7 @@ static uint32_t write_one(struct pump *pump, int index)
 static int pump_turn(struct pump *pump, int most_ms)
 {
     const int over = atomic_load(&pump->stream->over);
-    if (over && !has_more(pump) && !pump->failed) return 0; /* why a write failed is known with LINK_CLOSED */
+    if (over && !has_more(pump) && !pump->failed) return 0; /* LINK_CLOSED still brings a failed write's reason */
     if (take_events(pump, pump->want_write, timeout_ms(pump, over, most_ms)) < 0) {
         sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
         return 0;

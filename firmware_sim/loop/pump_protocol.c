@@ -141,8 +141,9 @@ static void give_frames(const struct protocol_ops *ops, struct session *s, const
     }
 }
 
-/* A device has watched its fields before the client came. A new session looks at the ticks that the ring still has,
- * since power came, so that results are there at once. It sends nothing meanwhile: its client has asked for nothing. */
+/* A device has watched its fields before the client came. So a new session begins with earlier ticks: those that the
+ * ring still has, but none from before power came. Then results are there at once. The session
+ * sends nothing meanwhile: its client has asked for nothing. */
 static void look_back(const struct pump *pump, struct session *s)
 {
     const struct loop_source *source = pump->links->source;
@@ -321,7 +322,7 @@ void session_read_protocol(struct pump *pump, struct session *s, int index)
     struct session_commands *c = &s->commands;
     pump_read(pump, s, index);
     if (pump->ops->datagrams) take_input(pump, s); /* before the next one comes */
-    /* As in pump_read_commands. */
+    /* Input waits, and no more fits: the link rests, for the reason in pump_read_commands. */
     if (c->in_len - c->in_pos == READ_BYTES && piece_of(pump, s) == 0) c->wrong = WRONG_AT_ONCE;
 }
 

@@ -174,7 +174,7 @@ export class TrialPanel {
     if (trial.stations.map((s) => s.number).join() !== [...this.#items.keys()].join()) this.#relist(colour);
     for (const station of trial.stations) this.#fill(station);
     const ghost = trial.next ? [{...trial.next, number: GHOST, name: 'Best next place', suggested: true}] : [];
-    // While a station is moved, the picture keeps its list, and has the newest place itself.
+    // A station that is moved in the picture has its newest place there. The picture's list is then not replaced.
     const {dragging, moved, pending} = this.#view.stations;
     if (!dragging && (!moved || pending)) {
       this.#view.setStations([...trial.stations.map((s) => ({...s, colour: colour(s.number).map((c) => c / 255)})), ...ghost]);

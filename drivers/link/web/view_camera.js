@@ -146,7 +146,7 @@ export class Camera {
     this.distance = 0.05;
     const [right, up, forward] = this.rotation;
     const across = 0.5 * FILLED * this.width / this.focal, along = 0.5 * FILLED * this.height / this.focal;
-    for (let k = 0; k < 8; k++) { // a corner is in sight from far enough
+    for (let k = 0; k < 8; k++) { // the eye goes back until each corner is in sight
       const d = [0, 1, 2].map((a) => (k >> a & 1 ? max : min)[a] - this.target[a]);
       const least = Math.max(Math.abs(dot(d, right)) / across, Math.abs(dot(d, up)) / along) - (this.flat ? 0 : dot(d, forward));
       this.distance = Math.max(this.distance, least);

@@ -104,7 +104,7 @@ static uint32_t best_of(const struct coverage_next *next, const double *estimate
     return best;
 }
 
-/* Scans from a place as a whole. The result waits for coverage_keep, or is replaced by the next scan. */
+/* Casts a whole scan from a place. The result waits for coverage_keep, or is replaced by the next scan. */
 static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_err *err)
 {
     const struct coverage_next_place *p = &c->f->next->place[place];

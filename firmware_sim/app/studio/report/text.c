@@ -163,7 +163,8 @@ static void print_tables(const struct report *r)
     print_labels(r);
     puts(
         "\nAll in mm. Left: distance from the nearest triangle. Right: deviation along the beam, measured minus exact\n"
-        "range, of points on smooth faces where nothing else is near; expected: its RMS by noise and counts.");
+        "range, of points on smooth faces where nothing else is near.\n"
+        "Expected: the RMS of the deviation that noise and rounding to counts cause.");
 }
 
 static void print_time(const struct report *r)
