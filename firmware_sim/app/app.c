@@ -328,7 +328,7 @@ int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), cons
     put(&json, ctx);
     int failed = json_end(&json, NULL) != SH_OK;
     failed |= fclose(out) != 0;
-    /* The number of a closed stream would be that of the next file or session, and messages would go there. */
+    /* Standard streams stay open: else the next file or session would get their numbers and the messages. */
     if (fd > STDERR_FILENO) close((int)fd);
     return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
 }

@@ -131,7 +131,8 @@ static void print_link(const struct soak_link *link, FILE *out)
     if (link->away != 0) fprintf(out, "; %" PRIu64 " frames came while there was no session", link->away);
     if (link->reader_lost != 0) fprintf(out, "; %" PRIu64 " left out, the client was too slow", link->reader_lost);
     if (link->ask.hurt != 0)
-        fprintf(out, "; %" PRIu64 " replies were lost or wrong next to other faults", link->ask.hurt);
+        fprintf(out, "; %" PRIu64 " replies were lost or wrong beside another fault, or just after a session",
+                link->ask.hurt);
     if (link->unknown != 0) fprintf(out, "; %" PRIu64 " frames the clean reader did not get", link->unknown);
     if (link->failed[0] != '\0') fprintf(out, "; gave up: %s", link->failed);
     fprintf(out, "\n");
