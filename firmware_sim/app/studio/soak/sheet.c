@@ -58,7 +58,7 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
 {
     const uint64_t bad = link->bad_bytes;
     struct soak_row sum = {0};
-    /* Acts that the client has not noticed by the end are missed. */
+    /* Faults that end or refuse connections, and that the client has not noticed by now, are missed. */
     for (uint32_t i = 0; i < link->n_acts; i++)
         link->row[link->act[i].kind].missed++;
     for (uint32_t i = 0; i < link->n_refusals; i++)
