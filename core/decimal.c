@@ -134,7 +134,7 @@ static inline int scale(struct parts v, u128 power, uint64_t *whole)
 }
 
 /* The same in doubles; returns 0 where their rounding might change the result. The power is exact, so the relative
- * error of the product is at most 2^-53. Products too near a tie are left to scale. */
+ * error of the product is at most 2^-53. Products too near a tie are left to scale(). */
 static inline int scale_surely(double v, double power, uint64_t *whole)
 {
     uint64_t bits;
@@ -165,8 +165,8 @@ char *decimal_put_fixed(char *to, double v, unsigned decimals)
     return put_fixed(to, v, decimals);
 }
 
-/* Writes a number of `digits` digits, the first of which is not 0, with a point after that one, and a power of ten from
- * 10^-22 on. */
+/* Writes `whole`, a number of `digits` digits, in scientific notation. The point follows the first digit, which is not
+ * 0. The power of ten is -22 to -5. */
 static char *put_power(char *to, uint64_t whole, unsigned digits, int power)
 {
     to = digits > 1 ? decimal_put_short(to, whole, digits - 1) : put_whole(to, whole);

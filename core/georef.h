@@ -18,9 +18,9 @@
  *
  * Methods. Exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm; `make
  * chart`). Order 1, 2, 3 evaluate its Taylor polynomial about the centre in a few ns, within georef_bound_m.
- * Order 5 exists where heights stay what they are (a grid to another one or to geodetic). In geodetic output
- * longitude has a closed form (georef/polynomial.h). It may be used near a pole, down to a distance of a few radii
- * of the scene.
+ * Order 5 exists where heights stay the same: from a grid to another grid, or from a UTM grid to geodetic. In
+ * geodetic output longitude has a closed form (georef/polynomial.h). So the orders may be used near a pole, too,
+ * down to a distance of a few radii of the scene.
  * Only a map that is not linear has polynomials. Local, ecef from a metric frame, and the scene's own grid are
  * linear, and exact with every method.
  *
@@ -39,7 +39,7 @@ enum georef_method { GEOREF_AUTO, GEOREF_EXACT, GEOREF_ORDER1, GEOREF_ORDER2, GE
 
 struct georef_geoid;
 
-/* The zone of UPS, where 0 means by position. */
+/* The value of georef_spec.utm_zone that means UPS. */
 enum { GEOREF_UPS = -1 };
 
 struct georef_spec {
@@ -49,7 +49,7 @@ struct georef_spec {
     double height_m;         /* ellipsoidal, whatever the output's heights are */
     int utm_zone;            /* 1..60, GEOREF_UPS, or 0: by position */
     int side;                /* utm: hemisphere of the false northing; 1: north, -1: south, 0: by position */
-    /* How prcs lies at the station, where it is not its tangent frame (see core/geoframe.h): */
+    /* How prcs lies at the station, where prcs is not the station's tangent frame (see core/geoframe.h): */
     double rotation[9]; /* differences in prcs -> east, north, up at the station, row by row; all 0: the same axes */
     int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */
     int prcs_zone;      /* its zone: 1..60, or 0: UPS */

@@ -12,11 +12,12 @@
  * of corner 3.
  *
  * Waiting for leaves to arrive in the cache takes most of a ray's time. So each leaf is two cache lines that lie
- * together. The first has the corners in single precision, counted from a point near them: they judge rays. The second
- * has the planes in double, for rays that hit. The scene has the corners in double. */
+ * together. The first has the corners in single precision, counted from a point near them. Where single precision is
+ * certain, these corners decide whether a ray hits (meet.c). The second line has the planes in double, for rays that
+ * hit. The scene has the corners in double. */
 struct bvh_leaf {
-    /* Corners count from this point, which counts from the BVH's origin. Its lowest bits hold the figures of
-     * bvh_leaf_rest. They are part of the point: corners count from the number with these bits. */
+    /* Corners count from this point, which counts from the BVH's origin. The lowest bits of its numbers hold other
+     * figures (bvh_leaf_rest). They stay in the numbers when corners are computed. */
     float base_m[3];
     float corner_m[3][4]; /* x, y, z of the corners, from base_m */
     uint32_t triangle;    /* number of triangle 0 */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Colours of the echoes that are sent. Colours of textures came with the hits. */
+/* This sets the colours of the echoes that are sent. Colours of textures are set before, at the hits (texels.c). */
 #include "core/cast/colours.h"
 
 #include <math.h>

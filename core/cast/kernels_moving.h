@@ -16,7 +16,7 @@ void kernel_leg(const struct pose_knot *a, const struct pose_knot *b, int64_t t0
 /* Turns directions s (socs) to d (prcs), of n pulses, dt_ns after the run's t0. */
 void kernel_turn_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, const struct vec3_in *s,
                      const struct vec3_out *d);
-/* Computes their origins, prcs. */
+/* Computes the origins (prcs) of n pulses, dt_ns after the run's t0. */
 void kernel_place_leg(const struct kernel_leg *leg, const uint32_t *dt_ns, uint32_t n, const struct vec3_out *p);
 /* o = p + by. */
 void kernel_shift(const struct vec3_in *p, const double by[3], uint32_t n, const struct vec3_out *o);

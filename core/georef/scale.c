@@ -38,7 +38,8 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
     georef_degrees(georef, reach_m, &lat_m, &lon_m, &axis_m);
     unit[0] = 1.0 / lat_m;
     unit[1] = angle_deg(1.0) / (axis_m + reach_m);
-    /* A degree of latitude is at least 110,574 m less 1/57 of the depth; 12 km deep are allowed. */
+    /* A degree of latitude is at least 110,574 m long on the ellipsoid, and 1/57 of the depth shorter below it. 110,300
+     * m is less than its length at a depth of 12 km, the lowest place of a station (locate.c). */
     span[0] = reach_m / (110300.0 - angle_rad(reach_m));
     span[1] = reach_m < axis_m ? angle_deg(asin(reach_m / axis_m)) * 1.0001 : 180.0;
     if (reach_m > 1e6) span[0] = 180.0;

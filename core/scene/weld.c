@@ -48,7 +48,7 @@ static int make_table(struct scene_build *b, struct build_weld *w, size_t size, 
     return SH_OK;
 }
 
-/* `vertices` has one for each corner of a triangle. As a rule six triangles have a corner at the same place: then at
+/* `vertices` counts each corner of each triangle. As a rule six triangles have a corner at the same place: then at
  * most a third of the table is in use. */
 int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err)
 {

@@ -15,9 +15,9 @@
 #include "core/waveform.h"
 
 enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 8, FINDER_PEAKS = 64 };
-#define FINDER_NEAR       2.5                /* sigmas about its centre: there one Gaussian is fitted */
-#define FINDER_LEAST      0.75               /* of the pulse's sigma: noise makes an echo narrower, nothing else does */
-#define FINDER_ROUGH      0.001              /* of a peak: added to a learned misfit for samples at other phases */
+#define FINDER_NEAR       2.5                /* sigmas on both sides of an echo's centre that a fit of one term uses */
+#define FINDER_LEAST      0.75               /* least sigma of an echo, over the pulse's: only noise makes it less */
+#define FINDER_ROUGH      0.001              /* added to a misfit (over the peak) that was learned at other samples */
 #define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
@@ -44,16 +44,18 @@ struct finder_spread {
 
 /* This is the pulse h, as detectors know it. It is constant after finder_learn. */
 struct finder {
-    int seen;                                    /* the table of h has its peak; else nothing is found */
-    double peak;                                 /* of h */
-    double width;                                /* of h, full at half maximum */
-    double signal;                               /* of one count */
-    double noise;                                /* sigma of a sample, digits included */
-    double limit;                                /* a sample from here on is limited */
-    uint32_t blind;                              /* samples without signal after a limited one */
-    double metre;                                /* range of one sample */
+    int seen;       /* the table `shape` reaches the peak of h; else no echo is found */
+    double peak;    /* of h */
+    double width;   /* of h, full at half maximum */
+    double signal;  /* of one count */
+    double noise;   /* sigma of a sample: the receiver's noise, and the rounding to counts */
+    double limit;   /* a sample from here on is limited */
+    uint32_t blind; /* samples without signal after a limited one */
+    double metre;   /* range of one sample */
     struct finder_spread spread[FINDER_SPREADS]; /* by growing tilt; the first is a plane that is hit head on */
-    double lead[FINDER_LEADS];    /* by v: from h's rise through exp(-v v / 2) of its peak to its centroid */
+    /* lead[k]: samples from the place where h rises through exp(-v v / 2) of its peak, v = k FINDER_LEAD_STEP, to the
+     * centroid of h. */
+    double lead[FINDER_LEADS];
     int gaussian;                 /* h is one */
     double middle;                /* from the centroid of h to its middle, in widths */
     double reach[2];              /* where a term ends, in sigmas before and after its middle */
@@ -71,13 +73,14 @@ static inline double finder_table(const double table[FINDER_SHAPE], double width
     uint32_t k = (uint32_t)place;
     return table[k] + (place - k) * (table[k + 1] - table[k]);
 }
-/* A term of peak 1 has this value, d of its sigmas after its middle. finder_fall is minus its derivative by d there. */
+/* Returns the value of a term of peak 1, d of its sigmas after its middle. finder_fall returns minus the derivative of
+ * this value by d. */
 double finder_value(const struct finder *finder, double d);
 double finder_fall(const struct finder *finder, double d, double value);
 /* Returns how long before its centroid h has `part` of its peak. */
 double finder_lead(const struct finder *finder, double part);
 
-/* Fills `finder` from the signals of a waveform that is otherwise complete. */
+/* Fills `finder` from signals that the waveform makes. All of the waveform but its finder must be set before. */
 void finder_learn(const struct waveform *waveform, struct finder *finder);
 /* Interpolates the figures of the echo whose term has this sigma, or of the echo of this width. */
 enum finder_key { FINDER_SIGMA, FINDER_WIDTH };
@@ -108,7 +111,7 @@ uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_
 /* Returns the largest signal about a top sample. *place: where it is. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place);
 /* Finds where the signal crosses half of the peak on both sides of its top, within the peak's samples. On a side
- * where it doesn't, that of the other side is mirrored. Returns how many sides were seen. */
+ * without a crossing, the crossing of the other side is mirrored. Returns how many sides have a crossing. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2]);
 
 struct finder_list {
@@ -153,8 +156,8 @@ struct finder_task {
 void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
 /* Fills rest[hi - lo + 1] with the part of the samples that the components don't explain. */
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
-/* Begins with one component a peak. adds: adds more while the residual could have another echo. Where a top is not
- * seen, its flanks decide. */
+/* Begins with one component for each peak. adds: more components follow while the residual could have another echo. The
+ * height of a limited top is estimated from its flanks. */
 void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, int adds,
                       struct finder_mix *mix);
 

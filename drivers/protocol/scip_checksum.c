@@ -38,8 +38,8 @@ void scip_content(const uint8_t *unit, size_t len, uint8_t *mask)
             if (unit[i] >= 0x30 && unit[i] <= 0x6f) mask[i] = 0x0f;
 }
 
-/* Lines of replies to VV, PP and II are "KEY:value;" with the sum after the ';', which it leaves out. Data of a scan
- * may end in ';', too, but there the sum has it. */
+/* Lines of replies to VV, PP and II are "KEY:value;" and the sum of the characters before the ';'. Data of a scan may
+ * end in ';', too, but there the sum has the ';'. */
 void scip_reseal(uint8_t *unit, size_t len)
 {
     struct line line = {.number = SIZE_MAX};

@@ -24,7 +24,7 @@ enum e57_stream {
     E57_X, /* coordinates are counts from INT32_MIN on, so the smallest is 0 */
     E57_Y,
     E57_Z,
-    E57_INVALID, /* where there are shots without echo: 2 */
+    E57_INVALID, /* if the file may have shots without echo: 2 for such a shot, 0 for a point */
     E57_INTENSITY,
     E57_NO_INTENSITY,
     E57_RED, /* where there are colours */

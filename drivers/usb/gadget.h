@@ -4,7 +4,7 @@
  * end.
  *
  * Why f_acm: FunctionFS takes no class-specific interface descriptors (type 24h), without which no host knows
- * a CDC console. The kernel's has them; what it lacks is described in functionfs_private.h. */
+ * a CDC console. f_acm has such descriptors. functionfs_private.h describes what f_acm lacks. */
 #ifndef DRIVERS_USB_GADGET_H
 #define DRIVERS_USB_GADGET_H
 

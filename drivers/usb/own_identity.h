@@ -4,7 +4,7 @@
  *
  * The serial number is computed from the machine's id and from a text that names the head (`whose`). So it does not
  * depend on which other heads run. Where several of the same configuration run at a time, the second and later ones
- * have serial numbers of their own, in the order in which they start. The number is the lowest that is free. */
+ * have serial numbers of their own, in the order in which they start. The head's number is the lowest that is free. */
 #ifndef DRIVERS_USB_OWN_IDENTITY_H
 #define DRIVERS_USB_OWN_IDENTITY_H
 

@@ -56,7 +56,7 @@ void app_catch_signals(void)
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
-    signal(SIGXFSZ, SIG_IGN); /* a file at its limit is an error of write, not the end */
+    signal(SIGXFSZ, SIG_IGN); /* write() fails at a limit of file size, and the program goes on */
 }
 
 int app_fail(const struct sh_err *err)
@@ -119,8 +119,8 @@ void app_warn_of(const char *what)
     warned_of = what;
 }
 
-/* Whether no warning had this text before. The texts that are kept have a bound, so that endless work takes no endless
- * memory; one beyond it is printed each time. Threads of a head warn, too. */
+/* Whether no warning had this text before. Up to MOST texts are kept, so that the memory of endless work stays bounded.
+ * Any other text counts as new each time. Threads of a head warn, too. */
 static int is_new(const char *text)
 {
     enum { MOST = 256 };
@@ -328,7 +328,7 @@ int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), cons
     put(&json, ctx);
     int failed = json_end(&json, NULL) != SH_OK;
     failed |= fclose(out) != 0;
-    /* The number of a closed stream would be that of the next file or session, and messages would go there. */
+    /* Standard streams stay open: else the next file or session would get their numbers and the messages. */
     if (fd > STDERR_FILENO) close((int)fd);
     return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
 }

@@ -234,7 +234,7 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
     if (!cfg_has_profile(rd) || kind == EMITTER_LINE) return;
     if (s->phase_lock && CFG_SOUND(rd, 0, "head.lines_hz", "head.phase_lock") && s->lines_uhz % 1000000 != 0)
         cfg_fail_key(rd, "head.phase_lock", 0,
-                     "on, but head.lines_hz is %.15g, which is at another azimuth each second; allowed with whole "
+                     "on, but with head.lines_hz %.15g the rotor is at another azimuth each second; allowed with whole "
                      "turns per second",
                      from_micro(s->lines_uhz));
     check_instrument(rd, cfg);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How many of each a configuration may have, for those who need room for them. */
+/* The largest numbers of meshes, links, stations and so on in a configuration, for modules that keep arrays of them. */
 #ifndef FIRMWARE_SIM_CONFIG_LIMITS_H
 #define FIRMWARE_SIM_CONFIG_LIMITS_H
 

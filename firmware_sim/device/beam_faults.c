@@ -139,7 +139,7 @@ static void add_wobble(const struct device_beam *beam, const struct device_beam_
                                                        .begin_ns = f->begin_ns};
 }
 
-/* Adds up the faults that strike. A stuck mirror does not wobble. Of several stuck faults the first one counts. */
+/* Adds up the faults that strike. A stuck mirror does not wobble. If several stuck faults strike, the first counts. */
 static void add_up(struct device_beam *beam)
 {
     struct device_disturbance *now = &beam->now;

@@ -20,7 +20,7 @@
 
 /* A set of kinds. */
 #define HEAD_FAULT(kind) (UINT64_C(1) << (kind))
-/* In holdover the clock gains ppm. */
+/* They put the clock into holdover, in which it gains the fault's `ppm`. */
 #define HEAD_FAULTS_HOLDOVER (HEAD_FAULT(FAULT_PTP_LOST) | HEAD_FAULT(FAULT_PTP_NO_SYNC) | HEAD_FAULT(FAULT_PTP_FAULTY))
 #define HEAD_FAULTS_PTP                                                                      \
     (HEAD_FAULTS_HOLDOVER | HEAD_FAULT(FAULT_PTP_GRANDMASTER) | HEAD_FAULT(FAULT_PTP_STEP) | \
@@ -78,8 +78,9 @@ int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct he
 /* Returns the fault of a kind that is active and comes next in the list: after NULL the first, after the last NULL. */
 struct head_fault *head_faults_next(struct head_faults *faults, enum fault_kind kind, const struct head_fault *before);
 
-/* The same for a kind that strikes at an event, such as a boot: the faults whose window has this moment. After a step
- * of this tick. Such kinds are in no step themselves: the caller that makes them strike notes them. */
+/* Does the same for a kind that strikes at an event, such as a boot. The event is at t_ns: the function returns faults
+ * whose time from from_s to until_s includes t_ns. Call it after a step of this tick. Such kinds are in no step
+ * themselves: the caller that makes such a fault strike notes it. */
 struct head_fault *head_faults_at(struct head_faults *faults, enum fault_kind kind, int64_t t_ns,
                                   const struct head_fault *before);
 /* Puts a note on the board, without a pulse. */

@@ -6,9 +6,9 @@
  * In: each pulse and each sentence as it arrives, in order of time, with the head's own clock at that moment. Out: both
  * at a device time.
  *
- * Pulses: absent where none came for more than a second. A pulse agrees when the head's clock has counted whole seconds
- * since the one before, to PPS_TOLERANCE_NS a second; one that doesn't is an error. After PPS_TO_LOCK pulses that
- * agreed, one a second, they are locked.
+ * Pulses are absent where none came for more than a second. A pulse agrees when the head's clock has counted a whole
+ * number of seconds since the pulse before, within PPS_TOLERANCE_NS for each second. Any other pulse but the first is
+ * an error. Pulses are locked after PPS_TO_LOCK pulses in a row that agreed, a second apart.
  *
  *     power comes -> counts from 0 -> locked pulse: its part of a second becomes 0 -> sentence: its minutes and seconds
  *                    by the head's own clock                                          are taken over
@@ -43,7 +43,7 @@ struct pps {
     struct pps_state kept[PPS_KEPT];
 };
 
-/* Power comes, and the counter begins with hour_ns. pulses: they are there, so that the state is synchronising. */
+/* Power comes, and the counter begins with hour_ns. pulses: 1: synchronising; 0: absent. */
 void pps_power_up(struct pps *pps, struct pps_moment at, int64_t hour_ns, int pulses);
 void pps_take(struct pps *pps, struct pps_moment edge);
 /* A sentence came that names this second of the hour, 0..3600. */

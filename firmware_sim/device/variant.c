@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Sites that are planned for settings of commands: ranges, noise, step of a sphere. The command makes one, and is
- * refused where there is no such plan. The scan takes it. It is freed once no work of a scan needs it. */
+/* A variant is the site, planned again after commands have changed ranges, noise or the step of a sphere. The command
+ * makes the variant, and is refused where no plan is possible. The next scan uses the variant. It is freed once no work
+ * of a scan needs it. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -2,8 +2,8 @@
 /* The bytes that a client sent and that are not answered yet: an echo sends them back.
  *
  * In: the client's bytes, in pieces of any size. Out: the lines that get an answer, one after the other; or, for a
- * protocol without lines, all bytes since the last answer. Thread: one. Allocates as it grows. Where HEARD_MAX bytes
- * wait for an answer, they are dropped and get no echo. */
+ * protocol without lines, all bytes since the last answer. Thread: one. Allocates as it grows. Up to HEARD_MAX
+ * bytes wait for an answer. If more come, the waiting ones are dropped and get no echo. */
 #ifndef FIRMWARE_SIM_FAULT_WIRE_HEARD_H
 #define FIRMWARE_SIM_FAULT_WIRE_HEARD_H
 
@@ -15,7 +15,7 @@ struct wire_heard {
     uint8_t *bytes;
     size_t len, room;
     size_t first;           /* begin of the oldest line that is not answered */
-    size_t begin, line_len; /* begin and length of the line that has no end yet; not all of it may be kept */
+    size_t begin, line_len; /* begin and length of the line that has no end yet; only its first part is kept */
     int is_blank, last_cr;
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The source of the loop that is a simulated head, by functions of device.h. The other source is a recording
+/* A simulated head as a source of the loop (source.h), by the functions of device.h. The other source is a recording
  * (firmware_sim/replay). */
 #include "firmware_sim/loop/source.h"
 

@@ -12,7 +12,8 @@
 #include "firmware_sim/loop/pump.h"
 #include "firmware_sim/site/waves.h"
 
-/* The time that an interrupted reader has to finish its copy of a tick, before a caster's claim of that slot waits. */
+/* A reader may be interrupted while it copies a tick. It has this time to go on, before a caster that claims the tick's
+ * slot has to wait for the reader. */
 static const double SPARE_MS = 250.0;
 
 static int create_stream(struct loop *loop, struct sh_err *err)
@@ -187,8 +188,8 @@ void loop_put_links(const struct loop *loop, struct json *json)
     json_close_array(json);
 }
 
-/* Locks the memory that is allocated now, so that nothing the pacing thread touches is paged out or in. Before the
- * threads start, since their whole stacks would be locked. */
+/* Locks the memory that is allocated now, so that nothing the pacing thread touches is paged out or in. It is called
+ * before the threads start, since else their whole stacks would be locked. */
 static void lock_memory(const struct loop *loop)
 {
     if (loop->stream.waits || mlockall(MCL_CURRENT) == 0) return;

@@ -2,10 +2,10 @@
 /* A capture of a device's traffic in place of a head: what the device answered, and what it sent unasked.
  *
  * In: a file of tcpdump's, Wireshark's or `record --raw` (.pcap, .pcapng). Out: a talk (drivers/protocol/talk.h) for
- * each port of a device in it. Of the two ends of a TCP connection, the device is the one that was connected to; where
- * the capture begins later than the connection, the one that sent more bytes. Of two ends of UDP it is the one that
- * sent more datagrams; where both sent as many, the one that did not begin. TCP streams are put together as receivers
- * do; what is missing in them is counted.
+ * each port of a device in it. With TCP, the device is the end that the connection was made to. If the capture begins
+ * later than the connection, the device is the end that sent more bytes. With UDP, it is the end that sent more
+ * datagrams, or, if both sent as many, the end that did not send first. TCP streams are put together as receivers do;
+ * missing bytes are counted.
  *
  * One thread; constant once it is open. */
 #ifndef FIRMWARE_SIM_REPLAY_CAPTURE_H

@@ -122,7 +122,7 @@ static void anchor_geotiff_say(const struct config *cfg, const struct sh_report 
     if (!cfg->scene.anchor.height_given && !t->above_ellipsoid)
         sh_warn(report,
                 "%s: its heights, which mostly count from sea level, are taken as heights above the ellipsoid; "
-                "scene.anchor.height_m sets the height of their 0 above it",
+                "scene.anchor.height_m sets the height of the raster's 0 above the ellipsoid",
                 t->file);
     if (at->accuracy_m > 0.1)
         sh_warn(report, "%s: coordinates in %s have errors up to %.2g m on WGS 84", t->file, t->crs, at->accuracy_m);

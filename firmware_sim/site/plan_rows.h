@@ -8,8 +8,8 @@
 
 /* Fills site->plan.row: rows of each stage, then one with the pulses per second that this machine computes (rate.c). */
 int site_plan_rows(struct site *site, struct sh_err *err);
-/* Processor time that the plan has for a pulse, ns: the sum of its rows, and a part that each pulse takes. The figures
- * are rounded: good enough to recognise an unusual cost. */
+/* Returns the processor time that the plan expects for a pulse, ns: the costs of its rows, and the work that each pulse
+ * takes with any method (plan_pulse_ns). The figures are rounded: good enough to recognise an unusual cost. */
 double site_planned_ns(const struct site *site);
 /* Writes why a pulse may take far more than that, as far as the plan shows it, and what the user can do. */
 void site_cost_reason(const struct site *site, char *text, size_t room);

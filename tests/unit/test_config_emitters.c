@@ -118,7 +118,7 @@ static void settings_that_do_not_fit_are_refused(void **state)
          "278 is outside the limits of head profile sphere; allowed 1 to"},
         {"velodyne-vlp16", "  prr_hz: 300000\n", ":3: head.prr_hz: 300000 is outside"},
         {"velodyne-vlp16", "  lines_hz: 9.5\n  phase_lock: on\n",
-         ":4: head.phase_lock: on, but head.lines_hz is 9.5, which is at another azimuth each second; allowed with whole"},
+         ":4: head.phase_lock: on, but with head.lines_hz 9.5 the rotor is at another azimuth each second; allowed "},
         {"velodyne-vlp16", "  phase_deg: 360\n",
          "head.phase_deg: \"360\" is out of range; allowed 0 to 359.999999 deg"},
         {"hokuyo-urg-04lx", "  phase_lock: on\n",

@@ -49,7 +49,7 @@ static void a_raster_gives_the_place(void **state)
     tif_write(file, &t);
     if (init(wire, "hill.tif") != 0) fail_msg("%s", err_text);
     has(made, "\n  anchor: {source: geotiff} # EPSG:32632; height_m: ");
-    has(err_text, "scene.anchor.height_m sets the height of their 0 above it");
+    has(err_text, "scene.anchor.height_m sets the height of the raster's 0 above the ellipsoid");
     t.key[0][1] = 32767;
     t.key[2][1] = 32767;
     tif_write(file, &t);

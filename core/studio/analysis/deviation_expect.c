@@ -50,7 +50,8 @@ static void angle_effects(const double rotation[9], const double beam[3], const 
     effect[1] = vec3_dot(normal, by_pan);
 }
 
-/* Returns the variance of a ball's moves along the normal (formula: core/studio/deviation.h). */
+/* Points are moved within a ball (noise.ball). Returns the variance of these moves along the normal (formula:
+ * core/studio/deviation.h). */
 static double ball_variance(const struct deviation_head *head, double range_m, const double beam[3],
                             const double normal[3])
 {

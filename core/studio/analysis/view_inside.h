@@ -9,8 +9,8 @@
 enum { VIEW_SUB = 2 }; /* places along a pixel's side: a pixel is the mean of its places, so that edges are smooth */
 
 struct view_place {
-    /* Depth of the disc at this place; a disc is deeper at its rim (view.h). Of several discs the one with the least is
-     * in front. INFINITY: there is no disc. */
+    /* Depth of the disc at this place; a disc is deeper at its rim (view.h). Where several discs overlap, the disc with
+     * the least depth is in front. INFINITY: there is no disc. */
     float order_m;
     float depth_m; /* of the disc's centre */
     union {

@@ -55,8 +55,8 @@ HAS_ATTRIBUTES, HAS_COLOURS, HAS_WAVES, HAS_DEVIATIONS = 1, 2, 4, 8  # content o
 _HASHED = (DESCRIPTOR, ANCHOR, POINTS, LINE_END, POSES, ATTRIBUTES, EMITTER, COLOURS, WAVES)
 _HEADER_LEN, _MAX_PAYLOAD, _MAX_TEXT = 28, 65536, 512
 _QUEUE_BYTES, _KEEP_POSES, _CHUNK = 64 << 20, 8192, 1 << 16
-# As in libscanhead: latest frames and gaps that are remembered, frames in such a gap at most, and late frames in a row
-# that are another sequence.
+# As in libscanhead: the latest _SEEN frames and _GAPS gaps are remembered, but no gap of more than _GAP_MOST frames.
+# _LATE_RUN late frames in a row are not late: they belong to another sequence.
 _SEEN, _GAPS, _GAP_MOST, _LATE_RUN = 256, 64, 65536, 256
 _FRAME_BYTES = 512  # memory of a kept frame beside its payload
 _POLL_MS = 2**31 - 1  # the longest that poll() waits
@@ -309,7 +309,7 @@ class _Sequence:
 
     def take(self, frame: Tuple) -> Tuple[str, int, int]:
         """frame: its number, its flags, and all that tells it from others. Returns the kind of its notice ("": there is
-        none), and the first number and the number of the frames concerned."""
+        none), and which frames it concerns: the number of the first one, and how many they are."""
         seq, flags = frame[:2]
         if flags & LOCAL:
             kind = "repeated" if frame == self._local else ""
@@ -423,8 +423,8 @@ class Parser:
             self.on_notice(Notice(*fields))
 
     def _end_bad(self, at_end: bool = False) -> None:
-        """Ends the run of bad bytes: good bytes follow or, at_end, nothing. A frame that seemed to be cut by the end is
-        a broken one if others stood within its length."""
+        """Ends the run of bad bytes: good bytes follow or, at_end, nothing. A frame that seemed to be cut by the end
+        was broken if good bytes follow within its length."""
         bad, self._bad = self._bad, None
         if bad is None:
             return
@@ -900,7 +900,7 @@ def geodetic_to_ecef(lat_deg, lon_deg, height_m, m=_Plain):
 
 def ecef_to_geodetic(x_m, y_m, z_m, m=_Plain):
     """Latitude, longitude in degrees, ellipsoidal height in metres. Bowring's iteration (Survey Review 23,
-    1976); near the Earth three steps leave rounding alone."""
+    1976); near the Earth only rounding errors are left after three steps."""
     p = m.hypot(x_m, y_m)
     beta = m.arctan2(z_m, (1 - _F) * p)
     for _ in range(3):
@@ -1385,7 +1385,7 @@ class Head:
     # -- frames
 
     def frames(self, timeout_s: Optional[float] = None) -> Iterator[Frame]:
-        """Frames in order. It ends with a recording. Closed: the head is gone; Timeout: none in timeout_s."""
+        """Frames in order, up to a recording's end. Closed: the head is gone; Timeout: none in timeout_s."""
         while True:
             frame = self.next_frame(timeout_s)
             if frame is None:

@@ -58,10 +58,10 @@ export function restShares(parts, more) {
   });
 }
 
-// There are three targets: one that is shown, one that is drawn into (the same, or one that replaces it once it has
-// enough points), and one for the page. Those of a moving view may be smaller. A picture for the page is drawn aside,
-// and put onto the canvas only once the GPU has finished it: a browser that composes in software waits for the canvas,
-// and the page waits, too.
+// There are three targets: one with the picture that is shown, one that is drawn into (the same, or one that replaces
+// it once it has enough points), and one for the page, into which the shown picture is drawn with its shading. Targets
+// of a moving view may be smaller. The one for the page is put onto the canvas only once the GPU has finished it: a
+// browser that composes in software waits for the canvas, and the page waits, too.
 export class Painter {
   moving = new Budget(MOVE_MS, 150_000);
   resting = new Budget(STEP_MS, 150_000);
@@ -139,7 +139,7 @@ export class Painter {
     return did;
   }
 
-  // Call it after a step's last command; it calls then(ms) once the GPU has done it.
+  // Call it after a step's last command. Once the GPU has done the step, busy() calls then(ms).
   fence(then) {
     const gl = this.#gl;
     this.#fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);

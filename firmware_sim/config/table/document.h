@@ -21,7 +21,7 @@ void cfg_close_file(struct cfg_document *doc);
 /* Reads the section `scanner` of rd->scanner over the values that were read before. */
 void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc);
 /* Applies the values of --set for the file's own keys or, where rd->in_scanner is 1, those for the scanner's. The
- * others are skipped. doc: the file's document, which keeps values that are YAML. */
+ * others are skipped. doc: the file's document. A value of --set that is YAML is parsed, and stored in doc. */
 void cfg_apply_sets(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets);
 /* Reads a list or a section from YAML in a --set. The key must have been forgotten before (cfg_forget). */
 void cfg_read_set_value(struct cfg_reader *rd, struct cfg_document *doc, const struct cfg_key *key, uint32_t item,

@@ -46,7 +46,8 @@ uint32_t heads_turns(const struct heads *heads, uint32_t first, uint32_t last);
 /* The configuration of the i-th of the heads that scan from stations first to last (0, 0: the station that the head is
  * set to); NULL: there is no i-th. */
 struct config *heads_config(const struct heads *heads, uint32_t i, uint32_t first, uint32_t last);
-/* Starts the first head; scan_s as of offline_open. site: of its configuration, by offline_load; NULL: it loads one. */
+/* Starts the first head. scan_s means the same as in offline_open. site: the site of the head's configuration, loaded
+ * by offline_load; NULL: heads_open loads one. */
 int heads_open(struct heads *heads, struct site *site, double scan_s, const struct sh_report *report,
                struct sh_err *err);
 /* Like recording_run, from each station with the head of its scanner. */

@@ -58,7 +58,7 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
 {
     const uint64_t bad = link->bad_bytes;
     struct soak_row sum = {0};
-    /* Acts that the client has not noticed by the end are missed. */
+    /* Faults that end or refuse connections, and that the client has not noticed by now, are missed. */
     for (uint32_t i = 0; i < link->n_acts; i++)
         link->row[link->act[i].kind].missed++;
     for (uint32_t i = 0; i < link->n_refusals; i++)
@@ -131,7 +131,8 @@ static void print_link(const struct soak_link *link, FILE *out)
     if (link->away != 0) fprintf(out, "; %" PRIu64 " frames came while there was no session", link->away);
     if (link->reader_lost != 0) fprintf(out, "; %" PRIu64 " left out, the client was too slow", link->reader_lost);
     if (link->ask.hurt != 0)
-        fprintf(out, "; %" PRIu64 " replies were lost or wrong next to other faults", link->ask.hurt);
+        fprintf(out, "; %" PRIu64 " replies were lost or wrong beside another fault, or just after a session",
+                link->ask.hurt);
     if (link->unknown != 0) fprintf(out, "; %" PRIu64 " frames the clean reader did not get", link->unknown);
     if (link->failed[0] != '\0') fprintf(out, "; gave up: %s", link->failed);
     fprintf(out, "\n");
