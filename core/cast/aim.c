@@ -170,8 +170,8 @@ void caster_aim(struct caster *c, struct chunk *k)
         aim_ideal(c, k, &(struct kernel_turns){k->n, l->mirror_turn, l->pan_turn});
 }
 
-/* Computes what the encoders read of entries at .. at + n. Overwrites c->socs and, where the head moves, c->read. There
- * dt_ns are the entries' times. */
+/* Computes what the encoders read of entries at .. at + n. Overwrites c->socs and, where the head moves, c->read.
+ * dt_ns has the entries' times, which are used only where the head moves. */
 static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const uint32_t *dt_ns)
 {
     const struct cast_setup *s = k->s;
