@@ -143,7 +143,7 @@ quoted = '$(subst ','\'',$(strip $(1)))'
 $(STAMPS): ALWAYS
 	@mkdir -p $(@D)
 	@printf '%s\n' $(call quoted,$(NOW)) | cmp -s - $@ || printf '%s\n' $(call quoted,$(NOW)) >$@
-# The page's files, built in: one line a file for web_pages.c.
+# The files of the web page are built into the program. This writes a line for each, which web_pages.c includes.
 WEB_FILES = $(sort $(filter-out %.md,$(wildcard drivers/link/web/*)))
 $(BUILD)/drivers/link/web_pages.inc: ALWAYS
 	@mkdir -p $(@D)
@@ -222,7 +222,7 @@ $(BUILD)/core/%.o: private override OPT += $(CORE_OPT)
 $(BUILD)/tests/%.o: private override CWARN += $(TEST_WARN)
 # These compute little themselves, and are built in half the time.
 $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT += -O1
-# Some 500 programs are linked, twenty at a time; gold takes two thirds of the time.
+# Some 500 programs are linked, twenty at a time; gold takes two thirds of the time that ld takes.
 # lld links what clang compiled: gold warns of the symbols of clang's sanitizers.
 # A program loads the libraries that it needs and no others: those of Embree and Assimp take longer than many a test.
 FAST_LD = $(if $(CROSS_COMPILE),,$(if $(findstring clang,$(CC)),$(LLD),$(GOLD)))

@@ -12,8 +12,8 @@
 #include "core/cast/disturbance.h"
 #include "core/mat3.h"
 
-/* Sets to_crs to the rotation from socs to the frame of positions: the CRS where that is a rotation, else prcs.
- * Returns 1 in the first case. */
+/* Sets to_crs to the rotation of differences from socs to the CRS, where that is a rotation, and returns 1. Elsewhere
+ * to_crs is the rotation from socs to prcs, and 0 is returned. */
 static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
     double g[9];

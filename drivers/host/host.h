@@ -81,7 +81,7 @@ struct scanhead {
     size_t surface_room;
     uint32_t n_surfaces;
 
-    uint64_t dropped, reader_lost, reader_lost_before; /* frames; reader_lost: of this session; _before: of earlier ones */
+    uint64_t dropped, reader_lost, reader_lost_before; /* frames; _before: of earlier sessions */
     uint64_t pulses_lost_told, pulses_lost_ended;      /* by OVERRUN events, by SCAN_END events */
     int hashing;
     struct sha256_ctx sha256;

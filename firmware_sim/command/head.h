@@ -11,7 +11,7 @@
 
 #include "core/emitter.h"
 
-/* The order is on the wire (telemetry, state events). */
+/* Telemetry and state events send these numbers, so their order stays. */
 enum head_state {
     HEAD_OFF,
     HEAD_BOOT,
