@@ -26,12 +26,12 @@ V ?= 0
 Q_0 = @
 Q = $(Q_$(V))
 
-# A fresh Debian 12 needs these packages for building and the demo,
+# A fresh Debian 12 needs these packages for building and for the demo.
 DEPS_BUILD = gcc g++ make pkg-config libc6-dev libembree-dev libassimp-dev libgeographiclib-dev libproj-dev libyaml-dev libpng-dev \
 	libstb-dev nettle-dev libusb-1.0-0-dev libusbredirparser-dev libwebsockets-dev libjansson-dev libwebp-dev libtiff-dev \
 	libmeshoptimizer-dev assimp-testmodels \
 	$(if $(shell command -v npm),,nodejs npm)
-# and these for the tests, with the second compiler and its sanitizers, clients and readers that are not ours.
+# The tests need these packages, too: the second compiler and its sanitizers, and clients and readers of other projects.
 DEPS_TEST = $(DEPS_BUILD) libcmocka-dev clang clang-format libclang-rt-dev lld ccache gpsd gpsd-clients cloudcompare mrpt-apps proj-bin python3-numpy \
 	llvm parallel tshark tcpreplay
 # The guest tests; they are skipped where these can't be had. The kernel (linux-image-amd64) is fetched, not installed.
@@ -46,20 +46,21 @@ ask_pkg_config = $(shell $(PKG_CONFIG) $(1) $(PKGS))$(if $(filter-out 0,$(.SHELL
 	find all of $(PKGS): make deps-build, or PKG_CONFIG=... for another machine))
 PKG_CFLAGS = $(eval PKG_CFLAGS := $$(call ask_pkg_config,--cflags))$(PKG_CFLAGS)
 PKG_LIBS = $(eval PKG_LIBS := $$(filter-out $$(LATE:%=-l%),$$(call ask_pkg_config,--libs)))$(PKG_LIBS)
-# These are loaded when they are needed (core/late.h), by the name that a program linked with them would have.
+# A program loads these libraries when it needs them (core/late.h), by their SONAME, as if it were linked with them.
 LATE = proj assimp tiff websockets
 find_soname = $(or $(shell readelf -d $$($(CC) -print-file-name=lib$(1).so) | sed -n 's/.*SONAME.*\[\(.*\)\]/\1/p'),$(error no \
 	lib$(1).so for $(CC): make deps-build))
 SONAMES = $(eval SONAMES := $$(foreach l,$$(LATE),-DSONAME_$$(l)='"$$(call find_soname,$$(l))"'))$(SONAMES)
-# Embree: the version of headers and library, decided here alone. EMBREE=4 asks for that one; else 3 where both are.
+# These lines alone choose the version of Embree's headers and library. EMBREE=4 asks for version 4. Without EMBREE,
+# version 3 is taken where both are installed.
 has_embree = $(shell $(CC) $(CPPFLAGS) -E -xc -include embree$(1)/rtcore.h /dev/null >/dev/null 2>&1 && echo $(1))
 find_embree = $(or $(firstword $(foreach v,$(filter 3 4,$(or $(EMBREE),3 4)),$(call has_embree,$(v)))),$(error no \
 	Embree $(or $(EMBREE),3 or 4) for $(CC); allowed 3 and 4: make deps-build, or EMBREE= for the one that is there))
 EMBREE_VERSION = $(eval EMBREE_VERSION := $$(call find_embree))$(EMBREE_VERSION)
 OPT ?= -O3 $(VEC_WIDTH)
-# Vectors are whole where there are 512 bits; gcc and clang both know the option on x86 alone.
+# Loops use all 512 bits of vectors on CPUs that have them. On other machines than x86 gcc and clang refuse the option.
 VEC_WIDTH = $(if $(filter x86_64-%,$(TARGET)),-mprefer-vector-width=512)
-# Named whole numbers are figures, too; clang 19 would warn of that.
+# Arithmetic in floating point uses constants of enums; clang 19 would warn of that.
 WARN = -Wall -Wextra -Wconversion -Wshadow -Wno-enum-float-conversion
 CWARN = $(WARN) -Wstrict-prototypes -Wmissing-prototypes
 # `make test` turns warnings into errors; a user's newer compiler may warn in peace.
@@ -98,11 +99,12 @@ HEAD_OBJ = $(filter-out $(STUDIO:%=$(BUILD)/%),$(OBJ))
 LIBOBJ = $(patsubst %,$(BUILD)/%.o,core/err.c $(PROTO) $(HOST))
 PROGRAMS = $(patsubst tests/%.c,$(BUILD)/tests/%,$(wildcard tests/$(1)/test_*.c))
 UNIT = $(call PROGRAMS,unit)
-# In `make test` (and tests/run_all.sh) all unit tests run with sanitizers. Those of core, and those that do less with
-# sanitizers, run as shipped, too. In `make test-unit` all run as shipped alone.
+# In `make test` (and tests/run_all.sh) all unit tests run with sanitizers. Unit tests of core, and unit tests that do
+# less with sanitizers, run as shipped, too: without sanitizers. In `make test-unit` no unit test has sanitizers.
 SHIPPED = $(patsubst tests/%.c,$(BUILD)/tests/%,$(shell sh tests/shipped.sh))
 TESTS = $(UNIT) $(call PROGRAMS,wire) $(call PROGRAMS,accuracy) $(call PROGRAMS,stability) $(call PROGRAMS,guest)
-# JOIN says which programs are linked at once: all, the unit tests, or all but those of them that don't run as shipped.
+# JOIN says which test programs are linked at once: all but those of the guest; the unit tests; or (shipped) all but
+# those of the guest and the unit tests that run with sanitizers alone.
 JOIN ?= all
 JOINED_unit = $(UNIT)
 JOINED_all = $(filter-out $(call PROGRAMS,guest),$(TESTS))
@@ -141,7 +143,7 @@ quoted = '$(subst ','\'',$(strip $(1)))'
 $(STAMPS): ALWAYS
 	@mkdir -p $(@D)
 	@printf '%s\n' $(call quoted,$(NOW)) | cmp -s - $@ || printf '%s\n' $(call quoted,$(NOW)) >$@
-# The page's files, built in: one line a file for web_pages.c.
+# The files of the web page are built into the program. This writes a line for each, which web_pages.c includes.
 WEB_FILES = $(sort $(filter-out %.md,$(wildcard drivers/link/web/*)))
 $(BUILD)/drivers/link/web_pages.inc: ALWAYS
 	@mkdir -p $(@D)
@@ -152,7 +154,7 @@ $(BUILD)/core/late.c.o: private override ALL_CPPFLAGS += $(SONAMES)
 $(BUILD)/core/late.c.o: $(BUILD)/sonames
 $(BUILD)/drivers/link/web_pages.c.o: $(BUILD)/drivers/link/web_pages.inc $(WEB_FILES)
 ALWAYS:
-# All modules for the program and the tests, and the client library alone.
+# modules.a has all modules, for scanhead and the tests. head.a has the modules of scanheadd.
 $(BUILD)/modules.a: $(OBJ) $(BUILD)/modules.members
 $(BUILD)/head.a: $(HEAD_OBJ) $(BUILD)/head.members
 ARCHIVES = $(patsubst %,$(BUILD)/%.a,modules head libscanhead client common benches)
@@ -160,7 +162,8 @@ $(ARCHIVES):
 	@rm -f $@
 	@echo "  AR    $@"
 	$(Q)$(AR) rcs $@ $(filter %.o,$^)
-# The library's archive has one object, in which all names are local but those of the interface: no client meets the others.
+# The library's archive has one object, in which all names but those of the interface are local. So they can't clash
+# with names of a client.
 $(BUILD)/libscanhead.o: $(LIBOBJ) $(BUILD)/library.members
 	@echo "  LD    $@"
 	$(Q)$(CC) -r -nostdlib -o $@ $(LIBOBJ)
@@ -192,7 +195,8 @@ $(BUILD)/scanheadd: $(BUILD)/firmware_sim/scanheadd.o $(BUILD)/head.a
 #   modules.a   head and studio, no main                                    all of them
 FIGURES = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight chart_georef chart_widths beam plain velodyne waves waveform waveform_detect loop_cost loading kernels panorama copies decode live write_mesh)
 BENCH_MAINS = $(FIGURES:$(BUILD)/%=%.c) tests/bench/bench.c
-# LIMIT ends a test program that waits for ever; each is linked with it as an object, as nobody calls it.
+# LIMIT ends a test program that waits for ever. It is linked as an object: nothing calls it, so the linker would leave
+# it in an archive.
 LIMIT = tests/common/limit.c
 LINK_LIMIT = -Wl,--wrap=_cmocka_run_group_tests
 COMMON = $(filter-out $(LIMIT),$(wildcard tests/common/*.c))
@@ -206,7 +210,7 @@ $(FIGURES): $(BUILD)/%: $(BUILD)/%.c.o
 $(BUILD)/bench $(FIGURES): $(BUILD)/benches.a $(BUILD)/common.a $(BUILD)/modules.a
 	@echo "  LD    $@"
 	$(Q)$(CC) $(SAN) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^) $(LDLIBS)
-# Its bus is the unit tests' stand-in for libusb, which checks its user with cmocka.
+# live reads a head on a bus that is made up: the unit tests' stand-in for libusb, which needs cmocka.
 $(BUILD)/tests/bench/live: $(BUILD)/tests/unit/fake_libusb.c.o
 $(BUILD)/tests/bench/live: private override LDFLAGS += -Wl,--as-needed
 $(BUILD)/tests/bench/live: private override LDLIBS += -lcmocka
@@ -214,12 +218,12 @@ $(BUILD)/tests/bench/live: private override LDLIBS += -lcmocka
 $(BUILD)/tests/common/chart.c.o: private override SAN =
 # With sanitizers core has flags of its own: it is a sixth of the code, and takes most of the time.
 $(BUILD)/core/%.o: private override OPT += $(CORE_OPT)
-# Tests have no warnings where sanitizers leave out parts of them.
+# With sanitizers some tests leave out parts of their code (SH_SANITIZE). So they are compiled without warnings there.
 $(BUILD)/tests/%.o: private override CWARN += $(TEST_WARN)
 # These compute little themselves, and are built in half the time.
 $(BUILD)/tests/unit/% $(BUILD)/tests/wire/% $(BUILD)/tests/guest/%: private OPT += -O1
-# Some 500 programs are linked, twenty at a time; gold takes two thirds of the time.
-# clang's sanitizers need its own: gold has doubts about their symbols.
+# Some 500 programs are linked, twenty at a time; gold takes two thirds of the time that ld takes.
+# lld links what clang compiled: gold warns of the symbols of clang's sanitizers.
 # A program loads the libraries that it needs and no others: those of Embree and Assimp take longer than many a test.
 FAST_LD = $(if $(CROSS_COMPILE),,$(if $(findstring clang,$(CC)),$(LLD),$(GOLD)))
 GOLD := $(if $(shell command -v ld.gold),-fuse-ld=gold)
@@ -227,7 +231,7 @@ LLD := $(if $(shell command -v ld.lld),-fuse-ld=lld)
 LINK_TEST = $(CC) $(SAN) $(FAST_LD) $(LINK_LIMIT)
 TEST_LIBS = -Wl,--as-needed -lcmocka -lassimp -ltiff $(LDLIBS)
 .SECONDEXPANSION:
-# This one links all of them, twenty in a file.
+# This rule links all test programs of JOINED, twenty in a file.
 $(BUILD)/tests/joined: $$(sort $$(foreach p,$$(JOINED),$$(p).c.o $$(call RIGS,$$(patsubst $$(BUILD)/%,%,$$(p))))) $(BUILD)/$(LIMIT).o \
 	$(BUILD)/common.a $(BUILD)/modules.a $(BUILD)/joined.members tests/join.sh
 	@echo "  JOIN  $(words $(JOINED)) test programs"
@@ -237,7 +241,8 @@ $(BUILD)/tests/%: $(BUILD)/tests/%.c.o $$(call RIGS,tests/$$*) $(BUILD)/$(LIMIT)
 	@echo "  TEST  $@"
 	@rm -f $@
 	$(Q)$(LINK_TEST) -o $@ $^ $(TEST_LIBS)
-# Programs of the guest have the client library alone, with its inside, so that they start faster there.
+# Test programs of the guest are linked with client.a alone: the client library with its internal names. So they start
+# faster in the guest.
 $(BUILD)/tests/guest/%: $(BUILD)/tests/guest/%.c.o $$(call RIGS,tests/guest/$$*) $(BUILD)/$(LIMIT).o $(BUILD)/client.a
 	@echo "  TEST  $@"
 	$(Q)$(CC) $(SAN) $(LINK_LIMIT) -o $@ $^ -lcmocka -lnettle -lusb-1.0 -lm -pthread
@@ -300,7 +305,8 @@ demo: deps-build
 # ---- tests. Warnings are errors. There are two builds. One has everything with gcc, as it is shipped. The other has the
 # unit tests with sanitizers and the fuzz targets, with clang and its warnings; without clang gcc builds them. Marks of
 # coverage for the fuzz targets cost a tenth. clang takes a third of the time at -O0 that it takes at -O1 (gcc with
-# sanitizers: two thirds); core alone is worth -O1. -g1, the lines alone, is an eighth less to compile.
+# sanitizers: two thirds); core alone is worth -O1. With -g1, which keeps line numbers alone, compiling takes an eighth
+# less time.
 JOBS ?= $(shell getconf _NPROCESSORS_ONLN)
 # A file that was compiled before, in any checkout, is not compiled again.
 CACHED = $(if $(findstring ccache,$(CC)),,$(if $(shell command -v ccache),ccache ))
@@ -391,25 +397,27 @@ CHARTS = $(patsubst %,$(BUILD)/tests/bench/%,chart chart_moving chart_sight char
 bench-beam: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/beam
 	@$(BUILD)/tests/bench/beam house wires foliage leaves
-# Each of these runs one program. plain: effects that are configured and not needed cost at most 5 % beside the plain
-# cast. copies: a forest of copies, its memory, and what a ray costs beside one tree. velodyne: the encoder of VLP-16
-# data packets, ns a firing. waves: waveforms on the wire, ns a window.
+# Each of these runs one program. plain: effects that are configured and not needed change the cost of the plain cast
+# by at most 5 %. copies: the memory of a forest of copies, and the cost of a ray compared with a single tree.
+# velodyne: the encoder of VLP-16 data packets, ns a firing. waves: waveforms on the wire, ns a window.
 #? bench-waveform    samples of full waveforms: ns a pulse by spread and window
 bench-plain bench-copies bench-velodyne bench-waves bench-waveform: bench-%: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/$*
 	@$(BUILD)/tests/bench/$*
-# A panorama of 0.1 degrees to files on one processor, beside Embree alone; last, PLY with coordinates as float alone.
+# This records a panorama of 0.1 degrees to files on one processor, and compares the time with that of Embree alone. The
+# last run writes PLY with nothing but coordinates, as float.
 PANORAMA = taskset -c $(shell expr $(JOBS) - 1) $(BUILD)/tests/bench/panorama --set loop.threads=1
 bench-panorama: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/panorama
 	@$(PANORAMA) --ending none,.ply,.las,.e57
 	@$(PANORAMA) --columns xyz,float
-# Beside HELIOS++, which isn't part of this: HELIOS="--helios PROGRAM --assets FOLDER"; ten minutes a round.
+# This compares the speed with that of HELIOS++, which isn't part of scanhead and is named by
+# HELIOS="--helios PROGRAM --assets FOLDER". A round takes ten minutes.
 HELIOS ?=
 bench-helios: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/write_mesh
 	@python3 tests/bench/helios.py $(HELIOS)
-# A browser beside a head at its limit, and how fast the page is; some minutes.
+# This measures what a browser costs a head that runs at its limit, and how fast the page is. It takes some minutes.
 bench-page: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/write_mesh
 	@SCANHEAD=$(BUILD)/scanhead node tests/bench/page.mjs $(PAGE)
@@ -418,19 +426,19 @@ bench-page: deps-build deps-browser
 page-pictures: deps-build deps-browser
 	@$(MAKE) --no-print-directory -j2 all
 	@SCANHEAD=$(BUILD)/scanhead node tests/page/pictures.mjs --out $(BUILD)/pictures
-# The arithmetic around the cast, ns a pulse: as on this CPU, and as x86 has it without AVX-512.
+# This measures the arithmetic around the cast, ns a pulse: for this CPU, and for an x86 without AVX-512.
 bench-kernels: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/kernels
 	@$(BUILD)/tests/bench/kernels
 	+@$(call make_avx2,tests/bench/kernels)
 	@$(if $(AVX2),echo "AVX2:" && $(AVX2)/tests/bench/kernels)
-# The real loop, processor time a pulse, with and without stream_sha256. In turns with others: make bench-loop
-# WITH="'/path/scanhead' '/other --option'".
+# This measures the processor time that the real loop takes a pulse, with and without stream_sha256. WITH names other
+# programs, which are measured in the same rounds: make bench-loop WITH="'/path/scanhead' '/other --option'".
 WITH ?=
 bench-loop: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loop_cost
 	@$(BUILD)/tests/bench/loop_cost $(BUILD)/scanhead '$(BUILD)/scanhead --no-hash' $(WITH)
-# `check` of meshes of 10 million triangles, beside Embree's build of them.
+# This measures `check` of meshes of 10 million triangles, and compares it with Embree's build of their BVH.
 bench-loading: deps-build
 	@$(MAKE) --no-print-directory -j2 all $(BUILD)/tests/bench/loading
 	@$(BUILD)/tests/bench/loading --program $(BUILD)/scanhead $(LOADING)
@@ -458,7 +466,8 @@ test-programs: all $(BUILD)/bench $(call PROGRAMS,guest) $(FIGURES)
 # Long tests and measurements have rules beside them.
 include $(wildcard tests/*/*.mk config/*/*.mk)
 
-# The readers of IFC, without what only browsers need. Builds below build/ use those of build/.
+# The readers of IFC are installed without the files that only browsers need. A build in a folder of build/ uses the
+# readers in build/ifc.
 IFC_BUILT = $(patsubst %/installed,%,$(firstword $(wildcard $(IFC_READERS)/installed $(BUILD)/../ifc/installed)))
 IFC_FILES = $(addprefix node_modules/web-ifc/,package.json LICENSE.md web-ifc-api-node.js web-ifc-node.wasm) \
 	$(addprefix node_modules/@ifc-lite/wasm/,package.json LICENSE pkg/ifc-lite.js pkg/ifc-lite_bg.wasm)

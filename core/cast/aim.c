@@ -12,8 +12,8 @@
 #include "core/cast/disturbance.h"
 #include "core/mat3.h"
 
-/* Sets to_crs to the rotation from socs to the frame of positions: the CRS where that is a rotation, else prcs.
- * Returns 1 in the first case. */
+/* Sets to_crs to the rotation of differences from socs to the CRS, where that is a rotation, and returns 1. Elsewhere
+ * to_crs is the rotation from socs to prcs, and 0 is returned. */
 static int reading_rotation(const struct cast_setup *s, double to_crs[9])
 {
     double g[9];
@@ -170,8 +170,8 @@ void caster_aim(struct caster *c, struct chunk *k)
         aim_ideal(c, k, &(struct kernel_turns){k->n, l->mirror_turn, l->pan_turn});
 }
 
-/* Computes what the encoders read of entries at .. at + n. Overwrites c->socs and, where the head moves, c->read. There
- * dt_ns are the entries' times. */
+/* Computes what the encoders read of entries at .. at + n. Overwrites c->socs and, where the head moves, c->read.
+ * dt_ns has the entries' times, which are used only where the head moves. */
 static void read_part(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const uint32_t *dt_ns)
 {
     const struct cast_setup *s = k->s;

@@ -108,7 +108,7 @@ uint32_t beam_find_lines(const struct beam_outlines *o, const struct beam *beam,
         turn_in(edge->a, sight, e.a);
         turn_in(edge->b, sight, e.b);
         if (!clip_to_beam(beam, &e)) continue;
-        if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* what lies inside the beam is too far */
+        if (e.a[2] > limit_m && e.b[2] > limit_m) continue; /* the part inside the beam is too far */
         if (!make_line(beam, &e, &one) || is_known(line, n, &one)) continue;
         if (n == BEAM_MAX_LINES) return n + 1;
         line[n++] = one;

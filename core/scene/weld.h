@@ -13,7 +13,7 @@ struct scene_build;
 enum { BUILD_RECENT = 65536, BUILD_TOGETHER = 1024 };
 /* Zero-initialise. */
 struct build_weld {
-    uint32_t *number; /* [n] in the scene, of the file's vertices */
+    uint32_t *number; /* [n] the scene's number of each vertex of the file */
     uint32_t n;
     uint32_t waiting; /* vertices at the scene's end that have no number yet */
     uint32_t *slot;   /* [size] of a hash table: numbers in the scene */
@@ -23,7 +23,7 @@ struct build_weld {
     uint32_t recent[BUILD_RECENT];
 };
 int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err);
-/* Adds the next of these vertices, as build_vertex, unless there is one at the same place, bit for bit. */
+/* Adds the file's next vertex as build_vertex does, unless the scene has one at the same place, bit for bit. */
 int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
 /* The same, but numbers come later, many together, which is faster: build_weld_flush gives the last ones. */
 int build_weld_later(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);

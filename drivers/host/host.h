@@ -81,7 +81,7 @@ struct scanhead {
     size_t surface_room;
     uint32_t n_surfaces;
 
-    uint64_t dropped, reader_lost, reader_lost_before; /* by the present session; by those before it */
+    uint64_t dropped, reader_lost, reader_lost_before; /* frames; _before: of earlier sessions */
     uint64_t pulses_lost_told, pulses_lost_ended;      /* by OVERRUN events, by SCAN_END events */
     int hashing;
     struct sha256_ctx sha256;
@@ -114,8 +114,8 @@ int host_has_content(const struct scanhead *sh, enum native_content content);
 int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len);
 void host_forget_poses(struct scanhead *sh);
 
-/* turns.c: sines and cosines of n <= HOST_BLOCK angles, u >= 0 turns: the table gives whole 1/256 turns, a series the
- * rest. */
+/* turns.c: host_turn_table fills the table with sines and cosines of whole 1/256 turns. host_sincos_turns computes them
+ * for n <= HOST_BLOCK angles of u >= 0 turns, by the table and a series for the rest of each angle. */
 void host_turn_table(struct scanhead *sh);
 void host_sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c);
 /* Sets rad to the angles of u turns in radians, folded into [lo, lo + 1) turns. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Poses of a moving head: kept for a while, and points taken to the scene with them. */
+/* Keeps the latest poses of a moving head, and converts points from the head's frame to the scene's by them. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

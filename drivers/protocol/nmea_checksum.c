@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For injected faults: marks the decimals of sentences, and corrects their checksums. */
+/* For injected faults in sentences: marks the bits of decimals, which a fault may flip, and corrects checksums. */
 #include <string.h>
 
 #include "drivers/protocol/protocol.h"

@@ -10,7 +10,7 @@ enum {
     BCD_USB_3 = 0x0320,     /* at super speed */
     PACKET_0 = 64,          /* bMaxPacketSize0, full and high speed */
     PACKET_0_SUPER = 9,     /* the same at super speed: 2^9 */
-    SELF_POWERED = 0x40,    /* bmAttributes, with bit 7, which is always set */
+    SELF_POWERED = 0x40,    /* a bit of bmAttributes, whose bit 7 is always set, too */
     CAP_USB_2_EXTENSION = 2,
     CAP_SUPER_SPEED = 3,
     CAP_PLATFORM = 5,

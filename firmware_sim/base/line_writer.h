@@ -5,7 +5,8 @@
  * finds no room in it is dropped, whole, and counted. Before the next line that is written, a line in the file says how
  * many are missing there (`gap`). After the first error in writing all lines are dropped and counted.
  *
- * There are two kinds of lines. Remarks have one half of the queue, so that a flood of them leaves room for the others.
+ * There are two kinds of lines. A remark is dropped when it would fill the queue beyond one half. So a flood of remarks
+ * leaves room for the other lines.
  *
  * Thread: any but the pacing thread, since line_writer_put holds a lock while a line is copied. It neither allocates
  * nor writes, so it may be called with other locks held. */
@@ -26,8 +27,8 @@ struct line_writer_spec {
     const char *what, *path; /* errors begin with them: "journal: FILE"; the caller's */
     size_t room;             /* size of the queue in bytes, at least 2 * (LINE_MOST_BYTES + LINE_GAP_BYTES) */
     _Atomic uint64_t *lost;  /* counts the lines that are not in the file; the caller's; may be NULL */
-    /* The line that stands for lost[kind] lines, which are not all 0: with its '\n', at most LINE_GAP_BYTES - 1. It is
-     * called with the writer's lock held. */
+    /* Writes the line that stands for lost[kind] lines, which are not all 0. With its '\n' it has at most
+     * LINE_GAP_BYTES - 1 characters. The caller holds the writer's lock. */
     void (*gap)(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS]);
 };
 
@@ -35,8 +36,8 @@ struct line_writer;
 
 int line_writer_open(const struct line_writer_spec *spec, struct line_writer **out, struct sh_err *err);
 
-/* Whole lines with their '\n', one or more, at most LINE_MOST_BYTES; they count as one. SH_ELOST: dropped; SH_EIO:
- * dropped, since the file can't be written. */
+/* Queues a text for the file: one or more whole lines with their '\n', at most LINE_MOST_BYTES. A text that is dropped
+ * counts as one lost line. SH_ELOST: the text was dropped; SH_EIO: it was dropped, since the file can't be written. */
 int line_writer_put(struct line_writer *writer, enum line_kind kind, const char *text, size_t len);
 
 /* 1: a quarter of the queue is full; callers that can wait should, so that nothing is dropped. 0 for NULL. */

@@ -11,7 +11,7 @@
 
 #include "core/emitter.h"
 
-/* The order is on the wire (telemetry, state events). */
+/* Telemetry and state events send these numbers, so their order stays. */
 enum head_state {
     HEAD_OFF,
     HEAD_BOOT,
@@ -55,8 +55,8 @@ struct head_settings {
     uint32_t echoes;                         /* which echoes of a pulse are sent: enum beam_select */
     uint32_t noise;                          /* of ranges: enum config_range_noise */
     uint32_t angle_noise;                    /* 0: none */
-    uint32_t phase_lock;                     /* 1: the rotor's phase is held to the pulses per second */
-    int64_t phase_udeg;                      /* its azimuth at a pulse */
+    uint32_t phase_lock;                     /* 1: the rotor's phase is held to the receiver's PPS pulses */
+    int64_t phase_udeg;                      /* the rotor's azimuth at a PPS pulse */
     int64_t range_min_nm, range_max_nm;      /* nothing nearer or farther is an echo */
     int64_t sigma_nm, ball_nm;               /* fixed part of the range noise, one sigma; radius of the ball noise */
     int64_t step_udeg;                       /* of a sphere, as it was set; of a planar head with geometries; else 0 */
@@ -86,7 +86,7 @@ struct head_limits {
     int64_t pan_min_udeg, pan_max_udeg;
     uint32_t n_stations;
     uint64_t elsewhere;    /* bit i: station i + 1 has another scanner than this head; 0 beyond 64 */
-    uint32_t n_geometries; /* of a planar head that has only some; 0: any line rate, at one step */
+    uint32_t n_geometries; /* of a planar head with a list of line rates; 0: any line rate, at one step */
     struct head_geometry geometry[HEAD_MAX_RATES];
     uint32_t line_pulses; /* pulses of each line, from which the pulse rate follows; 0: it doesn't. Where the step can
                            * be set, this is the number at the step of power-up: head_line_pulses() */

@@ -85,7 +85,7 @@ struct config_waveform {
     char pulse_file[CONFIG_PATH_LEN];
     double skew, bandwidth_mhz, sample_ns;
     uint32_t bits;
-    double baseline_counts, full_scale_db, saturation_db, dead_ns; /* dB of power above the threshold */
+    double baseline_counts, full_scale_db, saturation_db, dead_ns; /* both in dB: power above the threshold */
     double keep_db, before_ns, after_ns, near_m, far_m;
 };
 

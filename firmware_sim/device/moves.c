@@ -16,7 +16,7 @@
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/site/plan_rows.h"
 
-/* Most moves of a journal that are planned before time begins, for a replay in real time. */
+/* A replay in real time plans the first moves of its journal before time begins: at most so many. */
 enum { MAX_AHEAD = 16 };
 
 static void read_move(const struct command_result *command, struct device_move *plan)

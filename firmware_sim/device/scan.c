@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The scan program: the pulses and frames of each tick while a scan is on. */
+/* The scan program: the pulses and frames of each tick while a scan is on. Pulses are cast in packets of 16
+ * (SCHEDULE_PACKET), and a tick ends between two packets where it can. */
 #include <math.h>
 #include <string.h>
 
@@ -163,8 +164,8 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     if (end > work->pulse0) device->scan.stretch = site_stretch_at(device->site, schedule_time_ns(seg, end - 1));
     work->cut_short = (stop || ends) && end < seg->end_pulse;
     device_take_poses(device, work);
-    struct schedule_line line; /* of the next pulse, or of the last: a command may lower the number of frames */
-    const int is_whole = end >= seg->end_pulse && seg->spec.frames != 0;
+    struct schedule_line line; /* of the next pulse, or of the last where no more come */
+    const int is_whole = end >= seg->end_pulse && seg->spec.frames != 0; /* above it after SCAN:FRAMes was lowered */
     schedule_get_line(seg, schedule_line_of(seg, is_whole ? end - 1 : end), &line);
     device->cmd.frames_done = (uint64_t)line.frame + (uint64_t)is_whole;
     return done || stop || ends;

@@ -17,7 +17,7 @@ struct table {
     int column[3];  /* of x, y, z */
     char separator; /* of the line of names; 0: there is none, and each line has its own */
     size_t n, n_other;
-    uint64_t first_other; /* number of that line */
+    uint64_t first_other; /* number of the first line that is neither a point nor names; n_other counts them */
 };
 
 /* A line with semicolons or commas has one cell between two of them; else blanks are between cells. */

@@ -21,7 +21,7 @@ const DEVIATION = [
 ];
 const WIDTH = 300, HEIGHT = 92, BASE = 74;
 
-const NEAR_M = 1e-3; // the page's point that is this near to the head's is the same one
+const NEAR_M = 1e-3; // a point of the page that is this near to the head's largest deviation is that point
 const LOOK_M = 3;
 
 export class Quality {

@@ -9,7 +9,7 @@ import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} f
 // first at once, the second once the station rests. Surfaces at grazing incidence need the second.
 const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station must rest for this time before the second step
-const COVER_MS = 500; // while a station is dragged, its cells are asked for no more often
+const COVER_MS = 500; // while a station is dragged, its cells are asked for at most once in this time
 const MOST_STATIONS = 16; // so many stations may be in a request for a suggestion
 const MOST_RENEWED = 3; // how often in a row all stations are asked for again, where the head has dropped their answers
 

@@ -53,9 +53,10 @@ struct preview {
     struct preview_options options;
     struct sites sites;
     struct preview_work work;
-    struct coverage *blind;                       /* without cells; used where the options have no coverage */
-    struct sh_err why;                            /* why there is no `blind` either */
-    atomic_int ending, gives_way, is_place_asked; /* the work at hand stops for a place; one was asked for since */
+    struct coverage *blind; /* without cells; used where the options have no coverage */
+    struct sh_err why;      /* why there is no `blind` either */
+    /* ending: all work stops. gives_way: the present work stops for a place. is_place_asked: a place was asked for. */
+    atomic_int ending, gives_way, is_place_asked;
     pthread_t thread;
     int running;
     pthread_mutex_t lock;
@@ -106,7 +107,7 @@ static int is_asked_within(const struct job *job, int64_t ns)
     return clock_now_ns() - job->asked_ns <= ns;
 }
 
-/* Whether a search that has no answer yet needs this one. */
+/* Whether a search that has no answer yet needs the preview with this number. */
 static int is_named(const struct preview *p, uint32_t number)
 {
     for (int i = 0; i < JOBS; i++) {
@@ -300,7 +301,7 @@ static int add_job(struct preview *p, char *text, const struct preview_request *
     return SH_OK;
 }
 
-/* An answer may have megabytes, and slow readers: all share one. */
+/* Readers share the bytes of an answer, without copies: an answer may have megabytes, and readers may be slow. */
 static int lend(struct job *job, struct web_body *out, struct sh_err *err)
 {
     const int is_done = job->state == JOB_DONE;

@@ -11,7 +11,7 @@
 #include "firmware_sim/command/head.h"
 #include "firmware_sim/fault/fault.h"
 
-/* On a busy machine a reply takes seconds behind the frames that a terminal still has to carry. */
+/* On a busy machine a reply may take seconds, since a terminal first carries the frames that were sent before it. */
 enum { REPLY_MS = 5000, REPLY_LEN = SOAK_REPLY_LEN };
 static const double MARGIN_MS = 5.0;
 static const int64_t AFTER_END_NS = 1000000000;

@@ -35,7 +35,7 @@ struct datagram {
 struct soak_datagrams {
     int fd, clean_fd;
     struct soak_clean_frame ring[SOAK_RING];
-    soak_seq top;                  /* of the clean ones */
+    soak_seq top;                  /* number of the last clean one */
     struct datagram wait[WAITING]; /* in order; from `first` on */
     uint32_t first, n;
 };

@@ -74,8 +74,8 @@ static void judge_duplicate(struct soak_link *link, const struct soak_fact *f)
         decide(row, f->times[FAULT_DUPLICATE], f->got + f->late + f->repeated == 1 + f->copies);
 }
 
-/* Returns whether no frame overtook f: all that could were destroyed, held back themselves, or came while there was no
- * session. */
+/* Returns whether no frame overtook f. Then each frame that f was held back behind was destroyed, was held back itself,
+ * or came while there was no session. */
 static int nothing_overtook(struct soak_link *link, const struct soak_fact *f)
 {
     for (uint32_t i = 1; i <= f->behind; i++) {

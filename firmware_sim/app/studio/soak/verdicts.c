@@ -166,7 +166,7 @@ static int add_outputs(const struct verdicts *v, struct app_input *in, char (*pa
             name_scenario(v, i, name, sizeof name);
             snprintf(path, VERDICTS_PATH, "%.*s/%s.%s", VERDICTS_MAX_FOLDER, v->options.folder, name, endings[k]);
             const struct app_file file = {.option = "client-folder", .path = path, .use = APP_WRITES};
-            const int is_named = v->options.file != NULL && strcmp(v->options.file, path) == 0; /* {out}, written out */
+            const int is_named = v->options.file != NULL && strcmp(v->options.file, path) == 0; /* it is in the list */
             if (!is_written(&v->options, endings[k]) || is_named) continue;
             if (app_add_file(in, &file) != APP_OK) return APP_USAGE;
         }
