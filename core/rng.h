@@ -120,7 +120,7 @@ VEC_INLINE double rng_normal(uint64_t key, uint64_t pulse)
 }
 
 /* Arrays are filled in blocks: first the random bits of a block, then the numbers made from them. A processor
- * overlaps more passes of two short loops than of one long one. Returns how many bits it made. */
+ * overlaps more passes of two short loops than of one long one. Returns how many numbers of 64 bits it made. */
 enum { RNG_BLOCK = 64 };
 VEC_INLINE uint32_t rng_bits(uint64_t key, const uint64_t *restrict pulse, uint32_t n, uint64_t bits[RNG_BLOCK])
 {

@@ -50,7 +50,7 @@ struct surface_table {
     int has_optics; /* some surface is glass or a mirror */
     int has_mirror;
     struct surface *surface;          /* [n + 1] */
-    struct surface_texture **texture; /* [n + 1], NULL where there is none; NULL: none has */
+    struct surface_texture **texture; /* [n + 1], an entry is NULL without texture; NULL: no surface has one */
     uint8_t *by_vertex;               /* [n + 1] 1: colours of vertices count; NULL: nowhere */
 };
 

@@ -17,10 +17,10 @@ struct figures {
     double along_mean_m, along_rms_m, along_max_m; /* the last: the largest without its sign */
     size_t judged;                                 /* of these, of known sigma */
     double judged_mean_m, judged_rms_m;            /* of their deviations */
-    double expected_rms_m;                         /* of their sigmas and counts_m together */
-    size_t noisy;                                  /* of these, of sigma above 0 */
-    double z_mean, z_rms; /* of their deviations over their sigmas: 0 and 1 are expected of noise alone */
-    double z_counts;      /* RMS of counts_m over their sigmas */
+    double expected_rms_m; /* that sigma_m and counts_m (deviation.h) together predict for the judged points */
+    size_t noisy;          /* of these, of sigma above 0 */
+    double z_mean, z_rms;  /* of their deviations over their sigmas: 0 and 1 are expected of noise alone */
+    double z_counts;       /* RMS of counts_m over their sigmas */
 };
 
 /* Cosine of 80 degrees. Beyond, any small error across the beam is a large one along it, and sigma to first order is no

@@ -203,7 +203,8 @@ static int exchange_settle(struct scanhead *sh, int64_t deadline_ns)
     }
 }
 
-/* The reply may still come, and must not count as that of the next command: so exchange_settle() comes before that. */
+/* The reply may still come, and must not count as the next command's reply. So exchange_settle() runs before the next
+ * command. */
 static void give_up(struct scanhead *sh, const char *command)
 {
     const int asks = asks_identity(command);

@@ -38,7 +38,7 @@ struct velodyne {
     int64_t t0_ns;      /* device time of its first one */
     uint64_t next_pulse;
     int in_step;      /* 1: next_pulse is the one that has to come */
-    int is_left_over; /* 1: pulses up to the next firing sequence count as unsent: pulses before them are missing */
+    int is_left_over; /* 1: the beginning of this firing sequence is missing, and its other pulses count as unsent */
     uint8_t packet[VELODYNE_DATA_LEN];
     uint8_t reflectivity[N_REFL];
 };
@@ -78,7 +78,7 @@ static int velodyne_create(const struct protocol_spec *spec, void **protocol, st
 }
 
 /* The next pulse does not follow the last one, so the packet is dropped: the device has no packets with holes. The
- * reader was not too slow: the head never sent the pulses that would fill the packet. */
+ * packet's pulses count as unsent, not as lost by a slow reader: the pulses that would fill the packet never came. */
 static void fall_out_of_step(struct velodyne *v)
 {
     v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Points of a batch as a LAS file has them: figures in columns, and the rows that are written from them. The compiler
- * can vectorise the loops. Their counts are exactly those of the plain formulas. Pure. */
+ * can vectorise the loops. Coordinates and other figures are exactly those that the plain formulas give. Pure. */
 #ifndef DRIVERS_RECORD_LAS_COLUMNS_H
 #define DRIVERS_RECORD_LAS_COLUMNS_H
 

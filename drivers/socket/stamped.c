@@ -30,8 +30,8 @@ void stamped_enable(int fd)
     setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
 }
 
-/* Returns the time in a control message: when the kernel received the bytes or, if it stamped nothing then
- * (stamped_begin), when they were read. */
+/* Returns the time in a control message: when the kernel received the bytes. Until the kernel stamps what it receives
+ * (stamped_begin waits for that), it is the time at which the bytes were read. */
 static int64_t time_of(const struct cmsghdr *c)
 {
     struct timespec t;

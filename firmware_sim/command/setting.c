@@ -341,9 +341,9 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
     return !in_scan || (!setting->not_in_scan && (setting->derived == NULL || !can_vary));
 }
 
-/* Whether a step outside MIN to MAX is the step that DEF sets. The rates of power-up may give one step in the line and
- * another one of the pan, and the coarser one may be above MAX. A client may send it as a number: that does what DEF
- * does. */
+/* Whether a step outside MIN to MAX is the step that DEF sets. At the rates of power-up the step in the line and the
+ * step of the pan may differ. DEF answers the coarser step, which may be above MAX. A client that sends this step as a
+ * number gets what DEF gives. */
 static int is_default_beyond(const struct command_call *call, int64_t value)
 {
     struct head_settings then = call->dev->defaults;

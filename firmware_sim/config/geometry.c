@@ -44,8 +44,8 @@ static void check_one(struct cfg_reader *rd, const struct config_profile *p, uin
     else if (!divides_all(&p->arrangement, g->steps_per_turn))
         cfg_fail_key(
             rd, "geometries[].steps_per_turn", i,
-            "%u; steps_per_turn, %u, divided by it must be a whole number that also divides first_step, last_step and "
-            "front_step",
+            "%u; the head's steps_per_turn (%u) divided by this number must be a whole number that also divides "
+            "first_step, last_step and front_step",
             g->steps_per_turn, p->arrangement.steps_per_turn);
     else if (stands_before(&p->arrangement, i))
         cfg_fail_key(rd, "geometries[].lines_hz", i, "this geometry is given twice; allowed once");

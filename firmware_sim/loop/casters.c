@@ -29,8 +29,8 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
         got = -1;
     } else if (may_claim(loop)) {
         if (device_claim(loop->device, work) != 0) {
-            /* A tick that is still being computed may be lost. Its events then go out with one more tick, so the run is
-             * not over yet. */
+            /* A tick that is still being computed may be lost. Its events then need one more tick to go out with. So
+             * the run is over only once no tick is being computed. */
             if (atomic_load(&casters->n_computing) == 0) {
                 atomic_store(&loop->final_tick, casters->next_tick);
                 got = -1;

@@ -158,8 +158,9 @@ static int add_stretch(struct site *site, const double centre_m[3], double reach
     return SH_OK;
 }
 
-/* Cuts the path into stretches. A stretch ends at the time of its last pose, rounded up to a millisecond. So the head
- * may go on in it for that long: the reach covers the poses of 100 ms more. */
+/* Cuts the path into stretches. A stretch ends at the time of its last pose, rounded up to a millisecond. In the rest
+ * of that millisecond the head moves on beyond the last pose. So the reach also covers the poses of the next 100 ms,
+ * which is more than enough. */
 static int cover_path(struct site *site, struct sh_err *err)
 {
     int rc = SH_OK;

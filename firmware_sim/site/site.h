@@ -49,7 +49,7 @@ struct site_station {
     struct placement at;
     struct site_tripod tripod;
     struct cast_beam *beam;         /* NULL: one ray per pulse */
-    struct beam_outlines *outlines; /* an adaptive one's */
+    struct beam_outlines *outlines; /* of an adaptive beam */
     double scale[3];                /* of geo points on the wire, units of the CRS per count */
     struct site_leg *leg;           /* one for each stretch of a trajectory, in the geo layout; else NULL */
     struct plan_row plan;           /* how the georef's method was chosen; of the worst leg */
@@ -142,12 +142,12 @@ struct site {
     struct site_waves *waves; /* waveforms (waves.h); NULL: none */
     struct site_colours colours;
     struct site_plan plan;
-    uint32_t planned_frames; /* of a scan, as the plan counts its pulses; a run may scan on (--duration) */
+    uint32_t planned_frames; /* head.frames that the site was planned for; a run may scan longer (--duration) */
     int measures;    /* for `plan`: footprints are cast to measure the error of a forced beam, even of single rays */
     struct bvh *bvh; /* the world's */
     struct site_station *station;
     uint32_t n_stations;
-    struct config_station *stop; /* the stations where the platform stops; NULL: the configuration's are */
+    struct config_station *stop; /* a station for each stop of the platform; NULL: it does not stop */
     struct georef_geoid *geoid;  /* NULL: heights are ellipsoidal */
     /* A moving head; the stations then only give the scene's place on the Earth. */
     int moving;
@@ -200,8 +200,8 @@ struct site_place {
 void site_get_place(const struct site *site, uint32_t station, struct site_place *out);
 /* Why no station of a site can be moved; NULL: they can. */
 const char *site_why_fixed(const struct site *site);
-/* A station (0..) of a scanner that is moved. `to` NULL: back to where it stood in `first`, the site that was loaded
- * from the configuration. */
+/* A station (0..) of a scanner, and the place that the station moves to. `to` NULL: the station goes back to its place
+ * in `first`, the site that was loaded from the configuration. */
 struct site_station_move {
     const struct site *first;
     uint32_t station;
@@ -224,8 +224,8 @@ int site_count_stations(const struct config *cfg, const struct sh_report *report
  * has that of the station at hand. Whether a map is used changes no hit. */
 enum { SITE_MAX_SIGHTS = 16 };
 
-/* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. Before
- * their scans, and while none is on: casters take the map with the station's setup. */
+/* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. It must be
+ * called before these stations are scanned, and while no scan runs: casters take the map with the station's setup. */
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err);
 
 /* These give parts of its configuration: the file, for messages; the head profile; the head's settings at power-up. */
@@ -240,8 +240,9 @@ uint32_t site_n_served(const struct site *site);
 
 /* Sets zone and side of the grid of output.crs utm, as georef_spec has them. output.utm_zone decides where it is given.
  * Else an anchored scene has one grid for all its stations: the scene's own, or that of the anchor, or that of the
- * first station. Without an anchor zone is 0: each station has the grid of its position. The hemisphere of the false
- * northing is that in which the first station is given, if it is given in UTM; but the scene's own grid has its own. */
+ * first station. Without an anchor zone is 0: each station has the grid of its position. side is the hemisphere from
+ * which northings count: that of the scene's own grid; else of the first station, if its place is given in UTM; else of
+ * the anchor; 0: by position. */
 void site_grid(const struct site *site, int *zone, int *side);
 
 /* Fills the schedule of its head with these settings. */

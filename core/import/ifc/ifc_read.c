@@ -19,7 +19,7 @@ struct reading {
     struct scene_import_limits limits;
     struct ifc_records records;
     struct ifc_readings readings;
-    double largest_m; /* of what was rounded to single precision */
+    double largest_m; /* largest coordinate that was rounded to single precision */
     struct sh_err *err;
 };
 
@@ -145,7 +145,8 @@ static int say_missing(struct reading *r, const char *name, const struct sh_err 
     return SH_OK;
 }
 
-/* A file's largest circle may be too large for the sides that a reader makes of it. */
+/* A circle gets at most MOST_SEGMENTS sides. A file's largest circle may need more sides to stay within the
+ * tolerance. */
 static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
 {
     if (fineness->deviation_m <= r->b->tolerance_m) return SH_OK;

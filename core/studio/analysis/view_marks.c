@@ -117,7 +117,7 @@ void view_draw_scale(struct picture *picture, const char *title, double low, dou
     }
     const double step = figures_nice((high - low) / MAX_TICKS);
     const int digits = (int)fmin(9, fmax(0, -floor(log10(step) + 1e-9)));
-    /* Ticks are multiples of the step: a sum of steps would stand still where they are below a double's last place. */
+    /* Ticks are multiples of the step. A sum would stay the same where the step is smaller than the sum's rounding. */
     const double first = ceil(low / step - 1e-9);
     for (int i = 0; i <= MAX_TICKS && (first + i) * step <= high + 1e-9 * step; i++) {
         const double v = (first + i) * step;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `run` does this with a head and with a recording alike: it serves until the end, and writes statistics. */
+/* Serves a head, or a recording in its place, until the end, and writes statistics. */
 #include <errno.h>
 #include <poll.h>
 #include <stdio.h>
@@ -58,7 +58,7 @@ static int say_view(const struct loop *loop, struct sh_err *err)
 /* Reports to the service manager that the links are open: services that depend on this head wait for that. */
 static int notify_ready(const struct loop *loop, struct sh_err *err)
 {
-    enum { ROOM = 64 + (CONFIG_MAX_LINKS + 1) * (int)sizeof(struct link_place) }; /* one link is the observer's */
+    enum { ROOM = 64 + (CONFIG_MAX_LINKS + 1) * (int)sizeof(struct link_place) }; /* + 1: a link of the page's own */
     struct link_place place;
     char text[ROOM] = "READY=1\nSTATUS=links open:";
     size_t n = strlen(text);

@@ -320,9 +320,9 @@ static const char NOTES[] =
     "The next station is the place where the head of head.station, level and with the heading of that station,\n"
     "sees most area that no station sees. A place of the grid is a floor of at most 20 degrees, with room for the\n"
     "head and a tripod. Places are compared by rays. The best ones of each round are scanned as a whole, and the\n"
-    "gains of these scans decide. Places that see mostly backs of faces lie within bodies; they are left out where\n"
-    "the stations see fronts. The line below the table can be copied into `stations`. Mesh, figures and labels are\n"
-    "those of the present stations.\n";
+    "gains of these scans decide. Places that see mostly backs of faces lie within bodies. They are left out if the\n"
+    "stations see mostly fronts. The line below the table can be copied into `stations`. Mesh, figures and labels\n"
+    "are those of the present stations.\n";
 
 const struct app_command app_coverage = {
     .name = "coverage",
