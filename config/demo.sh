@@ -6,7 +6,7 @@ set -eu
 scanhead=$1
 out=$2
 mkdir -p "$out"
-# Without node or the readers of IFC Assimp reads the house, and says which products it can't be relied on for.
+# Assimp reads the house where node or the readers of IFC are missing. It names the products that it may get wrong.
 reader=auto
 if ! command -v node >/dev/null || [ ! -e "$(dirname "$scanhead")/ifc/installed" ]; then
     reader=assimp

@@ -145,8 +145,9 @@ double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3
 /* ---- for rays from one point whose triangles are known from elsewhere (core/sight); not for scenes with
  * holes. */
 
-/* Rays from .. to - 1 hit that triangle, or nothing (BVH_NO_TRIANGLE). Sets their ranges, labels and steepness,
- * bit by bit as bvh_hits does. It may overwrite up to seven rays after these, so set later ones afterwards. */
+/* All rays with the numbers `from` to `to` - 1 hit `triangle`, or nothing if it is BVH_NO_TRIANGLE. Sets their ranges,
+ * labels and steepness, bit by bit as bvh_hits does. It may overwrite up to seven rays after these, so set later ones
+ * afterwards. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
 /* The same where ray `from` hits triangle[0], the next one triangle[1], and so on. A ray stays as it
  * is where its entry of `triangle` is neither a triangle of the scene nor BVH_NO_TRIANGLE. */

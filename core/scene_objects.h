@@ -37,8 +37,8 @@ struct scene_open_edges {
 };
 
 /* Corners at the same place, bit for bit, are one. It takes up to 150 bytes a triangle of the largest object while it
- * works. edges NULL: they are only counted. SH_ENOMEM, SH_ESTOPPED, or as edges returns. scene_objects_free is due in
- * any case. */
+ * works. edges NULL: they are only counted. Fails with SH_ENOMEM, SH_ESTOPPED, or the error of edges->take.
+ * scene_objects_free is due in any case. */
 int scene_objects_find(const struct scene *scene, const struct scene_open_edges *edges, const struct sh_report *report,
                        struct scene_objects *objects, struct sh_err *err);
 void scene_objects_free(struct scene_objects *objects);

@@ -190,7 +190,7 @@ bool text_integer(struct text *t, int64_t *value)
     return true;
 }
 
-/* A decimal number taken apart: digits * 10^exponent; simple when that holds all of it. */
+/* A decimal number taken apart: digits * 10^exponent; simple: the two hold the number exactly. */
 struct decimal {
     uint64_t digits;
     int exponent;

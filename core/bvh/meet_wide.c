@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A packet of 16 at a leaf, with AVX-512. It finds what meet.c finds, with rays as bits of masks. The loops of meet.c
- * take 1.4 times as long, as compilers translate them. */
+/* Tests a packet of 16 rays against a leaf, with AVX-512. The hits are those of meet.c; the rays are bits of masks. The
+ * loops of meet.c take 1.4 times as long, as compilers translate them. */
 #include "core/bvh/meet.h"
 
 #if defined(__x86_64__) && !defined(VEC_ONE) /* measuring one instruction set: core/vecmath.h */
@@ -89,7 +89,8 @@ WIDE __mmask8 take_8(struct bvh_query *query, float *tfar, const struct plane *p
     return counts & (__mmask8)~takes;
 }
 
-/* Looks at rays one by one: it is in doubt whether `doubt` meet the triangle; `others` do. */
+/* Decides rays one by one. The rays in `doubt` may hit the triangle or miss it. The rays in `others` hit it, but
+ * another triangle may be as near. */
 static __attribute__((noinline)) void look_closer(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf,
                                                   int which, unsigned others, unsigned doubt, const double *range_m)
 {
@@ -118,7 +119,7 @@ WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_l
     if ((others | judged.doubt) != 0) look_closer(query, tfar, leaf, which, others, judged.doubt, range_m);
 }
 
-/* Adds the term of each edge's side that rays have if each begins at its own point. */
+/* Rays that begin at points of their own: adds the second term of each edge's side (meet.h). */
 WIDE void add_own(const struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES])
 {
     __m512 turned[3], more[BVH_EDGES];

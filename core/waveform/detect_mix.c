@@ -19,7 +19,8 @@ struct mix_normal {
     double h[MIX_MOST][MIX_MOST], r[MIX_MOST];
 };
 
-/* Samples are taken in blocks. A row has a derivative's values in a block's samples, and 0 beyond its ends. */
+/* Samples are taken in blocks. A row has one derivative at each sample of the block, and 0 at samples that
+ * the component does not reach. */
 enum { MIX_BLOCK = 48, MIX_LANES = 8 };
 struct mix_block {
     double row[MIX_MOST][MIX_BLOCK], rest[MIX_BLOCK];
@@ -168,7 +169,8 @@ static double mix_walk(const struct finder_task *task, const struct finder_mix *
     return chi2 + mix_expect(task, mix, normal);
 }
 
-/* Solves (h + damping diag h) p = r by Cholesky's decomposition. Returns 0 where that is not positive. */
+/* Solves (h + damping diag h) p = r by Cholesky's decomposition. Returns 0 where the matrix is not positive
+ * definite. */
 static int mix_solve(const struct mix_normal *normal, uint32_t n, double damping, double p[MIX_MOST])
 {
     double l[MIX_MOST][MIX_MOST], by[MIX_MOST]; /* by: 1 over the diagonal */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A return's energy spreads over time as pulses at nodes, by quadrature. h is the outgoing pulse after the receiver
- * (core/waveform.h). */
+/* A return that has an extent spreads over time. Its signal is a sum of pulses, one for each node of a quadrature rule.
+ * h is the outgoing pulse after the receiver (core/waveform.h). */
 #include <math.h>
 #include <stdlib.h>
 
@@ -23,7 +23,8 @@ static struct waveform_node disc_node(uint32_t i, uint32_t n)
     return (struct waveform_node){x, exp(-2.0 * x * x) * erf(M_SQRT2 * y) * y};
 }
 
-/* Returns node i of n of the Gaussian, at even steps. The trapezoidal rule's error falls as fast as its spectrum. */
+/* Returns node i of n of the Gaussian, at even steps. The trapezoidal rule's error falls as fast as
+ * the Gaussian's spectrum. */
 static struct waveform_node bell_node(uint32_t i, uint32_t n)
 {
     const double x = WAVEFORM_BELL_END * ((2.0 * i + 1.0) / n - 1.0);
@@ -99,7 +100,8 @@ void waveform_rule_free(struct waveform_rule *rule)
     free(rule->node);
 }
 
-/* Adds h between its steps, by the cubic through four of them. All samples lie at the same place between steps. */
+/* Adds a pulse to the signal. Between the steps of h, its value is that of the cubic through four steps. Steps divide a
+ * sample evenly, so all samples have the same place between two steps, and the same four coefficients. */
 VEC_CLONES
 static void add_pulse(const struct waveform_pulse *pulse, double amplitude, double centre, uint32_t n,
                       double *restrict signal)

@@ -18,7 +18,8 @@ static size_t get16(const uint8_t *unit, size_t len, size_t at)
     return at + 2 <= len ? be_get16(unit + at) : 0;
 }
 
-/* Marks the values of the channels of one width. Their number is at `at`, before them. Returns where they end. */
+/* Marks the values of the channels of one width. The number of channels stands at `at`, and the channels follow it.
+ * Returns where they end. */
 static size_t mark_channels(const uint8_t *unit, size_t len, size_t at, size_t width, uint8_t *mask)
 {
     size_t n = get16(unit, len, at);

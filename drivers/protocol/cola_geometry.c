@@ -5,7 +5,7 @@
 
 #include "drivers/protocol/cola.h"
 
-/* of mLMPsetscancfg */
+/* These are the statuses that mLMPsetscancfg answers. */
 enum { OK, FREQUENCY_ERROR, RESOLUTION_ERROR, RESOLUTION_AND_AREA_ERROR, AREA_ERROR, OTHER_ERROR };
 
 /* ---- the head as it is set */

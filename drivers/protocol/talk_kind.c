@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Protocols whose messages a talk can tell apart. */
+/* Tells apart the messages of a captured conversation (talk.h) in the protocols that it knows: CoLa, SCIP and lines. */
 #include <stdio.h>
 #include <string.h>
 
@@ -222,7 +222,7 @@ static const struct talk_kind talk_scip = {.name = "SCIP",
                                            .error = scip_error,
                                            .n_words = 1};
 
-/* ---- which it is */
+/* ---- which protocol a connection speaks */
 
 /* Two letters alone are no proof. A digit must follow the name, or the line's end after a command without digits. */
 static int is_scip(const uint8_t *bytes, size_t len)

@@ -23,7 +23,7 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
 struct velodyne_state {
     int motor_on, laser_on; /* it turns; it measures */
     uint32_t rpm;
-    const char *returns;             /* "Strongest", "Last", "Dual"; "" for the head's other selection */
+    const char *returns;             /* "Strongest", "Last", "Dual"; "" if the head selects echoes otherwise */
     int phase_lock;                  /* it is asked for */
     int is_locked;                   /* at the last pulse per second the rotor was where the lock wants it */
     uint32_t offset_cdeg, edge_cdeg; /* azimuth at pulses, 0.01 degree: as asked for; at the last one, or 0 */

@@ -35,7 +35,7 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 uint8_t *outfile_room(struct outfile *file, size_t n, struct sh_err *err);
 void outfile_used(struct outfile *file, size_t n);
 int outfile_flush(struct outfile *file, struct sh_err *err);
-/* SH_EIO with the error of that write, if an earlier write has failed. */
+/* If an earlier write has failed, returns SH_EIO with the error of that write. */
 int outfile_check(const struct outfile *file, struct sh_err *err);
 /* To be called about once a second: flushes, unless a part of the file was written since the last call. So no data wait
  * for longer than two calls, and a busy writer pays nothing. */

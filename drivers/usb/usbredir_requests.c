@@ -139,7 +139,7 @@ enum { MAX_HELD = 256 };
 enum request_kind { CONTROL, SET_CONFIGURATION, SET_ALT };
 
 struct redir_request {
-    struct usb_transfer held; /* its id is only that of a control request, since no other can be cancelled */
+    struct usb_transfer held; /* its id is `id` where kind is CONTROL: no other kind can be cancelled by its id */
     enum request_kind kind;
     uint64_t id;
     struct usb_redir_control_packet_header header;

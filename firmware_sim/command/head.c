@@ -3,7 +3,7 @@
 
 /* One row per state, one column per event. NO: the event is refused and the state stays. A movement that was
  * given up may still end (SPUN_UP after STOP): that event falls on NO. FAIL is taken in every state with
- * power. RESET while the mirror turns brakes it first. During the self test there is nothing to reset yet. */
+ * power. While the mirror turns, RESET brakes it first. During the self test there is nothing to reset yet. */
 enum { NO = -1 };
 
 #define OFF  HEAD_OFF

@@ -122,7 +122,7 @@ static int check_link_alone(struct cfg_reader *rd, struct link_spec *link, uint3
 {
     const struct protocol_ops *ops = ops_of(link);
     char allowed[64];
-    if (!CFG_SOUND(rd, i, "links[]")) return 0; /* with all its keys */
+    if (!CFG_SOUND(rd, i, "links[]")) return 0; /* a key of this link has a diagnostic */
     if (ops == NULL) {
         cfg_fail_key(rd, PROTOCOL_KEY, i, "this build does not have it");
         return 0;

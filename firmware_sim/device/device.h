@@ -127,7 +127,8 @@ int device_replays(const struct device *device);
  * journal that was replayed. Returns the first error in writing them; the lines that they lack are counted. A file that
  * takes nothing for 2 s is given up. Call it after the loop is joined. */
 int device_close_journal(void *self, struct sh_err *err);
-/* 1: one of these files is behind; callers that can wait should. Any thread; takes no lock. */
+/* 1: the buffer of one of these files is more than a quarter full, and callers that can wait should. Any thread; takes
+ * no lock. */
 int device_files_fill(const void *self);
 
 /* Returns the board of injected faults, from the configuration and from commands. It belongs to the device. */

@@ -33,7 +33,7 @@ enum {
     STREAM_MAX_LISTENERS = STREAM_MAX_LINKS + 1,
     STREAM_SCANS = 8,
     STREAM_POWER_TICKS = 64,
-    STREAM_FILES_NS = 5000000 /* between two looks at files that are behind */
+    STREAM_FILES_NS = 5000000 /* between two looks at the buffers of files (files_fill) */
 };
 _Static_assert((int)STREAM_HASH_READER < (int)RING_MAX_READERS, "each session is a reader, and so is the hash");
 
@@ -51,7 +51,7 @@ struct stream_listener {
     _Atomic uint64_t wake_tick; /* UINT64_MAX: none */
     _Atomic int wants_written;  /* step: a reply waits until other readers have written what was granted */
     /* of the pacing thread alone */
-    uint64_t every, quiet_until; /* least ticks between two writes; the first tick that may have the next one */
+    uint64_t every, quiet_until; /* least ticks between two writes; the first tick at which the next write may come */
     int pending;                 /* a tick that it wants was released since the last write */
 };
 
@@ -63,7 +63,7 @@ struct stream {
     int waits;           /* paces fast and step: release waits for casters and readers, and nothing is lost */
     int as_they_are;     /* frames are recorded: numbered already, and complete */
     int steps;           /* pace step: clients let time pass, also while the head has no power */
-    uint32_t first_seq;  /* of its first frame: near to the wrap by an injected fault */
+    uint32_t first_seq;  /* number of its first frame; an injected fault can put it just below the wrap at 2^32 */
     struct device_counters *counters;
     struct stream_reader reader[RING_MAX_READERS];
 
@@ -96,7 +96,7 @@ struct stream {
     _Atomic uint64_t wanted; /* the pacing thread sleeps until a reader has come to this tick; UINT64_MAX: it doesn't */
     /* of the pacing thread alone */
     uint64_t held_tick;    /* the tick that readers held back last, once the run is to end; 0: none */
-    int64_t held_until_ns; /* clock: when they no longer do */
+    int64_t held_until_ns; /* clock: from then on readers no longer hold it back */
     uint64_t unsaid;       /* ticks released since casters were woken; in the paces that wait, since any thread was */
     uint64_t say_ticks;    /* casters are woken after so many */
     uint64_t lazy_ticks;   /* an eighth of the queue */
@@ -105,8 +105,8 @@ struct stream {
     uint32_t n_listeners;
 };
 
-/* A stream as long as `size`, in ticks of tick_ns. The caller sets waits before; tick_bytes, counters and n_casters
- * before any thread starts. */
+/* Makes a stream as long as `size`, in ticks of tick_ns. The caller sets `waits` before the call, and tick_bytes,
+ * counters and n_casters before any thread starts. */
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err);
 void stream_free(struct stream *stream);
 
@@ -128,7 +128,7 @@ void stream_wait_for_casters(struct stream *stream);
 /* Waits until a reader went on. Once the run is to end, readers that stand still for 2 s hold back nothing
  * any more. */
 void stream_wait_for_readers(struct stream *stream, uint64_t tick);
-/* Waits STREAM_FILES_NS for files of the source that are behind. A disk wakes nobody, so the caller looks again. */
+/* Waits STREAM_FILES_NS for the source's files (files_fill). A disk wakes nobody, so the caller looks again. */
 void stream_wait_for_files(struct stream *stream);
 /* Nothing more will be released. */
 void stream_end(struct stream *stream);

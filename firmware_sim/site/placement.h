@@ -26,7 +26,7 @@ struct placement {
     double floor_m;            /* distance down to the floor that was looked for; NaN: it wasn't */
 };
 
-/* Station i (0...) of the configuration. Floors are those of the BVH, without what moves. */
+/* Station i (0...) of the configuration. A floor is a surface of the BVH; bodies that move are no floors. */
 int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor, const struct bvh *bvh,
                    struct placement *out, struct sh_err *err);
 

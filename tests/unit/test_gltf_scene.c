@@ -96,9 +96,10 @@ static void trees_that_are_none(void **state)
     (void)state;
     refuse_tree("\"nodes\":[{\"children\":[1]},{\"mesh\":0,\"children\":[2]},{\"children\":[1]}]",
                 "nodes[1] is a child of nodes[0] and of nodes[2]; allowed is one parent");
-    refuse_tree("\"nodes\":[{\"children\":[0],\"mesh\":0}]", "nodes[0] is a child of itself");
+    refuse_tree("\"nodes\":[{\"children\":[0],\"mesh\":0}]",
+                "nodes[0] is in a circle of children, or below one; allowed is a tree");
     refuse_tree("\"nodes\":[{\"children\":[1],\"mesh\":0},{\"children\":[0]},{\"mesh\":0}]",
-                "nodes[0] is a child of itself");
+                "nodes[0] is in a circle of children, or below one; allowed is a tree");
     refuse_tree("\"nodes\":[{\"children\":[7],\"mesh\":0}]", "nodes[0].children[0] is not a node; there are 1");
     refuse_tree("\"nodes\":[{\"children\":[\"1\"],\"mesh\":0},{\"mesh\":0}]",
                 "nodes[0].children[0] is not a node; there are 2");

@@ -100,7 +100,8 @@ int gltf_place_nodes(struct gltf *g)
     for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
         if (g->node[i].parent == GLTF_NONE) place_tree(g, nodes, i);
     for (uint32_t i = 0; i < g->n_nodes && rc == SH_OK; i++)
-        if (!g->node[i].has_world) rc = gltf_fail(g, "nodes[%u] is a child of itself", i);
+        if (!g->node[i].has_world)
+            rc = gltf_fail(g, "nodes[%u] is in a circle of children, or below one; allowed is a tree", i);
     return rc;
 }
 

@@ -4,7 +4,7 @@
 
 import {add, dot, radians, sub} from './view_camera.js';
 
-const WIDE = 1e9; // a height cut has sides so far away; as a float it is exact enough
+const WIDE = 1e9; // half of a height cut's width: its sides lie beyond any scene
 const THIN = 0.02; // a box is at least so thick
 
 const FACES = [['right', 0, 1], ['left', 0, -1], ['ahead', 1, 1], ['back', 1, -1], ['top', 2, 1], ['bottom', 2, -1]];
@@ -104,8 +104,8 @@ export function isWithin({middle, half, turn: [c, s]}, x, y, z) {
   return Math.abs(c * dx - s * dy) <= half[0] && Math.abs(s * dx + c * dy) <= half[1] && Math.abs(z - middle[2]) <= half[2];
 }
 
-// Returns the distance from `at`, along a line through it, to the point of the line that is closest to the ray of a
-// place of the screen; null if the line points at the eye.
+// A line goes through `at` in the direction `along`, and a ray from the eye through x, y of the screen. Returns the
+// distance from `at` to the line's point that is closest to the ray; null if the line points at the eye.
 export function alongLine(camera, at, along, x, y) {
   const o = camera.from(x, y), r = camera.ray(x, y);
   const f = r.map((c) => c / Math.hypot(...r));

@@ -176,7 +176,7 @@ export class Wire {
     this.#transfer.push(batch.x.buffer);
   }
 
-  // Live points that wait are passed on first: else this batch would be among them.
+  // Live points that the decoder still holds came before this batch, so they are passed on first.
   #addPast(batch) {
     this.decoder.flush();
     this.#addPoints(batch);

@@ -61,7 +61,7 @@ static int check_jobs(struct batch *b, uint32_t *n_gaps, struct sh_err *err)
     return SH_OK;
 }
 
-/* ---- files with a job's number that are not the job's, such as those of jobs before --force */
+/* ---- files that have a job's number and belong to no job, such as old files of jobs that --force repeated */
 
 static int is_of_job(const struct batch *b, const char *name)
 {

@@ -45,8 +45,8 @@ static int add_file(struct listing *l, const char *path)
     return batch_sha_file(path, file->sha, &file->bytes, NULL, l->err);
 }
 
-/* Lists a file that a mesh names (material, buffer, image) where it has the job's name, so that it was written with the
- * mesh. */
+/* Lists a file that a mesh names (material, buffer, image), if its name begins with that of the job. Other files were
+ * not written with the mesh. */
 static int add_sidecar(void *ctx, const char *name, const char *path)
 {
     struct listing *l = ctx;

@@ -12,7 +12,7 @@
 enum { TALK_PIECE = 65536 };
 
 struct talk_end {
-    struct raw_input input; /* first, so that an input is its end */
+    struct raw_input input; /* the first member, so that a pointer to it is also one to the end */
     struct talk *talk;
     int number;
     int fd;      /* end 0 is this program: -1 */

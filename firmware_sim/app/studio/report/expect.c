@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The deviations that follow from a recording's configuration, and whether its points have them. */
+/* Finds the deviations to be expected from a recording's configuration, and judges whether points stay within them. */
 #include <math.h>
 #include <stdio.h>
 

@@ -21,12 +21,12 @@ struct soak {
     struct fault_board *board;
     struct soak_clean clean;
     struct soak_link link[CONFIG_MAX_LINKS];
-    struct soak_datagrams *datagrams[CONFIG_MAX_LINKS]; /* by link, before the clients are there */
+    struct soak_datagrams *datagrams[CONFIG_MAX_LINKS]; /* [n_links] NULL: its datagrams are not compared */
     uint32_t n_links;
     int realtime;
     atomic_int phase;         /* enum soak_phase */
     _Atomic uint64_t until;   /* SOAK_DRAINS: clients go on up to this frame */
-    _Atomic uint64_t base;    /* of soak_seq; 0: nothing came so far */
+    _Atomic uint64_t base;    /* a late soak_seq, from which soak_seq_of finds others; 0: no frame came so far */
     struct fault_list faults; /* as configured */
     struct loop_stats stats;
     double wall_s;

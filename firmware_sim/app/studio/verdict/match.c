@@ -2,9 +2,9 @@
 /* Finds each point of a client among those that the head had, and how often it came.
  *
  * A point of the client's may agree with several of the head's. These are then one group, and counts are compared by
- * group. A client that has each point that it was sent once can't have more points in a group than were sent: each of
- * its points agrees with the one that it comes from, so both are in the same group. Dense points therefore give no
- * false finding. */
+ * group. Each point of the client's agrees with the head's point that it comes from, so both are in the same group.
+ * Where the client has no point more often than it was sent, no group has more points than were sent. Dense points
+ * therefore give no false finding. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -78,7 +78,7 @@ static int is_empty(const double p[3])
     return isnan(p[0]) || (fabs(p[0]) + fabs(p[1]) + fabs(p[2]) <= 0.0);
 }
 
-/* Returns the transformation by which most points agree, of a sample from all over the cloud. */
+/* Tries the transformations on a sample of points from the whole cloud. Returns the one with most points that agree. */
 static const struct way *best_way(const struct match_index *index, const struct match_input *in, const struct way *ways,
                                   int n_ways)
 {

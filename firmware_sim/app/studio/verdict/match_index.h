@@ -10,7 +10,7 @@
 struct match_entry {
     double p[3];
     int64_t cell[3];
-    uint32_t sent; /* how often sessions were sent it */
+    uint32_t sent; /* how often it was sent, over all sessions; of a group, at its root */
     uint32_t got;  /* how often the client has it; of a group, at its root */
     size_t parent; /* of its group; itself: it is the root */
 };

@@ -30,8 +30,8 @@ static int place_station(struct viewed_stream *s, struct sh_err *err)
     return SH_OK;
 }
 
-/* Returns 0 where points of this track have no mesh. The reason is that of the recorders, without the path and without
- * the formats that they allow. */
+/* Returns 0 where points of this track have no mesh. The reason is the text of mesh_grid_check, without the path at its
+ * beginning and without the allowed formats at its end. */
 static int check_mesh(struct viewed_stream *s)
 {
     struct sh_err why = {0};

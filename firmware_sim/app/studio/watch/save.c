@@ -170,7 +170,7 @@ static void put_state(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* Formats of points that need no other file beside them. */
+/* Allows the formats of points that need no second file. */
 static int check_as(const char *as, struct sh_err *err)
 {
     static const char *const all[] = {"las", "ply", "e57", "ptx", "pcapng"};
