@@ -14,7 +14,7 @@ enum colour_mode {
     COLOUR_HEIGHT,      /* metres, z of the scene's frame */
     COLOUR_REFLECTANCE, /* colour_reflectance */
     COLOUR_LABEL,       /* colour_number of the surface */
-    COLOUR_FRAME,       /* frame scalar of a trajectory, or of its stop */
+    COLOUR_FRAME,       /* frame scalar (core/cast.h) of a trajectory's point or stop */
     COLOUR_TEXTURE,     /* the texel at the hit; without one the surface's own colour; without that colour_grey */
     COLOUR_MODES
 };
