@@ -45,7 +45,7 @@ int offline_open_beside(struct config *cfg, const struct offline *other, double 
 void offline_stop(struct offline *offline);
 /* Ends the head, and completes the file `truth`. Returns the first error in writing it. Site and handle stay. */
 int offline_finish(struct offline *offline, struct sh_err *err);
-/* Prepares a scan from a station, from 1; 0: the one at power-up. No scan may be running. */
+/* Prepares a scan from a station. Stations count from 1; 0 is the station at power-up. No scan may be running. */
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 
