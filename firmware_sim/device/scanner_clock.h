@@ -41,7 +41,7 @@ void device_watch_time_server(struct device *device, int fd);
 /* Applies injected faults to a server's answer that comes at a device time. 1: it is as if it had not come. */
 int device_change_time_answer(struct device *device, int64_t t_ns, uint8_t packet[NTP_LEN]);
 /* Sets the clock forward by by_ns, which the answer of a server gave. The device itself carries out TIME:SHIFt for it,
- * which the journal then has. 0: since the server was asked, the settings have changed or power has come again. Then the
+ * which the journal then has. 0: since the server was asked, settings have changed or power has come again. Then the
  * clock stays as it is. */
 int device_shift_date(struct device *device, const struct device_time_server *asked, int64_t by_ns);
 /* Replaces what TIME:SERVer? STATe replies. report: error 107 and an event; NULL: nothing is to be reported. */
