@@ -47,7 +47,7 @@ struct scanhead *host_open(const struct host_source *source);
 /* Closes the source. The handle gives nothing more, but keeps its state and counts. */
 void host_hang_up(struct scanhead *sh);
 
-/* Opens what `source` names, non-blocking. */
+/* Opens what `source` names. Reading and writing it don't block; opening waits up to 10 s for a TCP connection. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
 int host_source_is_usb(const char *source);
 /* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
