@@ -14,7 +14,7 @@ enum colour_mode {
     COLOUR_HEIGHT,      /* metres, z of the scene's frame */
     COLOUR_REFLECTANCE, /* colour_reflectance */
     COLOUR_LABEL,       /* colour_number of the surface */
-    COLOUR_FRAME,       /* frame scalar of a trajectory, or of its stop */
+    COLOUR_FRAME,       /* frame scalar (core/cast.h) of a trajectory's point or stop */
     COLOUR_TEXTURE,     /* the texel at the hit; without one the surface's own colour; without that colour_grey */
     COLOUR_MODES
 };
@@ -36,8 +36,8 @@ static inline int colour_has_limits(enum colour_mode mode)
 void colour_between(double low, double high, double figure, uint8_t rgb[3]);
 
 /* Blue at 0, green at 1/3, yellow at 2/3, red at 1, with straight lines between; below 0 and above 1 as at the ends.
- * Low is blue and high is red everywhere: in recordings, maps, views and reports, and on the page (view_colours.js).
- * Between the two the page has other colours. NaN: colour_unknown. */
+ * Low is blue and high is red in recordings, maps, views and reports. The page's scales go from blue or dark to red or
+ * bright (view_ramps.js). NaN: colour_unknown. */
 void colour_ramp(double part, uint8_t rgb[3]);
 /* Grey: black at -30 dB and below, white at 0 dB and above, even steps of dB between. NaN: colour_unknown. */
 void colour_reflectance(double db, uint8_t rgb[3]);

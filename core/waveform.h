@@ -54,7 +54,7 @@ struct waveform_spec {
 
 struct waveform;
 
-/* SH_EINPUT, without the file's name: a value out of its range, and what is allowed. */
+/* Makes a waveform. SH_EINPUT: a value is out of its range. The text says what is allowed, without the file's name. */
 int waveform_create(const struct waveform_spec *spec, struct waveform **out, struct sh_err *err);
 void waveform_free(struct waveform *waveform);
 
@@ -84,13 +84,13 @@ struct waveform_record {
     struct waveform_window window[WAVEFORM_MAX_WINDOWS];
     uint16_t *sample; /* [capacity]: the caller's */
     uint32_t capacity;
-    uint32_t n_left_out; /* samples that found no room here, or windows too many: they count as lost */
+    uint32_t n_left_out; /* samples of windows for which there was no room here: they count as lost */
 };
 
 /* Makes the samples of one pulse. scan_key: rng_scan; pulse: its number in the scan. */
 void waveform_sample(const struct waveform *waveform, uint64_t scan_key, uint64_t pulse,
                      const struct waveform_return *returns, uint32_t n, struct waveform_record *record);
-/* Returns P at range r_m without noise and digits, for tests and closed forms. */
+/* Returns P at range r_m, without noise, the receiver's limits and rounding, for tests and closed forms. */
 double waveform_signal(const struct waveform *waveform, const struct waveform_return *returns, uint32_t n, double r_m);
 /* Returns the integral of h over time, s. */
 double waveform_pulse_area_s(const struct waveform *waveform);
@@ -100,7 +100,7 @@ const struct waveform_spec *waveform_spec_of(const struct waveform *waveform);
 /* ---- detection: echoes from the samples of one pulse, as the head's firmware finds them */
 
 enum waveform_detector {
-    WAVEFORM_THRESHOLD, /* leading edge at a fixed level, corrected by the level's crossing of h */
+    WAVEFORM_THRESHOLD, /* where the signal rises through a fixed level; h gives the time from there to the centroid */
     WAVEFORM_FRACTION,  /* constant fraction of the peak */
     WAVEFORM_GAUSSIANS, /* Gaussian decomposition (W. Wagner et al. 2006), Levenberg-Marquardt */
 };
@@ -114,8 +114,8 @@ struct waveform_echo {
     int saturated;    /* a sample of it was at the largest count, or limited */
 };
 
-/* SH_EINPUT, without the file's name: echoes are not found with this pulse, since a long and weak part of it keeps its
- * centroid away from its peak. Samples of such a pulse are as good as others. */
+/* SH_EINPUT: echoes are not found with this pulse, since a long and weak part of the pulse keeps its centroid away from
+ * its peak. The text is without the file's name. Samples of such a pulse are as good as others. */
 int waveform_check_detection(const struct waveform *waveform, struct sh_err *err);
 /* Returns the largest value of h, of a pulse with which echoes are found. */
 double waveform_pulse_peak(const struct waveform *waveform);

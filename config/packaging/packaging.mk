@@ -29,7 +29,7 @@ deb:
 		dpkg-buildpackage -us -uc -b
 	@rm -rf $(DEB_TREE)
 	@ls -l $(DEB_DIR)/*.deb
-#? deb-check         the packages in a root of their own
+#? deb-check         installs, tries and removes the packages in a new root
 deb-check: deb
 	$(call install_missing,$(DEPS_DEB_CHECK))
 	@bash config/packaging/check.sh $(DEB_DIR) $(RELEASE) | tee $(DEB_DIR)/check.log

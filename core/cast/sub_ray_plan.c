@@ -121,10 +121,10 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     return 1;
 }
 
-/* Returns whether the centre is certainly on its side of the lines. Ends of outlines are floats relative to the
- * station. So where a line is very near to the centre, the centre's side of it is not certain, and the centre's hit
- * says nothing about its part. The floats have an error of 2^-24 of the range. That is 1e-3 of the footprint's radius
- * for a divergence of 0.12 mrad, and less for wider beams. The limit is twice that. */
+/* Returns whether all lines are so far from the centre that the centre's side of each line is certain. Ends of outlines
+ * are floats relative to the station, so a line very near to the centre may in truth pass on its other side. Then the
+ * centre's hit says nothing about the part around the centre. The floats have an error of 2^-24 of the range. That is
+ * 1e-3 of the footprint's radius for a divergence of 0.12 mrad, and less for wider beams. The limit is twice that. */
 static int is_centre_clear(const struct beam_line *line, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++)

@@ -115,8 +115,9 @@ static void plane_means(const double *restrict term, float most, const float *re
     }
 }
 
-/* The series of sqrt((1 + t s^2) / (1 - t b^2)) - 1, b = s tan i, to third order in t, by x = 1 / cos^2 i:
- * s^2 + b^2 = s^2 x. Terms that are smaller than these by a factor of s^2 are left out. */
+/* The mean range of the sub-rays at one rho is longer than the range at the centre by a share of
+ * sqrt((1 + t s^2) / (1 - t b^2)) - 1, where b = s tan i (core/footprint.h). This function takes its series to third
+ * order in t. With x = 1 / cos^2 i, s^2 + b^2 is s^2 x. Terms below a kept one by a factor of s^2 are left out. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m)
 {
     double s2 = beam->slope * beam->slope;

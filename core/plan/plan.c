@@ -60,7 +60,7 @@ static struct plan_row *plan_signal(struct plan_row *row, const struct plan_head
     char why[192];
     if (!head->signal)
         return plan_add(row, "signal", "none", 0.0, 0.0, "signal.model is off: each hit within range_max_m is an echo");
-    snprintf(why, sizeof why, "signal.model: targets vanish %s; the farthest of the profile's reaches is %.4g m",
+    snprintf(why, sizeof why, "signal.model: targets vanish %s; the largest reach in the head profile is %.4g m",
              head->sharp ? "sharply" : "by chance", head->reach_m);
     return plan_add(row, "signal", "range equation", 0.0, 30.0, why);
 }

@@ -9,8 +9,8 @@
 int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
                      const struct sh_report *report, struct sh_err *err);
 
-/* Part of scene_keep: each copy keeps what its labels say, and is removed where that is nothing. label: new labels, by
- * old ones. SH_EINPUT where copies of a mesh would keep different surfaces. */
+/* Part of scene_keep: each copy keeps the surfaces that `keep` marks, by their labels. A copy without such a surface is
+ * removed. label: new labels, by old ones. SH_EINPUT where copies of a mesh would keep different surfaces. */
 int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err);
 
 #endif

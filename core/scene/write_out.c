@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Copies as triangles of the scene, for tools that need plain ones. Each triangle keeps its number. */
+/* Turns copies into triangles of the scene, for tools that can't use copies. Each triangle keeps its number. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,7 +7,7 @@
 #include "core/grow.h"
 #include "core/scene_copies.h"
 
-/* Says of triangles that they have no texture coordinates. */
+/* Sets texture coordinates to NaN: these triangles have none. */
 static void fill_uv(struct scene *scene, uint32_t from, uint32_t to)
 {
     for (uint32_t i = from; i < to; i++)

@@ -18,8 +18,8 @@ struct waveform_pulse {
     double scale;                   /* in samples: sigma of the Gaussian whose spectrum falls to 1e-5 where h's does */
     double area_s;
 };
-/* Makes the pulse of a spec within its limits, with a table whose peak is 1. waveform_pulse_free also follows a
- * failure. */
+/* Makes the pulse of a spec. The caller has checked the spec's limits, and scaled its table to a peak of 1. Also after
+ * an error, waveform_pulse_free is to be called. */
 int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse *pulse, struct sh_err *err);
 void waveform_pulse_free(struct waveform_pulse *pulse);
 

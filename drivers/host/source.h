@@ -19,8 +19,8 @@ struct host_source_ops {
     /* These return the bytes moved, or -1 with errno, which is EAGAIN when none can be moved now. read returns 0 at the
      * end. */
     ssize_t (*read)(struct host_source *source, void *to, size_t len);
-    /* In place of read: sets *bytes to whole items, as native_parser_lend() needs them. NULL: there is only read.
-     * Returns as read does. The bytes stay until the next call of wait or close. */
+    /* In place of read: sets *bytes to whole frames and reply lines, as native_parser_lend() needs them. NULL: there is
+     * only read. Returns as read does. The bytes stay until the next call of wait or close. */
     ssize_t (*lend)(struct host_source *source, const uint8_t **bytes);
     /* NULL where the source is a file: nothing is written to it. */
     ssize_t (*write)(struct host_source *source, const void *data, size_t len);
@@ -47,7 +47,7 @@ struct scanhead *host_open(const struct host_source *source);
 /* Closes the source. The handle gives nothing more, but keeps its state and counts. */
 void host_hang_up(struct scanhead *sh);
 
-/* Opens what `source` names, non-blocking. */
+/* Opens what `source` names. Reading and writing it don't block; opening waits up to 10 s for a TCP connection. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
 int host_source_is_usb(const char *source);
 /* usb_transfers.c: the same for "usb..."; out is zero but for its name. */

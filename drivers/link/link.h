@@ -115,8 +115,8 @@ struct link_ops {
 
     /* Waits up to timeout_ms (-1: for ever) and fills in at most max events; returns how many, or a negative
      * SH_E. want_write: where bit s is set, LINK_WRITABLE is reported when session s can take bytes. A
-     * session whose reader does not read must not make poll return at once. link_poll.h has what all of them
-     * need. */
+     * session whose reader does not read must not make poll return at once. link_poll.h has what the poll functions
+     * of all links need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
     /* They don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED: the
@@ -134,7 +134,7 @@ struct link_ops {
 
     /* Bytes written to a session that its reader has not taken: closing the link loses them. There may be more: the
      * system learns of the last ones a moment late, and counts only up to a limit. 0 also where it can't be known.
-     * NULL: closing loses none that the client takes. */
+     * NULL: closing loses no byte, as long as the client goes on reading. */
     int (*unread)(void *link, int session);
 
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of

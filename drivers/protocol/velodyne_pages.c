@@ -121,7 +121,7 @@ static void put_diag(struct page *p)
                           "\"vhv\":0,\"adc_nf\":0,\"ixe\":0}");
 }
 
-/* The four others as one document, for clients that read a snapshot. */
+/* Writes the four documents above as one, for clients that read a snapshot. */
 static void put_snapshot(struct page *p)
 {
     velodyne_pages_put(p, "{\"info\":");

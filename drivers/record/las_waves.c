@@ -59,7 +59,8 @@ int las_waves_flush(struct las_waves *w, struct sh_err *err)
 
 /* ---- descriptors */
 
-/* Four steps an octave: all lengths of a digitiser, up to 4096 samples, are rounded to 44 of them. */
+/* Rounds a number of samples up. Above 8 samples there are four lengths from one power of two to the next, so the 4096
+ * lengths that a digitiser can have become 44. */
 static uint32_t round_up(uint32_t n)
 {
     uint32_t step = 1;

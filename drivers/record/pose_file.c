@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* .poses.csv: where the head truly was, which a registration or a trajectory has to find.
+/* .poses.csv: the true poses of the head, to compare with those that a registration or a trajectory program finds.
  *
  * A head that stands has one row per scan. The pose takes points from the head's frame to the frame of the
  * recordings beside it (station_pose.h). At a stop the row has the frame scalar, too. Where the recordings

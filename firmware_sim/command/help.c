@@ -26,7 +26,7 @@ static void add_word(struct command_call *call, const char *word, const char *en
     add(call, "%s%s%s", call->out->reply[0] == '\0' ? "" : " ", word, end);
 }
 
-/* Lists commands without settings: all together don't fit into a reply. */
+/* Lists the commands that are not settings. One reply has no room for these and the settings. */
 static int list_others(struct command_call *call)
 {
     for (const struct command_row *row = command_rows; row->header != NULL; row++)
@@ -78,7 +78,7 @@ static void add_numbers(struct command_call *call)
     add(call, "%s,", setting->words == NULL ? number : "");
 }
 
-/* Adds its values, where it takes only some. */
+/* Adds the words or numbers of a setting that takes only some; otherwise an empty text. */
 static void add_values(struct command_call *call)
 {
     const struct command_setting *setting = call->row->setting;

@@ -191,7 +191,7 @@ static const char *pan_why_not(const struct command_device *dev)
     return has ? line_why_not(dev) : "the head has no pan";
 }
 
-/* Sets one of the geometries; the caller has checked that it is one. */
+/* Sets the geometry with this step. The caller has checked that there is one. */
 static int write_planar(struct command_call *call, int64_t step_ndeg)
 {
     const struct head_limits *l = &call->dev->limits;

@@ -11,7 +11,7 @@ typedef int config_take_file(void *ctx, const char *key, const char *path, int i
 
 /* Calls `take` for each path in the configuration's and the profile's keys, for the head profile and for the scenario.
  * It goes through the rows of the tables, so a new key can't be forgotten. The configuration itself is not among them.
- * is_written: the program writes the file, as those of links. Returns the last result of `take`. */
+ * is_written: the program writes the file, as that of a `file` link. Returns the last result of `take`. */
 int config_each_file(const struct config *cfg, config_take_file *take, void *ctx);
 
 #endif

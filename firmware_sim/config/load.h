@@ -44,8 +44,9 @@ void config_name_scenarios(char *buf, size_t len);
  * stack. */
 int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
 
-/* Loads the configuration of the scanner at a station, from 1, which becomes its head.station. It has no links. Output,
- * loop and scenario are those of cfg as it is now. The sets that cfg was loaded with must still be there. */
+/* Loads the configuration of a station's scanner into `out`. Stations count from 1. head.station of `out` is this
+ * station, and `out` has no links. Output, loop and scenario are those of cfg as it is now. The texts of --set that cfg
+ * was loaded with must still be there. */
 int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err);
 
 #endif

@@ -43,7 +43,7 @@ enum fault_kind {
     FAULT_REFUSE,            /* a client is turned away */
     FAULT_SLOW_ENUMERATION,  /* each control request takes for_ms */
     FAULT_DESCRIPTOR_LENGTH, /* the configuration says that it is n bytes longer than it is */
-    /* in the head: what is measured changes, and so does the hash */
+    /* in the head: these change what is measured, or what the head says of the time and of its state */
     FAULT_SLOW_BOOT,     /* takes for_ms longer */
     FAULT_POWER_CYCLE,   /* everything is off for for_ms, and boots again */
     FAULT_SELF_TEST,     /* fails at the end of boot */

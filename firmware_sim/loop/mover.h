@@ -35,7 +35,7 @@ struct mover {
 
 void mover_create(struct mover *mover, struct device *device, struct stream *stream);
 /* Plans the move that the device has begun. The box must stay until mover_join; wake_fd, an eventfd, is written once
- * the reply is there. Where no thread can be started, and after mover_join, the caller's thread plans. */
+ * the reply is there. Where no thread can be started, the caller's thread plans. After mover_join moves are refused. */
 void mover_ask(struct mover *mover, struct move_box *box, int wake_fd);
 /* Takes the reply. 0: it is not there yet. */
 int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX_REPLY]);

@@ -9,7 +9,7 @@
 struct site_vary {
     struct site site; /* the first member: site_vary_free gets its address */
     struct config cfg;
-    uint32_t station; /* the station whose georeference and legs are its own */
+    uint32_t station; /* this site has a georeference and legs of its own for this station alone */
 };
 
 int site_varies(const struct head_settings *a, const struct head_settings *b)

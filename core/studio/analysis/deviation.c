@@ -16,8 +16,8 @@ enum { CHUNK = 16 * BVH_CHUNK, PLACES_AROUND = 12 };
 /* Tolerances of "on a smooth face" (core/studio/deviation.h): the share of the distance, and a length. */
 static const double SAME_SHARE = 0.01, SAME_M = 2e-6;
 
-/* Rays run around a footprint at this many of its radii. So an outline that cuts it does not pass between two of the
- * twelve. */
+/* PLACES_AROUND rays run around a footprint, at this many radii from its centre. So an outline that cuts the footprint
+ * can't pass between two of these rays. */
 static const double AROUND = 1.1;
 
 /* Surfaces that are nearer to each other than this can't be told apart, however small the noise. */
@@ -236,7 +236,7 @@ static void cast(const struct work *w, struct batch *b, const struct deviation_h
     b->n = 0;
 }
 
-/* Adds the point's ray. Shots without echo, points that are far, and points of bodies have none. */
+/* Adds the point's ray. Shots without echo, points far from the scene, and points on moving bodies have no ray. */
 static void deviation_add(const struct work *w, struct batch *b, size_t i, const struct deviation_head *head)
 {
     double p[3], d[3];

@@ -59,7 +59,7 @@ static char *put_vertex(char *p, const struct mesh *m, uint32_t i)
     return p;
 }
 
-/* Vertex, texture coordinate and normal have one number. */
+/* Writes a face. A vertex, its texture coordinate and its normal have the same number. */
 static char *put_face(char *p, const struct mesh *m, uint32_t i)
 {
     *p++ = 'f';

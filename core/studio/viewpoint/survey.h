@@ -57,8 +57,9 @@ double survey_cosine(const struct survey *s, uint32_t ray);
 
 /* survey_look returns these figures of the rays first to first + n - 1. */
 struct survey_sight {
-    double seen, front; /* shares: of rays with a hit in range; of these, on a front */
-    double far_m;       /* geometric mean of these ranges; 0: none */
+    double seen;  /* share of the rays that hit something in range */
+    double front; /* share of these hits that are on the front of a triangle */
+    double far_m; /* geometric mean of the ranges of these hits; 0: there is no hit */
 };
 struct survey_sight survey_look(const struct survey *s, uint32_t first, uint32_t n);
 

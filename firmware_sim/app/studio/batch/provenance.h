@@ -21,7 +21,7 @@ struct batch_provenance {
     char program[32];                  /* its version */
     char engine[96];                   /* Embree and instruction set of that machine (bvh_engine) */
     char configuration[BATCH_SHA_LEN]; /* the text of the file */
-    char inputs[BATCH_SHA_LEN];        /* all files that the configuration names, and those that its meshes name */
+    char inputs[BATCH_SHA_LEN];        /* all files that the configuration reads, and those that its meshes name */
     char job[BATCH_SHA_LEN];           /* station, values of keys, options */
 };
 
@@ -33,7 +33,7 @@ const char *batch_provenance_differs(const struct batch_provenance *a, const str
 int batch_sha_file(const char *path, char hex[BATCH_SHA_LEN], uint64_t *bytes, const struct sh_report *report,
                    struct sh_err *err);
 
-/* Hashes of files that were read before. A file is read again only where its size or its time of change differs. */
+/* Hashes of files that were read before. A file is read again where its inode, size or modification time differs. */
 struct batch_known {
     char *path;
     struct stat st;

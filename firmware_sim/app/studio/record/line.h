@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The command line of `record`, read. `batch` makes such a line for each of its jobs, so that it has the options of
+/* Reads the command line of `record`. `batch` makes such a line for each of its jobs, so that it has the options of
  * `record` as they are. In: argv. Out: one recording (job.h), with the settings of keys. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_LINE_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_LINE_H

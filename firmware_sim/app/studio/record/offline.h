@@ -41,11 +41,12 @@ int offline_open_at(struct site *site, double scan_s, const struct sh_report *re
  * is loaded once. */
 int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
                         struct offline *offline, struct sh_err *err);
-/* The head ends; its scene and its threads are freed. The client's handle keeps what it knows. */
+/* Ends the head, and frees its threads and its site. A site given to offline_open_at stays. The client's handle
+ * keeps what it knows. */
 void offline_stop(struct offline *offline);
 /* Ends the head, and completes the file `truth`. Returns the first error in writing it. Site and handle stay. */
 int offline_finish(struct offline *offline, struct sh_err *err);
-/* Prepares a scan from a station, from 1; 0: the one at power-up. No scan may be running. */
+/* Prepares a scan from a station. Stations count from 1; 0 is the station at power-up. No scan may be running. */
 int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A page saves the points so far as a file, in each format that `scanhead record` writes from a stream.
+/* A page saves the points so far as a file: .las, .ply, .e57, .ptx or .pcapng.
  *
  * In: the frames of past.h. Out: a file, in pieces. One file at a time; a thread of its own makes it, at the lowest
  * priority. The file is in a folder for temporary files until the next one is made, or until save_free.
@@ -18,7 +18,7 @@ enum { SAVE_PIECE = 4 << 20 }; /* the most bytes of a piece */
 /* past must live on until save_free. NULL: no memory. */
 struct save *save_create(struct past *past);
 /* `/save?as=las` begins a file, `/save` asks for it: JSON (README.md).
- * SH_EINPUT: a format that it can't be, or one is being made. A file that could not be made is an error
+ * SH_EINPUT: the format is not one of these, or a file is being made. A file that could not be made is an error
  * until the next one begins. */
 int save_get(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
 /* `/saved?file=NUMBER&from=POSITION` gives bytes of that file from that position; at the file's end it gives none.
