@@ -290,8 +290,8 @@ static void clear_list(struct caster *c, const struct chunk *k)
     l->n_secondary = 0;
 }
 
-/* Returns the part with the most light within half an echo's width of it; if there is none, the nearest part within
- * two widths. NULL: the echo is noise. */
+/* Returns the part from which an echo comes. It is the part with the most light at most half the echo's width away.
+ * Without one it is the nearest part at most two widths away. NULL: the echo is noise. */
 static const struct wave_part *part_of(const struct caster *c, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {
