@@ -49,7 +49,8 @@ void coverage_free(struct coverage *coverage);
 struct coverage_scan {
     struct cast_setup setup;
     struct schedule_segment segment; /* has an end */
-    /* Poses of what moves at a time of the scan; NULL: nothing does. From any thread, each with a setup of its own. */
+    /* Sets the poses of what moves at a time of the scan; NULL: nothing moves. Called from any thread, each with a setup
+     * of its own. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
     /* Gets the scan's hits as well, also those on bodies, from the threads that cast. NULL: they are not wanted. */
@@ -118,7 +119,8 @@ uint32_t coverage_cells(const struct coverage *coverage);
 void coverage_get(const struct coverage *coverage, uint32_t cell, struct coverage_cell *out);
 
 /* Returns the cell that has the place p_m of a triangle of the scene. p_m may lie a little beside the triangle, as a
- * measured point does. COVERAGE_NO_CELL: the triangle is left out (it lies on another one, or is silent). Any thread. */
+ * measured point does. COVERAGE_NO_CELL: the triangle is left out, since it lies on another one or is silent. Any
+ * thread. */
 enum { COVERAGE_NO_CELL = 0xffffffff };
 uint32_t coverage_cell_at(const struct coverage *coverage, uint32_t triangle, const double p_m[3]);
 
@@ -148,12 +150,12 @@ struct coverage_directions {
 };
 
 /* The unseen surface that a head at a place would see, estimated by far fewer rays than a scan has. A ray that hits a
- * cell which no station sees stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where this area is
- * less than the cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where the area is
- * more, the ray stands for the cells around, too, and counts with its area. An infinite each_sr lets each cell
- * that is hit count as a whole. The estimate misses cells that lie between rays, if only a corner of them is seen. It is
- * too large by cells that a scan's points miss, and by the parts of rays' areas that reach beyond a surface's outline:
- * on average half a ray's area along all outlines. Glass counts as a wall, and moving bodies as nothing. */
+ * cell which no station sees stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where this area
+ * is less than the cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where the area is
+ * more, the ray stands for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is
+ * hit count as a whole. The estimate misses cells that lie between rays, if only a corner of them is seen. It is too
+ * large by cells that a scan's points miss, and by the parts of rays' areas that reach beyond a surface's outline: on
+ * average half a ray's area along all outlines. Glass counts as a wall, and moving bodies as nothing. */
 struct coverage_gain {
     double gain_m2;
     double front; /* share of the rays' hits that are on the front of a triangle; NaN: no ray hits */

@@ -26,7 +26,7 @@ struct view_column {
     enum view_type type;
     uint32_t components;
 };
-/* view_columns has a row for each enum viewed_column. The column of positions stands before all of them in an answer. */
+/* view_columns has a row for each enum viewed_column. An answer has the column of positions before all of these. */
 extern const struct view_column view_columns[VIEWED_COLUMNS], view_position;
 const char *view_type_name(enum view_type type);
 
