@@ -49,8 +49,8 @@ void coverage_free(struct coverage *coverage);
 struct coverage_scan {
     struct cast_setup setup;
     struct schedule_segment segment; /* has an end */
-    /* Sets the poses of what moves at a time of the scan; NULL: nothing moves. Called from any thread, each with a setup
-     * of its own. */
+    /* Sets the poses of what moves at a time of the scan; NULL: nothing moves. Any thread may call it, each with a
+     * setup of its own. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
     /* Gets the scan's hits as well, also those on bodies, from the threads that cast. NULL: they are not wanted. */
