@@ -93,8 +93,8 @@ struct cast_colour {
     const struct surface_colours *surfaces; /* texture; must outlive the scan */
 };
 
-/* Disturbances of a head, for the runs that are cast with it. Its encoders read the wobbles; the head doesn't notice
- * the others. All 0, with a share of 1: none. */
+/* Disturbances of a head. They hold for the runs that are cast with this struct. The head's encoders read the wobbles;
+ * the head doesn't notice the other disturbances. All 0, with a share of 1: there are none. */
 struct cast_disturbance {
     int dark;         /* the laser does not fire: shots are empty, except for echoes that noise makes in waveforms */
     double slip_turn; /* the beam's pan is this much more than the encoder reads */
@@ -157,7 +157,8 @@ struct cast_setup {
     uint32_t n_knots;
     const struct pose_knot *knot;
     const uint8_t *silent; /* by label: surfaces that hide what is behind them and give no echo; NULL: none */
-    /* NULL: every hit within the limits is one echo, the head is ideal. Its max_echoes is also the beam's. */
+    /* NULL: the head is ideal, and every hit within the limits is one echo. Else detect->max_echoes replaces
+     * beam->max_echoes. */
     const struct cast_detect *detect;
     const struct cast_colour *colour; /* for blocks with room for colours; NULL: none, and nothing is spent on them */
     const struct cast_disturbance *disturbance; /* NULL: no disturbance. Not for caster_meet */
@@ -216,9 +217,9 @@ uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, cons
 /* Finds exact hits (bvh.h) with the caster's working memory. */
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* Calls beam_outlines_create with a probe that casts its rays into bvh. So outlines that are hidden from the station,
- * or are no step as seen from there, are left out. spec->kind is that of surface_kinds where detection models surfaces.
- * It allocates: call it before the scan. */
+/* Calls beam_outlines_create with a probe that casts its rays into bvh. So outlines are left out that are hidden from
+ * the station, or on whose two sides range and kind of surface are the same. spec->kind is that of surface_kinds where
+ * detection models surfaces. The function allocates: call it before the scan. */
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
                   struct sh_err *err);
 

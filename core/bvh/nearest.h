@@ -25,7 +25,8 @@ VEC_INLINE float tfar_of(double nearest_m, double start_m)
 }
 
 /* Takes a hit that counts as equal to the nearest: the lowest number wins. The stored hit may turn out to be too far
- * from the nearest to count as equal. Then its low number may have kept out hits that do: the ray is cast again. */
+ * from the nearest to count as equal. Its low number may have kept out a hit that is near enough: the ray is cast
+ * again. */
 static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
     const double nearest_m = query->range_m[lane];
@@ -36,8 +37,9 @@ static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t tri
     query->hit_m[lane] = range_m;
 }
 
-/* Takes a hit at range_m, which counts as equal to first_m. first_m is no further than the nearest so far, or counts as
- * equal to it. */
+/* Takes a hit at range_m. first_m is the nearest range of the hits that count as equal to this one: for a triangle
+ * range_m itself, for a copy of a mesh the nearest range in the copy or so far. It is no further than the nearest range
+ * so far, or counts as equal to that. */
 VEC_INLINE void bvh_take_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m,
                              double first_m)
 {

@@ -91,9 +91,9 @@ static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apar
 /* With this many returns or fewer, none are joined. */
 enum { FEW = 16 };
 
-/* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. Here d is a sixteenth of the
- * pulse's area (its integral over time, in s), about a fifteenth of its width. So the signal changes by 1e-4 of its
- * peak: less than half a count of 12 bits. */
+/* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. Here d, as a time, is a
+ * sixteenth of the pulse's integral over time (in s). This is about a fifteenth of the pulse's width. So the signal
+ * changes by 1e-4 of its peak: less than half a count of 12 bits. */
 static double least_apart_m(const struct cast_waves *waves)
 {
     return 0.5 * LIGHT_SPEED_M_S * waveform_pulse_area_s(waves->waveform) / 16.0;
@@ -290,8 +290,8 @@ static void clear_list(struct caster *c, const struct chunk *k)
     l->n_secondary = 0;
 }
 
-/* Returns the part with the most light within half an echo's width of it; if there is none, the nearest part within
- * two widths. NULL: the echo is noise. */
+/* Returns the part from which an echo comes. It is the part with the most light at most half the echo's width away.
+ * Without one it is the nearest part at most two widths away. NULL: the echo is noise. */
 static const struct wave_part *part_of(const struct caster *c, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {

@@ -6,8 +6,8 @@
 static const uint64_t NS_TIMES_UHZ = 1000000000000000; /* ns per second x micro-hertz per hertz */
 static const uint64_t FINE_DEN = 1ull << 40;
 
-/* Returns how many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. Of the first one's sweep,
- * r0/den has passed already. */
+/* Returns how many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. The sweep of the first
+ * line has passed by r0/den already. */
 static uint64_t lines_for_span(const struct schedule_segment *seg, int64_t span_fine)
 {
     const struct schedule_spec *spec = &seg->spec;

@@ -49,7 +49,8 @@ void coverage_free(struct coverage *coverage);
 struct coverage_scan {
     struct cast_setup setup;
     struct schedule_segment segment; /* has an end */
-    /* Poses of what moves at a time of the scan; NULL: nothing does. From any thread, each with a setup of its own. */
+    /* Sets the poses of what moves at a time of the scan; NULL: nothing moves. Any thread may call it, each with a
+     * setup of its own. */
     void (*enter)(void *ctx, int64_t t_ns, struct cast_setup *setup);
     void *ctx;
     /* Gets the scan's hits as well, also those on bodies, from the threads that cast. NULL: they are not wanted. */
@@ -67,7 +68,7 @@ int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, c
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
 /* Gives figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
 void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *gain_m2);
-/* Makes the waiting scan that of the next station, counted from 1 in this order. */
+/* Makes the waiting scan that of the next station. Stations are numbered from 1 in the order of these calls. */
 void coverage_keep(struct coverage *coverage);
 void coverage_drop(struct coverage *coverage);
 
@@ -80,7 +81,8 @@ void coverage_forget(struct coverage *coverage);
 
 /* ---- figures */
 
-/* Shares of area, weakest first. */
+/* The spread of a figure over the area that is seen. Cells count by their area. On 5 %, 50 % and 95 % of the area the
+ * figure is at most p05, p50 and p95. */
 struct coverage_spread {
     double mean, p05, p50, p95; /* NaN: nothing is seen */
 };
@@ -116,8 +118,9 @@ struct coverage_cell {
 uint32_t coverage_cells(const struct coverage *coverage);
 void coverage_get(const struct coverage *coverage, uint32_t cell, struct coverage_cell *out);
 
-/* The cell of a place on a triangle of the scene, of which p_m is the nearest point or near it; COVERAGE_NO_CELL: the
- * triangle is left out (it lies on another one, or is silent). For measured points of other sources. Any thread. */
+/* Returns the cell that has the place p_m of a triangle of the scene. p_m may lie a little beside the triangle, as a
+ * measured point does. COVERAGE_NO_CELL: the triangle is left out, since it lies on another one or is silent. Any
+ * thread. */
 enum { COVERAGE_NO_CELL = 0xffffffff };
 uint32_t coverage_cell_at(const struct coverage *coverage, uint32_t triangle, const double p_m[3]);
 
@@ -131,7 +134,7 @@ void coverage_pieces(const struct coverage *coverage, coverage_piece *piece, voi
 
 /* SEEN: seen by none red, by one yellow, by several green. COUNT: how many stations, blue none to red all. DENSITY:
  * pulses per area, on a logarithmic scale: blue at its 5 % percentile of the area that is seen, red at 95 %. INCIDENCE:
- * blue head on to red at 90 degrees. Where nothing is seen the last two are grey. */
+ * blue at 0 degrees, red at 90 degrees. Where nothing is seen the last two are grey. */
 enum coverage_colour { COVERAGE_SEEN, COVERAGE_COUNT, COVERAGE_DENSITY, COVERAGE_INCIDENCE };
 int coverage_write_mesh(const struct coverage *coverage, const char *path, enum coverage_colour colour,
                         const struct sh_report *report, struct sh_err *err);
@@ -146,13 +149,13 @@ struct coverage_directions {
     double range_min_m, range_max_m;
 };
 
-/* The unseen surface that a head at a place would see, estimated by far fewer rays than a scan has. Each ray that hits
- * such a cell stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where that is less than the
- * cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where it is more, the ray stands
- * for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is hit count as a whole.
- * The estimate misses cells that lie between rays, if only a corner of them is seen. It is too large by cells that a
- * scan's points miss, and by the parts of rays' areas that reach beyond a surface's outline: on average half a ray's
- * area along all outlines. Glass counts as a wall, and moving bodies as nothing. */
+/* The unseen surface that a head at a place would see, estimated by far fewer rays than a scan has. A ray that hits a
+ * cell which no station sees stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where this area
+ * is less than the cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where the area is
+ * more, the ray stands for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is
+ * hit count as a whole. The estimate misses cells that lie between rays, if only a corner of them is seen. It is too
+ * large by cells that a scan's points miss, and by the parts of rays' areas that reach beyond a surface's outline: on
+ * average half a ray's area along all outlines. Glass counts as a wall, and moving bodies as nothing. */
 struct coverage_gain {
     double gain_m2;
     double front; /* share of the rays' hits that are on the front of a triangle; NaN: no ray hits */

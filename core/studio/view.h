@@ -9,7 +9,8 @@
  *
  * Each point is a disc: point_m wide, and at least point_px. Where discs overlap, that of the nearer point counts. A
  * disc is deeper at its rim than at its centre, so that on a surface each place shows the disc whose centre is nearest.
- * Memory depends on the image alone: 12 bytes for each place; a pixel has 2 x 2 places (VIEW_SUB).
+ * Memory depends on the image alone: 12 bytes for each place, and 32 while the image is drawn. A pixel has 2 x 2 places
+ * (VIEW_SUB).
  *
  * Shading: surfaces that face the light from the upper left of the eye are bright; places whose neighbours are
  * nearer are dark (eye-dome lighting, C. Boucheny: Visualisation scientifique de grands volumes de donnees: pour

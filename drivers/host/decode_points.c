@@ -126,7 +126,8 @@ VEC_CLONES static void fold_longitudes(double *y, int n)
     }
 }
 
-/* WGS 84, NIMA TR8350.2: geodetic to geocentric, from the polar axis and from the plane of the equator. */
+/* Converts geodetic coordinates to the distances from the Earth's polar axis and from the plane of its equator (WGS 84,
+ * NIMA TR8350.2). */
 VEC_INLINE void geocentric(double lat_deg, double h, double *from_axis, double *from_equator)
 {
     const double a = 6378137.0, f = 1 / 298.257223563, e2 = f * (2 - f);

@@ -66,7 +66,7 @@ void web_speak(struct web_link *web, int resets)
 static int web_unplug(struct web_link *web)
 {
     if (web->listening == NULL) return SH_ESTATE;
-    web->is_silent = 0;        /* what is left of its sockets ends here */
+    web->is_silent = 0;        /* the silent sockets end below */
     web_break(web->listening); /* first, so that a client that is cut off can't come back at once */
     web_break_all(web);
     web->listening = NULL;

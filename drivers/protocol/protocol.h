@@ -149,7 +149,9 @@ struct protocol_spec {
     const char *stored;       /* what store() has kept; "": nothing. NULL: as "". Valid during create */
     int dialect;              /* enum protocol_dialect: the one that the link is configured for */
     _Atomic uint32_t *shared; /* a word of the link that all of its sessions share; 0 at first. NULL: there is none */
-    int waits;                /* 1: paces fast and step: device time says nothing of how long a client takes */
+    /* 1: the head waits for clients (paces fast and step). Device time then says nothing of how long a client takes, so
+     * a protocol sets clients no time limit. */
+    int waits;
     /* velodyne_http: address and port of the link `velodyne`, to which the data go; "" and 0: not known */
     char address[64];
     int port;

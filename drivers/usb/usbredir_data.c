@@ -34,7 +34,7 @@ static int status_of(enum usb_status status)
     return numbers[status];
 }
 
-/* room: for bytes to the host; bytes: all that the transfer holds, those that came included. */
+/* Makes a transfer with room for bytes to the host. `bytes` counts them, or the bytes that came from the host. */
 static struct redir_transfer *new_transfer(struct usbredir *self, uint32_t room, uint32_t bytes)
 {
     if (self->n_pending >= MAX_PENDING || self->n_bytes + bytes > MAX_PENDING_BYTES) return NULL;

@@ -36,13 +36,13 @@ struct replay {
     int speed_changed, loop;
     int64_t position_ns; /* of the frame that was sent last, since the first one */
     int wants_again;     /* it is to begin anew by itself */
-    int n_clients;       /* without links that are readers themselves */
+    int n_clients;       /* sessions, without those that file, null and udp links open for themselves */
     int ends_then;       /* the run ends when the recording was played */
     uint32_t times;      /* how often it was begun so far */
     uint64_t frames;     /* sent */
     uint64_t scans, frames_done;
-    /* The state of the head that was recorded, by the ticks with which it goes out. Number i is at i %
-     * REPLAY_CHANGES. */
+    /* The last changes of the recorded head's state. A client sees a change once its tick is released. Change number i
+     * is at i % REPLAY_CHANGES. */
     struct replay_change {
         uint64_t tick;
         enum head_state state;
@@ -104,7 +104,7 @@ void replay_pace(struct replay *replay, uint64_t tick);
 void replay_fill(struct replay *replay, uint64_t tick, int may_skip);
 void replay_stop(struct replay *replay, uint64_t tick, int wants_again);
 
-/* replay_notes.c: a frame goes out with a tick. With the lock held; counts into r->tick. */
+/* replay_notes.c: a frame goes out with a tick. With the lock held; counts into replay->tick. */
 void replay_note_frame(struct replay *replay, const uint8_t *frame, uint64_t tick);
 
 /* replay_device.c: a recording as a device of another protocol than the native one. */

@@ -219,7 +219,7 @@ export async function trialTests(page, other, SIZE) {
     await page.clickAt([x, y]);
     const text = await page.until(`document.querySelector('.targets li span')?.textContent`);
     is(new RegExp(`^T1: seen by .*\\b${number}\\b`).test(text), `at ${at}: ${text}`);
-    equal(await page.eval(`document.querySelector('#trial-targets').textContent`), 'No two stations see 3 of them both.', 'what is said');
+    equal(await page.eval(`document.querySelector('#trial-targets').textContent`), 'No two stations have 3 targets in common.', 'what is said');
     const drawn = await page.eval(`scanhead.view.overlay.targets.map((t) => t.name).join()`);
     equal(drawn, 'T1', 'marks in the picture');
     await page.eval(`document.querySelector('.targets li button').click()`);

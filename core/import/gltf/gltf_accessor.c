@@ -92,7 +92,7 @@ int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint
     return rc;
 }
 
-/* Elements at an offset within a buffer view. */
+/* Finds v->count elements at an offset within a buffer view. */
 static int open_elements(struct gltf *g, const json_t *of, const char *at, uint32_t size, struct gltf_view *v)
 {
     struct gltf_bytes bytes;

@@ -7,7 +7,7 @@
 #include "core/angle.h"
 
 enum {
-    WALL_LEVELS = 14, /* height levels hit that make a pixel as dark as it gets */
+    WALL_LEVELS = 14, /* a pixel with points at so many height levels is as dark as it gets */
     FREE_LEVELS = 4,  /* floor and ceiling fill up to two levels each; only more levels than these are structure */
     HISTOGRAM_BINS = 1024,
     BAR_PX = 240, /* longest scale bar */
@@ -170,7 +170,7 @@ static void draw_station(const struct map *map, uint32_t i, struct pen *pen)
     draw_triangle_about(pen, at, MAP_STATION_PX, red);
 }
 
-/* A thin line leads from a label to its station where it stands away from it. */
+/* Draws a label. If it stands away from its station, a thin line leads from one to the other. */
 static void draw_label(const struct map *map, const struct map_label *label, struct pen *pen)
 {
     const struct map_station *station = &map->station[label->station];

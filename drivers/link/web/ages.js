@@ -17,7 +17,8 @@ export function ageRow(view) {
     if (view.cloud.latest_s === latest_s || view.cloud.latest_s === -Infinity || isSoon) return; // trial points have no time
     since_ms = performance.now();
     latest_s = view.cloud.latest_s;
-    view.times({from: latest_s - Number(select.value), to: latest_s + 1}); // later ones are of a head that was restarted
+    // A head that was restarted counts its time from 0 again. So points with later times are from before the restart.
+    view.times({from: latest_s - Number(select.value), to: latest_s + 1});
   };
   const choose = () => {
     clearInterval(timer);

@@ -162,8 +162,8 @@ function placeExactly(exactAt) {
   };
 }
 
-// Coordinates of a projection, such as UTM, need the cubic through the exact map within the head's reach d. Its error
-// is about d^4 / R^3 with the Earth's radius R: 0.1 um at 2 km.
+// For coordinates of a projection, such as UTM, a polynomial of order 3 takes the place of the exact formula within the
+// head's reach d. Its error is about d^4 / R^3 with the Earth's radius R: 0.1 um at 2 km.
 function placeByCubic(exactAt, anchor, descriptor) {
   const reach_m = Math.min(Math.max(1.1 * descriptor.range_max_m, 10), 20000), [ax, ay, az] = anchor.anchor;
   const k = fitCubic((u, v, w) => exactAt([ax + reach_m * u, ay + reach_m * v, az + reach_m * w]));

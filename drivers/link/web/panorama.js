@@ -110,8 +110,8 @@ export class Panorama {
     this.height = Math.max(1, Math.min(WIDEST, Math.round(this.width / columns)));
   }
 
-  // Where lines are further apart than the points in them, pixels are wider than high, or the other way round. Returns
-  // the shape with which the most pixels have a point.
+  // Points are often closer together along a scan line than from line to line. Pixels that are not square then leave
+  // fewer gaps. Chooses the shape with which the most pixels have a point.
   * #chooseShape(blocks) {
     const tries = SHAPES.map((shape) => {
       this.#size(shape);

@@ -54,7 +54,7 @@ export class TargetList {
     this.element.append(make('div', {class: 'actions'}, this.#put), this.#list, this.#says);
   }
 
-  // While a target is to be put, it takes clicks and these keys, also where a tool is open.
+  // Until a target is put, this list takes clicks and the keys below, even if a tool is open.
   tap({x, y}) {
     this.#at(x, y);
     return true;
@@ -91,7 +91,7 @@ export class TargetList {
       if (trial !== this.#trial || !trial?.cells || !this.#armed) return; // a second click came before the first was found
       const at = found && camera.at(x, y, found.w), cell = at && cellAt(trial.cells, at);
       this.#arm(false);
-      if (cell === null) return say(this.#says, 'There is no point of a surface.');
+      if (cell === null) return say(this.#says, 'There is no surface at that place.');
       this.#targets.push({number: 1 + (this.#targets.at(-1)?.number ?? 0), at, cell});
       this.#relist();
     });
@@ -120,6 +120,6 @@ export class TargetList {
     const pairs = pairsOf(stations, sights), enough = pairs.filter(([, , n]) => n >= NEEDED).map(([a, b]) => `${a} and ${b}`);
     say(this.#says, this.#armed ? 'Click a point of the picture; Esc leaves it.'
       : this.#targets.length === 0 ? `Two scans are put together by ${NEEDED} targets that both see.`
-        : enough.length > 0 ? `Enough for ${enough.join('; ')}.` : `No two stations see ${NEEDED} of them both.`);
+        : enough.length > 0 ? `Enough for ${enough.join('; ')}.` : `No two stations have ${NEEDED} targets in common.`);
   }
 }

@@ -12,7 +12,8 @@ const STOPS = {
   ember: ['#2f3b66', '#5b3f86', '#92428b', '#c84c76', '#ef6b52', '#fb9a3f', '#ffd166'],
 };
 
-// These are computed: lightness from and to; hue and chroma of OKLab at a place.
+// These scales are computed in OKLab. The lightness rises from DARK to BRIGHT. EVEN gives hue and chroma, as [a, b], at
+// the place f between the limits.
 const DARK = 0.32, BRIGHT = 0.92;
 const polar = (hue, chroma) => [chroma * Math.cos(hue), chroma * Math.sin(hue)];
 const BLUE = polar(4.62, 0.105), YELLOW = polar(1.87, 0.125);

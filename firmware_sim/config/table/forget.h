@@ -14,7 +14,8 @@ int cfg_is_of_scanner(const char *path);
 extern const char cfg_sections_of_scanner[];
 /* Drops the file's value of a key that is about to be read in a scanner. */
 void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key);
-/* To be called when the scanner has been read. If it has a profile of its own, the file's head is dropped. */
+/* To be called when the scanner has been read. If it has a head profile of its own, the keys of the file's
+ * sections `head` and `instrument` are dropped. */
 void cfg_end_scanner(struct cfg_reader *rd);
 /* Resets a list as if it had not been given. */
 void cfg_forget_list(struct cfg_reader *rd, const char *path);

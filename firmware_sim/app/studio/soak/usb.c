@@ -53,7 +53,7 @@ static int is_serial(const char *folder, const char *serial)
     return n == len + 1 && memcmp(text, serial, len) == 0;
 }
 
-/* Returns how many; -1: not known. */
+/* Returns how many bytes are announced and not there; -1: not known. */
 static int64_t excess_of(const char *serial)
 {
     glob_t found;

@@ -26,11 +26,12 @@ struct view_column {
     enum view_type type;
     uint32_t components;
 };
-/* By enum viewed_column; and that of positions, which comes first. */
+/* view_columns has a row for each enum viewed_column. An answer has the column of positions before all of these. */
 extern const struct view_column view_columns[VIEWED_COLUMNS], view_position;
 const char *view_type_name(enum view_type type);
 
-/* Points first, first + every, ...: at most `most` of them, and no more than an answer holds. every >= 1. */
+/* The points that an answer has: numbers `first`, `first` + `every` and so on, at most `most` of them, and no more than
+ * an answer holds. every >= 1. */
 struct view_part {
     uint32_t first, every, most;
 };
