@@ -3,8 +3,8 @@
  *
  * Fit. GeographicLib computes the map at 7 x 7 x 7 Chebyshev nodes of a cube about the centre. It is
  * interpolated by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are
- * kilometres apart. So the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in a
- * coefficient of degree k, and return multiplied by (scene / 20 km)^k only. Derivatives by small differences
+ * kilometres apart. So a coefficient of degree k has the nanometres of rounding in GeographicLib's figures,
+ * divided by (20 km)^k. Its term has (scene / 20 km)^k of these nanometres. Derivatives by small differences
  * would amplify the rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. For the form `meridian` all
  * nodes lie in the meridian's plane.
  *
