@@ -30,7 +30,7 @@ uint32_t embree_packet(RTCDevice device)
     return 1;
 }
 
-/* These are the steps in which Embree chooses its kernels. */
+/* Returns the instruction set for which Embree has kernels, and which this processor has. */
 static const char *instructions(void)
 {
 #if defined(__x86_64__)

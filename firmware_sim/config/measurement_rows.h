@@ -120,7 +120,8 @@
     {KEY(waveform.keep_db), CFG_REAL, "dB", "-6", -60, 60,
      .help = "Samples are kept in windows where the signal reaches this, relative to the threshold."},
     {KEY(waveform.before_ns), CFG_REAL, "ns", "5", 0, 4000,
-     .help = "A window begins this long before the signal reaches keep_db. Together with after_ns up to 2048 samples."},
+     .help = "A window begins this long before the signal reaches keep_db. before_ns and after_ns together are up to "
+             "2048 samples."},
     {KEY(waveform.after_ns), CFG_REAL, "ns", "10", 0, 4000,
      .help = "A window ends this long after the signal has fallen below keep_db."},
     {KEY(waveform.near_m), CFG_REAL, "m", "0", 0, 1e5,

@@ -26,7 +26,7 @@ struct pace {
     uint64_t together_until; /* ticks up to this one go out together; set it before pace_look gets a later one */
 
     int64_t credit_ns;
-    int64_t expected_ns;  /* when it should look again; beyond that time it stood still */
+    int64_t expected_ns;  /* when pace_look should be called next; a later call shows a standstill */
     int asleep;           /* it was told to sleep up to then */
     struct lateness wake; /* of the wake-ups from such a sleep */
     struct lateness late; /* of releases */
