@@ -57,7 +57,7 @@ int newfile_sync(const char *part, int fd, struct sh_err *err);
 int newfile_rename(const char *path, const char *part, struct sh_err *err);
 /* newfile_settle, but nothing at path is replaced: SH_ESTATE where something is there. */
 int newfile_settle_free(const char *path, const char *part, int fd, struct sh_err *err);
-/* Syncs, renames and closes; after a failure part is removed. Takes fd in any case. */
+/* Syncs and renames; after a failure part is removed. fd is closed in any case. */
 int newfile_keep(const char *path, const char *part, int fd, struct sh_err *err);
 /* Removes part and closes. */
 void newfile_drop(const char *part, int fd);

@@ -30,7 +30,7 @@ uint32_t embree_packet(RTCDevice device)
     return 1;
 }
 
-/* These are the steps in which Embree chooses its kernels. */
+/* Returns the widest instruction set of this processor for which Embree has kernels. */
 static const char *instructions(void)
 {
 #if defined(__x86_64__)

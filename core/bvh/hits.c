@@ -64,8 +64,8 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
 
 enum { LANES = 16 };
 
-/* Takes n <= LANES origins of rays into the local frame, from ray `at` on. apart2: in lanes, the largest squared
- * distances so far from the chunk's first ray. */
+/* Takes n <= LANES origins of rays into the local frame, from ray `at` on. apart2[k] is the largest squared distance to
+ * first_m, the first ray's origin, of all origins that lane k has had. */
 VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const double origin_m[3],
                            const double first_m[3], uint32_t at, uint32_t n, double apart2[LANES])
 {
@@ -88,9 +88,9 @@ VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const do
     }
 }
 
-/* Takes the rays' own origins into the local frame, also as Embree gets them. Returns a bound of their distances from
- * that frame's origin, and sets batch->apart_m, a bound of the distances between any two of them. Both bounds follow
- * from the largest distance from the first ray. */
+/* Takes the rays' own origins into the local frame, in double, and in float for Embree. Returns a bound of their
+ * distances from that frame's origin, and sets batch->apart_m, a bound of the distances between any two of them. Both
+ * bounds follow from the largest distance from the first ray. */
 VEC_CLONES
 static double take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
@@ -110,7 +110,8 @@ static double take_own(struct bvh_work *w, const struct bvh *bvh, const struct b
     return vec3_length(first_m) + sqrt(most2);
 }
 
-/* Rays that begin outside of the scene's radius enter it before they hit anything: the float ray begins there. */
+/* A ray that begins outside of the sphere around the scene hits nothing before it has gone as far as that sphere is
+ * away. The ray that Embree gets begins after this distance. */
 static void take_along(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     for (uint32_t i = 0; i < rays->n; i++) {

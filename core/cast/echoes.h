@@ -25,8 +25,8 @@ struct echo_list {
     uint8_t number[CAST_LIST]; /* among the pulse's echoes, from 0, left-out ones included */
     uint64_t key[CAST_LIST];   /* for random numbers */
     double cosine[CAST_LIST];
-    double energy[CAST_LIST]; /* share of the pulse's energy that took this way */
-    double rho[CAST_LIST];    /* the part of it that comes back; the energy itself where surfaces are not modelled */
+    double energy[CAST_LIST]; /* share of the pulse's energy that glass and mirrors on the echo's way leave */
+    double rho[CAST_LIST];    /* the part of that energy that comes back; all of it where surfaces are not modelled */
     uint8_t ghost[CAST_LIST];
     double amplitude[CAST_LIST];
     int16_t refl_cdb[CAST_LIST], amplitude_cdb[CAST_LIST];

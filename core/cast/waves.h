@@ -21,15 +21,14 @@ struct wave_part {
 
 /* Each thread has this working memory. */
 struct wave_work {
-    /* Pulses with returns of their own: part[first .. first + n]. All others have the one return that is their entry
-     * of the list. */
+    /* A pulse with own = 1 has n returns, from part[first] on. Any other pulse has one: its entry of the list. */
     struct {
         uint32_t first, n;
         int own;
     } of[CHUNK];
     struct wave_part part[CHUNK * WAVES_PARTS];
     uint32_t n_parts;
-    uint8_t merged[CHUNK]; /* where echoes are found in samples: how many the merged returns give */
+    uint8_t merged[CHUNK]; /* where echoes are found in samples: a pulse's echoes by its merged returns */
     /* of the pulse at hand: */
     struct waveform_return returns[WAVES_PARTS];
     struct waveform_record record;
@@ -41,7 +40,7 @@ struct chunk;
 
 /* Begins a chunk, before its returns are taken. */
 void waves_begin(struct caster *c, const struct chunk *k);
-/* Takes the returns of a pulse with sub-rays, in any order; they may change places. */
+/* Takes the returns of a pulse with sub-rays, in any order. The function sorts and shortens the caller's array. */
 void waves_take_returns(struct caster *c, const struct chunk *k, uint32_t pulse, struct beam_return *returns,
                         uint32_t n);
 /* Takes the returns of single rays through glass and off mirrors, before the list merges them. */

@@ -3,13 +3,14 @@
  *
  * Fit. GeographicLib computes the map at 7 x 7 x 7 Chebyshev nodes of a cube about the centre. It is
  * interpolated by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are
- * kilometres apart. So the nanometres of rounding in GeographicLib's figures are divided by (20 km)^k in a
- * coefficient of degree k, and return multiplied by (scene / 20 km)^k only. Derivatives by small differences
+ * kilometres apart. So a coefficient of degree k has the nanometres of rounding in GeographicLib's figures,
+ * divided by (20 km)^k. Its term has (scene / 20 km)^k of these nanometres. Derivatives by small differences
  * would amplify the rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. For the form `meridian` all
  * nodes lie in the meridian's plane.
  *
- * Bound. The error of an order, at every point of the cylinder, is at most the sum of four parts: the
- * absolute values of the terms left out up to degree 6, each at its own worst place; the rest of the series,
+ * Bound. Points lie in a cylinder about the centre: up to radius_m from its axis, and up to height_m above and
+ * below. The error of an order, at every point of the cylinder, is at most the sum of four parts: the absolute
+ * values of the terms left out up to degree 6, each at its own worst place; the rest of the series,
  * taken as geometric with the ratio of degree 5 to degree 4; ten times the part of degree 7 that the fit may
  * have folded into lower terms; and FLOOR_M for rounding. The triangle inequality proves the first part, and
  * the others are small beside it. tests/accuracy/test_georef.c compares the whole with true errors at 200

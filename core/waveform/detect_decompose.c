@@ -5,9 +5,13 @@
 
 #include <math.h>
 
-enum { DECOMPOSE_TURNS = 2, DECOMPOSE_REACH = 64 }; /* samples: how far a pulse is compared with the rest */
+enum {
+    DECOMPOSE_TURNS = 2,
+    DECOMPOSE_REACH = 64, /* samples before and after its centre in which a pulse is fitted to the residual, at most */
+};
 
-/* A mixture takes the samples from the foot (or the window's end) before its first maximum to that after its last. */
+/* A mixture takes the samples from the foot before its first maximum to the foot after its last maximum. A foot is
+ * where the signal has fallen near the noise, or where the samples of the maximum end. */
 static void decompose_range(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
                             struct finder_task *task)
 {
@@ -41,8 +45,9 @@ static double decompose_height(const struct finder *finder, double span, double 
     return finder->limit / fmax(fmax(h[a], h[b]), 1e-6);
 }
 
-/* Does the same by the rising flank alone, whose last samples are y0 and y1. The higher the top is, the less time
- * passes between these two shares of it. *centroid counts from the sample of y1. */
+/* Does the same by the rising flank alone, whose last samples are y0 and y1. The higher the top is, the faster its
+ * flank rises from y0 to y1. The height is found with which this rise takes one sample. *centroid counts from the
+ * sample of y1. */
 static double decompose_flank(const struct finder *finder, double y0, double y1, double *centroid)
 {
     double least = 0.0, most = 9.0; /* logarithms of the peak over y1; more than 39 dB is not believed */
@@ -129,7 +134,7 @@ static int decompose_enough(const struct finder_task *task, const struct finder_
     return mix->chi2 <= n * finder_noise2(task->run->finder, n) + decompose_shapes(task, mix);
 }
 
-/* Returns the pulse that explains most of the rest. At each place it gets its amplitude by least squares. */
+/* Returns the pulse that explains most of the residual. At each place it gets its amplitude by least squares. */
 static struct finder_term decompose_largest(const struct finder_task *task, const double *rest)
 {
     const double sigma = task->run->finder->spread[0].sigma;
@@ -184,7 +189,7 @@ static int decompose_sound(const struct finder_task *task, const struct finder_m
     return 1;
 }
 
-/* Adds a component for the rest. */
+/* Adds a component for the residual. */
 static int decompose_extra(const struct finder_task *task, double least, struct finder_mix *mix)
 {
     double rest[WAVEFORM_MAX_SAMPLES];
@@ -233,8 +238,9 @@ static void decompose_fewer(const struct finder_task *task, double least, struct
     }
 }
 
-/* Makes two pulses with the energy, the mean, the variance and the third moment of the samples. For shares p and q,
- * d apart, the variance is that of the pulse and p q d^2, the third moment p q (p - q) d^3. */
+/* Makes two pulses with the energy, the mean, the variance and the third moment of the samples. With shares p
+ * and q of the energy, d apart, they have the pulse's variance plus p q d^2, and its third moment plus
+ * p q (p - q) d^3. */
 static int decompose_two(const struct finder_task *task, struct finder_mix *mix)
 {
     const struct finder *finder = task->run->finder;
@@ -265,7 +271,7 @@ void finder_decompose(const struct finder_run *run, const struct finder_peak *pe
     struct finder_task task;
     decompose_range(run, peak, n, &task);
     if (decompose_begin(run, peak, n, mix)) return;
-    /* One term was not enough before this. Mostly two are. */
+    /* The caller has found that one term is not enough for these samples. In most cases two are. */
     struct finder_mix two;
     if (n == 1 && mix->open == 0 && run->mark == NULL && adds && decompose_two(&task, &two)) {
         finder_mix_fit(&task, &two);

@@ -13,7 +13,8 @@ enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
 /* Extent of each tilt, in widths of the pulse. */
 static const double learn_tilts[FINDER_SPREADS] = {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0};
 
-/* Parts of the peak. A Gaussian has 4e-6 at 5 sigmas. */
+/* Shares of the peak of h. A term reaches as far as h is above LEARN_LEAST, which a Gaussian has at 5 sigmas. In
+ * logarithms, values below LEARN_NOTHING count as LEARN_NOTHING. */
 #define LEARN_LEAST   4e-6
 #define LEARN_NOTHING 1e-12
 
@@ -152,7 +153,7 @@ static double learn_rest(const struct finder *finder, const struct learn_echo *e
 }
 
 /* Fits the term of an echo, and measures how far the echo differs from it. Where no term fits, as with some pulses of
- * several humps, it is that of the half maxima. */
+ * several humps, the term follows from the echo's half maxima. */
 static void learn_fit(const struct finder *finder, const struct learn_echo *echo, struct finder_spread *spread)
 {
     const struct finder_run run = {finder, echo->y, echo->n, NULL, 0.0};
@@ -203,7 +204,7 @@ void finder_learn(const struct waveform *waveform, struct finder *finder)
     }
     finder->noise = sqrt(spec->noise * spec->noise + finder->signal * finder->signal / 12.0);
     finder->limit = (most - spec->baseline_counts - 0.5) * finder->signal;
-    /* Noise comes after the receiver's limit: it lowers one sample in 3 million below this. */
+    /* Noise is added after the receiver's limit. It lowers one limited sample in 3 million by more than 5 sigmas. */
     if (spec->saturation > 0.0) finder->limit = fmin(finder->limit, spec->saturation - 5.0 * finder->noise);
 }
 
@@ -222,7 +223,7 @@ static void learn_between(const struct finder *finder, uint32_t k, double u, str
     };
 }
 
-/* Beyond the ends sigma, width and half_lead keep their ratios. */
+/* Before the first tilt and after the last one, sigma, width and half_lead change in proportion. */
 static void learn_stretch(const struct finder_spread *end, double ratio, struct finder_spread *spread)
 {
     *spread = *end;

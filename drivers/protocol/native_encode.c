@@ -163,8 +163,8 @@ struct encode_cut {
     const struct line_block *block;
     struct native_points head;
     uint32_t first;  /* entry */
-    uint32_t pulse0; /* after the block's */
-    uint32_t dt0_ns; /* after the block's t0_ns */
+    uint32_t pulse0; /* pulses since the block's pulse0 */
+    uint32_t dt0_ns; /* time since the block's t0_ns */
     uint32_t wave;   /* first window that was not sent yet */
     uint32_t n_lost; /* samples lost, which the next frame of waveforms reports */
     int is_last;

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#define M_PER_PS (0.5 * 299792458e-12) /* range, of a pulse's way out and back */
+#define M_PER_PS (0.5 * 299792458e-12) /* metres of range for a picosecond: light goes out and back */
 
 /* ---- the batch's columns. Functions with an rc return how many points are good. Where that is not all of them, *rc
  * says why. */
@@ -169,7 +169,7 @@ static int put_packets(struct las *las, int n, struct sh_err *err)
 }
 
 /* The specification puts a packet's first sample at point + location * (dx, dy, dz), which is nearer to the head
- * than the point. So (dx, dy, dz) leads back to the head, as readers take it. */
+ * than the point. So (dx, dy, dz) points from the target to the head. Programs that read LAS take it so (WAVES.md). */
 static void set_wave(struct las *las, int i)
 {
     struct track *t = &las->base.track;

@@ -19,9 +19,9 @@ struct mesh_sparse_part {
     uint32_t n_faces, station, scan;
 };
 
-/* Takes one part: its triangles, station and scan (core/studio/scan_mesh.h seeds the points by both). Adds round(area *
- * per_m2) points to `out`, black where points->rgb is NULL. *area_m2 grows by the area. SH_EINPUT with the figures
- * where there are more than a file or memory holds. */
+/* Takes one part: its triangles, station and scan. The places of points depend on the seed, the station and the scan
+ * (core/studio/scan_mesh.h). Adds round(area * per_m2) points to `out`, black where points->rgb is NULL. *area_m2 grows
+ * by the area. SH_EINPUT with the figures where there are more than a file or memory holds. */
 int mesh_sparse_add(const struct mesh_sparse *sparse, const struct mesh_points *points,
                     const struct mesh_sparse_part *part, struct mesh_points *out, double *area_m2, struct sh_err *err);
 

@@ -39,7 +39,8 @@ static inline void track_set_point(struct track *track, int i, const struct scan
 
 /* Returns the columns that the library writes points to. */
 struct scanhead_columns track_columns_to(struct track *track);
-/* Numbers the rows of n points. row: how many pulses the line has before them. Returns how many it has after them. */
+/* Gives each of n points the row of its pulse. row: how many pulses of the line come before the n points. Returns how
+ * many come before the points after them. */
 uint64_t track_number_rows(struct track *track, uint64_t row, int n);
 /* Takes the points of a moving head to the scene. Returns as scanhead_to_scene does. */
 int track_to_scene(struct track *track, int n);
@@ -65,8 +66,8 @@ int track_colours(struct track *track, const struct scanhead_frame *frame, struc
 
 /* Takes a frame of waveforms; a recorder without a place for them counts them. SH_ENOMEM, SH_EFORMAT. */
 int track_waves(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
-/* Returns the window that an echo of this pulse lies in, and its place in it; NULL: it is in none. Pulses never go
- * back between two calls of track_clear_waves. */
+/* Returns the window in which an echo of this pulse lies, NULL where there is none. *at: the echo's place in the
+ * window, in samples. The caller asks for pulses in rising order, until it calls track_clear_waves. */
 const struct scanhead_wave *track_find_wave(struct track *track, const struct scanhead_point *point, uint64_t pulse,
                                             double *at);
 /* Forgets all windows, and counts those that no point was in. */

@@ -61,8 +61,9 @@ void ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer);
 /* Waits until the host has taken what is at the kernel, as long as it takes something within timeout_ms. */
 void ffs_pipes_drain(struct ffs_pipes *pipes, int timeout_ms);
 void ffs_pipes_close(struct ffs_pipes *pipes);
-/* Returns the model's address of the first endpoint to which the controller has given another, and that in *given; 0:
- * there is none, or the controller does not say. To be called while a configuration is up. */
+/* Finds the first endpoint whose address the controller has changed. Returns its address in the model, and sets *given
+ * to the address that the controller gave. 0: there is none, or the controller does not say. To be called while a
+ * configuration is up. */
 uint8_t ffs_pipes_moved(const struct ffs_pipes *pipes, uint8_t *given);
 /* Returns the model's address of an endpoint by its number in FunctionFS, counted from 1; 0 where there is none. */
 uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);

@@ -85,7 +85,7 @@ void usbip_conn_answer_slow(struct usbip_conn *conn, const struct usb_owner *own
         run_control(conn, (struct usbip_urb *)request);
 }
 
-/* 1: it was held, and is gone. */
+/* Frees a control request that is held, and returns 1. 0: no such request is held. */
 static int forget_control(struct usbip_conn *conn, uint32_t seqnum)
 {
     struct usb_transfer *request = usb_let_go(&conn->held, seqnum);
@@ -161,7 +161,7 @@ static void take_urb(struct usbip_conn *conn)
 
 /* ---- bytes */
 
-/* Up to n bytes to `at`; 0: none there now, or the connection is broken. */
+/* Reads up to n bytes to `at`, and returns how many. 0: there are none now, or the connection is broken. */
 static uint32_t receive(struct usbip_conn *conn, uint8_t *at, uint32_t n)
 {
     ssize_t got = socket_read(conn->fd, at, n);

@@ -21,7 +21,7 @@ struct named {
     struct stat st;  /* where it is there */
     int needs_place; /* its folder must be there already */
     int is_sidecar;  /* it is written beside another file: meshes of one scan share their image */
-    size_t n_ending; /* of files of each scan: bytes of the path's ending; 0: it is one file */
+    size_t n_ending; /* where each scan gets a file of its own: bytes of the path's ending; 0: it is one file */
 };
 
 struct files {
@@ -52,7 +52,7 @@ int app_is_name_of_scan(const char *file, size_t n_ending, const char *name)
     return digits > 0 && strcmp(name + stem + 1 + digits, file + stem) == 0;
 }
 
-/* Whether they are one name in one folder: files that are not there yet would be made as the same one. */
+/* Whether both are one name in one folder: then they would be one file, also where it is not there yet. */
 static int is_same_name(const struct named *a, const struct named *b)
 {
     struct stat folder[2];
@@ -77,7 +77,8 @@ static int outputs_is_same(const struct named *a, const struct named *b)
 
 /* ---- what there is */
 
-/* Takes who and path, which are NULL where there is no memory. */
+/* Adds a file. `who` and `path` then belong to the list; both are freed after a failure. A NULL means that there was no
+ * memory for it. */
 static int outputs_add(struct files *f, char *who, char *path, int is_written, size_t n_ending)
 {
     if (who != NULL && path != NULL && grow(&f->file, &f->room, f->n + 1, sizeof *f->file)) {

@@ -253,8 +253,8 @@ static int act_reboot(struct command_call *call)
     return act_event(call, COMMAND_REBOOT);
 }
 
-/* Makes the settings those of power-up; the device writes them to its file. Station and frames are left out
- * (stored.h). */
+/* From now on the head powers up with the present settings; the device writes them to its file. Station and frames are
+ * left out (stored.h). */
 static int act_store(struct command_call *call)
 {
     struct command_device *dev = call->dev;

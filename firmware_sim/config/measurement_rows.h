@@ -9,8 +9,8 @@
     {KEY(beam.rings), CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS,
      .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). At a plane's end a range is wrong by up to 0.35 / "
              "n^0.75 of the footprint's radius times the tangent of the incidence: 9 mm with 4 rings, 0.35 mrad, "
-             "100 m and 77 deg. Outlines are exact. adaptive: used where a footprint holds more edges than it can "
-             "tell apart."},
+             "100 m and 77 deg. Outlines are exact. adaptive: used where a footprint holds more edges than this "
+             "mode can tell apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
      .help = "Which echoes of a pulse are sent. Echoes of glass and of surfaces behind it are among them."},
@@ -120,7 +120,8 @@
     {KEY(waveform.keep_db), CFG_REAL, "dB", "-6", -60, 60,
      .help = "Samples are kept in windows where the signal reaches this, relative to the threshold."},
     {KEY(waveform.before_ns), CFG_REAL, "ns", "5", 0, 4000,
-     .help = "A window begins this long before the signal reaches keep_db. Together with after_ns up to 2048 samples."},
+     .help = "A window begins this long before the signal reaches keep_db. before_ns and after_ns together are up to "
+             "2048 samples."},
     {KEY(waveform.after_ns), CFG_REAL, "ns", "10", 0, 4000,
      .help = "A window ends this long after the signal has fallen below keep_db."},
     {KEY(waveform.near_m), CFG_REAL, "m", "0", 0, 1e5,

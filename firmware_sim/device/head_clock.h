@@ -82,7 +82,7 @@ int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s
 
 /* Finds a full second of the head's clock that begins in [from_ns, to_ns) of device time, an interval of at most a
  * second. Returns 1, its first nanosecond and the TAI second; or 0. A jump is no edge, nor is the time in which the
- * clock stands. Of two edges the later one is given. */
+ * clock stands. If there are two edges, the later one is given. */
 int head_clock_edge(const struct head_clock *clock, int64_t from_ns, int64_t to_ns, int64_t *edge_ns, int64_t *tai_s);
 
 #endif

@@ -62,7 +62,7 @@ void faulty_carry_out(struct faulty_link *f, int session, const struct wire_piec
         f->spec.say(f->spec.owner, text);
         return;
     }
-    if (f->pulled.ended && note.t_ns <= f->pulled.t_ns) /* it has waited for the cable */
+    if (f->pulled.ended && note.t_ns <= f->pulled.t_ns) /* the act has waited for the cable */
         note.t_ns = f->spec.time_ns(f->spec.owner);
     fault_board_note(f->spec.board, &note);
     if (what == LINK_FAULT_UNPLUG || what == LINK_FAULT_CABLE) f->plug_ns = in_ms(for_ms);
@@ -147,7 +147,7 @@ static void look_at_list(struct faulty_link *f)
     if (c->version == fault_board_version(f->spec.board)) return;
     memcpy(before, c->fault, sizeof before);
     c->version = fault_board_copy_all(f->spec.board, entry, &n);
-    fault_tally_renew(&f->tally, entry, n); /* faults that were taken out last keep their counts */
+    fault_tally_renew(&f->tally, entry, n); /* entry also has the faults taken out last: their counts stay */
     c->n_faults = 0;
     for (uint32_t i = 0; i < n; i++) {
         if (entry[i].until_ns != INT64_MAX) continue;

@@ -5,8 +5,8 @@
  * it up; and how late wake-ups and releases were.
  *
  * A tick is due when its last pulse has fired. Ticks that go out together are due with the last of them. A late tick is
- * released as soon as it is ready. The pacing thread does not sleep until the next tick is due meanwhile, since a head
- * with few ticks ahead would never catch up.
+ * released as soon as it is ready. If the pacing thread slept until the next tick is due instead, a head with few ticks
+ * ahead would never catch up.
  *
  * A tick that is not ready late_ns after its time is given up. A machine that stood still gets credit, since the
  * casters stood still, too: the longest such time is added to late_ns until the pacing thread has caught up.
@@ -26,7 +26,7 @@ struct pace {
     uint64_t together_until; /* ticks up to this one go out together; set it before pace_look gets a later one */
 
     int64_t credit_ns;
-    int64_t expected_ns;  /* when it should look again; beyond that time it stood still */
+    int64_t expected_ns;  /* when pace_look should be called next; a later call shows a standstill */
     int asleep;           /* it was told to sleep up to then */
     struct lateness wake; /* of the wake-ups from such a sleep */
     struct lateness late; /* of releases */

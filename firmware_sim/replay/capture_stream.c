@@ -55,8 +55,9 @@ static int collect(const struct capture_flow *f, uint32_t side, struct parts *pa
     return SH_OK;
 }
 
-/* Leaves out bytes that came twice. A part gets the time at which all bytes before it had come, too, since a receiver
- * has its bytes only then. Without a SYN the first segment of the file need not be the first of the stream. */
+/* Leaves out bytes that came twice. If bytes before a part came later than the part, the part gets their later time,
+ * since a receiver has its bytes only then. Without a SYN the first segment of the file need not be the first of the
+ * stream. */
 static void trim(struct replay_capture *c, struct parts *parts)
 {
     int64_t place = parts->has_begin || parts->n == 0 ? 0 : parts->part[0].from, t_ns = INT64_MIN;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Queries of scans and commands to a loaded site. Nothing here changes it. */
+/* Scans and commands ask these functions about a loaded site. Nothing here changes the site. */
 #include "firmware_sim/site/site.h"
 
 #include <math.h>
@@ -47,7 +47,7 @@ uint32_t site_n_served(const struct site *site)
     return n;
 }
 
-/* Noise and long pulses make echoes of their own: those found in samples are not limited by the returns. */
+/* Noise and long pulses make echoes of their own. So samples may hold more echoes than the pulse has returns. */
 uint32_t site_points_per_pulse(const struct site *site)
 {
     const struct plan_methods *methods = &site->plan.methods;

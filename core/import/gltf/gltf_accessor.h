@@ -32,7 +32,8 @@ int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint
 int gltf_view_open(struct gltf *g, uint32_t accessor, const char *type, struct gltf_view *out);
 /* Component k of element i. Normalised numbers come out as -1 to 1, or 0 to 1 where they are unsigned. */
 double gltf_value(const struct gltf_view *v, uint32_t i, uint32_t k);
-/* Whole numbers have an error of up to half of this. 0: they are floats. */
+/* Returns the step from one whole number to the next, in units of gltf_value. Whole numbers have an error of up to half
+ * a step. 0: the accessor has floats. */
 double gltf_step(const struct gltf_view *v);
 
 #endif

@@ -35,8 +35,8 @@ static struct picture_box box_at(const double at[2], const double size[2], int r
     return (struct picture_box){x - 0.5 * size[0], y - 0.5 * size[1], x + 0.5 * size[0], y + 0.5 * size[1]};
 }
 
-/* Returns whether the box overlaps no label that is placed and no station's mark. Ticks of headings may be covered:
- * cost_of counts that of the label's own station. */
+/* Returns whether the box overlaps no label that is placed and no station's mark. Ticks of headings may be covered. A
+ * label that covers the tick of its own station costs more (cost_of). */
 static int is_free(const struct map *map, const struct map_label *label, uint32_t n, const struct picture_box *box)
 {
     for (uint32_t i = 0; i < n; i++) {

@@ -9,11 +9,11 @@
 #include "core/studio/mesh/numbering.h"
 #include "core/vec3.h"
 
-static const uint32_t NONE = NUMBERING_NONE; /* of a cluster and of a vertex, too */
+static const uint32_t NONE = NUMBERING_NONE; /* it also stands for a cluster or a vertex that is not known yet */
 enum { AXIS_BITS = 20, MOST_PASSES = 40, STOP_EVERY = 1 << 16 };
 
 struct cluster {
-    double sum_m[3]; /* since the lower bound */
+    double sum_m[3]; /* sum of its vertices, counted from low_m */
     uint32_t n;
     uint32_t vertex; /* of the result; NONE: no triangle uses it yet */
 };

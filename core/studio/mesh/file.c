@@ -21,10 +21,11 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
                    is_full ? ": make room, or write to another disk; nothing of it is kept" : "");
 }
 
-/* ---- a stream that remembers why it failed. After that it seems to take all bytes, since Assimp's exporter of FBX
+/* ---- a stream that remembers why a write failed. It seems to take all later bytes, since Assimp's exporter of FBX
  * ends the whole program where the stream's position does not move with a write. */
 
-/* Returns whether these are full buffers of a long file, as the stream writes them one after the other. */
+/* Returns whether the bytes are full, aligned buffers of a file that is long already. Such buffers can be written past
+ * the system's cache. */
 static int is_full_buffer(const struct mesh_file *file, const char *data, size_t n)
 {
     return file->at >= DIRECT_FROM && (uintptr_t)data % DIRECT_BLOCK == 0 && n % DIRECT_BLOCK == 0 &&

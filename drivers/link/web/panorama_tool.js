@@ -8,7 +8,8 @@ import {Panorama} from './panorama.js';
 import {runSlowly} from './view_pick.js';
 import {pointOf} from './cloud.js';
 
-const AGAIN_MS = 1000; // while points come it is made again so often, and takes no more than a quarter of the time
+// While points come, the panorama is made again after this time. Making it takes a quarter of the time at most.
+const AGAIN_MS = 1000;
 const DEG = 180 / Math.PI;
 
 export class PanoramaTool {
@@ -200,7 +201,7 @@ export class PanoramaTool {
   #tellSoon = atMostEvery(60, () => {
     const point = this.#next, {panorama} = this;
     if (panorama === null) return;
-    if (point === null) return say(this.#says, 'Point at it to see the point in the picture, and at the picture to see it here.');
+    if (point === null) return say(this.#says, 'Point at the panorama to see the point in the picture, or at the picture to see the point here.');
     const [azimuth, elevation, range] = panorama.anglesOf([point.x, point.y, point.z]);
     const deg = (rad) => `${(DEG * rad).toFixed(2).replace('-', '−')}°`;
     const surface = point.label === 0xffff ? '' : this.#names('label', point.label) ?? '';

@@ -8,7 +8,7 @@ const WORDS = {
   'spin-down': 'Spinning down', 'fault': 'Fault',
 };
 
-// Turns the number of a state into its word; words stay.
+// Turns the number of a state into its word. A word is returned as it is.
 export const stateName = (state) => STATES[Number(state)] ?? String(state);
 // In the pace step a head that was granted no time yet stays in its self test.
 export const stateWord = (state, pace) => (pace === 'step' && state === 'boot' ? 'Waits for time steps' : WORDS[state] ?? state);

@@ -38,7 +38,7 @@ void completion_print(const struct app_command *const *commands);
 
 /* ---- roff.c: text for man. Nothing in it is taken for a request or an escape. */
 void roff_put(const char *text, size_t n);
-/* A paragraph's words, to be filled. */
+/* Writes the words of a paragraph, which man breaks into lines. */
 void roff_text(const char *text);
 /* Notes as --help prints them: paragraphs are filled, lists of words and tables stay as they are. */
 void roff_notes(const char *notes);

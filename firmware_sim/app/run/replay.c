@@ -65,7 +65,7 @@ static void say_what_runs(const struct run_options *o, struct replay *replay, co
     replay_get_summary(replay, &s);
     app_say("replay of %s: %s", o->in.operand[0], s.idn);
     run_say_links(loop);
-    if (!o->device.start) app_say("it is played when a client starts scans, natively with SCAN:START");
+    if (!o->device.start) app_say("it is played when a client starts scans (in the native protocol: SCAN:STARt)");
 }
 
 static void say_what_ran(const struct run_options *o, struct replay *replay)
@@ -92,7 +92,8 @@ static int serve(const struct run_options *o, struct replay *replay, struct loop
     return app_and_also(rc, replay_check(replay, &why), &why, err);
 }
 
-/* With fewer places than --clients names the recording would never begin. A USB link has a console, too. */
+/* If the links had room for fewer clients than --clients says, the recording would never begin. A USB link has a
+ * console, too. */
 static int check_clients(const struct run_options *o, const struct config *cfg, struct sh_err *err)
 {
     int places = 0;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames, by their numbers, of the clean stream and of the links. */
+/* A frame of the clean stream, and the numbers by which frames are known. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_FRAME_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_FRAME_H
 
 #include <stdint.h>
 
-/* Frames that are remembered, clean and by link: a power of two. Half of them at most wait to be judged. */
+/* The clean stream and each link remember this many frames, a power of two. At most half of them wait to be judged. */
 enum { SOAK_RING = 1 << 16 };
 
 /* Numbers of frames as 64 bits: those on the wire wrap, these do not. */

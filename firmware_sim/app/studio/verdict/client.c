@@ -158,7 +158,7 @@ static void client_signal(const struct client *client, int number)
     if (!client->has_others) family_any(client_signal_one, &to);
 }
 
-/* A process that is killed may have started another one just before, so it looks again. */
+/* A process that is killed may have started another one just before, so the signal is sent again. */
 static void client_kill(struct client *client)
 {
     static const double KILLED_WITHIN_S = 5.0, AGAIN_S = 0.1; /* a process that the kernel holds is not waited for */

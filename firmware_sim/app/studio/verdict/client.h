@@ -30,9 +30,9 @@ struct client {
 
 /* out: the file for standard output; NULL: it goes into the log, as standard error does. Both are emptied. */
 int client_start(struct client *client, const char *line, const char *log, const char *out, struct sh_err *err);
-/* 1: all of it has ended. */
+/* Returns 1 when the shell and all processes that descend from it have ended. */
 int client_has_ended(struct client *client);
-/* SIGTERM, after grace_s SIGKILL. Due after each start. */
+/* Sends SIGTERM, and SIGKILL after grace_s. It must be called once after each client_start. */
 void client_end(struct client *client, double grace_s);
 
 #endif

@@ -54,7 +54,7 @@ static int get_mesh(struct view_serve *s, const char *query, struct web_body *ou
                        : rc;
 }
 
-/* Points that were made last are not made again. */
+/* Where the wish is the last one again, its points are still there, and are used. */
 static int make_sparse(struct view_serve *s, const struct view_spread *wish, struct sh_err *err)
 {
     if (s->made && s->per_m2 == wish->per_m2 && s->long_edge == wish->long_edge && s->seed == wish->seed &&

@@ -13,8 +13,8 @@
 #include "firmware_sim/command/head.h"
 
 enum { NEXT_MS = 100, QUIET = 20 };
-/* The stream comes tick by tick. The observer sleeps so long when nothing is there, since larger pieces cost less to
- * read. The socket and the link's queue hold what comes meanwhile. */
+/* The stream comes tick by tick. When nothing is there, the observer sleeps for this time, since larger pieces cost
+ * less to read. The socket and the link's queue hold what comes meanwhile. */
 static const int64_t NAP_NS = 4000000;
 static const int64_t PUBLISH_NS = 500000000;
 
@@ -27,8 +27,8 @@ static int is_about(const struct georef *georef, const struct scanhead_info *inf
     return fabs(d[0]) <= info->scale[0] && fabs(d[1]) <= info->scale[1] && fabs(d[2]) <= info->scale[2];
 }
 
-/* Makes a georeference around the place that the stream says, from that of the station, which may have moved since.
- * Returns 0 where there is none. */
+/* Makes a georeference around the place in the stream, from that of the station. The station may have moved since the
+ * scan began. Returns 0 where there is none. */
 static int follow_georef(struct watch *w, const struct georef *of, const struct scanhead_info *info)
 {
     struct sh_err err;
@@ -84,7 +84,7 @@ static void end_scan(struct watch *w)
     w->at.over = 1;
     w->dirty = 1;
     watch_publish(w);
-    w->at.in_scene = 0; /* no more of its points come, and what it was made with is given back */
+    w->at.in_scene = 0; /* no more points of this scan come, and its site is given back */
     let_go(w);
 }
 
@@ -126,7 +126,7 @@ static void take_point(struct watch *w, const struct scanhead_frame *frame, uint
     if (to_scene(w, &point, p_m)) watch_sample_add(w, p_m, hash);
 }
 
-/* Fibonacci hashing: the hashes of neighbouring pulses, and of those of neighbouring lines, are unrelated. */
+/* Fibonacci hashing gives unrelated hashes to neighbouring pulses, on one line and on neighbouring lines. */
 static uint32_t hash_of(uint64_t pulse)
 {
     const uint64_t h = pulse * 0x9e3779b97f4a7c15ULL;
