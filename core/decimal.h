@@ -19,7 +19,7 @@ char *decimal_put_whole(char *to, uint64_t v);
 char *decimal_put_fixed(char *to, double v, unsigned decimals);
 /* Writes as "%.*g" does, in DECIMAL_GENERAL_ROOM bytes. 1 <= digits <= 17. */
 char *decimal_put_general(char *to, double v, unsigned digits);
-/* Writes n such numbers, each with a comma after it, in n times that room. */
+/* Writes n numbers in the same form, each with a comma after it, in n * DECIMAL_GENERAL_ROOM bytes. */
 char *decimal_put_cells(char *to, const double *v, int n, unsigned digits);
 /* Writes v / 10^decimals without the zeros at its end, in DECIMAL_GENERAL_ROOM bytes. 1 <= decimals <= 20. */
 char *decimal_put_short(char *to, uint64_t v, unsigned decimals);

@@ -31,8 +31,8 @@
  * Width. An echo's width adds two widths as squares: that of the pulse, resolution_m, and 2.355 sigma of its
  * ranges (full widths at half maximum of Gaussians). A return may stand for a part of the footprint, or for
  * the area around a sub-ray. The ranges within it count as well, to first order on its plane: the standard
- * deviation comes out too small, by a share of (s tan i)^2 / 2, with s = theta / 2. Where lines cross in the footprint
- * it is a few percent smaller still, since the parts are then made of sample places.
+ * deviation comes out too small, by a share of (s tan i)^2 / 2, with s = theta / 2. Where outlines cross
+ * in the footprint, the deviation is a few percent smaller still: each part is then a set of places of BEAM_FINE_RINGS.
  *
  * One ray for the whole footprint. Where the footprint lies on one plane at incidence i, its mean range is
  * not that of its centre: a sub-ray at (rho, phi) meets the plane at (R - rho D/2 tan i cos phi) / (1 - rho
@@ -88,8 +88,8 @@ struct beam {
 void beam_init(struct beam *beam, double exit_m, double divergence_rad, double pulse_width_s);
 double beam_radius(const struct beam *beam, double range_m);
 /* Replaces the range at a footprint's centre by the mean of the footprint's ranges. The footprint lies on one plane,
- * with steep = 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. Beyond
- * s / cos i = 1/2, where the plane is nearly along the beam, x stays as it is there. */
+ * with steep = 1 / cos^2 of the incidence. The mean is range (1 + a x + b x^2 + c x^3), x = steep. Where
+ * s / cos i is above 1/2, the plane is nearly along the beam, and x is limited to its value at 1/2. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m);
 /* Sets the widths of the echoes of such footprints, for pulses of beam->resolution_m. */
 void beam_plane_widths(const struct beam *beam, const float *steep, const double *range_m, uint32_t n, float *width_m);
@@ -111,9 +111,9 @@ struct beam_pattern {
 /* Makes a pattern of 0 (the centre alone) to BEAM_MAX_RINGS rings. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
-/* Where a plane ends within a footprint, the sub-rays that hit it stand for the part of the footprint on it. The error
- * of their centre is less than this times w, and that of the echo's range less than this times w(R) tan i: 0.12 with 4
- * rings, 0.05 with 12. The RMS over all cuts is about a quarter of it. No fit through the same sub-rays does
+/* Where a plane ends within a footprint, the sub-rays that hit it stand for the part of the footprint on it. Returns
+ * a bound b: the error of their centre is less than b w, and that of the echo's range less than b w(R) tan i. b is 0.12
+ * with 4 rings and 0.05 with 12. The RMS over all cuts is about b / 4. No fit through the same sub-rays does
  * better, since each has 1/n of the energy or nothing. Outlines (below) cut exactly. */
 double beam_end_error(uint32_t rings);
 
@@ -225,9 +225,9 @@ enum { BEAM_MAX_LINES = 12, BEAM_MAX_PARTS = 64 };
 struct beam_line {
     double n[2], h;
 };
-/* Finds the outlines that cross the footprint of a pulse nearer than limit_m; the lines refer to its axes. Returns
- * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. near->next_m: the range from
- * which there may be more (INFINITY: none, or nothing crosses it up to limit_m). */
+/* Finds the outlines that cross the footprint of a pulse nearer than limit_m, as lines in the axes of `sight`. Returns
+ * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. From the range near->next_m on further
+ * outlines may cross the footprint. It is INFINITY where there are none, or where no outline crosses up to limit_m. */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
                          const struct beam_sight *sight, double limit_m, struct beam_line *line);
 

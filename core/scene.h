@@ -3,9 +3,9 @@
  * vertices in double, in the project frame (prcs): metres, z up.
  *
  * A file's vertex v becomes R(up) * v * scale + offset_m, in double. `up: z` leaves the axes, `up: y` turns
- * (x, y, z) to (x, -z, y). Units and axes are what the spec says, never guessed. Assimp (5.2) itself changes
- * some before that:
- *   Collada  comes in metres and y up, its unit and up_axis applied
+ * (x, y, z) to (x, -z, y). Units and axes are what the spec says, never guessed. Readers give v in these
+ * units and axes:
+ *   Collada  comes in metres and y up: Assimp (5.2) applies its unit and up_axis
  *   IFC      comes in metres and y up, from its own readers, too
  *   FBX      keeps the file's unit (mostly centimetres: scale 0.01) and axes (mostly y up)
  *   glTF     is metres and y up by definition; its tree is multiplied in double (core/import/gltf)
@@ -35,13 +35,13 @@ enum {
 };
 #define SCENE_MAX_COORDINATE_M 1e9
 
-/* The readers of IFC bodies. AUTO: web and lite both read, and Assimp where they are not installed. The others: this
- * one reader alone. */
+/* The readers of IFC bodies: web-ifc, ifc-lite and Assimp. AUTO: web-ifc and ifc-lite both read, or Assimp where they
+ * are not installed. Each other value names the one reader that reads alone. */
 enum scene_ifc_reader { IFC_READER_AUTO, IFC_READER_WEB, IFC_READER_LITE, IFC_READER_ASSIMP };
 
 /* Limits for readers in processes of their own: Assimp, and the readers of glTF, GeoTIFF and IFC. */
 struct scene_import_limits {
-    uint32_t memory_mib; /* on top of the program's own; the same for the scene that is handed back */
+    uint32_t memory_mib; /* on top of the program's own; the file that hands the scene back may be as large */
     double time_s;       /* the most seconds, both of time and of processor time */
     uint32_t files;      /* open at a time in such a process; the programs of IFC have a limit of their own */
     enum scene_ifc_reader ifc_reader;
@@ -92,7 +92,7 @@ struct scene_surface {
     char material[SCENE_NAME_LEN];
     float colour[3]; /* diffuse, sRGB, 0..1: of glTF, FBX, Collada and IFC, and of OBJ with an mtllib (Kd) */
     int has_colour;
-    uint16_t vertex_colours; /* enum scene_vertex_colours, once the load is over; they count before `colour` */
+    uint16_t vertex_colours; /* enum scene_vertex_colours, once the load is over; colours of corners replace `colour` */
     uint16_t texture;        /* of the diffuse colour: 1 + its number in the scene's textures; 0: none */
     uint16_t opacity;        /* of the opacity map that cuts holes, likewise; 0: the alpha of `texture` cuts them */
     float clear;             /* share of the light that goes through it, as the file says, 0..1. core doesn't use it */
@@ -223,7 +223,7 @@ void scene_free(struct scene *scene);
  * NULL: it is nowhere. */
 char *scene_find_file(const char *const *folder, size_t n, const char *name);
 
-/* The image of a texture: texture_read. */
+/* Reads the image of a texture, as texture_read does. */
 int scene_read_texture(const struct scene_texture *texture, int alpha_only, struct texture_image *image,
                        struct sh_err *err);
 
@@ -274,8 +274,8 @@ static inline void scene_copy_put_back(const struct scene_copy *c, const double 
 void scene_uv_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
                  double uv[2]);
 
-/* Interpolates the colour there between those of the corners, sRGB; scene->rgb must be there. Returns 0 where a corner
- * has none. */
+/* Interpolates the colour at point p of a triangle's plane between the colours of its corners, sRGB; scene->rgb must be
+ * there. Returns 0 where a corner has none. */
 int scene_rgb_at(const struct scene *scene, uint32_t triangle, const double *const corner[3], const double p[3],
                  uint8_t rgb[3]);
 

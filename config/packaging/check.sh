@@ -1,11 +1,13 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The packages in a new root of Debian 12: installed by apt, tried, removed, purged; nothing may be left. Run by make
-# deb-check. Prints TAP, lintian's output, and what of systemd can be looked at without booting.
+# This tries the packages in a new root of Debian 12: apt installs, removes and purges them, and nothing may be left.
+# Where systemd-nspawn is installed, the root is then booted, and the service runs in it. The script is run by make
+# deb-check. It prints TAP, the service's output in the booted root, lintian's output, and systemd's rating of the
+# service.
 #
 #   check.sh DEB_DIR VERSION      DEB_DIR: where the packages are; the root is made in it
 #
-# MIRROR: where Debian is taken from; SUITE: which one.
+# MIRROR: where Debian is taken from. SUITE: the release of Debian, bookworm when not given.
 set -u
 [ $# -eq 2 ] || { echo "usage: $0 DEB_DIR VERSION (make deb-check)" >&2; exit 2; }
 debs=$1 version=$2
@@ -35,7 +37,8 @@ inside() {
 as_nobody() {
     inside setpriv --reuid=65534 --regid=65534 --clear-groups --no-new-privs --bounding-set=-all "$@"
 }
-# Runs a head as that user, with real time: by the limits of the service where they can be set here, else by two rights.
+# Runs a head as that user, with real-time scheduling and locked memory. Where this script may set the service's limits,
+# the limits allow both. Elsewhere two capabilities do.
 as_head() {
     if [ "$limits" = yes ]; then
         as_nobody "$@"
@@ -215,7 +218,8 @@ END
     timeout 180 systemd-nspawn --register=no --keep-unit --private-network -D "$root" -b >"$work/boot" 2>&1
     [ -s "$root/service.out" ]
 }
-# No root, no capability, a filter of system calls; ready when its link was open; a good end; no user afterwards.
+# The service must run without root and capabilities, and behind a filter of system calls. It must be ready once its
+# link is open, end without an error, and leave no user.
 service_is_sound() {
     for line in started ActiveState=active 'StatusText=links open: tcp:127.0.0.1:5025' DynamicUser=yes 'CapEff:.0*' 'CapBnd:.0*' \
         'NoNewPrivs:.1' 'Seccomp:.2' 'Uid:.6[0-9]*.*' scanned stopped ActiveState=inactive Result=success; do
@@ -226,16 +230,16 @@ service_is_sound() {
 
 check "lintian has no error" lintian_finds_no_errors
 check "a new root: $suite, minbase" make_root
-check "what the packages depend on comes from Debian" install_others
+check "all dependencies of the packages come from Debian" install_others
 picture >"$work/before"
 check "apt installs the packages" install_ours
 check "one version: program, library, header" versions_agree
 check "check, record, report, list" records
-# The service's manager sets these before it gives up its own rights. From here on the script has them.
+# The service's manager sets two limits before it drops its rights. From here on this script has the same limits.
 limits=yes
 { ulimit -r 80 && ulimit -l unlimited; } 2>/dev/null || limits=no
 [ $limits = yes ] || echo "# no CAP_SYS_RESOURCE here: CAP_SYS_NICE and CAP_IPC_LOCK stand in for the two limits"
-check "a head, as nobody, with no more than real time takes" start_head
+check "a head runs as nobody, with no rights but those for real time" start_head
 check "a client in Python" client_in_python
 check "a client in C, by pkg-config, shared and static" client_in_c
 check "the head ends in good order" stops

@@ -40,7 +40,7 @@ static inline double edge_range(const double a[3], const double b[3], const doub
     return (ad + s * ed) / dd;
 }
 
-/* Returns the distance of the point at range t on the ray from the segment. */
+/* Returns how far the ray's point at range t is from the segment. */
 static inline double edge_gap(const double a[3], const double b[3], const double dir[3], double t)
 {
     double e[3], w[3];

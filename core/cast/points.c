@@ -30,7 +30,8 @@ static void follow_pulse(struct caster *c, const struct chunk *k)
 }
 
 /* Computes positions as a head does, from ranges and what its encoders read, and writes the three numbers of
- * echoes at .. at + n of the list. Returns 0 where all fit; numbers that don't are LINE_XYZ_NONE. */
+ * echoes at .. at + n of the list. A number that doesn't fit into 32 bits becomes LINE_XYZ_NONE. Returns 0 where all
+ * numbers fit. */
 static uint32_t place(struct caster *c, const struct chunk *k, uint32_t at, uint32_t n, const struct kernel_wire *out)
 {
     const struct cast_setup *s = k->s;

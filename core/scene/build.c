@@ -176,7 +176,7 @@ void build_warn(const struct scene_build *b, const char *fmt, ...)
 
 int build_single(struct scene_build *b, double largest, double error, bool refuse, struct sh_err *err)
 {
-    const double most_m = 1.0;    /* of the tolerance */
+    const double most_m = 1.0;    /* the largest scene.tolerance_m */
     const double coarse_m = 1e-3; /* a larger error is visible in a scan */
     double error_m = error * b->spec->scale;
     char set[48] = "";

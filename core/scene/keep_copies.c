@@ -58,7 +58,8 @@ int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *
         struct scene_copied *of = &scene->copied[n];
         const uint8_t *kept;
         if (n != i) {
-            const struct scene_copied gone = *of; /* so that each is freed once, also after an error */
+            /* The two entries change places, so that each mesh is freed once, also after an error. */
+            const struct scene_copied gone = *of;
             *of = scene->copied[i];
             scene->copied[i] = gone;
         }

@@ -4,7 +4,7 @@
  *
  * Vertex clustering on a grid (Rossignac and Borrel, Multi-resolution 3D approximations for rendering complex scenes,
  * 1993): all vertices in one cell of the grid become one, their mean. A triangle whose corners then lie in fewer than
- * three cells is left out. Of several triangles between the same three cells only the first stays, whichever way they
+ * three cells is left out. Where several triangles have the same three cells, only the first stays, whichever way they
  * face.
  *
  * The grid: along each axis the bounds are divided into n = ceil(extent / cell_m) steps of at most cell_m. Cells are

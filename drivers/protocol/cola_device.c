@@ -162,7 +162,8 @@ int cola_start_scan(struct cola *self)
     const enum protocol_head_state head = protocol_ask_state(&self->host);
     int refused = head == PROTOCOL_HEAD_FAULT || head == PROTOCOL_HEAD_UNKNOWN;
     if (head == PROTOCOL_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
-    self->wants_scan = !refused; /* until the first scan has come, since somebody may stop the head before that */
+    /* Until a scan has come, a head that is idle is started again, since somebody may have stopped it. */
+    self->wants_scan = !refused;
     if (!refused) return 0;
     for (uint32_t i = 0; i < self->n_waiting; i++)
         cola_refuse(self, (enum cola_form)self->waiting_form[i], COLA_CONDITION);
@@ -188,7 +189,7 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
     if (error != COLA_OK) return error;
     self->measures = self->started = 0;
     self->wants_scan = self->n_waiting != 0; /* a poll is answered also where nothing is measured */
-    cola_ports_select(self);                 /* old results would hide that nothing is watched now */
+    cola_ports_select(self);                 /* drops the fields' results: they are out of date from now on */
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }

@@ -44,7 +44,8 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
     if (t->ops->points == NULL) return 0;
-    /* has_waves is set as a scan begins. So with a recorder that wants waveforms, no scan has begun here. */
+    /* has_waves is set as a scan begins, for recorders that want waveforms. Where such a recorder lacks it, the
+     * beginning of the scan did not come, and its windows can't be placed. */
     if (!t->has_waves) {
         *(t->ops->wants_waves ? &t->missing.n_waves_unplaced : &t->missing.n_waves_unheld) += frame->n_points;
         return 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Injected faults of a device. usb_core.c shortens transfers, control.c lengthens the configuration. */
+/* Injected faults of a device. usb_core.c shortens transfers, and control.c adds to the length that
+ * the configuration states. */
 #include "core/monotonic.h"
 #include "drivers/usb/usb_core.h"
 

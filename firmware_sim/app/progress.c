@@ -21,7 +21,7 @@ double progress_left_s(struct progress_pace *pace, const char *what, double frac
     return 1e-9 * (double)(now_ns - pace->since_ns) * (1 - fmin(1, fraction)) / done;
 }
 
-/* One of `frames` is a sweep of the pan, or one line where the pan stands still (core/schedule.h). */
+/* `frames` counts sweeps of the pan, or lines where the pan stands still (core/schedule.h). */
 double progress_scan_s(const struct scanhead_frame *frame)
 {
     struct native_descriptor d;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Monitored fields of the configuration: the keys as they are written. fields.c makes shapes of them
- * (drivers/protocol/cola_field.h), in which protocols evaluate them. Metres and degrees, in the head's frame; angles as
+/* Monitored fields of the configuration: the keys as they are written. From the keys, fields.c makes the
+ * fields that protocols evaluate (drivers/protocol/cola_field.h). Metres and degrees, in the head's frame; angles as
  * SICK counts them: 0 right, 90 forward. */
 #ifndef FIRMWARE_SIM_CONFIG_FIELDS_H
 #define FIRMWARE_SIM_CONFIG_FIELDS_H

@@ -306,7 +306,8 @@ static const struct cfg_key config_keys[] = {
      .help = "Later, where the offset is larger, the servo unlocks and steps the clock; 0: it slews."},
     {KEY(time.ptp.max_ppm), CFG_REAL, "ppm", "500", 1, 100000, .help = "The most that the servo changes the rate."},
 
-    {"gnss", .type = CFG_MAP, .help = "The GNSS receiver, which sends on links of protocol nmea; it needs the time."},
+    {"gnss", .type = CFG_MAP,
+     .help = "The GNSS receiver, which sends on links of protocol nmea. Such a link needs time.epoch."},
     {KEY(gnss.rate_hz), CFG_COUNT, "Hz", "1", 1, 20, .allowed = "1, 2, 4, 5, 10 or 20 Hz",
      .help = "Positions per second."},
     {KEY(gnss.talker), CFG_ENUM, .def = "GN", WORDS([TALKER_GN] = "GN", [TALKER_GP] = "GP"),

@@ -8,17 +8,18 @@
              "large. When not given: a tenth of plan.tolerance_m, or 1 m where that isn't given either. Errors above "
              "1e-6 m give a warning."},
     {KEY(scene.cutouts), CFG_BOOL, .def = "on",
-     .help = "Rays pass through a surface where its texture's alpha or opacity map is below a half, as between "
-             "leaves. Textures are then read when the scene is loaded; scenes without such a texture take no more "
-             "time."},
+     .help = "Rays pass through a surface where its texture's alpha or opacity map is below a half (glTF: below the "
+             "material's alphaCutoff), as between leaves. Textures are then read when the scene is loaded; scenes "
+             "without such a texture take no more time."},
     {"scene.import_memory_mib", IN_CONFIG(scene.import.memory_mib), CFG_COUNT, "MiB", "8192", 16, 1 << 24,
-     .help = "Memory that the reader of a mesh may take, or each reader of an .ifc (all formats but .obj, .ply and "
-             ".stl); more is an error. Readers run in their own processes, since broken files make them crash, run "
-             "without end or take all memory."},
+     .help = "Memory that the reader of a mesh may take (all formats but .obj, .ply and .stl), or each of the readers "
+             "of an .ifc; more is an error. Readers run in their own processes, since broken files make them crash, "
+             "run without end or take all memory."},
     {"scene.import_s", IN_CONFIG(scene.import.time_s), CFG_REAL, "s", "300", 0.1, 1e6,
      .help = "Time that a reader may take for one mesh; more is an error."},
     {"scene.import_files", IN_CONFIG(scene.import.files), CFG_COUNT, NULL, "64", 4, 1000,
-     .help = "Files that Assimp may have open at a time: a mesh and the files that it names."},
+     .help = "Files that a reader may have open at a time: a mesh and the files that it names. web-ifc and "
+             "ifc-lite have a limit of their own."},
     {"scene.ifc_reader", IN_CONFIG(scene.import.ifc_reader), CFG_ENUM,
      .def = "auto", WORDS([IFC_READER_AUTO] = "auto", [IFC_READER_WEB] = "web-ifc", [IFC_READER_LITE] = "ifc-lite",
      [IFC_READER_ASSIMP] = "assimp"),
@@ -85,7 +86,7 @@
      .help = "utm: zone of the meshes' coordinates; 0: UPS. Required with source: utm."},
     {"scene.anchor.hemisphere", IN_CONFIG(scene.anchor.north), CFG_ENUM, .def = "",
      .example = "north", WORDS("south", "north"),
-     .help = "utm: hemisphere that their northing counts from. Required with source: utm."},
+     .help = "utm: hemisphere of the zone. Required with source: utm."},
 
     {"stations", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},
@@ -166,7 +167,7 @@
              "Required for stops without a trajectory."},
     {KEY(platform.step_s), CFG_REAL, "s", "0", 0, 1e9, .of = CFG_KIND(PLATFORM_STOPS),
      .help = "stops: time from each stop to the next, up to end_s. Required with kind: stops, unless frames_per_s "
-             "is."},
+             "is given."},
     {KEY(platform.frames_per_s), CFG_REAL, "1/s", "0", 0, 1e6, .example = "25", .of = CFG_KIND(PLATFORM_STOPS),
      .help = "stops: first_frame, last_frame and frame_step give the times of the stops, in place of start_s, end_s "
              "and step_s. Frame 0 is at the trajectory's first sample, or at time 0. The points' frame scalar "

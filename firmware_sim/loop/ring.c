@@ -29,7 +29,8 @@ void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more)
 
 static size_t round_up(size_t bytes)
 {
-    enum { STEP = 1024 }; /* sizes differ a little: rounded, a tick's memory fits the next one, too */
+    /* Ticks differ a little in size. With rounded sizes malloc can give a tick memory that another tick has freed. */
+    enum { STEP = 1024 };
     return (bytes + STEP - 1) / STEP * STEP;
 }
 

@@ -13,8 +13,8 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/steps.h"
 
-/* Hardly any scene for such a head is smaller or larger than this. The scale of a scene beyond these limits is probably
- * wrong by a factor of a thousand. */
+/* Hardly any scene for a laser scanner is smaller or larger than this. The scale of a scene beyond these limits is
+ * probably wrong by a factor of a thousand. */
 static const double SMALL_M = 0.05, LARGE_M = 10000.0;
 
 /* A scan is called mostly empty where a smaller share of its pulses hits a surface. */
@@ -186,7 +186,7 @@ static int check_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     return SH_OK;
 }
 
-/* Draws pulses evenly over the first pan sweep. */
+/* Chooses directions of pulses that are spread evenly over the first pan sweep. */
 static void fill_frame(const struct site *site, const struct site_station *s, struct look *look)
 {
     struct head_settings settings = site->cfg->head.settings;
@@ -209,7 +209,7 @@ static void fill_frame(const struct site *site, const struct site_station *s, st
     }
 }
 
-/* Draws directions evenly over the window of a scan, as its pulses are. */
+/* Chooses directions that are spread evenly over the window of a scan. */
 static void fill_window(const struct site *site, const struct site_station *s, struct look *look)
 {
     const struct head_settings *set = &site->cfg->head.settings;
@@ -256,8 +256,9 @@ static void check_view(const struct site *site, uint32_t i, struct bvh_work *wor
         far);
 }
 
-/* Checks the views of stations. There is no check with moving meshes, which may fill a view, nor with a path, which
- * leads elsewhere. Of many stops only some are checked. */
+/* Checks what stations see. Moving meshes may fill a view, so with these only the reach is checked: a surface must be
+ * within range_max_m. Nothing is checked with a path, which leads elsewhere. Where there are many stops, only some are
+ * checked. */
 static int check_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const uint32_t step = site->n_stations / CONFIG_MAX_STATIONS + 1;

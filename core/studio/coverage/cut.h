@@ -22,7 +22,7 @@
 
 struct cut {
     int base[2], apex; /* corners A, B, T */
-    double foot;       /* of A -> B */
+    double foot;       /* place of F from A to B, 0..1 */
     struct cut_part {
         int from_apex;    /* the tip is T; else A, or B */
         uint32_t columns; /* 0: the triangle has no such part */

@@ -32,9 +32,9 @@ export class Stations {
   list = [];
   fields = []; // the head's monitored fields are {number, name, outline_m}
   selected = null; // number
-  moved = null; // {number, x, y, z, heading_deg, what} is the place to which it is being moved
-  dragged = null; // it is called with the place of a station while this is dragged
-  pending = false; // it was let go, but setStations() has not confirmed it yet
+  moved = null; // {number, x, y, z, heading_deg} is the station that is moved, at its new place
+  dragged = null; // it is called with the place of a station while the station is dragged
+  pending = false; // the moved station was let go, but setStations() has not confirmed its place yet
   #changed;
   #tell;
   #timer = 0;
@@ -143,7 +143,7 @@ export class Stations {
       const on = onPlane(camera, hold.x, hold.y, at[2], hold.reach);
       hold.off = [at[0] - on[0], at[1] - on[1]];
       hold.turn = this.moved.heading_deg - headingTo(at, on);
-      // From the side, places on its plane are too close together, so a vertical plane is used.
+      // Seen from the side, places on the station's plane are too close together. The station then moves sideways only.
       hold.steep = Math.abs(camera.ray(hold.x, hold.y)[2]) > 0.04;
     }
     const m = this.moved;

@@ -281,7 +281,8 @@ bits(ROWS[ANCHOR], "anchor.", "moving",
 bits(ROWS[LINE_END], "line_end.", "status",
      {{"last", "Last line of the pan sweep", 1}, {"stopped", "The scan was stopped within the line", 2}})
 bits(ROWS.pose, "pose.", "flags",
-     {{"extrapolated", "Extrapolated", 1}, {"late", "Late: taken to stand", 2}, {"none", "None had come yet", 4}})
+     {{"extrapolated", "Extrapolated", 1}, {"late", "Late: the platform counts as standing still", 2},
+      {"none", "None had come yet", 4}})
 
 local GOOD_BAD = {[0] = "Bad", "Good"}
 add_field("type", ProtoField.uint8, "Type", base.DEC, TYPES)
@@ -333,13 +334,13 @@ add_field("point.y", real(), "y, or longitude")
 add_field("point.z", real("m"), "z")
 local ATTRIBUTE_FIELDS = {add_field("attribute.amplitude_db", real("dB"), "Amplitude"),
                           add_field("attribute.width_ns", real("ns"), "Width of the echo"),
-                          add_field("attribute.deviation", real(), "Deviation of its shape, of its amplitude")}
+                          add_field("attribute.deviation", real(), "Deviation of its shape, share of the amplitude")}
 local COLOUR_FIELDS = {add_field("colour.red", ProtoField.uint8, "Red"),
                        add_field("colour.green", ProtoField.uint8, "Green"),
                        add_field("colour.blue", ProtoField.uint8, "Blue")}
 local WAVE_FIELDS = {}
 for i, row in ipairs({{"pulse", ProtoField.uint64, "Pulse"},
-                      {"dt_ns", ProtoField.uint32, "Fired after the points' first"},
+                      {"dt_ns", ProtoField.uint32, "Fired after the first pulse of the points"},
                       {"first", ProtoField.uint32, "First sample"}, {"n", ProtoField.uint16, "Samples"},
                       {"range_m", real("m"), "Range of the first sample"},
                       {"line_deg", real("°"), "Line angle"}, {"pan_deg", real("°"), "Pan angle"},
@@ -372,7 +373,7 @@ add_expert("repeated", "A frame that came before: not counted again", "SEQUENCE"
 add_expert("late", "A frame that was missing, after newer ones: not used", "SEQUENCE", "WARN")
 add_expert("restarted", "The sequence begins anew", "SEQUENCE", "WARN")
 add_expert("no_anchor", "Points that nobody can place yet: no descriptor or no anchor", "SEQUENCE", "NOTE")
-add_expert("no_points", "Not of the points frame before it", "SEQUENCE", "NOTE")
+add_expert("no_points", "The points that it belongs to did not come just before", "SEQUENCE", "NOTE")
 add_expert("counts", "Counts do not agree", "PROTOCOL", "WARN")
 add_expert("missing", "Pulses that were delivered are not in this capture", "SEQUENCE", "WARN")
 add_expert("event_warning", "The head is in trouble", "RESPONSE_CODE", "WARN")
@@ -577,7 +578,7 @@ end
 
 local function forget(flow) flow.descriptor, flow.anchor, flow.emitter = nil, nil, nil end
 
--- Counting begins with a scan that is seen from its start, and goes on as long as nothing is missing.
+-- Pulses of a scan are counted from its start on, across gaps, and pulses of a line while no frame is missing.
 local function begin_scan(flow, scan)
   flow.scan, flow.line = {number = scan, received = 0}, {pulses = 0, whole = true}
 end
@@ -681,7 +682,8 @@ local function absorb(flow, h, bytes, at, m)
     flow.line.whole = false
   end
   if m.notice == RESTARTED then
-    if not flow.told_alone then forget(flow) end -- else the descriptor for this reader alone is of the new sequence
+    -- A descriptor for this reader alone that came just before belongs to the new sequence already.
+    if not flow.told_alone then forget(flow) end
     flow.scan, flow.final, flow.last_pulse0, flow.line = nil, nil, nil, {pulses = 0, whole = false}
   end
   flow.told_alone = h.is_local and (flow.told_alone or h.type == DESCRIPTOR)

@@ -60,7 +60,7 @@ static const char FUNCTION[] =
     "}\n"
     "complete -F _scanhead ";
 
-/* Each program has functions of its own, so that a shell may have the completions of both. */
+/* Each program has functions of its own, so that a shell may have those of scanhead and scanheadd. */
 static void put_script(const char *text)
 {
     static const char name[] = "_scanhead";

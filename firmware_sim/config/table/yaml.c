@@ -19,7 +19,7 @@ struct walk {
     struct cfg_reader *rd;
     yaml_document_t *doc;
     struct cfg_document *of;   /* with doc in it */
-    struct cfg_document *main; /* the file's, whose scanners are filled in */
+    struct cfg_document *main; /* the file's document, which keeps the scanners of all stations */
     int from_set;
     char base_dir[CONFIG_PATH_LEN];
 };
