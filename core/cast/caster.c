@@ -5,7 +5,8 @@
  *     nearest    nearest.c        the first surface that the beam's centre hits, of the scene and of bodies that
  *                                 move; exact (core/bvh.h)
  *     tripod     tripod.c         pulses that the tripod below the head hides
- *     optics     optics.c         where that is glass or a mirror: the surfaces seen in it (caster_follow)
+ *     optics     optics.c         where this surface is glass or a mirror: the surfaces seen in it
+ *                                 (caster_follow)
  *     sub-rays   sub_rays.c       pulses with a footprint: which of them need more rays, and their echoes;
  *                sub_ray_plan.c   where in a footprint those rays lie
  *     waves      waves.c          the light of a pulse over time, and echoes found in it, where the setup has
@@ -176,8 +177,8 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     chunk.texels = chunk.colours && setup->colour->scale.mode == COLOUR_TEXTURE;
     uint32_t echoes = 0;
     begin_block(block, setup, run);
-    /* With several entries a pulse, the pulses' times wait at the end of the array: no entry overtakes the
-     * pulses that are still to come. */
+    /* Where a pulse may have several entries, the pulses' times first stand at the end of the array. The entries' times
+     * are written from its front, and never reach a pulse's time that is still to be read (points.c). */
     int several = setup->beam != NULL || setup->detect != NULL;
     uint32_t *dt_ns = several ? block->dt_ns + block->capacity - run->n : block->dt_ns;
     kernel_times(run, dt_ns);

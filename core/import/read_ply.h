@@ -36,7 +36,7 @@ struct ply {
     bool has_vertex_uv, has_texcoords; /* by vertex; by face, in the row at hand, a pair for each corner */
     bool has_texnumbers;
     bool has_label[PLY_MAX_TEXTURES + 1];
-    uint16_t labels[PLY_MAX_TEXTURES + 1]; /* by texture; the last is that of faces without */
+    uint16_t labels[PLY_MAX_TEXTURES + 1]; /* by texture; the last one: of faces without a texture */
     uint16_t texture[PLY_MAX_TEXTURES];    /* their numbers in the scene, 0: unused */
     char *texture_name[PLY_MAX_TEXTURES];
     uint64_t n_unfit; /* faces with another number of texture coordinates than corners */

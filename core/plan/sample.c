@@ -363,7 +363,7 @@ static double rays_on(const struct bvh *bvh, const struct bvh_rays *cast, double
     return rays * across_m2 / (4.0 * M_PI * range_m * range_m);
 }
 
-/* Adds a pulse to the kind of its cell. */
+/* Counts a pulse's cell under its kind. */
 static void count_cell(const struct bvh *bvh, const struct bvh_rays *cast, double rays, struct plan_sight_found *found)
 {
     const uint32_t kinds = count_different(cast->triangle);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Whether a map of what the station sees pays. */
+/* Decides whether to make a map of what the station sees: it must save more time than it costs. */
 #include <math.h>
 #include <stdio.h>
 

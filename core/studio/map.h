@@ -11,8 +11,8 @@
  * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow. Each station has a
  * red triangle, a tick where its heading points, and its name and height beside it. A label stands near its
  * station where it covers neither another label nor a station, and as little of walls as possible. Without such a
- * place it is left out and counted. An SVG has the points as an image, and all else as vectors; labels left out
- * are titles there, as those of all stations are.
+ * place it is left out and counted. An SVG has the points as an image, and all else as vectors. There each
+ * station has its name and height as a title, also where its label is left out.
  *
  * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
  * safe. */
@@ -43,8 +43,8 @@ struct map_spec {
 
 struct map;
 
-/* SH_EINPUT: limits that are not finite or the wrong way round, an area too large for its pixel size (with
- * the smallest pixel size that is allowed). */
+/* SH_EINPUT: limits that are not finite or the wrong way round, an area that is a point, a pixel size that is
+ * negative, or too small for the area. In the last case the text has a pixel size that is large enough. */
 int map_create(const struct map_spec *spec, struct map **out, struct sh_err *err);
 void map_free(struct map *map);
 

@@ -21,9 +21,10 @@ static double detect_signals(const struct finder *finder, double baseline, const
     return ((double)most - baseline) * finder->signal;
 }
 
-/* Marks samples that are limited, and those in which the receiver is blind. *until: number on the pulse's grid of the
- * first sample that is not blind any more; it goes on from window to window. If a receiver has not saturated, it shows
- * a signal right after the last limited sample: then only the digits were limited, and it is not blind. */
+/* Marks samples that are limited, and those in which the receiver is blind. *until: number on the pulse's grid of
+ * the first sample that is not blind any more; it goes on from window to window. A receiver that has not saturated
+ * shows a signal right after the last limited sample. Then only the digitiser's range was exceeded, and the receiver
+ * is not blind. */
 static void detect_mark(const struct finder *finder, const struct waveform_window *window, double *y, uint8_t *mark,
                         uint32_t *until)
 {
@@ -192,8 +193,9 @@ static double detect_others(const struct finder *finder, const struct finder_mix
     return sum;
 }
 
-/* Returns the RMS of the samples minus h, divided by the echo's peak. The samples are those within the echo's width on
- * both sides of its centroid. */
+/* Returns the RMS of the difference between samples and expected signal, divided by the echo's peak. The expected
+ * signal is the pulse's shape (h of core/waveform.h) with the echo's peak, plus the other terms of its mixture. The
+ * samples are those within the echo's width on both sides of its centroid. */
 static double detect_deviation(const struct finder_run *run, const struct finder_found *found,
                                const struct finder_mix *mix, uint32_t self)
 {

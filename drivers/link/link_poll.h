@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The poll functions of links share these: the events that they fill in; for those that wait in poll(2) also the wait
- * and the wake-up. Private. */
+/* Private helpers for the poll functions of links: they add events, wait in poll(2), and report the owner's wake-up. */
 #ifndef DRIVERS_LINK_LINK_POLL_H
 #define DRIVERS_LINK_LINK_POLL_H
 

@@ -225,8 +225,8 @@ static ssize_t pty_read(void *link, int session, void *buf, size_t len)
 {
     struct pty_link *pty = link;
     if (session != 0 || !pty->open) return SH_ECLOSED;
-    /* Bytes of a client that has come meanwhile belong to its own session: answers to them must not be
-     * dropped with what is left of this one. */
+    /* A client that has come meanwhile begins a session of its own, and its bytes are read there. In the old session
+     * the answers to them would be dropped at its end. */
     pty_read_inotify(pty, 1);
     if (pty->due_closed || pty->due_opened) return 0;
     ssize_t n = pty_line_read(&pty->line, pty->device.master, buf, len);

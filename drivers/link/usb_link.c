@@ -2,9 +2,9 @@
 /* The usb link: the head as a USB device, with the sessions of its USB identity (drivers/usb/personalities.h): console
  * and stream, or one alone.
  *
- * The back end carries out the host's acts one at a time. It stops when one has begun or ended a session,
- * until that has been reported: so a session begins or ends at most once between two polls. The end of a
- * session is reported once what came in it has been read. */
+ * The back end carries out the host's acts one at a time. An act that begins or ends a session stops the back end until
+ * this has been reported. So a session begins or ends at most once between two polls. The end of a session is reported
+ * after all its bytes have been read. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -148,7 +148,8 @@ static void usb_link_report(struct usb_link *self, int i, uint32_t want_write, s
     if ((want_write >> i & 1u) != 0 && is_writable(self, i)) link_events_push(events, LINK_WRITABLE, i, NULL);
 }
 
-/* The back end's message comes first. About an unplug it says more than that of scanhead_usb_cut, which is left out. */
+/* The back end's message comes first. After an unplug the message of scanhead_usb_cut is left out, since it says
+ * less. */
 static void report_news(struct usb_link *self, struct link_events *events)
 {
     if (self->news[0] != '\0' && self->head.cut == USB_END_UNPLUGGED) self->head.cut_due = 0;

@@ -24,7 +24,7 @@ enum ip_packet_found {
     IP_PACKET_FOUND,
     IP_PACKET_OTHER,    /* not TCP or UDP */
     IP_PACKET_FRAGMENT, /* part of a datagram, which is not put together here */
-    IP_PACKET_DAMAGED,  /* headers that are cut, or lengths that can't be */
+    IP_PACKET_DAMAGED,  /* headers that are cut off, or impossible lengths */
     IP_PACKET_LINK,     /* a link type that is not known here */
 };
 

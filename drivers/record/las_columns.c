@@ -10,7 +10,8 @@
 
 /* ---- coordinates */
 
-/* Rounds as rint does. Returns 0 where a number is too far for 32 bits; vec_round never makes such a number small. */
+/* Rounds as rint does. Returns 0 where a number does not fit into 32 bits. vec_round is not exact from 2^51 on, but its
+ * result is still far beyond 32 bits there. */
 VEC_CLONES static int counts_fit(const double *restrict at, int n, double offset, double scale, int32_t *restrict to)
 {
     uint64_t any_beyond = 0;

@@ -31,8 +31,8 @@ struct mesh_point {
     uint8_t rgb[3];
 };
 
-/* Adds a point. SH_ENOMEM; SH_EINPUT: files of meshes hold no more points. Both texts have the number of points, and no
- * path. */
+/* Adds a point. SH_ENOMEM; SH_EINPUT: files of meshes hold no more points. The texts of both errors have the number of
+ * points, and no path. */
 int mesh_points_add(struct mesh_points *points, const struct mesh_point *point, struct sh_err *err);
 void mesh_points_get(const struct mesh_points *points, uint32_t i, struct mesh_point *point);
 /* Copies point `from` over point `to`. */

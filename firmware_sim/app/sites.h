@@ -20,10 +20,11 @@ struct sites {
     struct scanner_warnings warnings;
 };
 
-/* sites begins as zeros, and is to be freed, also after an error. cfg must live on, with its sets. */
+/* sites begins as zeros, and is to be freed, also after an error. cfg must live on, and so must the settings of
+ * --set that it was loaded with. */
 int sites_load(const struct config *cfg, enum site_purpose purpose, const struct sh_report *report, struct sites *sites,
                struct sh_err *err);
-/* The same beside the first site of a head that runs, which stays the caller's. */
+/* Does the same for a head that runs. `first` is the site of that head, and stays the caller's. */
 int sites_load_beside(const struct config *cfg, const struct site *first, const struct sh_report *report,
                       struct sites *sites, struct sh_err *err);
 /* Returns the site of the scanner at a station, from 0. */

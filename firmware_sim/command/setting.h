@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Settings: a field of struct head_settings or what follows from fields, with its range. */
+/* Settings. Each one is a field of struct head_settings, or is computed from fields, and has a range. */
 #ifndef FIRMWARE_SIM_COMMAND_SETTING_H
 #define FIRMWARE_SIM_COMMAND_SETTING_H
 

@@ -19,7 +19,8 @@ void cfg_check_places(struct cfg_reader *rd, struct config *cfg);
 void cfg_check_tripods(struct cfg_reader *rd, struct config *cfg);
 /* Checks keys that only some kinds of platform have. Returns whether all of them belong to this kind. */
 int cfg_check_platform_keys(struct cfg_reader *rd, const struct config_platform *platform);
-/* Checks the platform's keys against each other, and converts frames to seconds. */
+/* Checks the platform's keys against each other, and converts its stops from frames (platform.frames_per_s) to
+ * seconds. */
 void cfg_check_platform(struct cfg_reader *rd, struct config *cfg);
 
 #endif

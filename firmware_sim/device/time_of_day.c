@@ -70,7 +70,8 @@ static struct pps_moment moment_at(const struct device *device, int64_t t_ns)
     return (struct pps_moment){t_ns, head_clock_ns(&device->clock, t_ns)};
 }
 
-/* A head that was synchronised before the run has the time of its own clock. Power-ups after that find it cold. */
+/* A head that was synchronised before the run (gnss.cold: off) has the time of its own clock at the first power-up,
+ * if pulses and sentences come then. At later power-ups it has no time. */
 static void follow_from_power_up(struct device *device, int64_t t_ns)
 {
     const struct pps_moment at = moment_at(device, t_ns);
@@ -91,7 +92,8 @@ static void take_sentence(struct device *device, const struct receiver_sentence 
     pps_take_sentence(&device->pps, moment_at(device, sentence->t_ns), utc.minute * 60 + utc.second);
 }
 
-/* Takes the sentences that have arrived before end_ns. One that comes with a pulse per second names its second. */
+/* Takes the sentences that have arrived before end_ns. At a pulse per second, end_ns is the time of the pulse. So a
+ * sentence that arrives together with the pulse belongs to the second that begins. */
 static void take_sentences(struct device *device, int64_t end_ns)
 {
     const struct receiver_line *line = &device->line;

@@ -134,7 +134,7 @@ int site_rate_row(const struct site *site, struct plan_row *row, struct sh_err *
         snprintf(
             why, sizeof why,
             "%u processor%s compute%s %.3g million pulses/s; the configuration has %.3g million/s; %.3g million of "
-            "them are cast and need %.3g %% of that",
+            "them are cast and need %.3g %% of the processor time",
             rate.processors, rate.processors > 1 ? "s" : "", rate.processors > 1 ? "" : "s",
             1e3 * rate.processors / rate.pulse_ns, 1e-6 * rate.fired_hz, 1e-6 * rate.cast_hz, 100.0 * rate.share);
     plan_say(row, "total", "measured", (double)NAN, rate.pulse_ns, why);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* glTF 2.0 into a scene, by its specification. README.md has the rules. */
+/* Reads glTF 2.0 into a scene, by its specification. README.md has the rules. */
 #ifndef CORE_IMPORT_GLTF_GLTF_READ_H
 #define CORE_IMPORT_GLTF_GLTF_READ_H
 
@@ -9,10 +9,11 @@
 
 struct scene_build;
 
-/* Whether the file is one, by its ending. */
+/* Returns whether a file is glTF, by the ending of its name. */
 bool gltf_is_name(const char *file);
 
-/* Fills b as a reader does, in the process that reads. SH_ESTATE: the file is for Assimp (glTF 1.0, Draco). */
+/* Reads the file of b into b. This is called in a process of its own (import_apart.c). SH_ESTATE: Assimp has to read
+ * this file (glTF 1.0, Draco). */
 int import_gltf(struct scene_build *b, struct sh_err *err);
 
 #endif

@@ -11,7 +11,7 @@ struct drawing {
     uint32_t *near;
 };
 
-/* Light is a factor of the encoded colour: about even steps for the eye. */
+/* Light multiplies the encoded (sRGB) colour: equal steps of light then look about equal. */
 static void place_colour(const struct view *view, const struct drawing *d, const struct view_colours *colours, size_t i,
                          float sum[3])
 {

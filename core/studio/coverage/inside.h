@@ -33,7 +33,7 @@ struct coverage {
     uint64_t *duplicate; /* bits: triangles that lie on others */
     double duplicate_m2, silent_m2;
     struct cell *cell;
-    struct cell_hits *hits; /* of the scan that waits */
+    struct cell_hits *hits; /* of the last scan, until it is kept or dropped */
 };
 
 uint32_t coverage_bits(double value);

@@ -19,7 +19,8 @@ static int look_from_outside(struct survey *s, struct viewpoint *out, struct sh_
     const int is_part_found = survey_outside(s, &part);
     if (part.seen > out->seen || (is_part_found && !is_found)) *out = part;
     if (is_found || is_part_found) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "viewpoint: a view of %.4g to %.4g deg holds nothing of the scene from around it",
+    return sh_fail(err, SH_EINPUT,
+                   "viewpoint: a view of %.4g to %.4g deg holds nothing of the scene from any place that was tried",
                    angle_deg(s->view->line_min_rad), angle_deg(s->view->line_max_rad));
 }
 

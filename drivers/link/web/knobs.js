@@ -138,7 +138,7 @@ export class Knobs extends EventTarget {
       this.#form.replaceChildren(...groups.map(([title, rows]) => [title, rows.filter(([header]) => has.has(header))])
         .filter(([, own]) => own.length > 0).map(([title, own]) => this.#makeGroup(title, own, has)));
     }
-    this.#allow(); // this must hold before the values have come, too
+    this.#allow(); // fields that can't be set are disabled already before their values come
   }
 
   // The title of a group has the unit if all its settings have the same one.

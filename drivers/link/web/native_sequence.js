@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This module finds missing, repeated and late frames by their sequence numbers, as LOSSES.md defines them.
-// The limits are libscanhead's: frames that are remembered, gaps that are remembered, frames in such a gap, and late
-// frames in a row that are another sequence.
+// The limits are libscanhead's: how many frames and gaps are remembered, how many frames such a gap may have, and how
+// many late frames in a row count as another sequence.
 const SEEN = 256, GAPS = 64, GAP_MOST = 65536, LATE_RUN = 256;
 const LOCAL = 2;
 
@@ -70,7 +70,8 @@ export class Sequence {
       if (before >= gap.n) continue;
       const rest = gap.n - before - 1;
       gap.n = before;
-      // The second part drops the oldest gap if there is no room. That must not be the first part of the same gap.
+      // A frame within a gap leaves two parts. Adding the second part drops the oldest gap if there is no room. If the
+      // oldest gap is the first part, it becomes the newest, so that it stays.
       if (this.#gaps.length === GAPS && gap === this.#gaps[0]) this.#gaps.push(this.#gaps.shift());
       this.#addGap((seq + 1) >>> 0, rest);
       return true;

@@ -51,7 +51,8 @@ static inline size_t preview_words(const struct coverage *coverage)
     return ((size_t)coverage_cells(coverage) + 63) / 64;
 }
 
-/* This site has the scanner's settings as a request says, and room for a place; it shares all else. It is large. */
+/* A copy of a scanner's site, with the settings of a request and room for a place of its own. It shares all else with
+ * the original. The struct is large. */
 struct preview_site {
     struct site site;
     struct config cfg;

@@ -201,8 +201,8 @@ static int check_second(const char *second, const char *path, struct sh_err *err
                    second, len, path);
 }
 
-/* With --split: looks for remains of any scan's file before the recording begins. Else one would stop the recording
- * only when its scan begins. `end` is the ending of the remains, in place of FILE's own ending. */
+/* With --split: looks for remains of any scan's file before the recording begins. Without this they would stop the
+ * recording only when their scan begins. `end` is the ending of the remains, in place of FILE's own ending. */
 static int check_parts_of_scans(const struct record_file *file, const char *end,
                                 int (*check)(const char *left, const char *path, struct sh_err *err),
                                 struct sh_err *err)

@@ -2,7 +2,8 @@
 /* `record --raw` writes the traffic of any protocol to a .pcapng, which other programs read.
  *
  * In: the command line. Out: Ethernet frames (drivers/protocol/ethernet.h) with the kernel's times of receiving. A
- * source is UDP (sockets of its own) or TCP (a connection of its own, or those of others that it passes on). */
+ * source is UDP, on sockets of its own, or TCP. TCP is a connection of its own or, with --relay, the connections of
+ * other programs, which reach the device through it. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
 
