@@ -39,7 +39,8 @@ void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
 void scip_reply_time(struct scip_reply *r, uint32_t ms);
 /* The same in 11 characters. */
 void scip_reply_time_us(struct scip_reply *r, uint64_t us);
-/* Data: a value of 2 or 3 characters (at most the largest that fits), or one character as it is. */
+/* Data: a value in 2 or 3 characters, or one character as it is. For a value that does not fit, the largest one that
+ * fits is written. */
 void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars);
 void scip_reply_mark(struct scip_reply *r, char mark);
 /* The last block, and the empty line. */

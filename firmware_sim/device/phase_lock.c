@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The phase lock of a rotor: at each pulse per second it shall point to one azimuth. Here a pulse is one per second,
- * unless it is said to be the scan's.
+/* The phase lock of a rotor: at each pulse of the pulses per second (PPS) the rotor shall point to one azimuth. In this
+ * file a pulse is one of PPS. A pulse of the laser is called a pulse of the scan.
  *
  *     at a pulse         the speed until the next one is chosen so that the azimuth will be right then
  *     pulses not locked  the rotor runs free: at the speed that is set, with the error of its motor

@@ -44,7 +44,7 @@ struct replay_capture {
     int64_t now_ns;   /* of the last packet that was read, since the first one */
     int64_t clock_ns; /* the file's time then */
     int has_clock;
-    uint32_t n_places;
+    uint32_t n_places; /* a place: a port of a device, with the talk that was captured there */
     struct capture_place place[CAPTURE_MAX_TALKS];
     struct capture_store { /* what the talk of a place points to */
         uint8_t *bytes;
