@@ -139,7 +139,7 @@ int plan_sight(const struct plan_sight_need *need, const struct plan_places *pla
 
 /* The steps of plan_sight. This returns 0 where so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
-/* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as of struct sight_spec. */
+/* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as in struct sight_spec. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
 /* Returns whether a map is made. found NULL: nothing was sampled. */
 int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);

@@ -49,8 +49,8 @@ void scip_reply_end(struct scip_reply *r);
 /* The sum of a line, as the character that ends it. */
 char scip_sum(const void *text, size_t len);
 
-/* For protocol_ops of the same names: content marks ranges and intensities of scans, reseal corrects the sums of all
- * replies. */
+/* The members content and reseal of struct protocol_ops: content marks ranges and intensities of scans, reseal corrects
+ * the sums of all replies. */
 void scip_content(const uint8_t *unit, size_t len, uint8_t *mask);
 void scip_reseal(uint8_t *unit, size_t len);
 

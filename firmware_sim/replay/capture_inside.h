@@ -31,7 +31,7 @@ struct capture_said {
     size_t at; /* in bytes of the builder */
     uint32_t len, side;
     int64_t begin_ns, end_ns; /* of its first and its last byte */
-    size_t number;            /* of the flow's segment with its last byte, from which on the receiver had it */
+    size_t number; /* of the segment in the flow that has the message's last byte: then the receiver had all of it */
 };
 
 struct replay_capture {
