@@ -101,13 +101,13 @@ void plan_sample_free(struct plan_sample *sample);
 
 /* Finds the error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
  * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures are upper
- * limits: error_m is three standard errors above the mean square. echo_share is the 95 % limit of Poisson's
- * distribution for footprints that do not lie on one smooth surface; the others count as they are found. The
- * first call casts the reference. */
+ * limits: error_m is three standard errors above the mean square. For footprints that do not lie on one smooth
+ * surface, echo_share has the 95 % limit of Poisson's distribution. For the others it has the share that was found,
+ * without a margin. The first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* Finds the error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
- * pulse whose way is longer than that counts as wrong, too: the rest of its way is not known. */
+ * pulse whose way goes on after CAST_MAX_DEPTH surfaces counts as wrong: the rest of its way is not known. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
 /* ---- sight */
@@ -139,7 +139,7 @@ int plan_sight(const struct plan_sight_need *need, const struct plan_places *pla
 
 /* The steps of plan_sight. This returns 0 where so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
-/* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as of struct sight_spec. */
+/* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as in struct sight_spec. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
 /* Returns whether a map is made. found NULL: nothing was sampled. */
 int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);
@@ -149,7 +149,7 @@ int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sigh
 /* The methods that a scan uses. */
 struct plan_methods {
     enum beam_mode beam; /* BEAM_SINGLE, BEAM_RINGS, BEAM_ADAPTIVE */
-    uint32_t rings;      /* of sub-rays; adaptive: for footprints with more edges than it tells apart */
+    uint32_t rings;      /* of sub-rays; adaptive: for those footprints that are cast as rings (struct cast_beam) */
     uint32_t depth;      /* of glass and mirrors */
     int sight;           /* first hits are looked up in the station's map */
 };
@@ -169,7 +169,7 @@ struct plan_head {
     double range_sigma_m, range_sigma_ppm;
     double range_sigma_at_m; /* the range at which that sigma holds; 0: noise does not depend on the signal */
     double ball_radius_m;    /* 0: no ball-shaped noise */
-    int signal, sharp;       /* there is a signal model; without noise of its own */
+    int signal, sharp;       /* there is a signal model; its signal has no noise (struct detect_signal_spec) */
     double reach_m;          /* where a white target vanishes */
     enum detect_ambiguity ambiguity;
     int instrument, angle_noise; /* errors of geometry; noise of the angles */

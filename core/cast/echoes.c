@@ -103,7 +103,8 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
     return to - 1;
 }
 
-/* Finds how much comes back of single rays' returns, and merges near ones. */
+/* Finds how much of the pulse's energy comes back from each hit of a single ray, and merges hits of a pulse that are
+ * near each other. */
 static void weigh_returns(struct caster *c, const struct chunk *k)
 {
     const struct cast_detect *d = k->s->detect;

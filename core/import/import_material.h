@@ -13,7 +13,7 @@ struct aiMaterial;
 struct aiColor4D;
 struct scene_build;
 
-/* Takes the properties of a surface from its material; values that are set already stay. */
+/* Takes the properties of a surface from its material. Properties that were set before are not changed. */
 int import_material(const struct assimp_lib *lib, struct scene_build *b, const struct aiScene *in,
                     const struct aiMaterial *material, struct scene_surface *surface, struct sh_err *err);
 

@@ -170,8 +170,8 @@ static void free_arrays(struct sight *s)
     s->record = NULL;
 }
 
-/* Builds with the current number of cells. TOO_FINE where the memory does not hold them, and
- * may_coarsen. */
+/* Builds with the current number of cells. Returns TOO_FINE where may_coarsen is set and the memory does not hold so
+ * many cells. */
 static int try_cells(struct sight *s, const struct sight_spec *spec, unsigned threads, const struct sh_report *report,
                      int may_coarsen, struct sh_err *err)
 {

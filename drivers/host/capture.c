@@ -40,8 +40,8 @@ static ssize_t capture_fill(struct host_source *source)
     return n;
 }
 
-/* Goes on to the next packet of frames. Returns 1 if there is one or no block can follow, 0 at the file's end, -1 with
- * errno. */
+/* Goes on to the next packet of frames. Returns 1 if there are bytes to hand on: a packet, or, from a damaged block on,
+ * the rest of the file (is_raw). Returns 0 at the file's end, -1 with errno. */
 static int next_packet(struct host_source *source)
 {
     struct host_capture *c = source->capture;

@@ -15,7 +15,7 @@ enum cola_ports {
 struct cola_model {
     const char *model;    /* of the head profile; NULL: the row for all others, with the profile's own text */
     const char *version;  /* of DeviceIdent, where the profile has no firmware */
-    const char *firmware; /* FirmwareVersion where the version is `version`; else FirmwareVersion is the version */
+    const char *firmware; /* of FirmwareVersion, where DeviceIdent has `version`; else both have the same text */
     uint8_t echoes;       /* DIST1, DIST2 */
     uint8_t rssi;         /* LMDscandatacfg at power-up: 1 with RSSI */
     uint8_t rssi_16bit;   /* 0: 8 bit */

@@ -16,8 +16,8 @@ static void put_lines(const struct cola *self, char *text, size_t cap)
         n += (size_t)snprintf(text + n, cap - n, " %u", *bytes[i]);
     n += (size_t)snprintf(text + n, cap - n, " %u\nFREchoFilter %u\nLMDscandatascalefactor %u\n", s.every, s.filter,
                           s.scale);
-    /* The lines are for the sessions of all links. Where the dialect is the configured one, it is not stored, so that
-     * links with another one keep theirs. */
+    /* The lines are for the sessions of all links. Each link may be configured with another dialect. So a dialect is
+     * stored only where it is not the one that this link is configured with. */
     if (cola_framing(self) != cola_configured_framing(self))
         n += (size_t)snprintf(text + n, cap - n, "EIHstCola %u\n", cola_framing(self));
     if (s.narrowed) n += (size_t)snprintf(text + n, cap - n, "LMPoutputRange %d %d\n", s.start_e4, s.stop_e4);

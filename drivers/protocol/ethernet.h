@@ -40,7 +40,7 @@ enum { TCP_FIN = 1, TCP_SYN = 2, TCP_RST = 4, TCP_PSH = 8, TCP_ACK = 16 };
 
 /* ---- a connection, as segments with the numbers that each end would send */
 
-struct tcp_talk {               /* begins with both ends, and zeros */
+struct tcp_talk {               /* The caller sets both ends, and all other members to 0. */
     struct ethernet_end end[2]; /* 0: who connects; 1: who listens */
     uint32_t next[2];           /* sequence number of the next byte of each */
     uint32_t acked[2];          /* sequence number up to which each has acknowledged the other end's bytes */

@@ -39,7 +39,8 @@ void scip_reply_key(struct scip_reply *r, const char *key, const char *fmt, ...)
 void scip_reply_time(struct scip_reply *r, uint32_t ms);
 /* The same in 11 characters. */
 void scip_reply_time_us(struct scip_reply *r, uint64_t us);
-/* Data: a value of 2 or 3 characters (at most the largest that fits), or one character as it is. */
+/* Data: a value in 2 or 3 characters, or one character as it is. For a value that does not fit, the largest one that
+ * fits is written. */
 void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars);
 void scip_reply_mark(struct scip_reply *r, char mark);
 /* The last block, and the empty line. */
@@ -48,8 +49,8 @@ void scip_reply_end(struct scip_reply *r);
 /* The sum of a line, as the character that ends it. */
 char scip_sum(const void *text, size_t len);
 
-/* For protocol_ops of the same names: content marks ranges and intensities of scans, reseal corrects the sums of all
- * replies. */
+/* The members content and reseal of struct protocol_ops: content marks ranges and intensities of scans, reseal corrects
+ * the sums of all replies. */
 void scip_content(const uint8_t *unit, size_t len, uint8_t *mask);
 void scip_reseal(uint8_t *unit, size_t len);
 

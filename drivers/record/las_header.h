@@ -69,7 +69,7 @@ size_t las_own_len(const struct las_facts *facts);
 /* Returns where in a point's bytes the time begins; a colour may follow it. */
 size_t las_time_at(const struct las_facts *facts);
 
-/* Counts a point's record as it is in the file: its place and its return. Of the facts it needs `minor`. */
+/* Counts a point's record as it is in the file: its place and its return. facts->minor must be set before. */
 void las_count_record(struct las_facts *facts, const uint8_t *record);
 /* Writes the number of points, of returns, and the bounds into a header that has the rest. */
 void las_put_counts(const struct las_facts *facts, uint8_t *header);

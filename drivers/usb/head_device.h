@@ -27,7 +27,8 @@ struct scanhead_usb {
     enum usb_end cut;
 };
 
-/* Makes the device of head, which must be zeroed and stay where it is. usb_device_free(head->device). */
+/* Makes the device of head, which must be zeroed and stay where it is. The caller frees the device with
+ * usb_device_free(head->device). */
 int scanhead_usb_create(const struct usb_personality *personality, const struct usb_identity *id,
                         struct scanhead_usb *head, struct sh_err *err);
 /* Does what follows from the host's transfers rather than from its requests: begins a session by data, sends the

@@ -76,7 +76,7 @@ void usbip_conn_read(struct usbip_conn *conn, const struct usb_owner *owner);
 /* Whether so many replies wait for the host that nothing more is read until it takes some. */
 int usbip_conn_is_full(const struct usbip_conn *conn);
 void usbip_conn_write(struct usbip_conn *conn);
-/* Answers control requests whose time has come, until go_on says 0. */
+/* Answers control requests whose time has come, until the owner's go_on (backend.h) returns 0. */
 void usbip_conn_answer_slow(struct usbip_conn *conn, const struct usb_owner *owner);
 /* Sends the queue and waits until the peer has taken it and hung up, timeout_ms at most for each step
  * (usb_backend_hang_up). */

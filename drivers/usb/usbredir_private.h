@@ -43,7 +43,7 @@ int usbredir_is_early(struct usbredir *self);
 
 /* Gives the device to the guest, whose hello has come. */
 void usbredir_plug(struct usbredir *self);
-/* Answers requests whose time has come, until go_on says 0. */
+/* Answers requests whose time has come, until the owner's go_on (backend.h) returns 0. */
 void usbredir_answer_slow(struct usbredir *self);
 /* Cancels a request that is held. Returns 1: it is answered as cancelled; 0: none of that id is held. */
 int usbredir_cancel_slow(struct usbredir *self, uint64_t id);

@@ -13,7 +13,7 @@
 
 /* A pipe takes pieces of up to PIPE_BUF bytes whole or not at all, so it never has half a line. */
 enum { PIECE = 4096, STACK_BYTES = 256 * 1024 };
-static const int64_t PATIENCE_NS = 2000000000; /* a link gives its reader as long at the end (DRAIN_NS) */
+static const int64_t PATIENCE_NS = 2000000000; /* at the end, links wait for their readers equally long (DRAIN_NS) */
 
 struct line_head {
     uint16_t len;

@@ -98,8 +98,8 @@ int command_header_matches(const char *pattern, const char *header, size_t len)
     return text == NULL;
 }
 
-/* Reads the optional exponent; without one, returns p. A value beyond 32000 (IEEE 488.2, 7.7.2.4.1) is
- * taken as 32000: no mantissa of one line brings that back into any range. */
+/* Reads the optional exponent; without one, returns p. Once the exponent has reached 32000 (IEEE 488.2, 7.7.2.4.1),
+ * further digits are passed over: no mantissa of one line brings such a value back into any range. */
 static const char *parse_exponent(const char *p, int *exponent)
 {
     *exponent = 0;

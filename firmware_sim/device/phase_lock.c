@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The phase lock of a rotor: at each pulse per second it shall point to one azimuth. Here a pulse is one per second,
- * unless it is said to be the scan's.
+/* The phase lock of a rotor: at each pulse of PPS (one pulse per second) the rotor shall point to one azimuth. In this
+ * file a pulse is a pulse of PPS. A pulse of the laser is called a pulse of the scan.
  *
  *     at a pulse         the speed until the next one is chosen so that the azimuth will be right then
  *     pulses not locked  the rotor runs free: at the speed that is set, with the error of its motor
@@ -22,7 +22,7 @@ static double wrap(double turn)
     return turn - round(turn);
 }
 
-/* Turns of the rotor's present sweep, at a time since the scan's start near pulse k. */
+/* Turns of the rotor's present sweep, at a time since the scan's start near the scan's pulse k. */
 static double turn_at(const struct schedule_segment *seg, uint64_t k, int64_t t_ns)
 {
     const double since_s = (double)(t_ns - schedule_time_ns(seg, k)) / SECOND_NS;

@@ -10,7 +10,7 @@ struct faulty_session {
     struct wire *wire;       /* NULL: no fault so far */
     struct wire_heard heard; /* from the session's begin on */
     size_t rest;             /* bytes still to come of a frame, line or unit that was begun without a wire */
-    int next_is_reply;       /* faulty_next */
+    int next_is_reply;       /* the next unit is a reply; faulty_next sets this and its time */
     int64_t next_t_ns;
     int is_blocked; /* the inner link takes nothing now */
     int is_gone;    /* an act has ended it */
@@ -38,7 +38,7 @@ struct faulty_link {
     struct faulty_session session[LINK_MAX_SESSIONS];
     struct faulty_connections connections;
     int64_t plug_ns;          /* clock: when an unplugged link is there again; 0: it is */
-    struct fault_note pulled; /* the cable that was pulled last; once it is in again, `ended` and the time of that */
+    struct fault_note pulled; /* of the last pull of the cable; at its end `ended` is set, and t_ns to the end's time */
     int resets;               /* 1: what was connected is reset once that cable is in again */
     int plug_failed;          /* it could not come back so far, and that was reported */
     int64_t refuse_until_ns;  /* clock: until then clients are turned away */
@@ -52,7 +52,8 @@ int faulty_is_pulled(const struct faulty_link *f);
 /* Whether the act belongs to the pull of the cable that another session has begun: it is of the same fault, and was due
  * before the cable was in again. A link has one cable, so it is pulled once for all sessions. */
 int faulty_is_same_pull(const struct faulty_link *f, const struct wire_piece *act);
-/* Takes out the act that is first in the session's wire. It has not struck. */
+/* Takes out the act that is first in the session's wire, without carrying it out. The link's count of the fault no
+ * longer includes the act. */
 void faulty_drop_act(struct faulty_link *f, int session, const struct wire_piece *act);
 /* Brings an unplugged link back when its time is over. */
 void faulty_plug(struct faulty_link *f);

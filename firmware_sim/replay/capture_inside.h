@@ -31,7 +31,7 @@ struct capture_said {
     size_t at; /* in bytes of the builder */
     uint32_t len, side;
     int64_t begin_ns, end_ns; /* of its first and its last byte */
-    size_t number;            /* of the flow's segment with its last byte, from which on the receiver had it */
+    size_t number; /* of the segment in the flow that has the message's last byte: then the receiver had all of it */
 };
 
 struct replay_capture {
@@ -44,7 +44,7 @@ struct replay_capture {
     int64_t now_ns;   /* of the last packet that was read, since the first one */
     int64_t clock_ns; /* the file's time then */
     int has_clock;
-    uint32_t n_places;
+    uint32_t n_places; /* a place: a port of a device, with the talk that was captured there */
     struct capture_place place[CAPTURE_MAX_TALKS];
     struct capture_store { /* what the talk of a place points to */
         uint8_t *bytes;

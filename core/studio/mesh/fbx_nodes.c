@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Binary FBX files of Assimp 5.2 lack the empty node that ends each list of nodes: neither Blender nor Assimp itself
- * reads them. Here the nodes are copied, each list with its end, and the offsets of ends that nodes hold grow by that.
+ * reads them. Here the nodes are copied, and each list gets its empty node. A node holds the offset of its end in the
+ * file, which grows by all empty nodes that were added before that end.
  *
  * A node (version 7500 and up) is its end's offset in the file, number and bytes of its properties, 64 bits each; the
  * length of its name, 8 bits; name, properties, nodes. The layout of the file's end is the one that Blender's exporter

@@ -59,9 +59,9 @@ export class Head extends EventTarget {
   #knowsWho = false; // the head has SYSTem:CONTrol:WHO?
   #told = ''; // who has control, as in the last `control` event
 
-  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true takes the points
-   * from before, too, where the head keeps them; a batch of these has `past`. It connects at once, and again and again
-   * until close(). */
+  /** url: "ws://host:port/ws", or "/ws" in a page. worker: false decodes in this thread. past: true also takes the
+   * points that the head sent before this connection, where it keeps them; a batch of such points has `past`. This
+   * object connects at once, and again and again until close(). */
   constructor(url, {worker = typeof Worker === 'function', past = false} = {}) {
     super();
     this.#past = past;
@@ -124,7 +124,8 @@ export class Head extends EventTarget {
    * - frames, bytes, points (records, shots without echo among them), pulses (received), empty
    * - lost_frames: missing in the sequence
    * - left_out_frames, left_out_pulses: the part of these that the head left out, since this page was too slow
-   * - lost_pulses: lost by the head; missing_pulses: of all scans that ended here, delivered but not received
+   * - lost_pulses: lost by the head; missing_pulses: those that the head sent and this page did not get, in the scans
+   *   whose end this page has seen
    * - dropped_points, dropped_pulses: decoded, and dropped by the page itself
    * - unplaced_points, unplaced_pulses: came before their anchor or their pose
    * - past_points, past_pulses, past_hash: from before this connection, and in none of the other counts
@@ -223,8 +224,8 @@ export class Head extends EventTarget {
     this.#introduce().catch(() => {}); // the head is gone again; a `close` event says so
   }
 
-  // Asks for identity and state. HELP comes first: an older head has no session numbers, and the question would put an
-  // error into its queue.
+  // Asks for identity and state. An older head has no session numbers: SYSTem:SESSion? would put an error into its
+  // queue. So HELP? is asked before, which shows whether the head has that query.
   async #introduce() {
     const [idn, state, controller, help] = await Promise.all(
       ['*IDN?', 'HEAD:STATe?', 'SYSTem:CONTrol?', 'HELP?'].map((line) => this.command(line)));

@@ -30,14 +30,15 @@ function startPanels() {
   for (const panel of document.querySelectorAll('.panel')) {
     const was = kept.get(panel.id);
     let open = panel.open = was === null ? matchMedia(WIDE).matches || few.includes(panel.id) : was === 'open';
-    panel.addEventListener('toggle', () => { // this also comes once for the line above, which is no choice of the user
+    panel.addEventListener('toggle', () => { // setting panel.open above also fires this once: that is no user's choice
       if (panel.open !== open) kept.set(panel.id, panel.open ? 'open' : 'closed');
       open = panel.open;
     });
   }
 }
 
-// A double click takes a number whole. Browsers leave its sign out, and what is typed then is no number.
+// A double click selects a number with its sign. A browser alone would leave the sign out of the selection: a negative
+// number typed over it would then have two signs.
 addEventListener('dblclick', ({target}) => target.matches?.('input[inputmode="decimal"]') && target.select());
 
 // The page works without a picture: figures and settings need none.
@@ -134,7 +135,7 @@ function startHead(cloud, view, names, keepsPast) {
     bar.name(info);
     session.paced(info.pace);
     if (view) view.stations.fields = info.fields ?? [];
-    stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true, info.run)).catch(() => {}); // it is gone again
+    stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true, info.run)).catch(() => {}); // the head is gone
     showPlan();
     view?.setScene(await fetchScene());
   };

@@ -29,10 +29,11 @@ enum viewed_column {
 
 enum { VIEWED_LABEL_NONE = 0xffff };
 
+/* Each array but xyz_m is NULL where the file has no such column. */
 struct viewed_points {
     uint32_t n;
     double (*xyz_m)[3];                             /* [n] */
-    float *range_m, *reflectance_db, *amplitude_db; /* [n] NaN: none; NULL, as the others: the file has none */
+    float *range_m, *reflectance_db, *amplitude_db; /* [n] NaN: this point has none */
     double *t_s;                                    /* [n] as the file counts it */
     uint16_t *label, *station;                      /* [n] label: VIEWED_LABEL_NONE where unknown; station: from 1 */
     uint8_t *echo, *echoes;                         /* [n] */

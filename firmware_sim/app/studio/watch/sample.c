@@ -110,8 +110,8 @@ static void without_beams(const struct deviation_points *p, const uint32_t *tria
 }
 
 /* Thins the sample until comparing it fits the budget, by the time that one point takes and by how many have come.
- * Reading the stream and working out figures come first; comparing has what they leave, and a tenth of the budget in
- * any case. The budget of the first second is there at once: points that are passed over now can't be sampled later. */
+ * Reading the stream and working out figures come first; comparing has what they leave, but at least a tenth of the
+ * budget. The budget of the first second is there at once: points that are passed over now can't be sampled later. */
 static void adapt(struct watch *w, size_t n, int64_t took_ns)
 {
     struct watch_sample *s = &w->sample;
