@@ -53,7 +53,7 @@ static bool match_part(const char *folder, char *part)
     return found;
 }
 
-/* Gives the parts of the path from `at` on the case that they have on this disk. */
+/* Changes the case of the path's names, from `at` on, to that of the names on this disk. */
 static bool match_case(char *path, size_t at)
 {
     for (char *part = path + at; *part != '\0';) {
