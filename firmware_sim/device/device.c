@@ -85,7 +85,7 @@ static int open_journals(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
-/* Gives the parts that don't use struct device pointers to what they need of it. */
+/* Some parts of the device don't know struct device. Here they get pointers to those of its members that they need. */
 static void set_parts(struct device *device)
 {
     device->events.tick_hz = device->overrun.tick_hz = device->tick_hz;
@@ -319,7 +319,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
-    /* 1: the run was to end before this tick. Else, where it is over, this tick was the last of its one scan. */
+    /* `told`: the run was to end before this tick. If it is over without that, its one scan ended in this tick. */
     const int told = device->ending || tick >= device->end_tick;
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;
