@@ -35,7 +35,7 @@ char *build_join(struct text_span folder, struct text_span name)
 }
 
 /* Looks in `folder` for an entry whose name differs from `part` in case only, and writes that name over `part`. `part`
- * is one name of a path and ends with a zero byte. Of several entries, the first in byte order is taken. */
+ * is one name of a path and ends with a zero byte. If several entries match, the first in byte order is taken. */
 static bool match_part(const char *folder, char *part)
 {
     DIR *dir = opendir(folder[0] != '\0' ? folder : ".");

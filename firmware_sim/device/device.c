@@ -13,8 +13,8 @@
 #include "firmware_sim/device/limits.h"
 #include "firmware_sim/site/plan_rows.h"
 
-/* With platform.kind live the head needs a pose for the first pulse of a tick. Pulses are cast in packets of 16, so
- * that pulse may be 15 pulse periods old. */
+/* With platform.kind live the head needs poses for all pulses that a tick casts. Pulses are cast in packets of 16, so
+ * the first of these may have been fired 15 pulse periods before the tick. There is room for DEVICE_MAX_POSES ticks. */
 static int check_live(const struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;

@@ -13,9 +13,9 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/fault.h"
 
-/* Between two events the head's clock and device time should go equally far. Where the clock is behind by more than
- * STEP_S, it has stopped. A difference between GAIN_S and STEP_S is drift. Both limits are far above a nanosecond, the
- * unit of the times, and far below a usual jump. PPS_WITHIN_S: the longest time between two pulses. */
+/* Between two events the head's clock and device time should go equally far. Where the clock lost more than STEP_S, it
+ * was stopped. A difference between GAIN_S and STEP_S is drift. Both limits are far above a nanosecond, the unit of the
+ * times, and far below a usual jump. PPS_WITHIN_S: the longest time between two pulses. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
 
 /* Returns why a client can't notice faults of a kind; NULL: it can. */
