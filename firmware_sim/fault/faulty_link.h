@@ -10,7 +10,7 @@
  * as too slow. Bytes in the wire when the client goes away, or at the end of the run, are not written; faulty_forget
  * counts them. Frames that a fault dropped or changed count as written.
  *
- * A wire needs to know more than link_ops can say. The functions below tell it the rest. Thread: as link.h says. */
+ * A wire needs to know more than link_ops can say. The functions below are for that. Thread: as link.h says. */
 #ifndef FIRMWARE_SIM_FAULT_FAULTY_LINK_H
 #define FIRMWARE_SIM_FAULT_FAULTY_LINK_H
 
