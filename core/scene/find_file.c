@@ -35,7 +35,7 @@ char *build_join(struct text_span folder, struct text_span name)
 }
 
 /* Looks in `folder` for an entry whose name differs from `part` in case only, and writes that name over `part`. `part`
- * is one name of a path and ends with a zero byte. Of several entries, the first in byte order is taken. */
+ * is one name of a path and ends with a zero byte. If several entries match, the first in byte order is taken. */
 static bool match_part(const char *folder, char *part)
 {
     DIR *dir = opendir(folder[0] != '\0' ? folder : ".");
@@ -53,7 +53,7 @@ static bool match_part(const char *folder, char *part)
     return found;
 }
 
-/* Gives the parts of the path from `at` on the case that they have on this disk. */
+/* Changes the case of the path's names, from `at` on, to that of the names on this disk. */
 static bool match_case(char *path, size_t at)
 {
     for (char *part = path + at; *part != '\0';) {

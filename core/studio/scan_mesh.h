@@ -25,7 +25,7 @@
 struct scan_column {
     uint32_t line;  /* in the scan: columns whose lines differ by one are neighbours */
     uint32_t first; /* its first point; the last column ends with the last point */
-    int is_pole; /* all its shots have one direction: only its first point counts, next to all rows of its neighbours */
+    int is_pole;    /* all its shots have one direction: its first point borders on all rows of both neighbours */
 };
 
 struct scan_grid {
@@ -35,7 +35,7 @@ struct scan_grid {
     const struct scan_column *column; /* [n_columns] lines rising */
     double head_m[3];                 /* where the head stood */
     const float (*to_head_m)[3];      /* [n_points] head minus point; NULL: head_m */
-    uint32_t rows_per_turn;           /* from 3 on: the last row of a turn borders on row 0; less: none does */
+    uint32_t rows_per_turn;           /* 3 or more: the last row of a turn borders on row 0; 0 to 2: it doesn't */
     int closes;                       /* the last column borders on the first; needs three columns */
     double long_edge;                 /* 0: no filter */
 };

@@ -12,7 +12,7 @@
 enum {
     WEB_PLACES = 48,        /* connections at a time */
     WEB_PLACES_OF_ONE = 40, /* of one address; the others are left for the rest of the world */
-    WEB_GOODBYE_MS = 2000,  /* at an end, for clients to take what was written; and see web_places_take */
+    WEB_GOODBYE_MS = 2000,  /* for clients to take what was written before an end; see also web_places_take */
 };
 
 enum web_phase {

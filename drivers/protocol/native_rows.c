@@ -33,7 +33,8 @@ enum { LANES = 16 };
 /* Sixteen rows are 80 words, in five vectors. Word l of vector v belongs to row ROW, and is its word WORD. */
 #define ROW(v, l)  ((16 * (v) + (l)) / 5)
 #define WORD(v, l) ((16 * (v) + (l)) % 5)
-/* Places of words in a pair of vectors: a and b, c and surface. */
+/* Two vectors of a pair (a and b, c and surface) are numbered as one array of 32 words. These macros give the number of
+ * the word that goes to place l of vector v. Places of other words get any number, and masks fill them in later. */
 #define FIRST_PAIR(v, l)  (ROW(v, l) + (WORD(v, l) == 1 ? LANES : 0))
 #define SECOND_PAIR(v, l) (ROW(v, l) + (WORD(v, l) == 3 ? LANES : 0))
 #define ALL(of, v)                                                                                                     \

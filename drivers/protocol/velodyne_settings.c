@@ -182,7 +182,7 @@ static int check_phase_input(const struct posted *p, const char *value)
     return read_decimal(value, 360.0, &deg) ? 200 : refuse(p, 400, "offsetInput: allowed are 0 to 359.99, in degrees");
 }
 
-/* A head without a settings file takes it, too, and stores nothing: clients expect that a device takes it. */
+/* A head without a settings file stores nothing, but answers 200: clients expect that a device takes this form. */
 static int save(const struct posted *p, const char *value)
 {
     if (strcasecmp(value, "submit") != 0) return refuse(p, 400, "data: allowed is submit");

@@ -319,7 +319,7 @@ static int add_head(struct ply *ply)
     ply->last.station = info->station;
     snprintf(ply->last.idn, sizeof ply->last.idn, "%s", info->idn);
     snprintf(ply->last.profile, sizeof ply->last.profile, "%s", info->profile);
-    sh_keep_line(ply->last.idn); /* neither may end its line of the header */
+    sh_keep_line(ply->last.idn); /* a line break in a text would end its line of the header */
     sh_keep_line(ply->last.profile);
     if (facts->n_heads > 0 && strcmp(before.idn, ply->last.idn) == 0 && strcmp(before.profile, ply->last.profile) == 0)
         return 0;

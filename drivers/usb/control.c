@@ -14,7 +14,7 @@ struct setup {
 
 typedef int (*handler)(struct usb_device *device, const struct setup *s, uint8_t *data);
 
-/* Status of two bytes, all bits 0 but these. */
+/* Writes a status of two bytes. Returns how many bytes the answer has. */
 static int put_status(uint8_t *data, unsigned status)
 {
     le_put16(data, (uint16_t)status);

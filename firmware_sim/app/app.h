@@ -50,8 +50,9 @@ int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, 
 int app_with_links(const struct app_input *in, const char *links,
                    int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
 
-/* Adds the result `more`, with its reason, to rc, that of earlier work. The first failure is returned, and err has its
- * text; a second one is printed as a warning, unless its text is the same. */
+/* Takes the results of two pieces of work: `rc` of the first, whose reason is in err, and `more` of the second, whose
+ * reason is in `why`. Returns the first failure, with its text in err. If both failed, the second text is printed as a
+ * warning, unless it is the same. */
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
 /* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
@@ -84,8 +85,8 @@ extern const struct sh_report app_report_quiet;
 /* 1: app_report_stderr and app_report_seconds print no progress either. app_parse calls it, for --quiet. */
 void app_set_quiet(int quiet);
 
-/* From now on warnings begin with `what`, the name of a part of the work, which must live on. A warning that several
- * parts give is printed once. NULL, as at first: warnings have no name, and each is printed. */
+/* From now on warnings begin with the text `what`, the name of a part of the work. The text is not copied. A warning
+ * that several parts give is printed once. NULL, as at first: warnings have no name, and each is printed. */
 void app_warn_of(const char *what);
 
 /* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second

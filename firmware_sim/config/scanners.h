@@ -8,7 +8,8 @@
 struct config;
 struct config_diagnostics;
 
-/* Loads for the scanner of a station, from 1; 0: of head.station. The list of diagnostics begins anew. */
+/* Loads the configuration of a station's scanner. station: from 1; 0: head.station. The list of diagnostics begins
+ * anew. */
 int cfg_load_for(const char *path, const char *const *sets, int n_sets, uint32_t station, struct config *cfg,
                  struct config_diagnostics *diagnostics);
 /* Returns the station, from 0, that head.station's number (from 1) names; n_stations and more: there is none. */

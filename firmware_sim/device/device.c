@@ -13,8 +13,8 @@
 #include "firmware_sim/device/limits.h"
 #include "firmware_sim/site/plan_rows.h"
 
-/* With platform.kind live the head needs a pose for the first pulse of a tick. Pulses are cast in packets of 16, so
- * that pulse may be 15 pulse periods old. */
+/* With platform.kind live the head needs poses for all pulses that a tick casts. Pulses are cast in packets of 16, so
+ * the first of these may have been fired 15 pulse periods before the tick. There is room for DEVICE_MAX_POSES ticks. */
 static int check_live(const struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
@@ -85,7 +85,7 @@ static int open_journals(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
-/* Gives the parts that don't use struct device pointers to what they need of it. */
+/* Some parts of the device don't know struct device. Here they get pointers to those of its members that they need. */
 static void set_parts(struct device *device)
 {
     device->events.tick_hz = device->overrun.tick_hz = device->tick_hz;
@@ -319,7 +319,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
-    /* 1: the run was to end before this tick. Else, where it is over, this tick was the last of its one scan. */
+    /* `told`: the run was to end before this tick. If it is over without that, its one scan ended in this tick. */
     const int told = device->ending || tick >= device->end_tick;
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;

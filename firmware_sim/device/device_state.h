@@ -92,7 +92,7 @@ struct device {
         int64_t t_ns;
     } edge;
     struct receiver_line line;
-    uint64_t line_taken;                    /* sentences that pps has */
+    uint64_t line_taken;                    /* sentences of `line` that pps has been given */
     struct scanner_clock date, date_before; /* since the last power-up, and before it */
     int server_fd;                          /* device_watch_time_server */
     char plan[160];                         /* site_plan_text */
@@ -129,8 +129,8 @@ enum head_state device_visible_state(const struct device *device, uint64_t relea
 uint64_t device_ticks_of(const struct device *device, double s);
 
 /* scan.c */
-/* With options.start: options.duration_s counts from this tick. Called where a scan begins, of which only the first one
- * has an effect, and where a self-test fails before any scan, of which only the first one has an effect, too. */
+/* With options.start: options.duration_s counts from this tick. Called where a scan begins, and where a self-test fails
+ * before any scan. Only the first scan, and only the first failure, has an effect. */
 void device_count_duration(struct device *device, uint64_t tick);
 void device_begin_scan(struct device *device, uint64_t tick);
 /* Claims the tick's part of the scan that is on: descriptor, names, pulses; and the scan's end. */
@@ -188,7 +188,8 @@ int device_is_dead(const struct device *device, uint64_t released);
 /* phase_lock.c: the rotor's phase, held to the receiver's pulses per second. */
 /* A pulse per second comes in the tick at hand. */
 void device_hold_phase(struct device *device, int64_t edge_ns);
-/* A tick begins: chooses the rotor's speed after a pulse per second. While these are not locked, it runs free. */
+/* A tick begins: chooses the rotor's speed after a pulse per second. While the pulses are not locked (pps.h), the rotor
+ * runs free. */
 void device_check_phase(struct device *device, int64_t t_ns);
 
 /* scanner_clock.c */
@@ -196,7 +197,7 @@ void device_check_phase(struct device *device, int64_t t_ns);
 void device_init_time_server(struct device *device);
 /* Power comes at a device time: the scanner's clock and its time server are as at power-up. */
 void device_start_date(struct device *device, int64_t t_ns);
-/* Its time server, or whether it may be asked, has changed. */
+/* Wakes up the client of the time server. The server, or whether it may be asked, has changed. */
 void device_say_time_server(const struct device *device);
 
 /* time_of_day.c: the head's clock and the receiver. */

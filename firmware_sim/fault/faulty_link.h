@@ -10,7 +10,7 @@
  * as too slow. Bytes in the wire when the client goes away, or at the end of the run, are not written; faulty_forget
  * counts them. Frames that a fault dropped or changed count as written.
  *
- * The functions below are what a wire needs to know and link_ops can't say. Thread: as link.h says. */
+ * A wire needs to know more than link_ops can say. The functions below are for that. Thread: as link.h says. */
 #ifndef FIRMWARE_SIM_FAULT_FAULTY_LINK_H
 #define FIRMWARE_SIM_FAULT_FAULTY_LINK_H
 
@@ -52,8 +52,8 @@ int faulty_pass(struct faulty_link *link, int session, int64_t t_ns);
 /* A command of the session changed the faults. Its own reply is the last of the next n ones. */
 void faulty_changed(struct faulty_link *link, int session, uint64_t n_replies);
 
-/* Notes that a cable which was pulled is plugged in, or that something else took its place: another act, or the end of
- * the run. */
+/* Notes the end of a pulled cable: it is plugged in, or another fault of the link replaces it, or the run ends. Does
+ * nothing where no cable is pulled. */
 void faulty_end_cable(struct faulty_link *link);
 
 struct faulty_state {

@@ -43,7 +43,7 @@ struct session {
     int reader;          /* of the stream */
     uint64_t cursor;     /* next tick to take */
     uint64_t power_from; /* only a power cycle at this tick or later ends it */
-    uint64_t came_at;    /* ticks before are looked back at, and not received (look_back) */
+    uint64_t came_at;    /* ticks before it only prepare the protocol, and don't count as received (look_back) */
     struct {
         int have_seq; /* next_seq and next_pulse are known */
         uint32_t next_seq;
@@ -87,7 +87,7 @@ struct pump {
     uint32_t power_seen;             /* changes of power that were done here */
     int is_off;                      /* the head has no power */
     struct session session[LINK_MAX_SESSIONS];
-    struct link_memory *client; /* it lets this link work, in its own thread; NULL: the link has a thread */
+    struct link_memory *client; /* in memory: its thread does this link's work; NULL: the link has a thread */
     pthread_t thread;
     int running;         /* it has begun, and has not been joined */
     int is_done;         /* it has ended */

@@ -324,7 +324,7 @@ void site_wave_row(const struct site *site, struct plan_row *row)
         used += (size_t)snprintf(why + used, sizeof why - used,
                                  "; echoes are found in them, with the noise of the samples");
     if (beam == BEAM_SINGLE) snprintf(why + used, sizeof why - used, "; single rays: an edge has no second return");
-    const double error_m = site->waves->cast.finds ? (double)NAN /* of ranges: those of the detector */
+    const double error_m = site->waves->cast.finds ? (double)NAN /* the detector's errors of range are not known here */
                            : beam == BEAM_SINGLE   ? site->plan.beam.error_m
                                                    : 0.0;
     plan_say(row, "waveform", beam == BEAM_RINGS ? "sub-rays" : "closed form", error_m, site_wave_ns(site), why);

@@ -199,7 +199,7 @@ static void each_line(void **state)
                         "density    mean 11, 5 % 12, 50 % 13, 95 % 14 points/m2\n"
                         "incidence  mean 45, 5 % 15, 50 % 30, 95 % 60 deg\n"
                         "range      mean 21, 5 % 22, 50 % 23, 95 % 24 m\n"
-                        "\nstation               sees m2        %     alone m2        %       pulses          met\n"
+                        "\nstation               sees m2        %     alone m2        %       pulses   with a hit\n"
                         "first                   4.000   10.000        3.000    7.500          201          202\n"
                         "second                  5.000   12.500        1.500    3.750          301          302\n"
                         "\n     area m2    unseen m2   seen %    points/m2  object | material\n"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The records of an IFC file, and what they say of its products. Readers of bodies don't give this. In: a path. Out:
- * products with type, GlobalId and name, metres per unit, and marks of what their geometry consists of. */
+/* Reads the records of an IFC file. They say more of its products than web-ifc and ifc-lite do, which make the bodies.
+ * In: a path. Out: products with type, GlobalId and name, metres per unit, and marks of what their geometry consists
+ * of. */
 #ifndef CORE_IMPORT_IFC_IFC_RECORDS_H
 #define CORE_IMPORT_IFC_IFC_RECORDS_H
 
@@ -17,9 +18,10 @@ struct ifc_records {
     struct ifc_product *product; /* [n_products] in the order of ids */
     size_t n_products, room_products;
     double unit_m;
-    struct sh_err no_unit;   /* why the file's unit of length is not known, so that unit_m is 1; code 0: it is known */
-    double radius_m;         /* of the largest circle that is cut into edges; 0: there is none */
-    uint32_t *mark, stamp;   /* [index.n] of the last walk */
+    struct sh_err no_unit; /* why the file's unit of length is not known, so that unit_m is 1; code 0: it is known */
+    double radius_m;       /* of the largest circle that is cut into edges; 0: there is none */
+    /* mark: [index.n] the walk that last came to a record, 0: none did. stamp: the last walk. Walks count from 1. */
+    uint32_t *mark, stamp;
     struct ifc_style *style; /* [n_styles] by item */
     size_t n_styles, room_styles;
     size_t n_limited; /* styles whose colour or transparency was beyond 0..1, and is limited to it */

@@ -5,7 +5,7 @@
 
 #include "core/import/ifc/ifc_index.h"
 
-/* Metres per unit of length, as the project says; SH_EINPUT where it doesn't. *m is good on success. */
+/* Finds the metres per unit of length, as the IfcProject says; SH_EINPUT where it doesn't. *m is good on success. */
 int ifc_unit_find(const struct ifc_index *x, double *m, struct sh_err *err);
 /* The same for a record that is a unit. */
 int ifc_unit_of(const struct ifc_index *x, const struct step_record *unit, double *m, struct sh_err *err);

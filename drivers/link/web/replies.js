@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This class sends command lines and assigns the replies, by COMMANDS.md: each line has one reply, in the order of the
 // lines. A reply that did not come in time may still come. So the head is then asked *IDN?, and all replies before the
-// answer to that are dropped (*Coming into step*).
+// answer to that are dropped (*Old replies on a serial line*).
 
 /** A command that the head refused. number: SCPI's, text: the head's words. */
 export class CommandError extends Error {

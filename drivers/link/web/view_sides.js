@@ -6,7 +6,7 @@ import {radians} from './view_camera.js';
 
 export const SIDES = [['top', 'Top', 'T'], ['front', 'Front', 'F'], ['side', 'Side', 'S']];
 
-// The front is seen from the south, the side from the east, or from there in the section's frame.
+// The front is seen from the south, the side from the east. The heading of a box section turns both.
 export function lookFromSide(camera, side) {
   if (!camera.flat) camera.before = {azimuth: camera.azimuth, elevation: camera.elevation};
   const heading = radians(camera.section?.kind === 'box' ? camera.section.heading_deg : 0);

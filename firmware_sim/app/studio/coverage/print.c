@@ -31,7 +31,7 @@ static void print_spread(const char *what, const struct coverage_spread *s, doub
 
 static void print_stations(const struct coverage_result *r)
 {
-    printf("\n%-16s %12s %8s %12s %8s %12s %12s\n", "station", "sees m2", "%", "alone m2", "%", "pulses", "met");
+    printf("\n%-16s %12s %8s %12s %8s %12s %12s\n", "station", "sees m2", "%", "alone m2", "%", "pulses", "with a hit");
     for (uint32_t i = 0; i < r->site->n_stations; i++) {
         const struct coverage_result_station *s = &r->station[i];
         printf("%-16s %12.3f %8.3f %12.3f %8.3f %12" PRIu64 " %12" PRIu64 "\n", r->site->station[i].station->name,

@@ -13,8 +13,9 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/fault/fault.h"
 
-/* STEP_S: a step of the clock, as any reader would see it. GAIN_S: the least drift between two events that counts. Both
- * are far above a nanosecond and far below a jump. PPS_WITHIN_S: the longest time between two pulses. */
+/* Between two events the head's clock and device time should go equally far. Where the clock lost more than STEP_S, it
+ * was stopped. A difference between GAIN_S and STEP_S is drift. Both limits are far above a nanosecond, the unit of the
+ * times, and far below a usual jump. PPS_WITHIN_S: the longest time between two pulses. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
 
 /* Returns why a client can't notice faults of a kind; NULL: it can. */
@@ -157,7 +158,7 @@ static void take_state(struct soak_link *link, const struct scanhead_frame *fram
     }
 }
 
-/* Hides faults from before the client's first time, since there is no earlier time to compare that one with. */
+/* Hides faults that were over before the client knew a time of day, since it has no earlier one to compare with. */
 static void hide_clock(struct soak_link *link, int64_t at_ns)
 {
     for (uint32_t i = link->n_moments; i-- > 0;) {

@@ -162,8 +162,8 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
 
-/* Adds a second link, without faults, beside each that sends datagrams. Where there is no room for it, the first one is
- * not soaked. A device on USB gets a name. Where no client could start a scan, the head does so itself. */
+/* Adds a second link, without faults, beside each udp link. A udp link without such a second one gets no client. Each
+ * device on USB gets a name. Where no client could start a scan, the head does so itself. */
 static void open_clean_links(struct config *cfg, struct soak *soak, struct soak_options *o)
 {
     int starts = 0;
@@ -307,7 +307,7 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "client-grace", "S", .min = 0.01, .max = 3600.0, .at = AT(verdicts.options.grace_s),
      .help = "the client has to end within S seconds of SIGTERM (default 5)"},
     {APP_NUMBER, "match-mm", "MM", .min = 0.0, .max = 1e6, .at = AT(match_mm),
-     .help = "allow a difference of MM, and of the file's rounding, between coordinates of points (default 0.01; scip and "
+     .help = "allow a difference of MM plus the file's rounding between coordinates of points (default 0.01; scip and "
              "cola 2, velodyne 20)"},
     {APP_CALL, "allow", "CHECK", .apply = take_allowed, .choices = verdict_names, .n_choices = VERDICT_N_CHECKS,
      .help = "a finding of this check does not count; may be repeated"},
