@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Events on their way into ticks, and errors, of which each session has a limited number of events a second. */
+/* Events that wait for a tick, and errors. A session gets a limited number of events a second for its errors. */
 #ifndef FIRMWARE_SIM_DEVICE_EVENTS_H
 #define FIRMWARE_SIM_DEVICE_EVENTS_H
 
