@@ -115,7 +115,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         int fd;
         const int slot = free_slot(tcp);
         if (slot == tcp->n_sessions && !is_any_ending(tcp)) tcp_make_room(tcp);
-        if (slot == tcp->n_sessions && is_any_ending(tcp)) { /* poll comes back at once */
+        if (slot == tcp->n_sessions && is_any_ending(tcp)) { /* a later tcp_poll takes the client */
             give_up_one(tcp);
             return;
         }

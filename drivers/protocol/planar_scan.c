@@ -57,7 +57,7 @@ static void take_descriptor(struct planar_scan *s, const struct native_descripto
         s->done = 1;
         s->scan_t0_ns = INT64_MIN;
     }
-    /* A recording that is replayed jumps within the scan: the turns between are no loss. */
+    /* A new local descriptor says that a replayed recording jumps within the scan: the turns between are no loss. */
     if ((flags & NATIVE_LOCAL) != 0 && !repeated) s->fresh = s->done = 1;
     s->scan = d->scan;
     s->pan_counts = d->pan_counts_per_turn;

@@ -10,8 +10,8 @@ import {copyOf} from './picture.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
 const SHOW_MS = 160; // least time between updates of a growing picture; it is also at least twice the time of an update
-const PLAIN = 150_000; // with fewer points per frame, a frame is drawn plain
-const COARSE = 0.5; // this is the scale of such a frame
+const PLAIN = 150_000; // a GPU that draws fewer points in the time of a frame gets plain frames (#plain)
+const COARSE = 0.5; // this is the scale of a plain frame
 const SHADING = 260; // the strength of eye-dome lighting: a factor of differences in logarithmic depth (view_gl.js)
 
 export class Frames {
