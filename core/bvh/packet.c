@@ -9,7 +9,7 @@
 #include "core/vecmath.h"
 
 struct packet {
-    struct RTCRayHit16 at; /* or, from its beginning, one of fewer rays */
+    struct RTCRayHit16 at; /* a packet of 4 or 8 rays, or one ray, lies at its beginning */
     int valid[BVH_PACKET];
 } __attribute__((aligned(64)));
 
@@ -134,8 +134,8 @@ static void take_near(struct bvh_query *query, uint32_t n)
     bvh_forget_near(query);
 }
 
-/* Casts rays again whose nearest range is known. No range is smaller, so the lowest number among equally near hits is
- * found in any order. */
+/* Casts the unsure rays again, with their nearest range known. No hit makes that range smaller now. So of the triangles
+ * that count as equally near, the one of lowest number is found, in whatever order Embree meets them. */
 static void packet_settle(struct bvh_query *query, struct packet *packet, uint32_t width)
 {
     float *tfar = bvh_field(&packet->at, width, tfar);

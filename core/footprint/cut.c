@@ -77,7 +77,7 @@ static int cut_caps(const struct beam *beam, const struct beam_line *line, uint3
     return 1;
 }
 
-/* Sets of places of the fine pattern, as bits: place 16 r + i is bit r of lane i. So one comparison of vectors
+/* A set of places of the fine pattern is held as bits: place 16 r + i is bit r of lane i. So one comparison of vectors
  * decides one bit in every lane. */
 enum { LANES = 16, MAX_ROWS = 32 };
 _Static_assert(1 + 3 * BEAM_FINE_RINGS * (BEAM_FINE_RINGS + 1) <= LANES * MAX_ROWS, "a bit for each place");

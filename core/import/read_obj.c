@@ -55,8 +55,8 @@ static bool at_statement_end(struct obj *o)
     return text_at_line_end(&o->t) || *o->t.p == '#';
 }
 
-/* Reads least to most numbers up to the statement's end, else fails with `what`. Missing numbers keep their
- * values. */
+/* Reads `least` to `most` numbers up to the statement's end, else fails with `what`. Elements of `number` that the
+ * statement lacks keep their values. */
 static int read_numbers(struct obj *o, int least, int most, double *number, const char *what, struct sh_err *err)
 {
     int n = 0;
@@ -94,8 +94,8 @@ static int keep_rgb(struct obj *o, const double rgb[3], struct sh_err *err)
     return SH_OK;
 }
 
-/* Reads x y z and up to five further numbers. Three or more of these begin with a colour. All others are ignored, also
- * the weight w, which only curves use. */
+/* Reads x y z and up to five further numbers. Where there are three or more of these, the first three are a colour. All
+ * others are ignored, also the weight w, which only curves use. */
 static int read_vertex(struct obj *o, struct sh_err *err)
 {
     double v[8] = {[5] = NAN};

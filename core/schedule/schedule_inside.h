@@ -59,7 +59,7 @@ static inline uint64_t firing_after(const struct schedule_segment *seg, uint64_t
     return tau / e->sequence_ticks * e->n_beams + i;
 }
 
-/* Returns the first pulse of line n in the scan: the first at or after r0 + ticks*num = (n - line0)*den. */
+/* Returns the first pulse of line n in the scan: the first one with r0 + ticks*num >= (n - line0)*den. */
 static inline uint64_t line_first_pulse(const struct schedule_segment *seg, uint64_t n)
 {
     if (n <= seg->line0) return seg->k0;
@@ -84,8 +84,8 @@ static inline uint32_t frame_of_line(const struct schedule_segment *seg, uint64_
     return seg->frame0 + 1 + (uint32_t)f;
 }
 
-/* angles.c: the pan at pulse k in 2^-24 micro-degrees. first_line is the first line of the pulse's frame. The pan is
- * rounded up, so that rounding never adds a line to a frame that a change cuts in two. */
+/* angles.c: the pan at pulse k in 2^-24 micro-degrees. first_line is the first line of the pulse's pan sweep (a
+ * frame). The pan is rounded up. So rounding never adds a line to a pan sweep in which a setting changes. */
 int64_t pan_fine(const struct schedule_segment *seg, uint64_t k, uint64_t first_line);
 
 #endif

@@ -13,8 +13,9 @@ struct range {
 };
 
 /* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along.
- * Corners that touch a side count as within: a triangle seen edge-on may be hit a little beside its end. That is
- * SIGHT_TILT_DOUBT over 1e-6, the sine below which core/bvh limits ranges to those between the edges. */
+ * Corners within BUILD_BESIDE of a side count as within the pyramid, since a triangle seen edge-on may be hit a little
+ * beside its end. BUILD_BESIDE is SIGHT_TILT_DOUBT over 1e-6, the sine below which core/bvh limits ranges to those
+ * between the edges. */
 static int is_beside(const double w[3], const double a[3], const double b[3], double far_m)
 {
     const double behind = -BUILD_BESIDE * far_m;
@@ -52,7 +53,7 @@ static void across(const double w[3], const double a[3], uint32_t regions, uint3
     *to = region_at(hi + 4.0 * SIGHT_PAD, regions);
 }
 
-/* The largest of all coordinates. */
+/* Returns the largest coordinate, without its sign. */
 static double farthest(double v[3][3])
 {
     double far_m = 0.0;
@@ -63,7 +64,8 @@ static double farthest(double v[3][3])
     return far_m;
 }
 
-/* The range is all of the face's regions where a corner lies behind the station, or almost. */
+/* Finds the regions of a face in which a triangle may be seen. Where a corner lies behind the station, or hardly in
+ * front of it, these are all regions of the face. Returns 0 where the face shows nothing of the triangle. */
 static int range_of(double v[3][3], double far_m, uint32_t face, uint32_t regions, struct range *r)
 {
     const uint32_t axis = face / 2, n1 = (axis + 1) % 3, n2 = (axis + 2) % 3;
@@ -84,7 +86,8 @@ static uint32_t region_number(const struct build_shared *b, uint32_t face, uint3
     return (face * b->regions + v) * b->regions + u;
 }
 
-/* Finds the regions where rays go, by a region's middle and the distance of its corners from it. */
+/* Finds the regions that rays go to. `sees` gets a cone that holds the region: the direction of the region's middle,
+ * and an angle around that direction. */
 static void find_seen(struct build_shared *b)
 {
     const double half = 1.0 / b->regions;
@@ -98,7 +101,7 @@ static void find_seen(struct build_shared *b)
                 d[axis] = (face & 1 ? -1.0 : 1.0) / length;
                 d[(axis + 1) % 3] = u / length;
                 d[(axis + 2) % 3] = v / length;
-                /* No corner is further from the middle than on the plane of the face. */
+                /* The face is 1 from the station. So the angle from middle to corner is at most their distance. */
                 const double radius_rad = 1.5 * half + 4.0 * SIGHT_PAD;
                 b->seen[region_number(b, face, i, j)] =
                     b->spec->sees == NULL || b->spec->sees(b->spec->ctx, d, radius_rad) != 0;
@@ -182,7 +185,8 @@ int build_bins(struct build_shared *b, struct sh_err *err)
     if (b->seen == NULL || b->bin == NULL || b->kept == NULL)
         return sh_fail(err, SH_ENOMEM, "sight: no memory for %u regions", regions);
     find_seen(b);
-    /* Regions were counted one place further: filling a region moves its begin to its end. */
+    /* Filling moves bin[region] from the region's begin to its end, which is the begin of the next region. So bin
+     * points one place further while regions are counted and filled. */
     b->bin++;
     int rc = put_all(b, 0, err);
     for (uint32_t i = 0; i < regions; i++)

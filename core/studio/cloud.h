@@ -39,7 +39,7 @@ struct cloud {
     double count_m;
     int is_single;      /* 1: in single precision */
     int is_text;        /* 1: the file holds coordinates as decimal numbers */
-    int has_own_counts; /* 1: a LAS file of ours: points of its first station stand as the stream's own counts */
+    int has_own_counts; /* 1: a LAS file of ours: its first station's points have the stream's own integers */
     /* Where they were asked for and the file has them, else NULL: */
     double *time_s;        /* [n] PLY: since the scan's start; LAS: as the file counts it */
     float *range_m;        /* [n] PLY alone; NaN: a shot without echo */
@@ -125,8 +125,8 @@ struct cloud_coverage {
  * there is no such triangle. */
 uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 
-/* Counts the surfaces and the triangles that have points. n_surfaces: those of the scene and then those of bodies;
- * triangles: of the scene, and far points have none. SH_EINPUT: a label of n_surfaces or more. */
+/* Counts the surfaces and the triangles that have points. n_surfaces: those of the scene and then those of bodies.
+ * `triangle` is as cloud_compare sets it. SH_EINPUT: a label of n_surfaces or more. */
 int cloud_cover(const struct cloud *cloud, const struct scene *scene, uint32_t n_surfaces, const uint32_t *triangle,
                 struct cloud_coverage *out, struct sh_err *err);
 

@@ -5,8 +5,8 @@
  * peer that shuts down its sending side is reported as LINK_SHUT, and goes on reading. One that has closed its socket
  * looks the same until something is written to it.
  * A client that finds all sessions taken is accepted and closed at once, so that it does not wait. Where
- * clients come for one request, the session that has been silent for longest ends instead. A client that comes while
- * another client sends no more gets that one's session, as soon as what was sent has been read. */
+ * clients come for one request, the session that has been silent for longest ends instead. Where a client has shut down
+ * its sending side, the session of that client ends instead, once the owner has read what the client sent. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -115,7 +115,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         int fd;
         const int slot = free_slot(tcp);
         if (slot == tcp->n_sessions && !is_any_ending(tcp)) tcp_make_room(tcp);
-        if (slot == tcp->n_sessions && is_any_ending(tcp)) { /* poll comes back at once */
+        if (slot == tcp->n_sessions && is_any_ending(tcp)) { /* a later tcp_poll takes the client */
             give_up_one(tcp);
             return;
         }
@@ -232,7 +232,8 @@ static void tcp_end(void *link, int session)
     const struct tcp_link *tcp = link;
     struct tcp_session *self = tcp_session(link, session);
     if (self == NULL) return;
-    self->state = TCP_ENDED; /* a pulled cable holds back the end: poll closes the socket once it is in again */
+    /* While the cable is pulled, no end is sent: tcp_poll closes the socket once the cable is plugged in again. */
+    self->state = TCP_ENDED;
     if (tcp->is_silent) return;
     shutdown(self->fd, SHUT_WR);
     socket_drain(self->fd);

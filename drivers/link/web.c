@@ -162,7 +162,7 @@ static int close_for(struct web_conn *conn, enum lws_close_status status, const 
     return -1;
 }
 
-/* A close frame is on its way or out: ours, or that of libwebsockets, which reports it seconds later. */
+/* Whether a close frame waits or was sent: ours, or that of libwebsockets, which reports the end seconds later. */
 static int is_closing(struct lws *wsi)
 {
     return web_lws.lws_get_close_length(wsi) > 0;
@@ -282,7 +282,7 @@ static void time_is_over(lws_sorted_usec_list_t *timer)
     (void)timer; /* lws_service returns */
 }
 
-/* Has libwebsockets work, and wait for most_us at most (below 0: for ever; 0: not at all). Returns 0 or SH_EIO. */
+/* Lets libwebsockets work, and wait for most_us at most (below 0: for ever; 0: not at all). Returns 0 or SH_EIO. */
 static int web_serve(struct web_link *web, lws_usec_t most_us)
 {
     if (most_us > 0) web_lws.lws_sul_schedule(web->context, 0, &web->timer, time_is_over, most_us);

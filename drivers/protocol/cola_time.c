@@ -47,7 +47,7 @@ static int set_clock(struct cola *self, int64_t ns)
 
 /* The settings of TIME:SERVer, in SOPAS' numbers. */
 struct cola_server {
-    uint32_t role, interface, address[4], update_s, zone; /* zone: hours ahead of UTC, and 12 more */
+    uint32_t role, interface, address[4], update_s, zone; /* zone: hours ahead of UTC plus 12 */
 };
 
 static const char *const roles[N_ROLES] = {"NONE", "CLIENT", "SERVER"}, *const interfaces[N_INTERFACES] = {"ETH",

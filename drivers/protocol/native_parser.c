@@ -183,7 +183,8 @@ static void count_notice(struct native_stats *stats, const struct native_notice 
     stats->restarts += notice->kind == NATIVE_RESTARTED;
 }
 
-/* A frame in order, or after a gap, shows which frames were missing before it. The first one of a sequence doesn't. */
+/* Renews bad_unseen, the broken frames that no gap shows. A frame in order, or after a gap, shows which frames were
+ * missing before it. So only those before the first frame of the sequence remain. */
 static void see_bad(struct native_parser *parser, int is_first)
 {
     if (is_first)

@@ -48,7 +48,7 @@ static void take_head(struct planar_scan *s)
     s->pan0_place = (uint32_t)(h->front - h->first + (int32_t)e->steps) % e->steps;
 }
 
-/* A scan that begins ends the turn at hand. A repeated descriptor may be of the scan that this turn belongs to. */
+/* The descriptor of a new scan ends the turn at hand. A repeated one doesn't: the turn may belong to its scan. */
 static void take_descriptor(struct planar_scan *s, const struct native_descriptor *d, uint8_t flags)
 {
     struct planar_head *h = &s->head;
@@ -57,7 +57,7 @@ static void take_descriptor(struct planar_scan *s, const struct native_descripto
         s->done = 1;
         s->scan_t0_ns = INT64_MIN;
     }
-    /* A recording that is replayed jumps within the scan: the turns between are no loss. */
+    /* A new local descriptor says that a replayed recording jumps within the scan: the turns between are no loss. */
     if ((flags & NATIVE_LOCAL) != 0 && !repeated) s->fresh = s->done = 1;
     s->scan = d->scan;
     s->pan_counts = d->pan_counts_per_turn;
@@ -110,7 +110,7 @@ static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, in
         if (!s->done) news->broken++;
         if (line > next) news->broken += line - next;
     }
-    /* Where turns are missing at a scan's begin and are no loss (fresh), numbers go on without them. */
+    /* Where the first turns of a scan are missing and are no loss (fresh), they get no numbers. */
     if (s->seen && !same_scan) s->number0 += s->line + 1 - (s->fresh ? line : 0);
     s->done = s->fresh && !from_start;
     s->fresh = 0;

@@ -13,7 +13,7 @@
 
 #include "core/newfile.h"
 
-static const uint64_t OUTFILE_RESERVE_AT = (uint64_t)1 << 40; /* beyond any recording, and within what ext4 counts */
+static const uint64_t OUTFILE_RESERVE_AT = (uint64_t)1 << 40; /* beyond any recording, and below ext4's largest file */
 enum { OUTFILE_RESERVE_MOST = 1 << 30 };
 
 void outfile_leave(struct outfile *file)
@@ -190,8 +190,8 @@ void outfile_say_left(const char *path, const struct sh_report *report)
                 part, path);
 }
 
-/* Returns whether file sizes are limited. Room is reserved far beyond the end. Some file systems compare that place
- * with the limit, and the signal ends the program. */
+/* Returns whether file sizes are limited. Room is reserved far beyond the end of the file. Some file systems compare
+ * the place of that room with the limit, and the signal SIGXFSZ would end the program. */
 static int has_limit(void)
 {
     struct rlimit most;

@@ -124,7 +124,7 @@ static int ends_with_block(const struct repair *r, uint64_t from, struct sh_err 
     return rc != SH_OK ? rc : le_get32(first) == n;
 }
 
-/* Checks that only the piece of another block, and then zeros, follow the last whole block. */
+/* Checks that only a piece of one more block, and then zeros, follow the last whole block. */
 static int check_behind(const struct repair *r, const struct packets *p, struct sh_err *err)
 {
     enum { HEAD = 12 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* `scanhead check` prints this about places. In: a loaded site. Out: lines with the anchor, and with each
- * station or stop in every frame that is known: metres and degrees. */
+ * station or stop in every coordinate frame that is known: metres and degrees. */
 #ifndef FIRMWARE_SIM_APP_CHECK_PLACES_H
 #define FIRMWARE_SIM_APP_CHECK_PLACES_H
 

@@ -223,7 +223,7 @@ static void print_help(const struct app_command *command)
 
 /* ---- parsing */
 
-/* The table as getopt_long wants it; a long option's value is FIRST_VALUE and its row. */
+/* Makes the table that getopt_long takes. The value of a long option is FIRST_VALUE plus the number of its row. */
 static void list_options(const struct app_option *row, struct option longs[APP_MAX_OPTIONS + 2], char *letters)
 {
     int n = 0;
@@ -371,15 +371,15 @@ void app_set_help(void (*print)(const struct app_command *command))
 
 /* ---- parsing */
 
-/* Counts all operands, and keeps as many as errors name. */
+/* Counts all operands. It keeps only as many as an error message shows. */
 static void count_operand(char *words[APP_MAX_OPERANDS + 1], int *n, char *word)
 {
     if (*n <= APP_MAX_OPERANDS) words[*n] = word;
     ++*n;
 }
 
-/* One option as getopt gave it, from `word`. APP_OK, or the exit status of an error. *done: the command line
- * ends with it. */
+/* Takes the option that getopt has found in `word`. Returns APP_OK, or the exit status of an error. *done: what follows
+ * on the command line is not read. */
 static int take_option(const struct app_command *command, int opt, const char *word, struct app_input *in, void *values,
                        int *done)
 {

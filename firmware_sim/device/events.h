@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Events on their way into ticks, and errors, of which each session has a limited number of events a second. */
+/* Events that wait for a tick, and errors. A session gets a limited number of events a second for its errors. */
 #ifndef FIRMWARE_SIM_DEVICE_EVENTS_H
 #define FIRMWARE_SIM_DEVICE_EVENTS_H
 
@@ -16,7 +16,7 @@ enum { DEVICE_MAX_PENDING = 256 };
 struct device_errors {
     uint64_t until_tick; /* end of the second at hand */
     uint32_t said;       /* events in that second */
-    uint32_t held;       /* errors since then that no event has reported */
+    uint32_t held;       /* errors that no event has reported yet */
     int last;            /* number of the last one of those */
 };
 enum { DEVICE_ERRORS_A_SECOND = 10, DEVICE_MAX_SESSIONS = (CONFIG_MAX_LINKS + 1) * LINK_MAX_SESSIONS };

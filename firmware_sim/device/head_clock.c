@@ -131,8 +131,8 @@ int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s
     return utc_table_add(&clock->table, *posix_s);
 }
 
-/* Returns the clock's time a nanosecond before t_ns. At a jump it extends the piece backward, for a jump counts as no
- * edge. */
+/* Returns the clock's time a nanosecond before t_ns. A piece that begins with a jump is extended backward, so that the
+ * jump counts as no edge. */
 static int64_t before_ns(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t t_ns)
 {
     const int begins = t_ns == piece->from_ns && piece != clock->piece && piece->change.jump_ns == 0;
@@ -147,7 +147,7 @@ static int find_edge(const struct head_clock *clock, const struct head_clock_pie
     if (from_ns >= to_ns) return 0;
     int64_t s = piece_ns(clock, piece, to_ns - 1) / UTC_SECOND_NS, target_ns = s * UTC_SECOND_NS;
     if (before_ns(clock, piece, from_ns) >= target_ns) return 0;
-    int64_t low_ns = from_ns - 1, high_ns = to_ns - 1; /* before it, and not before it */
+    int64_t low_ns = from_ns - 1, high_ns = to_ns - 1; /* low_ns < edge <= high_ns */
     while (high_ns - low_ns > 1) {
         int64_t mid_ns = low_ns + (high_ns - low_ns) / 2;
         if (piece_ns(clock, piece, mid_ns) < target_ns)

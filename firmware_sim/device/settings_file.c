@@ -203,8 +203,8 @@ static int put_image(const void *source, FILE *out, struct sh_err *why)
     return SH_OK; /* newfile looks for errors of writing */
 }
 
-/* Writes each new image, and the last one before it ends. An image that could not be written is tried once more
- * then. */
+/* Writes each new image. When the file is closed, this thread writes what is new, or tries a failed write once more.
+ * Then it ends. */
 static void *settings_file_main(void *arg)
 {
     struct settings_file *file = arg;

@@ -8,7 +8,7 @@
 /* A fault of the list, with this session's counts. */
 struct wire_fault {
     struct fault_entry entry;
-    uint64_t base[FAULT_N_OF]; /* by counting: items before the fault was added */
+    uint64_t base[FAULT_N_OF]; /* items of each fault_of that came before the fault was added */
     uint64_t hits;
 };
 

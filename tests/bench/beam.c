@@ -110,8 +110,8 @@ static void accuracy(struct beam_rig *rig, const struct sight *sight, const stru
     free(ref);
 }
 
-/* The view's lines are as dense as their pulses. Only a few are cast, in groups of neighbours all over the view. What
- * one line has read is then in the cache for the next, as in a whole scan. */
+/* The view's lines are as far apart as the pulses on a line. Only a few lines are cast, in groups of neighbours all
+ * over the view. The cache then holds for a line what the line before it has read, as in a whole scan. */
 enum { NEIGHBOURS = 20 };
 static uint32_t line_of(const struct beam_view *view, uint32_t i)
 {

@@ -284,8 +284,8 @@ static int add_row(struct raster *r, uint32_t y, const double *height, uint32_t 
     return rc;
 }
 
-/* Adds the triangles between four middles, counter-clockwise seen from above: two, or one where three of them have a
- * height. */
+/* Adds the triangles between the middles of four cells, counter-clockwise seen from above: two triangles, or one where
+ * only three of the cells have a height. */
 static int add_quad(struct raster *r, const uint32_t *above, const uint32_t *below, int is_mirrored, struct sh_err *err)
 {
     const uint32_t round[4] = {above[0], below[0], below[1], above[1]};

@@ -16,7 +16,8 @@ struct ifc_index {
 };
 
 /* ifc_index_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut off, a number
- * that two records have, a reference to a record that is not there. No reader of bodies reports any of these. */
+ * that two records have, a reference to a record that is not there. The programs that read the file's
+ * geometry (ifc_bodies.h) report none of these errors. */
 int ifc_index_open(struct ifc_index *x, const char *path, struct sh_err *err);
 void ifc_index_close(struct ifc_index *x);
 
@@ -37,9 +38,10 @@ int ifc_no_memory(const struct ifc_index *x, struct sh_err *err);
  * False: there is none. */
 bool ifc_next_reference(const char **p, const char *end, uint64_t *id);
 
-/* Compares entries whose first member is their number, or such a number itself. */
+/* Compares two elements of a list by number, for qsort and bsearch. An element is a number, or has one as its first
+ * member. */
 int ifc_compare(const void *a, const void *b);
-/* Finds the first entry of such a sorted list whose number is id or above. Returns its place; n: there is none. */
+/* Finds the first element of such a sorted list whose number is id or above. Returns its place; n: there is none. */
 size_t ifc_first(const void *list, size_t n, size_t size, uint64_t id);
 
 #endif

@@ -28,7 +28,8 @@ export class MeasureTool {
   #table = make('div', {class: 'picked', tabindex: 0, role: 'region', 'aria-label': 'Picked points'});
   #layer = (pen, camera) => this.#draw(pen, camera);
 
-  // expected.ask() gets what the head expects of its points; expected.of(station) returns that, or null.
+  // expected.ask() asks the head for the expected errors of its points. expected.of(station) returns those of a
+  // station, or null.
   constructor(view, names, expected) {
     this.#view = view;
     this.#names = names;
@@ -189,8 +190,8 @@ export class MeasureTool {
     const spacing = Math.max(...m.points.map((p) => p.spacing));
     const isKnown = m.flat ? m.flat.sigma > 0 : Number.isFinite(m.figures[0][2].error);
     if (!isKnown) rows.push(['Expected error', 'not known']);
-    if (!m.flat && Number.isFinite(spacing)) rows.push(['Points apart, mean', millimetres(spacing),
-      'The real edge may lie further out than the picked point, by up to the distance of scan lines, which may be several times this figure']);
+    if (!m.flat && Number.isFinite(spacing)) rows.push(['Mean spacing', millimetres(spacing),
+      'The real edge may lie further out than the picked point, by up to the distance between scan lines, which may be several times this figure']);
     return rows;
   }
 

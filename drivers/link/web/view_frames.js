@@ -10,8 +10,8 @@ import {copyOf} from './picture.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
 const SHOW_MS = 160; // least time between updates of a growing picture; it is also at least twice the time of an update
-const PLAIN = 150_000; // with fewer points per frame, a frame is drawn plain
-const COARSE = 0.5; // this is the scale of such a frame
+const PLAIN = 150_000; // a GPU that draws fewer points in the time of a frame gets plain frames (#plain)
+const COARSE = 0.5; // this is the scale of a plain frame
 const SHADING = 260; // the strength of eye-dome lighting: a factor of differences in logarithmic depth (view_gl.js)
 
 export class Frames {
@@ -37,9 +37,9 @@ export class Frames {
   #photos = []; // these take the next picture on the page
   #seen; // it is the camera of the picture on the page
 
-  // contents is {parts, aim(scale), follow, fit, under(shown), over(camera)}. parts() are those of the stored picture;
-  // under() draws over that picture each time it is shown, and over() on the canvas over it. follow() returns whether
-  // all is to be drawn again.
+  // contents is {parts, aim(scale), follow, fit, under(shown), over(camera)}. parts() are those of the stored picture.
+  // Each time that picture is shown, under(shown) draws the stations and the scene over it, and over(camera) draws the
+  // 2D canvas that lies above both. follow() returns whether all is to be drawn again.
   constructor(view, gl, contents) {
     this.#view = view;
     this.#gl = gl;
@@ -111,7 +111,7 @@ export class Frames {
 
   #frame(now) {
     if (this.#lost) return;
-    if (this.#painter.busy()) { // the GPU is still at it
+    if (this.#painter.busy()) { // the GPU has not finished what was drawn before
       this.#scheduled = true;
       setTimeout(() => {
         this.#scheduled = false;

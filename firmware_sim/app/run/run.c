@@ -90,8 +90,8 @@ static int has_page(const struct config *cfg)
     return is_there && page != NULL;
 }
 
-/* Opens what a page gets beside the stream. Where readers of the web link hold the head back, the observer does so,
- * too, and then sees the whole stream. */
+/* Opens the observer of the stream, from which a page gets more than the stream (page.h). Where clients of the web link
+ * may hold the head back, the observer may do so, too, and then sees the whole stream. */
 static int open_watch(const struct config *cfg, const struct site *site, struct device *device,
                       struct loop_options *loop, struct watch **watch, struct sh_err *err)
 {
@@ -110,7 +110,8 @@ static int open_watch(const struct config *cfg, const struct site *site, struct 
     return page->start(*watch, err);
 }
 
-/* A replayed journal has what was stored, as its first commands. It must not depend on a file that changes. */
+/* A journal begins with commands for the stored settings. So its replay reads no settings file, which may have changed
+ * since. */
 static int open_settings(struct run_options *o, const struct config *cfg, struct sh_err *err)
 {
     if (o->device.replay != NULL)
@@ -139,8 +140,8 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     rc = site_load_for(cfg, has_page(cfg) ? SITE_WRITTEN_OUT : SITE_FOR_SCANS, NULL, &app_report_stderr, &site, err);
     if (rc == SH_OK && o->surfaces != NULL) rc = surfaces_write(o->surfaces, site, err);
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
-    /* The plan above is made with the frames of the configuration, and only now they change. So a journal of this run
-     * gives the same stream when it is replayed without --start. */
+    /* The plan above is made for head.frames of the configuration, and only now the scan gets no end. So a journal of
+     * this run gives the same plan and the same stream when it is replayed without --start. */
     if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = open_settings(o, cfg, err);
@@ -200,10 +201,10 @@ static const struct app_option OPTIONS[] = {
     {APP_KEY, "pace", "PACE", .key = "loop.pace",
      .help = "realtime, fast (as fast as it computes), step (a peer grants time with TIME:STEP)"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(device.duration_s),
-     .help = "end after S seconds of device time, counted from power-up, or with --start from the scan's start, or "
-             "from a self-test that fails before one. With --start the scan continues until then, frame after frame, "
-             "and head.frames of the file is not used. Without --duration and --frames the head runs until it is "
-             "stopped"},
+     .help = "end after S seconds of device time, counted from power-up. With --start they count from the first "
+             "scan's start, or from a self-test that fails before it. The scan continues until then, frame after "
+             "frame, and head.frames of the file is not used. Without --duration and --frames the head runs until it "
+             "is stopped"},
     {APP_KEY, "frames", "N", .key = "head.frames",
      .help = "frames per scan; with --start, end after the first scan, even before --duration"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},

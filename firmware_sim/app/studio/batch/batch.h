@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A campaign: many recordings off line, each of which is a station and values of keys. In: the command line of
- * `batch`. Out: the list of jobs in its fixed order, which of them are done, their files, and the manifests.
+/* A campaign: many recordings off line, each for one station and one combination of values of keys. In: the command
+ * line of `batch`. Out: the list of jobs in its fixed order, which of them are done, their files, and the manifests.
  *
  * Jobs are numbered from 1: all stations of the first combination of values, then all of the next one. A job is a head
  * of its own from power-up on, so that its files don't depend on which jobs ran before it in the same process. One

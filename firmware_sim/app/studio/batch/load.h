@@ -19,7 +19,8 @@ struct batch_loaded {
     int status; /* an exit status, or APP_GO_ON: there is a site. 0: nothing was loaded */
 };
 
-/* APP_GO_ON, or the exit status of a failure: printed when it is new, and the same for each job of the combination. */
+/* Returns APP_GO_ON, or the exit status of a failure. The failure is printed for the first job of a combination.
+ * Further jobs of that combination get the same status. */
 int batch_load(struct batch *b, uint32_t combination, struct batch_loaded *loaded);
 void batch_unload(struct batch_loaded *loaded);
 

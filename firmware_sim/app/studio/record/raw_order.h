@@ -13,9 +13,9 @@
 struct raw_input {
     int is_full; /* it has a piece, of t_ns */
     int64_t t_ns;
-    /* Asked while it is empty: 1, with t_ns, where it has one now; 0: none; or SH_E. */
+    /* Asks an empty input for a piece. Returns 1, with t_ns set, where there is one now; 0: none; or SH_E. */
     int (*take)(struct raw_input *input, struct sh_err *err);
-    /* The piece goes on; the input is empty then. SH_OK or SH_E. */
+    /* Passes the piece on. The input is empty after that. Returns SH_OK or SH_E. */
     int (*pass)(struct raw_input *input, struct sh_err *err);
 };
 
