@@ -61,11 +61,11 @@ END
 check "each operator makes something, and it is C" operators_make_c
 
 # ---- an example with one mutant of each kind
-mkdir -p "$work/tiny/core/tiny" "$work/tiny/tests/unit"
+mkdir -p "$work/tiny/core/tiny" "$work/tiny/firmware_sim" "$work/tiny/tests/unit" "$work/tiny/tests/wire"
 cd "$work/tiny" || exit 1
 cp "$top/tests/rigs.sh" tests/
 cat >Makefile <<'END'
-objects: $(BUILD)/core/tiny/tiny.c.o
+objects: $(BUILD)/core/tiny/tiny.c.o $(BUILD)/core/tiny/text.c.o $(BUILD)/firmware_sim/main.c.o
 $(BUILD)/%.c.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(SAN) -O2 -I. -MMD -MP -fPIC -c $< -o $@
@@ -88,6 +88,30 @@ int tiny_negative(int a)
     return -a;
 }
 END
+cat >core/tiny/text.c <<'END'
+#include <stdlib.h>
+int tiny_text(void);
+int tiny_text(void)
+{
+    char *volatile text = malloc(3);
+    if (text == NULL) return 1;
+    text[2] = 0;
+    free(text);
+    return 0;
+}
+END
+cat >firmware_sim/main.c <<'END'
+int tiny_text(void);
+int main(void) { return tiny_text(); }
+END
+cat >tests/wire/test_tiny.c <<'END'
+#include <stdlib.h>
+int main(void)
+{
+    return system("$SCANHEAD") != 0;
+}
+END
+echo 'for name in tiny; do' >tests/check_sanitized.sh
 cat >tests/unit/test_tiny.c <<'END'
 int tiny_most(int a, int b);
 int tiny_is_of_age(int years);
@@ -97,7 +121,8 @@ int main(void)
 }
 END
 cp -r "$work/tiny" "$work/before"
-tiny() { LINK=cc LIBS='' SHIPPED=CC=cc python3 -B "$top/tests/mutants/run.py" -n 100 -j 2 build >"$work/tiny.out" 2>&1; }
+asan=-fsanitize=address
+tiny() { LINK=cc LIBS='' SHIPPED=CC=cc LINK_SANITIZED="clang $asan" SANITIZED="CC=clang SAN=$asan" python3 -B "$top/tests/mutants/run.py" -n 100 -j 2 build >"$work/tiny.out" 2>&1; }
 whole() {
     tiny
     [ $? = 1 ] || { cat "$work/tiny.out"; return 1; }
@@ -105,6 +130,8 @@ whole() {
 said() { grep -e "$1" "$work/tiny.out" || { cat "$work/tiny.out"; return 1; }; }
 check "the example is tried to its end" whole
 check "what a test sees is found" said '] found .*relation: return a < b ? b : a;  ->  return a > b ? b : a;  by unit/test_tiny'
+check "an error of memory in a command is found by its test with a sanitized head" \
+    said '] found .*bound: char .volatile text = malloc(3);  ->  char .volatile text = malloc(2);  by wire/test_tiny, sanitized'
 check "what is the same code is equivalent" said '] equivalent .*dropped: a |= a;'
 check "what no test sees survives" said '^survived .*relation: return years >= 20;  ->  return years > 20;'
 check "what no test calls is unreached" said '^unreached .*sign: return -a;  ->  return a;'

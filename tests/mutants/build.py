@@ -64,6 +64,11 @@ class Build:
     def link_program(self, objects, target):
         self.link([f"-Wl,-rpath,{self.work}", "-Wl,--enable-new-dtags"], [*objects, f"{self.work}/{LIBRARY}"], target)
 
+    def link_head(self, folder, changed):
+        """Links the head with the library in a folder, whatever LD_LIBRARY_PATH says: a test of another build starts it."""
+        self.link([f"-Wl,-rpath,{folder}", "-Wl,--disable-new-dtags"], [changed.get(MAIN, self.object(MAIN)), f"{folder}/{LIBRARY}"], f"{folder}/head")
+        return f"{folder}/head"
+
     def link(self, options, objects, target):
         """Links again only where an object is newer."""
         newest = max(os.path.getmtime(os.path.join(self.tree.path, name)) for name in objects)

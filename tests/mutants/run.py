@@ -44,10 +44,11 @@ def shown(mutant):
 
 
 class Judge:
-    """`sanitized` is None without clang. As `make test` does, it runs unit tests alone."""
+    """`sanitized` is None without clang. As `make test` does, it runs unit tests, and its head serves the tests of commands."""
 
     def __init__(self, reach, shipped, sanitized):
         self.tree, self.reach, self.shipped, self.sanitized, self.passing = shipped.tree, reach, shipped, sanitized, {}
+        self.commands = trees.tests_of_commands()
         self.workers = queue.SimpleQueue()
         for i in range(self.tree.jobs):
             self.workers.put(f"{self.tree.path}/build/worker-{i}")
@@ -88,41 +89,59 @@ class Judge:
         if not tests:
             return "unreached", []
         units, others = ([test for test in tests if test.startswith("unit/") == is_unit] for is_unit in (True, False))
-        rounds = [(self.shipped, units), (self.sanitized, units), (self.shipped, others)]  # the last take longest
+        commands = [test for test in others if test in self.commands]
+        rounds = [(self.shipped, units), (self.sanitized, units), (self.shipped, others), (self.sanitized, commands)]  # quick ones first
         for build, some in rounds:
             if build is None or not some:
                 continue
             objects = changed if build is self.shipped else {user: build.compile(user, worker) for user in changed}
-            by = self.first_that_fails(build, name, worker, objects, some)
+            if None in objects.values():
+                continue
+            build.link_library(f"{worker}/{build.name}", objects)
+            first = self.first_of_commands if some is commands else self.first_that_fails
+            by = first(build, name, worker, objects, some)
             if by is not None:
                 return "found", [by]
         return "survived", tests
 
     def first_that_fails(self, build, name, worker, changed, tests):
-        if None in changed.values():
-            return None
         env = build.environment(f"{worker}/{build.name}")
-        build.link_library(f"{worker}/{build.name}", changed)
         if trees.MAIN in changed:
             env["SCANHEAD"] = f"{worker}/{build.name}/scanhead"
             build.link_program([changed[trees.MAIN]], env["SCANHEAD"])
         for test in tests:
             program = build.program_with(name, worker, test)
-            if program is not None and self.fails(build, test, program, f"{worker}/log", env):
+            if program is not None and self.fails(test, (program, env), (build.program(test), build.environment()), f"{worker}/log"):
                 return test if build is self.shipped else f"{test}, sanitized"
         return None
 
-    def fails(self, build, test, program, log, env):
-        """Tells whether a test fails because of the mutant: it fails twice, and passes without it. A test that hangs is not run again."""
+    def first_of_commands(self, build, _, worker, changed, tests):
+        """The tests are as shipped, and only the head that they start has sanitizers and the mutant, as in tests/check_sanitized.sh."""
+        env, without = ({**build.environment(), **self.shipped.environment(), "SCANHEAD": build.link_head(folder, objects)}
+                        for folder, objects in ((f"{worker}/{build.name}", changed), (build.work, {})))
+        for test in tests:
+            program = self.shipped.program(test)
+            if self.fails(test, (program, env), (program, without), f"{worker}/log"):
+                return f"{test}, sanitized"
+        return None
+
+    def fails(self, test, mutated, without, log):
+        """Tells whether a test fails because of the mutant: it fails twice, and passes without it. A test that hangs is not run again.
+        Both `mutated` and `without` are (program, environment)."""
         limit_s = LIMIT_S + LIMIT_TIMES * self.reach.tests[test]
-        status, _ = self.tree.run_test(program, limit_s, log, **env)
-        if status == 0 or (status is not None and self.tree.run_test(program, limit_s, log, **env)[0] == 0):
+
+        def status_of(program, env, log):
+            return self.tree.run_test(program, limit_s, log, **env)[0]
+
+        status = status_of(*mutated, log)
+        if status == 0 or (status is not None and status_of(*mutated, log) == 0):
             return False
-        key = (build.name, test)
+        program, env = without
+        key = (program, env.get("SCANHEAD"))
         if key not in self.passing:
-            self.passing[key] = self.tree.run_test(build.program(test), limit_s, f"{log}-without", **build.environment())[0] == 0
+            self.passing[key] = status_of(program, env, f"{log}-without") == 0
             if not self.passing[key]:
-                say(f"{test} fails without a mutant, too, and judges nothing ({build.name})")
+                say(f"{test} fails without a mutant, too, and judges nothing ({program})")
         return self.passing[key]
 
 

@@ -3,6 +3,7 @@
 import fcntl
 import glob
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -76,6 +77,15 @@ def files_below(part):
 def sources():
     """Returns the sources of the product, in order."""
     return sorted(name for part in PRODUCT for name in files_below(part) if name.endswith((".c", ".h", ".cpp")))
+
+
+def tests_of_commands():
+    """Returns the tests whose head `make test` also runs with sanitizers. The script has the list."""
+    try:
+        found = re.search(r"^for name in (.*); do$", read("tests/check_sanitized.sh").decode(), re.M)
+    except FileNotFoundError:
+        return []
+    return [f"wire/test_{name}" for name in found.group(1).split()]
 
 
 class Tree:
