@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead check --scene` prints the objects of the scene as a table. Objects that are not closed, and transparent
+/* `scanhead check --scene` prints the objects of the scene as a table. Open and turned objects, and transparent
  * surfaces, are listed once more by their names. */
 #ifndef FIRMWARE_SIM_APP_CHECK_SCENE_H
 #define FIRMWARE_SIM_APP_CHECK_SCENE_H
