@@ -23,7 +23,8 @@ static void say_linear(const struct georef *georef, struct plan_row *row, double
 {
     int local = georef_crs(georef) == GEOREF_LOCAL;
     plan_say(row, "georef", local ? "none" : "rotation", error_m, 0.0,
-             local ? "points stay in the scene frame" : "ECEF is a rotation, and one matrix with the head's rotation");
+             local ? "points stay in the scene frame"
+                   : "ECEF is a rotation; one matrix does this and the head's rotation together");
 }
 
 static void leave_out(const struct georef *georef, const struct plan_georef_need *need, enum georef_method chosen,
