@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Assimp reads and writes the meshes that the project doesn't know itself. It is loaded late (core/late.h). */
+/* Assimp reads and writes the mesh formats for which the project has no code of its own. It is loaded late
+ * (core/late.h). */
 #ifndef CORE_ASSIMP_LIB_H
 #define CORE_ASSIMP_LIB_H
 

@@ -19,7 +19,8 @@ void body_begin(struct body_sum *s, const double min_m[3], const double max_m[3]
 void body_add_triangle(struct body_sum *s, const double corner[3][3]);
 /* An edge of a triangle in its direction. Edges that lie twice in the body, once in each direction, may be left out. */
 void body_add_edge(struct body_sum *s, const double a[3], const double b[3]);
-/* An estimate of the area that would close the body. Rounding leaves some 1e-7 of the area that was added. */
+/* Returns an estimate of the area that would close the body. For a closed body, rounding leaves about
+ * 1e-7 of area_m2. */
 double body_open_m2(const struct body_sum *s);
 
 #endif

@@ -4,7 +4,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-/* Some terminals take U+0080 to U+009F, in UTF-8 0xc2 and a byte, for commands, too. */
+/* Some terminals take U+0080 to U+009F for commands, too. In UTF-8 these are 0xc2 and one more byte. */
 static int is_high_control(const char *c)
 {
     return (unsigned char)c[0] == 0xc2 && (unsigned char)c[1] >= 0x80 && (unsigned char)c[1] < 0xa0;

@@ -27,8 +27,8 @@ struct schedule_spec {
     int64_t line_start_udeg, line_stop_udeg; /* cast window, both ends included; a sphere's may cross azimuth 0 */
     int64_t pan_start_udeg, pan_stop_udeg;
     uint32_t frames; /* 0: without end */
-    /* NULL: a line head. With an emitter the pan stands still, and line angles count from azimuth 0, those of a
-     * planar head as emitter_step_udeg counts. prr_uhz is then steps * lines_uhz; for beams it has no effect. */
+    /* NULL: a line head. With an emitter the pan stands still. Line angles then count from azimuth 0, in a planar head
+     * from its front step (emitter_step_udeg). prr_uhz is then steps * lines_uhz; for beams it has no effect. */
     const struct emitter *emitter;
 };
 
@@ -63,12 +63,12 @@ struct schedule_run {
     int64_t t0_ns, line_t0_ns;
     double mirror0_turn, mirror_turn_per_r; /* mirror = mirror0 + (r + j*num) * per_r, j from 0 */
     uint64_t r, num;
-    double pan0_turn, pan_step_turn; /* pan = pan0 + (in_line + j) * step, of the line's first pulse */
+    double pan0_turn, pan_step_turn; /* pan = pan0 + (in_line + j) * step; pan0 is that of the line's first pulse */
     uint64_t ns_acc, ns_rem, ns_den; /* dt(j) = j*ns_quot + floor((ns_acc + j*ns_rem) / ns_den) */
     int64_t ns_quot;
     /* The table of beams or directions, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings:
      * mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r + firing[i].pan_turn.
-     * A head of beams fires pulse j d ticks after the run's first one, so d replaces j in dt above:
+     * In a head of beams, pulse j fires d(j) ticks after the run's first pulse. There d(j) replaces j in dt above:
      * d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick.
      * A list of directions has a pulse each tick: its sequence_ticks is 0, and dt holds as it stands. */
     const struct emitter_firing *firing;

@@ -20,8 +20,8 @@
 
 struct sight;
 
-/* A map leaves triangles to the BVH that fewer rays than this meet, unless larger ones are in their group. Examining a
- * triangle costs as much as it saves for this many rays. */
+/* The map leaves a group of triangles to the BVH where it gets fewer rays than this for each of its triangles.
+ * Examining a triangle costs as much as it saves for this many rays. */
 #define SIGHT_GROUP_RAYS 64.0
 
 struct sight_spec {

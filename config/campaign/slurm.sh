@@ -4,8 +4,8 @@
 #
 #   sbatch --array=1-16 slurm.sh CONFIG -o DIR [options of scanhead batch]
 #
-# SCANHEAD: the program (default: scanhead of PATH). SHARDS: the number of shards, where the array is only some of them.
-# Task I is then shard I, as for tasks that are done again: SHARDS=16 sbatch --array=3,7 ...
+# SCANHEAD: the program (default: scanhead of PATH). SHARDS: the number of all shards, if the array has only some.
+# With SHARDS, task I does shard I. So single shards can be done again: SHARDS=16 sbatch --array=3,7 ...
 #SBATCH --job-name=scanhead
 #SBATCH --array=1-16
 #SBATCH --cpus-per-task=4

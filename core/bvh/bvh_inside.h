@@ -8,26 +8,27 @@
  * can't change that sign, vectors compute it in single precision (meet.c). Else it is computed again in double
  * (edges.h), in one way for both triangles of the edge. Both then get the same number with opposite signs, so no ray
  * passes between them. A ray that misses a triangle by less than the rounding at its edges meets that triangle, unless
- * it meets something nearer. So nothing passes at corners, either, nor where a corner lies on another's edge up to
- * rounding.
+ * it meets something nearer. So nothing passes at corners, either. The same holds where a corner of one triangle
+ * lies on an edge of another one, to within rounding.
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). The nearest of the triangles that a ray
  * meets is the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever
  * order they were tried. Where the order may have mattered, the ray is cast again from the nearest range on
  * (packet.c).
  *
- * Why no leaf is left out. Embree works in float. In units of 2^-24 its ray lies off the real one by at most 2 |o| +
- * |h| where it meets something at h, both counted from the BVH's origin: the rounding of the ray's origin, and of its
- * direction over the range, which is |o| + |h| at most. Embree's test of a box is the fast one for such geometry,
- * whatever the scene's flags say (3.13 and 4.4): with the reciprocal of a direction, its products and their difference
- * it errs by up to 7 units of the range. Together that is at most 9 |o| + 8 |h|. The boxes are larger than their
- * triangles by 8 (2 r + |h|), r being the radius of the scene. R is BVH_STRETCH_M. Where 9 R + 17 |h| is less than
- * that, boxes are larger by 9 R + 17 |h| instead, and float rays are at most R long: then |o| is at most |h| + R. A hit
- * makes tfar the next float above its range. At that range the real ray is at its triangle. So the float ray is in the
- * triangle's box there, and has entered that box at a shorter range. Rays begin at most 1.5 r from the scene's middle:
- * a ray from further away is moved along its direction until it is that near (hits.c). So nothing here depends on where
- * rays begin. Large triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that
- * origin is where most triangles are, else in the middle.
+ * Why no leaf is left out. Embree works in float. Errors are in units of 2^-24 here. o is the start of a ray and h its
+ * hit, both counted from the BVH's origin. At h Embree's ray is at most 2 |o| + |h| away from the real ray. One |o| is
+ * the rounding of the start. The rest is the rounding of the direction over the range, which is at most |o| + |h|.
+ * Whatever the scene's flags say, Embree (3.13 and 4.4) uses its fast test of a box for such geometry. This test
+ * multiplies by the reciprocal of the direction, and errs by up to 7 times the range. Together that is at most 9 |o| +
+ * 8 |h|. The boxes are larger than their triangles by 8 (2 r + |h|), where r is the radius of the scene. R is
+ * BVH_STRETCH_M. Where 9 R + 17 |h| is smaller, boxes are larger by this instead, and float rays are at most R long:
+ * then |o| is at most |h| + R. A hit makes tfar the next float above its range. At that range the real ray is at its
+ * triangle. So the float ray is in the triangle's box there, and has entered that box at a shorter range. A ray from
+ * outside of the sphere of radius r about the BVH's origin starts further along its direction (hits.c). If it can hit
+ * anything, its start is then at most 1.5 r from that origin. So nothing here depends on where rays begin. Large
+ * triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that origin is where most
+ * triangles are, else in the middle.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. Its copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches one is turned into the mesh's frame in double, and cast

@@ -17,7 +17,7 @@
 struct search {
     const struct bvh *bvh;
     const double *p;
-    double slack_m; /* of the float frame, for this point */
+    double slack_m; /* how far rounding to float may move this point */
     double best_m;
     struct distance_hit *hit;
     int found;
@@ -91,7 +91,7 @@ static float query_radius(double radius_m, double slack_m)
 static void visit_triangle(struct search *s, uint32_t triangle)
 {
     const struct scene *scene = s->bvh->scene;
-    double corner[3][3], nearest[3] = {0}; /* squares of the largest numbers are infinite: no edge is nearer then */
+    double corner[3][3], nearest[3] = {0}; /* where squares overflow to infinity, no edge sets nearest */
     for (int i = 0; i < 3; i++)
         vec3_sub(scene->vertex_m[scene->triangle[triangle][i]], s->p, corner[i]);
     const double d = nearest_on_triangle(corner, nearest);

@@ -57,8 +57,8 @@ static double held_range(double v[3][3], const double dir[3], double range_m)
     return range_m < lo || isnan(range_m) ? lo : range_m > hi ? hi : range_m;
 }
 
-/* Notes a triangle that the ray misses by no more than double precision resolves at its edges. Of several, the
- * nearest counts; of equally near ones, that with the lowest number. */
+/* Notes a triangle that the ray misses by no more than the rounding of double at the triangle's edges. If there are
+ * several, the nearest one counts; if some are equally near, the one with the lowest number does. */
 static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
     if (!(range_m > query->at_origin_m) || range_m > query->near_m[lane]) return;

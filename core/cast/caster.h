@@ -25,9 +25,10 @@ struct caster {
     uint8_t body[CHUNK];
     struct echo_list list;
     /* touched only where the head moves, or is not ideal: */
-    struct chunk_vectors socs, read; /* in the head's frame. read: the beams as encoders read them, or their origins */
-    struct chunk_vectors origin;     /* of beams that don't begin where the head is, prcs */
-    struct path_rays paths;          /* touched only where there is glass or a mirror */
+    struct chunk_vectors socs;   /* directions of beams in the head's frame */
+    struct chunk_vectors read;   /* directions that the encoders read; with an instrument's offsets, origins of beams */
+    struct chunk_vectors origin; /* of beams that don't begin where the head is, prcs */
+    struct path_rays paths;      /* touched only where there is glass or a mirror */
     uint32_t secondary_a[CAST_LIST], secondary_b[CAST_LIST], secondary_c[CAST_LIST]; /* echoes for the block */
 };
 

@@ -51,11 +51,11 @@ struct job {
 };
 
 struct sub_ray_work {
-    float steep[CHUNK];                /* of an adaptive beam's central rays */
-    struct beam_near candidate[CHUNK]; /* pulses to look at */
-    struct beam_near reach[CHUNK];     /* with glass or mirrors: those near outlines */
-    uint32_t near[CHUNK], n_near;      /* those with sub-rays, in order */
-    uint32_t again[CHUNK], n_again;    /* those that hit glass or a mirror: whole footprints */
+    float steep[CHUNK];                /* 1 / cos^2 of the incidence of central rays (adaptive) */
+    struct beam_near candidate[CHUNK]; /* pulses that may need sub-rays */
+    struct beam_near reach[CHUNK];     /* pulses near outlines, where there is glass or a mirror */
+    uint32_t near[CHUNK], n_near;      /* pulses with sub-rays, in order */
+    uint32_t again[CHUNK], n_again;    /* pulses that hit glass or a mirror: whole footprints */
     struct job job[MAX_JOBS];
     uint32_t n_jobs;
     int scattered; /* the pool's rays have nothing in common */
@@ -74,7 +74,7 @@ struct sub_ray_work {
 /* ---- sub_rays.c: puts the echoes of a chunk's footprints into the list, with rho where something asks for it. */
 void caster_sub_rays(struct caster *c, const struct chunk *k);
 
-/* ---- sub_ray_plan.c: jobs, their sub-rays at the end of the pool. */
+/* ---- sub_ray_plan.c: plans jobs, and puts their sub-rays at the end of the pool. */
 /* Adds sub-rays over the whole footprint. */
 void plan_whole(struct caster *c, const struct chunk *k, struct job *job);
 /* Adds the rays that a pulse needs, given the outlines up to limit_m. known: the number of outlines that its rays were

@@ -9,7 +9,7 @@
 #include "core/vec3.h"
 
 enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
-#define NEAREST_M 0.02 /* nearer pieces of edges are left out: they are near to most directions */
+#define NEAREST_M 0.02 /* nearer pieces of edges are left out: most cells would list them */
 #define PIECE     0.1  /* length of the longest piece of an edge, as a share of its distance */
 
 /* Count into first[c + 1]; write at first[c]++; mark in around. */
@@ -83,7 +83,9 @@ static void draw_piece(struct draw *d, const double p[3], const double q[3], dou
     for (uint32_t face = 0; face < 6; face++) {
         int axis = (int)face / 2, ua = (axis + 1) % 3, va = (axis + 2) % 3;
         double sign = face % 2 == 0 ? 1.0 : -1.0, zp = sign * p[axis], zq = sign * q[axis];
-        double least = 0.35 * range_m; /* a face's corner is at 0.577; a piece is short */
+        /* Along the face's axis, a point seen at a corner of the face has 0.577 of its distance. 0.35 leaves room
+         * for a footprint or a short piece that reaches beyond the face. */
+        double least = 0.35 * range_m;
         if (zp < least || zq < least) continue;
         double a[2] = {p[ua] / zp, p[va] / zp}, b[2] = {q[ua] / zq, q[va] / zq};
         /* on the face an angle appears larger by 1 / cos^2 from its middle */

@@ -7,7 +7,7 @@
 
 struct scene_build;
 
-/* Fills b as a reader does. Needs the whole process: Assimp's logger is global. */
+/* Fills b as a reader does. No other thread of the process may use Assimp meanwhile, since its logger is global. */
 int import_assimp(struct scene_build *b, struct sh_err *err);
 
 #endif

@@ -63,7 +63,7 @@ static int read_facet(struct stl *s, const char *p, struct sh_err *err)
 static int read_binary(struct stl *s, struct sh_err *err)
 {
     const uint32_t n = le_get32(s->t.data + COUNT_AT);
-    const uint64_t size = binary_size(&s->t); /* now: text_drop_read gives back the memory with the count */
+    const uint64_t size = binary_size(&s->t); /* taken before text_drop_read frees the count */
     int rc = begin_solid(s, (struct text_span){"", 0}, err);
     if (rc == SH_OK) rc = build_weld_begin(s->b, &s->weld, 3 * (uint64_t)n + 1, err);
     if (rc == SH_OK) rc = build_reserve(s->b, 0, n, err);

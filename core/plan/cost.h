@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Costs of methods, to compare them: rounded ns on one core. To get them again: `make bench-beam` measures
  * single rays, sub-rays and the adaptive beam (house, wires, foliage), `make bench` stages, `make chart`
- * ways to georeference. Sub-rays cost 65 ns in a house and 105 ns among leaves. A pulse that outlines cut
- * costs 0.2 to 2.2 us. */
+ * ways to georeference. Sub-rays cost 65 ns in a house and 105 ns among leaves. A pulse whose
+ * footprint is cut by an outline costs 0.2 to 2.2 us. */
 #ifndef CORE_PLAN_COST_H
 #define CORE_PLAN_COST_H
 
@@ -22,11 +22,11 @@
 
 /* ---- a ray's first hit, and the map of core/sight (build/bench --only-sight) */
 
-/* Costs of the BVH, by how many rays Embree takes at once: for a hit, for a miss, and extra for a ray near a border,
- * beyond which rays hit another triangle, since the rays of a packet then go to more leaves. They come from the bench's
- * column `without` (no map) of house, garden and terrain, 1 to 22.5 million pulses. `hit` and `miss` are costs where
- * such rays are rare; `border` times the share of such rays is added. For packets of 8 and 4 all three follow the
- * ratios of Embree's packets in the chart. */
+/* Costs of the BVH for a ray, by how many rays Embree takes at once. `hit` and `miss` are the costs where few rays are
+ * near a border. Rays beyond a border hit another triangle, so a packet with such rays goes to more leaves. For this,
+ * `border` times the share of rays near a border is added. The costs come from the bench's column `without` (no map) of
+ * house, garden and terrain, 1 to 22.5 million pulses. For packets of 8 and 4 all three follow the ratios of Embree's
+ * packets in the chart. */
 struct plan_ray_cost {
     uint32_t packet;
     double hit, miss, border;

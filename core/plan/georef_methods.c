@@ -23,7 +23,8 @@ static void say_linear(const struct georef *georef, struct plan_row *row, double
 {
     int local = georef_crs(georef) == GEOREF_LOCAL;
     plan_say(row, "georef", local ? "none" : "rotation", error_m, 0.0,
-             local ? "points stay in the scene frame" : "ECEF is a rotation, and one matrix with the head's rotation");
+             local ? "points stay in the scene frame"
+                   : "ECEF is a rotation; one matrix does this and the head's rotation together");
 }
 
 static void leave_out(const struct georef *georef, const struct plan_georef_need *need, enum georef_method chosen,
@@ -74,8 +75,8 @@ int plan_georef(const struct georef *georef, const struct plan_georef_need *need
                       : *method != GEOREF_EXACT         ? "the cheapest that meets the tolerance"
                       : georef_has_geoid(georef)        ? "the geoid is interpolated for each point"
                                                         : "no polynomial meets the tolerance";
-    snprintf(row->why, sizeof row->why, "%s: %.3g m within %.5g m, %.5g m up or down", why, need->tolerance_m,
-             need->radius_m, need->height_m);
+    snprintf(row->why, sizeof row->why, "%s: %.3g m for points up to %.5g m away, %.5g m up or down", why,
+             need->tolerance_m, need->radius_m, need->height_m);
     return SH_OK;
 }
 

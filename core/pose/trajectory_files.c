@@ -10,11 +10,11 @@
 #include "core/csv.h"
 #include "core/pose/trajectory.h"
 
-static const double STEP_S = 0.02;  /* of the samples that way-points are turned into */
-static const double STEP_M = 0.01;  /* likewise, where that is longer */
+static const double STEP_S = 0.02;  /* between the samples that way-points become */
+static const double STEP_M = 0.01;  /* between these samples, where the platform needs longer than STEP_S for it */
 static const double LEG_PARTS = 64; /* a leg may have this many, however short: a cubic curve needs them */
 static const double SLOWEST_M_S = 1e-3;
-static const double LATEST_S = 4e9; /* differences fit into 63 bits of nanoseconds, and the year 2096 since 1970 */
+static const double LATEST_S = 4e9; /* the year 2096, in seconds since 1970; differences fit into 63 bits of ns */
 
 struct samples {
     struct pose_sample *at;
@@ -207,7 +207,8 @@ static double along(double f, int from_rest, int to_rest)
     return f + f * g * (f * to_rest - g * from_rest);
 }
 
-/* The number of parts of the way after point i: STEP_S each, or STEP_M where that is longer. */
+/* Returns the number of parts of the way after point i. A part takes STEP_S, or the time for STEP_M where that is
+ * longer. A way may have LEG_PARTS parts even if they are shorter than STEP_M. */
 static size_t leg_parts(const struct trajectory *curve, size_t i)
 {
     if (i + 1 >= curve->n) return 1;
@@ -225,7 +226,8 @@ struct walk {
     double heading_rad; /* of the last sample */
 };
 
-/* Adds the sample of time t_s: the curve at curve_s, heading as from d before to d after it. */
+/* Adds a sample at time t_s. Its place is that of the curve at curve_s, its heading is that of the way from curve_s - d
+ * to curve_s + d. */
 static int put_sample(struct walk *w, double curve_s, double t_s, double d, struct sh_err *err)
 {
     struct pose_sample *s = add_sample(&w->out);

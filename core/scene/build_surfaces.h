@@ -33,15 +33,15 @@ void build_forget_surfaces(struct scene_build *b);
  * counted. */
 void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4]);
 
-/* The range of floating colours is judged by these counts. Zero-initialise. */
+/* A file may have colours as real numbers, from 0 to 1 or from 0 to 255. These counts show which. Zero-initialise. */
 struct build_rgb_range {
     double largest;
     uint64_t n_above, n_between; /* above 1; between 0 and 1 */
 };
 void build_rgb_look(struct build_rgb_range *range, double number);
-/* The factor that takes colours to 0..255: 255, or 1 where they go up to 255 already. They do where one is 2 at least,
- * and more are above 1 than between 0 and 1: rounding leaves numbers just above 1, and few colours are brighter than
- * white. */
+/* Returns the factor that takes colours to 0..255: 1 where the file's numbers already go up to 255, else 255. The
+ * numbers go up to 255 where the largest is at least 2, and more of them are above 1 than between 0 and 1. In a file
+ * from 0 to 1, rounding may leave numbers just above 1, and few colours are brighter than white. */
 double build_rgb_scale(const struct build_rgb_range *range);
 
 #endif

@@ -90,7 +90,8 @@ static void clip(struct triangulate *t, uint32_t i, uint32_t *n_out)
     t->at[i].next = i;
 }
 
-/* No ear is left: take a corner without area (nothing is lost), else the polygon crosses itself. */
+/* No ear is left. A corner without area is taken, since nothing is lost by it. Where there is none, the polygon crosses
+ * itself, and a convex corner is taken. */
 static uint32_t forced_corner(struct triangulate *t, uint32_t start)
 {
     uint32_t convex = start, i = start;

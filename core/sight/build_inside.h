@@ -37,8 +37,8 @@ struct build_group {
     uint8_t beside; /* a bit for each face that shows nothing of it */
 };
 
-/* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. What they
- * mean and are scaled by: struct sight_record. */
+/* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. They have the
+ * meaning and the scale of those in struct sight_record. */
 struct build_candidate {
     union {
         double edge[3][3];

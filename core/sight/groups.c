@@ -137,7 +137,7 @@ int build_groups(struct build_shared *b, struct sh_err *err)
     return SH_OK;
 }
 
-/* near_m is that of the box's nearest point. The rounding of its squares loses less than 1e-12. */
+/* near_m is the distance of the box's nearest point, less 1e-12 of it. The rounding of the squares is smaller. */
 void build_group_candidate(const struct build_group *g, uint32_t face, struct build_candidate *c)
 {
     double rect[2][2], near2 = 0.0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/sight: the map of directions, and the triangles that rays of it are decided among.
+/* Private to core/sight: the map of directions, and its lists of triangles, one of which a ray may hit.
  *
  * A direction d belongs to the face of the cube that its largest component points through: face
  * 2 * axis + (d[axis] < 0). There it has the coordinates u = d[axis + 1] / |d[axis]| and
@@ -8,7 +8,8 @@
  * and takes its extremes over a square at the corners.
  *
  * Two kinds of such functions matter for a triangle a, b, c (corners relative to the station). The side of
- * an edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range.
+ * an edge, (a x (b - a)) . d, is positive inside; and plane . d = 1 / range. The doubt of such a function is a
+ * bound of its rounding error, per unit length of d.
  *
  * A face has cells x cells squares, in tiles of SIGHT_TILE x SIGHT_TILE. A tile is one leaf, or a block of
  * leaves. A look-up may round a direction's coordinates: each leaf is valid for SIGHT_PAD beyond its own
@@ -32,9 +33,8 @@
  * that holds them, with the margin of regions. Behind as a whole: by the box's nearest point. Where a group is not left
  * out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that covers the square
  * (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A few are decided ray by ray with the same doubts (candidate_list.c).
- * Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover nor hide. A doubt
- * bounds the rounding error of such a function, per unit length of a ray. A ray whose largest component is 1 is up to
- * sqrt(3) long: over squares they count twice. */
+ * Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover nor hide. Over a
+ * square each doubt counts twice, since there d has a largest component of 1 and is up to sqrt(3) long. */
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 
@@ -66,7 +66,7 @@ static inline enum sight_kind sight_kind(uint32_t leaf)
     return (enum sight_kind)(leaf >> SIGHT_KIND_SHIFT);
 }
 
-/* A triangle of a list, as rays are decided. d is the ray's unit vector. Where q = plane . d:
+/* A triangle of a list, in the form that decides whether a ray hits it. d is the ray's unit vector, and q = plane . d:
  * - inside for certain: all of edge[k] . d >= 1. Outside for certain: one is <= -1. (Edges are divided by
  *   what double precision leaves in doubt, here and in core/bvh together.)
  * - certainly not hit, or not to be decided here: q < graze, or q > SIGHT_NEAR.
@@ -81,8 +81,8 @@ struct sight_record {
 } __attribute__((aligned(128)));
 
 /* The doubt of an edge's side, relative to the distance of its farther end times its length. It is 10 units
- * of 2^-53 here: the difference of the corners 1, the cross product 6, the product with a direction 3. As
- * many come from core/bvh, and 8 more within which core/bvh takes a missed edge for nearly hit. */
+ * of 2^-53 here: the difference of the corners 1, the cross product 6, the product with a direction 3. core/bvh
+ * adds as many. It also takes a ray for a near miss up to 8 units beyond an edge. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
 /* The doubt of a . (b x c), relative to the product of their lengths, here and in core/bvh together. */
 #define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)

@@ -22,12 +22,13 @@
  * range; with cos i = |n u| a move of the point by m changes the deviation by (n m) / (n u):
  *     range noise      sigma0 + sigma1 R, or by the signal (core/detect.h)
  *     angle noise      R sigma |n e| / cos i, e: the direction in which the angle moves the beam
- *     ball             f_k |n_k| radius / sqrt(5) / cos i over its axes: a ball's uniform points have r^2/5 an axis
+ *     ball             f_k |n_k| radius / sqrt(5) / cos i for each axis k of the ball: points that fill a ball evenly
+ *                      have the variance r^2 / 5 along an axis
  * The steps of counts add to that. They are summed separately, since they are no noise:
  *     of encoders      as angle noise of sigma = step / sqrt(12)
  *     of positions     step / sqrt(12) / cos i; of polar ranges without the cosine
- * This holds where all places within a count are equally likely. Angles of a schedule need not be: their part is from
- * 0 to sqrt(3) times that.
+ * This holds where all places within a count are equally likely. The angles of a schedule may repeat a few places: then
+ * the sigma of their rounding is from 0 to sqrt(3) times that of the formula.
  * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
  * instrument.
  *
@@ -67,8 +68,9 @@ struct deviation_points {
 int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err);
 void deviation_points_free(struct deviation_points *points);
 
-/* Fills `out`. head: [compared->site->n_stations]. Labels from n_surfaces on are of
- * bodies that move: they get ranges alone. All threads; the result doesn't depend on them. SH_ESTOPPED. */
+/* Fills `out`. head: [compared->site->n_stations]. Labels from n_surfaces on are of bodies that move: their points get
+ * ranges alone. The function uses all threads; the result doesn't depend on their number. Returns SH_ESTOPPED after a
+ * stop. */
 int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
                     const struct sh_report *report, const struct deviation_points *out, struct sh_err *err);
 
@@ -77,7 +79,7 @@ struct deviation_hit {
     double range_m, beam[3], normal[3]; /* unit vectors, prcs */
     int32_t label;                      /* of the surface; -1: the power that comes back is not known */
 };
-/* Returns the expected sigma there, by noise. *counts_m: the part of counts, if all places within one are as likely. */
+/* Returns the expected sigma there, by noise. *counts_m: the part of counts, for equally likely places in a count. */
 double deviation_sigma_m(const struct deviation_head *head, const struct deviation_hit *hit, double *counts_m);
 
 /* These figures give a client the same sigma. Amplitudes count in units of the threshold. */

@@ -146,7 +146,7 @@ static int has_long_table(const uint8_t *bytes, size_t n)
         const uint8_t *table = marker + 4; /* after the segment's length */
         for (ptrdiff_t codes = 0; end - table > 1 && table[0] >> 4 <= 1 && (table[0] & 15) <= 3; table += 17 + codes) {
             codes = 0;
-            for (int i = 1; i <= 16 && i < end - table; i++) /* beyond the end it reads zeros */
+            for (int i = 1; i <= 16 && i < end - table; i++) /* stb_image reads zeros beyond the end */
                 codes += table[i];
             if (codes > 256) return 1;
             if (end - table <= 17 + codes) break;

@@ -7,7 +7,7 @@
 #include "core/digits.h"
 #include "core/waveform/waveform_inside.h"
 
-/* sigma of a Gaussian of width 1, full at half maximum */
+/* sigma of a Gaussian whose full width at half maximum is 1 */
 #define SIGMA_1 0.42466090014400953
 /* Beyond this many sigmas a Gaussian is below 1e-9 of its peak. */
 #define GAUSSIAN_END 6.5
@@ -176,8 +176,8 @@ int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse 
 {
     const struct outgoing o = outgoing_of(spec);
     const double sigma_s = receiver_sigma_s(spec->bandwidth_hz), end_s = GAUSSIAN_END * sigma_s;
-    const double length =
-        ceil((o.to_s - o.from_s + 2.0 * end_s) / spec->sample_s) + 2.0; /* the edge is a sample or less */
+    /* Of the 2 samples more, one has room for the EDGE_STEPS before the pulse, and one comes after it. */
+    const double length = ceil((o.to_s - o.from_s + 2.0 * end_s) / spec->sample_s) + 2.0;
     if (length > WAVEFORM_MAX_SAMPLES)
         return sh_fail(err, SH_EINPUT, "the pulse is %.0f samples of %.4g ns long; at most %d are allowed", length,
                        1e9 * spec->sample_s, WAVEFORM_MAX_SAMPLES);

@@ -27,7 +27,7 @@ const char *scanhead_version(void)
 }
 
 /* Tries to open a source until the deadline, as long as it isn't there. wrong_too: also as long as its name seems
- * wrong, because it was right once. */
+ * wrong, for a source that was open before. */
 static int open_in_time(const char *source, int wrong_too, int64_t deadline_ns, struct host_source *out,
                         struct sh_err *err)
 {

@@ -24,8 +24,8 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
         !(d.mirror_counts_per_turn >= 1 && d.pan_counts_per_turn >= 1 && d.range_scale_m > 0))
         return bad(sh, "a polar descriptor without scales");
     if (d.n_surfaces > SCANHEAD_NO_LABEL) return bad(sh, "a descriptor with more surfaces than labels");
-    /* The anchor of another scan may be that of another station; a descriptor that is not a repetition begins
-     * a scan. */
+    /* The anchor at hand stays valid only if this descriptor repeats the last one. After any other descriptor
+     * comes another anchor, which may be that of another station. */
     int same_scan = sh->have_descriptor && sh->descriptor.scan == d.scan && (header->flags & NATIVE_REPEAT) != 0;
     if (!same_scan) {
         sh->have_anchor = sh->have_pulse = 0;
@@ -66,10 +66,10 @@ static void forget(struct scanhead *sh)
 }
 
 /* Forgets the state where another sequence of numbers begins: the head has started again, or recordings were put one
- * after the other. The parser hands out a number that goes back only there. The state is kept in two cases. First, the
- * new sequence may have begun with frames equal to earlier ones. The parser dropped them as repeated, and the state
- * already has what they say. Second, a descriptor for this reader alone (LOCAL) may have come just before. The state
- * since then is that of the new sequence. */
+ * after the other. The parser drops repeated and late frames. So a number that goes back means another sequence. The
+ * state is kept in two cases. First, the new sequence may have begun with frames equal to earlier ones. The parser
+ * dropped them as repeated, and the state already has what they say. Second, a descriptor for this reader alone (LOCAL)
+ * may have come just before. The state since then is that of the new sequence. */
 static void follow_sequence(struct scanhead *sh, const struct native_header *header)
 {
     const uint64_t repeated = sh->parser.stats.repeated;

@@ -182,7 +182,7 @@ static int ask_source(const struct sockaddr_storage *to, socklen_t len, struct s
     return ok ? 0 : -1;
 }
 
-/* Whether a receiver is on this machine, where packets to it come from `from`. */
+/* Returns whether a receiver is on this machine. The system sends packets to it from the address `from`. */
 static int is_own_machine(const struct sockaddr_storage *to, const struct sockaddr_storage *from)
 {
     struct sockaddr_storage a = *to, b = *from;
@@ -249,7 +249,7 @@ static int bind_source(int fd, const struct link_spec *spec, const struct sockad
 {
     const int one = 1;
     const int own = spec->source_port != 0 && is_same_place(from, to);
-    errno = EADDRINUSE; /* for a receiver with this very address, where bind() is not tried */
+    errno = EADDRINUSE; /* if the receiver has this very address, bind() is not tried */
     if (spec->source_port != 0) setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &one, sizeof one);
     if (!own && bind(fd, (struct sockaddr *)from, len) == 0) return 0;
     if (spec->source_port == 0 || !spec->usual_port || errno != EADDRINUSE) return -1;

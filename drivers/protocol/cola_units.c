@@ -54,7 +54,8 @@ uint32_t cola_head_scale(const struct planar_head *head)
     return head->range_max_m * 1000.0 > MOST_DISTANCE ? 2 : 1;
 }
 
-/* 1024 counts a dB, that is 0.25 dB for each count of the upper byte. A reflectance of -64 dB is 0. */
+/* 1024 counts a dB, that is 0.25 dB for each count of the upper byte. Reflectances count from -64 dB. An echo has at
+ * least 1, since 0 means that neither amplitude nor reflectance is modelled. */
 uint16_t cola_echo_signal(const struct planar_echo *echo)
 {
     int32_t cdb = echo->amplitude_cdb;

@@ -46,7 +46,7 @@ enum native_type {
     NATIVE_ATTRIBUTES = 9, /* amplitude and width of the points in the frame before */
     NATIVE_EMITTER = 10,   /* how the head's beams are arranged; after the descriptor, unless it is a line head */
     NATIVE_COLOURS = 11,   /* a colour for each of the points in the last points frame */
-    NATIVE_WAVES = 12,     /* waveforms of its pulses: native_waves.h */
+    NATIVE_WAVES = 12,     /* waveforms of the pulses in the last points frame: native_waves.h */
 };
 
 enum native_flags {
@@ -109,7 +109,7 @@ struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams o
     uint64_t sequence_ns_num, sequence_ns_den; /* num / den ns is the time of a firing sequence (beams) or a pulse */
     int64_t first_ring_udeg; /* sphere: elevation of ring 0, rounded; the others follow by 180 deg / gaps */
     uint32_t echoes;         /* enum native_echoes: which echoes of a pulse are sent */
-    uint32_t gaps;           /* sphere: gaps between rings from pole to pole, where not all are scanned. 0: rings - 1 */
+    uint32_t gaps; /* sphere: gaps from ring to ring, pole to pole, if some rings are not scanned; 0: rings - 1 */
 };
 enum native_echoes {
     NATIVE_ECHOES_ALL = 0,

@@ -46,8 +46,8 @@ static void forget(struct native_sequence *s)
         s->gap[i].n = 0;
 }
 
-/* Whether late frames in a row are another sequence: if a head started again while many frames were lost, all its new
- * numbers may be missing ones. */
+/* Whether late frames in a row are another sequence. If a head started again while many frames were lost, each new
+ * frame may have the number of a lost one, so it seems late. */
 static int is_run(struct native_sequence *s, uint32_t seq)
 {
     s->late_run = s->late_run > 0 && seq == s->last_late + 1 ? s->late_run + 1 : 1;

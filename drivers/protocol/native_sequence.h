@@ -34,7 +34,7 @@ enum native_notice_kind {
 
 enum {
     NATIVE_SEEN = 256,       /* frames that a repeated one is compared with */
-    NATIVE_GAPS = 64,        /* ranges of missing frames that a late one may be of */
+    NATIVE_GAPS = 64,        /* ranges of missing frames: a frame in one of them is late */
     NATIVE_GAP_MOST = 65536, /* frames in such a range: a larger one is not remembered */
     NATIVE_LATE_RUN = 256,   /* late frames with consecutive numbers, which together are another sequence */
 };

@@ -36,7 +36,7 @@ struct scip {
     struct protocol_host host;
     const struct protocol_identity *identity;
     const struct scip_model *model;
-    uint32_t features; /* enum scip_feature, with its firmware */
+    uint32_t features; /* enum scip_feature: those of the model with this firmware */
     int64_t now_ns;
     int64_t epoch_ns, epoch_us_ns; /* when the time stamp is 0, and when the one in microseconds is */
     int64_t laser_ns;              /* since when the laser is on */

@@ -9,10 +9,10 @@
 
 #include "drivers/protocol/protocol.h"
 
-/* The document of a path, at device time t_ns, ended by a NUL: its length; or 0 where there is none. cap
- * 2048. */
+/* Writes the document of a path, as it is at device time t_ns, into dst, ended by a NUL. Returns its length; 0: the
+ * path has no document. cap: the size of dst, 2048 for the longest document. */
 size_t velodyne_page(const struct protocol_spec *spec, const char *path, int64_t t_ns, char *dst, size_t cap);
-/* Whether a path has one. */
+/* Whether a path has a document. */
 int velodyne_has_page(const char *path);
 
 #endif

@@ -6,7 +6,7 @@
  * about 110 bytes each, and triangles with 12, two a point.
  *
  * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of
- * the file) by itself. So is each sweep of the pan. Where lines go back, another part begins, too. */
+ * the file) by itself. So is each sweep of the pan. Where line numbers go back, another part begins, too. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

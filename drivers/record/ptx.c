@@ -17,7 +17,7 @@
  * Places without a shot are bounded, so that a small stream never makes a huge file. A grid has no more lines,
  * and pulses in a line, than the descriptor says a scan can have. All grids of a recording together, also in
  * files of their own, are filled up by PADDING_FREE places and PADDING_PER_SHOT more for each shot. Where more
- * is missing, or lines go back, another grid begins with the same pose: no point is lost, and the grids are
+ * is missing, or line numbers go back, another grid begins with the same pose: no point is lost, and the grids are
  * reported. */
 #include <math.h>
 #include <string.h>

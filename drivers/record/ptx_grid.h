@@ -61,7 +61,7 @@ int ptx_grid_drain(struct ptx_grid *grid,
 /* Empties the file; to be called once the text is in the recording. */
 int ptx_grid_clear(struct ptx_grid *grid, struct sh_err *err);
 
-/* ---- for a repair. spool, at its begin, and path are set, and nothing else. */
+/* ---- for a repair: the caller has set path, and spool, which is at its begin; all other members are 0. */
 
 /* 1: the file holds a grid; *head and the size are set, and *cut is the number of bytes at its end that are no cell. 0:
  * the file holds no grid. SH_EFORMAT: it is damaged. */

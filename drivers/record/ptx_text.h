@@ -7,7 +7,8 @@
 #include "drivers/record/outfile.h"
 #include "drivers/record/ptx_grid.h"
 
-enum { PTX_ROWS_MAX = 1 << 22 }; /* of a grid, whose column is held in memory: 160 MiB. Heads have up to 550,000 */
+/* One column of a grid is held in memory: 160 MiB for so many rows. Heads have up to 550,000 rows. */
+enum { PTX_ROWS_MAX = 1 << 22 };
 
 /* The line of a shot without echo, without and with colours. */
 extern const char ptx_text_empty[2][17];
@@ -17,7 +18,7 @@ struct ptx_text {
     struct ptx_grid *grid;
     const struct station_pose *pose;
     int coloured;
-    const struct sh_report *report; /* progress, and its stop gives up; may be NULL */
+    const struct sh_report *report; /* takes progress, and may ask to stop; NULL: none */
     /* out */
     uint64_t n_points;
     /* inner state */

@@ -47,7 +47,7 @@ struct recorder_options {
     struct colour_choice colour; /* for formats that hold a colour */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    uint32_t n_heads;            /* heads that scan in turn; one that scans again after another counts again. 0: 1 */
+    uint32_t n_heads;            /* turns of heads: one that scans again after another counts again; 0 stands for 1 */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     int las_wdp;   /* waveforms of .las go to a .wdp beside it */
@@ -67,7 +67,7 @@ struct recorder_options {
 struct recorder_scan {
     uint32_t station;
     int moves, is_geo, in_degrees;
-    double place_m[3]; /* of the head; of one that moves, in the geo layout, the anchor */
+    double place_m[3]; /* of the head; in the geo layout the place of the anchor */
     double range_max_m, scale_m;
     double n_shots; /* at most; infinity: not known */
 };

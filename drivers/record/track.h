@@ -159,7 +159,8 @@ int track_beam(const struct track *track, int i, double beam[3]);
 int track_flush(struct track *track, struct sh_err *err);
 void track_free(struct track *track);
 
-/* GPS time of the present scan's start, seconds since 1980-01-06: 1, or 0 where it is not known (yet). */
+/* Sets *gps_s to the GPS time of the present scan's start, in seconds since 1980-01-06. Returns 1, or 0 where the time
+ * is not known (yet). */
 int track_start_gps(const struct track *track, double *gps_s);
 
 #endif

@@ -138,8 +138,8 @@ void ffs_pipes_complete(struct ffs_pipes *pipes, struct usb_transfer *transfer)
 }
 
 /* Whether a slot that the kernel gave back unused has to rest. On an endpoint that is down the kernel would give it
- * back at once again. A slot from before the present start says nothing about the endpoint. After another failure the
- * slot is used again, unless FFS_MAX_FAILURES come in a row. */
+ * back at once again. A slot from before the present start says nothing about the endpoint. After a failure for
+ * another reason the slot is used again, unless FFS_MAX_FAILURES come in a row. */
 static int has_to_rest(const struct ffs_pipes *pipes, struct ffs_slot *slot, int64_t result)
 {
     const int is_down = result == -EAGAIN || result == -ESHUTDOWN || result == -ENODEV;

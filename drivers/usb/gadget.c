@@ -169,7 +169,8 @@ static int write_string(const char *dir, const char *file, const struct usb_mode
     return index != 0 ? sysfile_write(dir, file, "%s", model->string[index - 1]) : 0;
 }
 
-/* This and the next two end with the first step that fails, and errno is that step's: each step needs those before. */
+/* In this function and the next two, each step needs the steps before it. The first step that fails ends the function,
+ * and sets errno. */
 static int write_os_descriptors(const char *dir, const struct usb_model *model)
 {
     return sysfile_write(dir, "os_desc/use", "1") ||

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead check --scene` prints this: the objects of the scene as a table, and those that are open by name. */
+/* `scanhead check --scene` prints the objects of the scene as a table. Open and turned objects, and transparent
+ * surfaces, are listed once more by their names. */
 #ifndef FIRMWARE_SIM_APP_CHECK_SCENE_H
 #define FIRMWARE_SIM_APP_CHECK_SCENE_H
 

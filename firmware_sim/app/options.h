@@ -25,7 +25,7 @@ enum app_option_kind {
     APP_TEXT,      /* sets a const char * */
     APP_NUMBER,    /* sets a double, from min to max */
     APP_WHOLE,     /* sets a long, from min to max */
-    APP_OUTPUT,    /* the same, of a descriptor that the program was started with and can write to */
+    APP_OUTPUT,    /* sets a long: a descriptor that the program was started with and can write to */
     APP_KEY,       /* stands for a configuration key */
     APP_SET,       /* any configuration key */
     APP_CALL,      /* calls apply */
@@ -47,7 +47,7 @@ struct app_option {
     double min, max;
     const char *word;     /* WHOLE: a word that is allowed, too, and gives APP_WORD; NULL: none */
     const char *key;
-    const char *const *choices; /* words that it takes, which a shell completes; NULL: others, or those of the key */
+    const char *const *choices; /* words that it takes, which a shell completes; NULL: any, or the key's words */
     size_t n_choices;
     enum app_use file;          /* of each option that names a file (outputs.c) */
     int (*apply)(void *values, const char *text); /* APP_OK, or APP_USAGE with the reason printed */
@@ -114,7 +114,7 @@ struct app_input {
     const struct app_option *options; /* those of the command */
     uint64_t given;                   /* a bit for each of their rows */
     int n_options;                    /* that were given, --help aside */
-    int alone;                        /* an APP_ALONE was: there are no operands */
+    int alone;                        /* 1: an APP_ALONE option was given: there are no operands */
     struct app_sets sets;
     struct app_file file[APP_MAX_FILES];
     int n_files;
@@ -153,7 +153,7 @@ int app_usage(const struct app_command *command, const char *fmt, ...) __attribu
 /* Finds the one of `n` words that may have been meant. NULL: none is near. */
 const char *app_nearest(const char *word, const char *const *known, size_t n);
 
-/* What follows the command's name in its usage line: operands, needed options, [options]. */
+/* Writes the usage line from after the command's name into buf: operands, needed options, [options]. */
 void app_arguments(const struct app_command *command, char *buf, size_t len);
 
 #endif

@@ -56,7 +56,7 @@ static void print_line(const char *stage, const char *method, const double figur
     printf("%-8s %-22s %8s %8s %6s  %s\n", stage, method, shown[0], shown[1], shown[2], why);
 }
 
-/* Whether neither is measured, for the same reason: it is then printed once. */
+/* Returns whether neither method is measured, for the same reason. The reason is then printed once. */
 static int is_like(const struct plan_option *a, const struct plan_option *b)
 {
     return isnan(a->error_m) && isnan(b->error_m) && strcmp(a->why_not, b->why_not) == 0;

@@ -135,8 +135,8 @@ static const struct cfg_key profile_keys[] = {
     {KEY(pan_sigma_deg), CFG_REAL, "deg", "0", 0, 1, FIGURE, .help = "One sigma of the noise of the pan angle."},
     {"reaches", .type = CFG_LIST, .min = 0, .max = DETECT_MAX_REACHES, .offset = offsetof(struct config_profile, reach),
      .size = sizeof(struct config_reach), .count_offset = offsetof(struct config_profile, n_reaches),
-     .help = "Ranges up to which targets are seen, by reflectance; range_max_m on 0.9 when there are none. Programs "
-             "with reach_90_m use that instead."},
+     .help = "Ranges up to which targets are seen, by reflectance. Without reaches, a target of reflectance 0.9 is "
+             "seen up to range_max_m. Programs with reach_90_m use that instead."},
     {"reaches[]", .type = CFG_MAP, .help = "Written { reflectance: R, range_m: V, from: data sheet|quoted|assumed }."},
     {REACH(reflectance), CFG_REAL, NULL, NULL, 0.001, 1, .help = "Reflectance of the target: Lambertian, head on."},
     {REACH(range_m), CFG_REAL, "m", NULL, 0.1, 1e5, .help = "Range where half of the pulses still detect it."},
@@ -159,7 +159,8 @@ static const struct cfg_key profile_keys[] = {
     {"programs[].range_min_m", PROGRAM(range_min_m), CFG_REAL, "m", "", 0, 1e5, FIGURE,
      .help = "Shortest range; range_min_m of the head when not given."},
     {"programs[].used_hz", PROGRAM(used_uhz), CFG_MICRO, "Hz", "", 1, 1e7, FIGURE,
-     .help = "Pulses per second that fall into the field of view; within 2 % of prr_hz times its share of the sweep."},
+     .help = "Pulses per second that fall into the field of view; within 2 % of prr_hz times that field's share of the "
+             "sweep."},
     {KEY(accuracy_m), CFG_REAL, "m", "0", 0, 10, FIGURE,
      .help = "Accuracy of ranges, fixed part: shown, never drawn as noise. 0: not known."},
     {KEY(accuracy_ppm), CFG_REAL, "ppm", "0", 0, 1e4, FIGURE, .help = "Accuracy of ranges, part per distance."},

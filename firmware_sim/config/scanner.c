@@ -13,7 +13,7 @@
 uint32_t cfg_station_at(const struct config *cfg, uint32_t number)
 {
     const uint32_t n = cfg->n_stations;
-    if (n == 1) return 0; /* it has all stops of a trajectory */
+    if (n == 1) return 0; /* this station has all stops of a trajectory */
     /* Without a trajectory stops go through all stations in order, again and again. */
     return cfg->platform.kind == PLATFORM_STOPS && n > 0 ? (number - 1) % n : number - 1;
 }

@@ -86,7 +86,7 @@ struct device_work {
     int cut_short;                         /* the scan stops at pulse_end, within a line */
     uint32_t station;
     uint32_t station_scan; /* number of the scan among that station's since power-up, from 1 */
-    size_t stretch;        /* of a trajectory: the one of the last anchor */
+    size_t stretch;        /* number of the path's stretch that the last anchor is for */
     uint32_t echoes;       /* enum beam_select */
     uint32_t waves;        /* 1: waveforms are sent */
     uint32_t n_poses;      /* live: the head's poses of this tick; 0: the head stands still or follows a trajectory */
@@ -212,7 +212,8 @@ void device_report(void *self, int number, const char *text);
 int device_power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
 
 /* The GNSS receiver (receiver_line.h). device_next_fix_ns: when its first sentence at or after t_ns arrives; INT64_MAX:
- * none does. The other gives the last one that had arrived at t_ns, at the head's place then. 0: there is none. */
+ * none does. device_fix gives the fix of the last sentence that had arrived at t_ns. Its place is where the head was at
+ * the time of the fix. Returns 0 if there is none. */
 int64_t device_next_fix_ns(void *self, int64_t t_ns);
 int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second, and the time since the top of the hour, at a device time that was claimed (pps.h). */

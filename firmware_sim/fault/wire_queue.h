@@ -21,11 +21,11 @@ struct wire_piece {
     int open;              /* it waits for frames that go into its write */
     uint32_t act;          /* of WIRE_ACT: enum fault_kind; n and for_ms go with it */
     uint32_t n;
-    double for_ms; /* of WIRE_PAUSE: its length, from when it is the first */
-    int started;   /* of WIRE_PAUSE: it has begun, and lasts until not_before_ns */
-    int of;        /* held until frame number `after` in this counting has come; after 0: until not_before_ns */
-    uint64_t after;
-    int64_t t_ns; /* device time of the frame */
+    double for_ms;  /* of WIRE_PAUSE: its length, from when it is the first */
+    int started;    /* of WIRE_PAUSE: it has begun, and lasts until not_before_ns */
+    int of;         /* enum fault_of: the counting in which `after` is a number */
+    uint64_t after; /* held until that frame has come; 0: held until not_before_ns */
+    int64_t t_ns;   /* device time of the frame */
     /* counted as written once the whole piece is: */
     uint32_t frames;
     uint64_t pulses;
@@ -48,7 +48,8 @@ int wire_queue_put(struct wire_queue *queue, struct wire_piece *piece);
 void wire_queue_hold(struct wire_queue *queue, struct wire_piece *piece);
 /* The last piece no longer waits for more frames. */
 void wire_queue_close(struct wire_queue *queue);
-/* The frame of that number has come. Pieces that were held for it, and those from before t_ns, go to the end. */
+/* A frame has come, with its number in the counting `of`. Pieces that were held for this frame or an earlier one go to
+ * the end, and so do held pieces of frames from before t_ns (device time). */
 int wire_queue_pass(struct wire_queue *queue, int of, uint64_t number, int64_t t_ns);
 /* Held pieces whose time has come go to the end. */
 int wire_queue_let_go(struct wire_queue *queue, int64_t now_ns);

@@ -30,7 +30,7 @@ double cost_add(struct cost_figures *figures, const struct cost_sample *now);
 /* A thread that takes a sample every second. The loop starts and joins it. */
 struct cost_watch;
 struct loop;
-/* After the casters were started. NULL: nobody is to be warned, or no thread could be started. */
+/* Call it after the casters were started. NULL: nobody is to be warned, or no thread could be started. */
 struct cost_watch *cost_watch_start(struct loop *loop);
 void cost_watch_join(struct cost_watch *watch);
 

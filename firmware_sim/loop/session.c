@@ -130,8 +130,8 @@ void session_shut(struct pump *pump, struct session *s)
     if (s->open) leave_when_done(pump, s);
 }
 
-/* Whether something is still due to the client. In the native protocol the stream is due up to the tick from which on
- * the head waits for a command, and so are replies. */
+/* Whether something is still due to the client. In the native protocol replies are due, and so is the stream up to the
+ * tick at which the head begins to wait for a command. */
 static int owes(const struct pump *pump, const struct session *s)
 {
     const struct loop_source *source = pump->links->source;

@@ -190,7 +190,7 @@ static void take_answer(struct time_client *c)
 
 /* ---- the thread */
 
-/* Milliseconds until the next thing to do, rounded up; -1: nothing is. */
+/* Returns the milliseconds until a request is due or the wait for an answer ends, rounded up; -1: neither will. */
 static int wait_ms(const struct time_client *c, int64_t now_ns)
 {
     const int64_t at_ns = c->ask_ns < c->give_up_ns ? c->ask_ns : c->give_up_ns, most_ms = 1000000;

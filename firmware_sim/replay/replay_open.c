@@ -118,7 +118,7 @@ static int check_faults(const struct config *cfg, struct sh_err *err)
     return SH_OK;
 }
 
-/* Takes the firmware of its profile: other protocols report it, and the stream does not have it. */
+/* Takes the firmware from the profile of the recorded head: other protocols report it, and the stream lacks it. */
 static void take_firmware(struct config *cfg)
 {
     struct config_profile *profile = calloc(1, sizeof *profile);

@@ -4,8 +4,8 @@
  * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end
  * the head released it. Most frames have that time in their header. For points it follows from their pulses: a head
  * releases packets of SCHEDULE_PACKET pulses, counted from the line's first, once the last pulse of a packet has fired.
- * Where a line, or the scan, ends within a packet, a later frame gives the time. A live platform that was stepped has
- * no packets: its points may come a tick later than they did.
+ * Where a line, or the scan, ends within a packet, a later frame gives the time. In the pace `step` a head
+ * on a live platform does not wait for whole packets. Its points may then be assigned a tick too late.
  *
  * The time is exact from the scan's start until the rates change, since the stream then says exactly when pulses fire.
  * After that, and where frames are missing, it is good to a nanosecond, and about one frame in a million may be

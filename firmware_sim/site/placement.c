@@ -53,9 +53,9 @@ static int find_ifc(const struct config *cfg, const struct config_mesh **out, st
     return sh_fail(err, SH_EINPUT, "%s: scene.anchor: source ifc, but no mesh is an .ifc file", cfg->file);
 }
 
-/* Returns the height of a model above the ellipsoid: that of the configuration, else that of the file. The file's
- * counts from the sea, and is taken as it is, with a warning. height_m: of the file; NaN: it has none, and 0 is
- * returned. */
+/* Returns the height of a model above the ellipsoid: that of the configuration, else height_m of the file. Files give
+ * heights above sea level. They are taken without a conversion, with a warning. height_m NaN: the file has no height,
+ * and 0 is returned. */
 static double ifc_height(const struct config *cfg, const struct sh_report *report, const char *file, const char *what,
                          double height_m)
 {

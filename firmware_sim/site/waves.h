@@ -19,7 +19,7 @@ struct site_wave_room {
 
 struct site_waves {
     struct waveform *waveform;
-    struct beam beam; /* of single rays, too */
+    struct beam beam; /* the head's beam; single rays need it, too */
     struct cast_waves cast;
     struct site_wave_room usual; /* of a usual pulse */
 };
@@ -39,7 +39,7 @@ struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulse
 /* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
 double site_wave_bytes_s(const struct site *site);
 /* Makes a block of so many pulses and points, with what the site's output has of attributes, colours, waveforms, and
- * deviations of echoes that are found in these. Prepares the caster for waveforms. */
+ * deviations of the echoes found in waveforms. Prepares the caster for waveforms. */
 int site_make_block(const struct site *site, uint32_t n_pulses, uint32_t n_points, struct caster *caster,
                     struct line_block *block, struct sh_err *err);
 

@@ -190,7 +190,7 @@ static void texts(void **state)
     static const char whole[] = "138000 # a coarse scan of 1.2 s, a line every 0.15 deg; higher rates and a slower pan "
                                 "make it finer\n  lines_hz: 200\n  pan_deg_s: 30\n";
     static const char anchor[] =
-        "  anchor: {source: geotiff} # EPSG:32633; height_m: height of its 0 above the ellipsoid\n";
+        "  anchor: {source: geotiff} # EPSG:32633; height_m: height of the raster's 0 above the ellipsoid\n";
     expect_text(&t, whole, anchor,
                 "inside, 1.75 m above a floor; 42 % of the view hits something\n"
                 "  - {name: inside, position_m: [1.5000, 2.5000, 3.5000], heading_deg: 0}",

@@ -278,7 +278,7 @@ static void test_refused(void **state)
         {{"--height", "3", "--candidates", csv}, {"--height: allowed only with --grid"}},
         {{"--step-deg", "2"}, {"--step-deg: allowed only with --grid or"}},
         {{"--step-deg", "2", "--grid", "1", "--set", "head={profile: hokuyo-urg-04lx}"},
-         {"--step-deg: with head profile hokuyo-urg-04lx", "allowed without it"}},
+         {"--step-deg: head profile hokuyo-urg-04lx", "leave --step-deg out"}},
         {{"--scans", "2"}, {"--scans: allowed only with --grid"}},
         {{"--grid", "1", "--at", "0,0,1"}, {"--at 0,0,1:", "X0,Y0,X1,Y1"}},
         {{"--grid", "1", "--at", "1,0,0,1"}, {"--at 1,0,0,1:", "the lower number"}},

@@ -25,7 +25,7 @@ struct ifc_readings {
     struct sh_err web_said, lite_said; /* why there is none; code 0: it was not asked */
 };
 
-/* Whether node and both readers are there; else why not: a phrase. */
+/* Returns whether Node.js and both readers are installed. If not, `why` gets the reason, as a phrase. */
 bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, size_t size);
 
 /* Writes a reader's error with the reader's name, without the file's name and without advice. */

@@ -219,8 +219,8 @@ static double known_unit_m(double m, double model_m)
     return NAN;
 }
 
-/* Scale has to convert the model's unit to MapUnit, except for the map's own scale. 1 says nothing: it also stands for
- * a Scale that is left out. */
+/* Scale has to be the factor from the model's unit to MapUnit, up to 1 % for the map's own scale. A Scale of 1 says
+ * nothing, since it also stands for one that is left out. */
 static int check_scale(struct reader *r, double scale, double expected)
 {
     char what[128];

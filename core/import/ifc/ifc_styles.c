@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Styles of surfaces: IfcStyledItem, and the records that it refers to. Readers of bodies give colours; the names are
- * only here. */
+/* Styles of surfaces: IfcStyledItem, and the records that it refers to. The readers of bodies (README.md) give the
+ * colour of a part, but not the name of its style. So the name is found here, by the colour. */
 #include "core/import/ifc/ifc_styles.h"
 
 #include <math.h>

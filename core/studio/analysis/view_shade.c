@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Depths as surfaces, and light on them. */
+/* Shades a picture of points: closes holes between them, smooths their depths to surfaces, and lights these. */
 #include <math.h>
 #include <stdlib.h>
 

@@ -21,8 +21,8 @@
 #define STEP_NS INT64_C(1000000)
 #define PI      3.14159265358979323846
 
-/* The car drives clockwise on a circle about the middle of the street. The head is in front of its middle, on its roof;
- * the walls are at x = +-20 m (lockstep.yaml, street.obj). */
+/* The car drives clockwise on a circle about the middle of the street. The head is on the car's roof, in front of the
+ * car's middle. The walls are at x = +-20 m (lockstep.yaml, street.obj). */
 static const double SPEED_M_S = 5.0, RADIUS_M = 8.0, MOUNT_M[3] = {0.0, 0.5, 1.8}, WALL_M = 20.0;
 
 /* The largest error of a point: the head takes the car along a chord of 1 ms (speed^2 / radius * step^2 / 8: 0.39 um);

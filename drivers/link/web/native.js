@@ -121,7 +121,7 @@ export class Decoder {
       case EVENT: return this.#event(Object.assign(readEvent(view), own));
       case SURFACES: return this.on.names?.(readNames(view));
       case POSES: return this.#poses(readPoses(view));
-      default: this.stats.unknown++; // of later heads
+      default: this.stats.unknown++; // a later head may send types that this page doesn't know
     }
     return undefined;
   }

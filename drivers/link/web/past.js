@@ -24,7 +24,7 @@ function readHead(bytes) {
 
 export class Past {
   stats = {past_points: 0, past_pulses: 0, past_gone: 0, past_lost_frames: 0};
-  unplaced = {points: 0, shots: 0}; // so many points of live frames were left to a /past that is missing
+  unplaced = {points: 0, shots: 0}; // counts of live frames that were left to /past, where the head has no /past
   #left = {points: 0, shots: 0}; // these are live frames that are left to /past
   #give;
   #hasRoom;
@@ -78,7 +78,8 @@ export class Past {
     this.#isReading = false;
   }
 
-  /** Returns whether a live frame goes to its decoder; canPlace comes from the decoder. */
+  /** Returns whether a live frame goes to the decoder of live frames. canPlace: whether that decoder can place
+   * points. */
   takes(frame, canPlace) {
     if (this.#url === null || frame.flags & LOCAL) return true;
     const {seq} = frame;
@@ -167,7 +168,7 @@ export class Past {
       past_lost_frames: head.lost_frames});
   }
 
-  // The head stores nothing, as older heads: live frames that were left to /past stay without a place.
+  // The head has no /past, like all older heads: live frames that were left to /past stay without a place.
   #hasNone() {
     this.unplaced.points += this.#left.points;
     this.unplaced.shots += this.#left.shots;

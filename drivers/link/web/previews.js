@@ -17,7 +17,7 @@ export async function ask(path, signal) {
   }
 }
 
-// Joins names and numbers; those that are null are left out, and the head takes its own.
+// Joins names and numbers to a path. Numbers that are null are left out; the head then uses its defaults.
 export function pathOf(name, values) {
   const words = Object.entries(values).filter(([, value]) => value !== null && value !== undefined);
   return `/${name}?${words.map(([key, value]) => `${key}=${value}`).join('&')}`;

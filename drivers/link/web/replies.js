@@ -96,7 +96,7 @@ export class Replies {
     one.reject(error);
   }
 
-  // Lines that were sent after it are given up with it, since their replies can no longer be told apart.
+  // Lines that were sent after the late one are given up, too, since their replies can no longer be told apart.
   #late(one) {
     const waits = this.#waiting.indexOf(one);
     const words = `no reply within ${one.timeout_s} s`;

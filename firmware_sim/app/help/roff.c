@@ -9,7 +9,7 @@ void roff_put(const char *text, size_t n)
 {
     static const char marks[] = "\\-'`^~"; /* roff takes these for something else than themselves */
     static const char *const instead[] = {"\\e", "\\-", "\\(aq", "\\(ga", "\\(ha", "\\(ti"};
-    if (n > 0 && text[0] == '.') fputs("\\&", stdout); /* or it is a request */
+    if (n > 0 && text[0] == '.') fputs("\\&", stdout); /* else roff takes the line for a request */
     for (size_t i = 0; i < n; i++) {
         const char *mark = strchr(marks, text[i]);
         if (mark != NULL)

@@ -22,7 +22,7 @@ struct watch;
 struct watch_options {
     double cpu_share;         /* of a processor, for looking at points; 0: no limit, and no low priority */
     int waits;                /* 1: the observer holds back the paces fast and step, and so sees everything */
-    struct device *device;    /* whose scans they are; is to be closed after the watch */
+    struct device *device;    /* the head whose scans are observed; to be closed after the watch */
     uint32_t scene_triangles; /* the most in the page's /scene, without bodies that move */
     const struct sh_report *report;
 };

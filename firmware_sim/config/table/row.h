@@ -48,9 +48,9 @@ struct cfg_key {
     const char *const *names;      /* enum: by value, NULL at the end */
     size_t count_offset;
     int flags;
-    unsigned of;         /* bit by kind of its link, platform or emitter: these have the key; 0: all have it */
-    unsigned of_backend; /* of a key of USB links, the same by back end */
-    int needed;          /* the kinds that have it need it */
+    unsigned of;                    /* bits of the kinds of link, platform or emitter that have the key; 0: all kinds */
+    unsigned of_backend;            /* for keys of USB links: bits of the back ends that have the key; 0: all */
+    int needed;                     /* the kinds that have the key need it */
     const char *const *definitions; /* of a figure: the words of enum beam_definition */
     size_t definition_offset;
     const char *example; /* a value for the example, where there is no default */

@@ -143,8 +143,8 @@ static int spread_directions(struct coverage_finder *f, struct sh_err *err)
     return rc;
 }
 
-/* For heads whose beams lie in planes or on cones, rays are some of their pulses, and a cell that one hits counts as a
- * whole. */
+/* The beams of a planar head lie in one plane, and those of the emitter `beams` lie on cones. So the rays are some of
+ * the head's pulses, and each cell of a surface that a ray hits counts with its whole area. */
 static int draw_directions(struct coverage_finder *f, struct sh_err *err)
 {
     struct coverage_scan_at at;
@@ -172,8 +172,8 @@ static int choose_directions(struct coverage_finder *f, struct sh_err *err)
     const int of_pulses = kind == EMITTER_PLANAR || kind == EMITTER_BEAMS;
     if (of_pulses && f->o->step_given)
         return sh_fail(err, SH_EINPUT,
-                       "--step-deg: with head profile %s, which scans planes or cones, places are compared by its "
-                       "pulses; allowed without it",
+                       "--step-deg: head profile %s scans planes or cones, so places are compared by its pulses; leave "
+                       "--step-deg out",
                        site_profile(f->site)->name);
     int rc = of_pulses ? draw_directions(f, err) : spread_directions(f, err);
     f->next->directions = f->n_dir;

@@ -114,7 +114,8 @@ static void put_scene(const struct init_text *t, FILE *out)
     fprintf(out, "\n      up: %s # %s\n", t->mesh->up == SCENE_UP_Y ? "y" : "z", t->mesh->up_from);
     fprintf(out, "      scale: %.7g # metres per unit; %s\n", t->mesh->scale, t->mesh->scale_from);
     if (t->mesh->crs[0] != '\0')
-        fprintf(out, "  anchor: {source: geotiff} # %s; height_m: height of its 0 above the ellipsoid\n", t->mesh->crs);
+        fprintf(out, "  anchor: {source: geotiff} # %s; height_m: height of the raster's 0 above the ellipsoid\n",
+                t->mesh->crs);
 }
 
 /* A mesh file can't decide which surfaces are glass, so the line is a comment, whose # the user may remove. */

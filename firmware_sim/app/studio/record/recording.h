@@ -31,7 +31,8 @@ struct recording_options {
     int (*prepare)(void *ctx, uint32_t station, struct sh_err *err);
     /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-    /* About once a second or more often, also while no frames come. NULL: not called. A negative SH_E as of frame. */
+    /* About once a second or more often, also while no frames come. NULL: not called. A negative SH_E ends the
+     * recording. */
     int (*second)(void *ctx, struct sh_err *err);
     void *ctx;
     /* Asked often: non-zero ends the recording in good order. NULL: never. */

@@ -251,8 +251,8 @@ static void put_words(FILE *out, const struct report *r)
         "<dt>Judged</dt><dd>Points on smooth faces whose deviation is caused by noise alone: no other surface is "
         "nearer than about eight times their expected noise. Up to about 400,000 are taken, evenly.</dd>\n"
         "<dt>Expected</dt><dd>The RMS deviation along the beam that follows from the configured noise (of ranges, angles "
-        "and places) and from the counts of encoders and numbers. It is worked out for each judged point from its range "
-        "and incidence.</dd>\n"
+        "and places) and from rounding: of angles by the encoders, of coordinates on the wire. It is worked out for "
+        "each judged point from its range and incidence.</dd>\n"
         "<dt>Bound</dt><dd>Noise with a normal distribution has no bound. Without it no point may be farther from "
         "the scene than the sum of these: the errors that the plan allows, half a count per axis of the numbers on the "
         "wire, and half a count of the encoders.</dd>\n",

@@ -81,7 +81,7 @@ static const char NOTES[] =
     "\n"
     "Along the beam: the line from the station through a point is followed to the scene. Measured minus exact\n"
     "range is given for points on smooth faces, away from edges. The column `expected` has the RMS that noise and\n"
-    "the counts of encoders and numbers give.\n"
+    "the rounding of angles and coordinates give.\n"
     "The last line says whether the points are as good as expected: without noise each point must be within its\n"
     "bound (that of the plan, and half a count on each axis); with noise the RMS of deviation over sigma must be 1.\n"
     "For heads that moved there are only distances, which are not judged. With noise or a footprint only points on\n"

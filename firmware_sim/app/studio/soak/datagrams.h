@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The client of a link that sends datagrams. What it gets is compared with what a second link of the same protocol
- * sends, which has no faults. */
+/* The client of a link that sends datagrams. The datagrams are compared with those of a second link, which has the
+ * same protocol and no faults. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_SOAK_DATAGRAMS_H
 #define FIRMWARE_SIM_APP_STUDIO_SOAK_DATAGRAMS_H
 

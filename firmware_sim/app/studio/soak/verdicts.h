@@ -17,7 +17,8 @@ struct verdicts {
     const char *json, *junit;                     /* NULL: none */
 };
 
-/* Where sheets go: standard output, or standard error where --json or --truth has that. */
+/* Returns where sheets go: to standard output, or to standard error where --json or --truth writes to standard
+ * output. */
 FILE *verdicts_out(const struct verdicts *verdicts);
 /* Returns SH_EINPUT where the configuration has no link of that number, from 1. 0 is allowed: none is named. */
 int soak_check_link(const struct config *cfg, uint32_t number, struct sh_err *err);

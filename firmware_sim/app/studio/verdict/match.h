@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Compares a client's points with those of the head. In: both, and which of the head's frames each session was sent.
- * Out: how many of the client's points no pulse had, and how many it has more often than the head sent them. */
+/* Compares a client's points with those of the head. In: both, and which stream frames the head sent to each session.
+ * Out: how many of the client's points agree with no point of the head, and how many points the client has more often
+ * than the head sent them. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_MATCH_H
 
@@ -14,7 +15,7 @@ struct match {
     size_t unknown;          /* no pulse had them */
     size_t repeated;         /* the client has them more often than they were sent */
     size_t sent;             /* points of the head that some session was sent, once for each */
-    size_t again;            /* of `sent`, those that agree with another point: a repeated one may go unseen there */
+    size_t again;            /* points in `sent` that agree with an earlier one; a repetition of these may go unseen */
     size_t first_unknown;    /* index in the cloud */
     const char *frame;       /* the coordinate frame in which they agree best */
     double unit_m, within_m; /* the rounding of the file; how far a coordinate may differ */
