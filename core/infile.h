@@ -13,7 +13,7 @@
  * not a file", ... The words live until the thread's next call of strerror. */
 FILE *infile_open(const char *path, const char **why);
 
-/* Whether a file begins with up to 8 characters; -1: it can't be opened. */
+/* Returns whether a file begins with magic, which has up to 8 characters; -1: it can't be opened. */
 int infile_begins(const char *path, const char *magic);
 
 #endif

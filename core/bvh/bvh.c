@@ -61,7 +61,8 @@ static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err
     return check_device(bvh->device, err);
 }
 
-/* The places of planes are noted after Embree has freed its memory for building, so that the peak is lower. */
+/* bvh_find_planes notes where the leaves have each plane. It comes after Embree has freed its memory for building, so
+ * that the peak is lower. */
 static int build(struct bvh *bvh, unsigned threads, const struct sh_report *report, struct sh_err *err)
 {
     int rc = bvh_make_leaves(bvh, report, err);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/bvh: Embree casts packets of rays, and leaves see their state in double. */
+/* Private to core/bvh: packets of rays that Embree casts, and their state in double for the leaves. */
 #ifndef CORE_BVH_PACKET_H
 #define CORE_BVH_PACKET_H
 
@@ -38,16 +38,16 @@ struct bvh_query {
     int has_own;                       /* each ray begins at its own point, org; else all begin at `at` */
     double at[3], at_local[3];         /* prcs; from the BVH's origin. With own points at_local is the first of them */
     double most_m;                     /* greatest length of a float ray; INFINITY: any */
-    /* [BVH_PACKET] each, in the arrays of all rays or in `room`; of lanes without a ray: any. */
+    /* [BVH_PACKET] numbers each, in the arrays of all rays or in `room`. A lane without a ray has any value. */
     const double *dir[3], *org[3], *local[3];
-    const float *dir_float;        /* [3][width] dir for Embree; may be read on to BVH_PACKET */
+    const float *dir_float;        /* [3][width] dir for Embree; BVH_PACKET elements of each may be read */
     double room[9][BVH_PACKET];    /* for dir, org, local */
     float turned[3][BVH_PACKET];   /* of own points: (local - at_local) x dir */
-    double apart_m;                /* no local - at_local is longer */
+    double apart_m;                /* no two rays begin further from each other */
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
-    double range_m[BVH_PACKET];    /* out: of the nearest so far; INFINITY: none */
+    double range_m[BVH_PACKET];    /* out: the nearest so far; before a hit, the greatest that counts */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
-    double hit_m[BVH_PACKET];      /* out: its range */
+    double hit_m[BVH_PACKET];      /* out: range of that hit; it counts as equal to range_m */
     uint32_t unsure;               /* a bit for each ray that may have another hit of lower number */
     double near_m[BVH_PACKET];     /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
     uint32_t near[BVH_PACKET];
@@ -99,7 +99,7 @@ VEC_INLINE void bvh_turn_origins(struct bvh_query *query)
     query->at_local[2] = az;
 }
 
-/* Casts n <= BVH_CHUNK rays, whose float directions and origins are given. */
+/* Up to BVH_CHUNK rays for bvh_intersect, with their directions and origins in float. */
 struct bvh_batch {
     const struct bvh_rays *rays;
     struct vec3_floats dir, org; /* org.x NULL: all at local.at_m */

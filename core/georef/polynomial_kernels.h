@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The loops that evaluate polynomials, as a macro: the program has them in clones for the CPU at hand
- * (polynomial_apply.c), the chart once for each width of vectors (tests/bench). */
+/* The loops that evaluate polynomials are a macro, since they are compiled more than once. polynomial_apply.c makes
+ * clones for several CPUs. tests/bench/chart_widths.c makes one version for each width of vectors. */
 #ifndef CORE_GEOREF_POLYNOMIAL_KERNELS_H
 #define CORE_GEOREF_POLYNOMIAL_KERNELS_H
 

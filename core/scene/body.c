@@ -2,10 +2,12 @@
 /* Whether a body is closed, by integrals along its edges.
  *
  * A body is closed where the edges of its triangles, each with its direction, cancel. By Stokes the sum of any field's
- * integrals along them is then 0, however the faces are divided: an edge whose other side has a corner in its middle
- * cancels, too, which a count of equal edges would miss. The fields are independent of the body: w cos(k x + p), with
- * directions, wave numbers and phases from a fixed table. Where a face is missing, each sum has the flux of the field's
- * curl through that face, which grows with its area and with |k|. */
+ * integrals along the edges is then 0, however the faces are divided. So a long edge cancels two short edges of the
+ * faces on its other side, too. A search for pairs of equal edges would call such a body open.
+ *
+ * The fields are independent of the body: w cos(k x + p), with directions, wave numbers and phases from a fixed table.
+ * Where a face is missing, each sum has the flux of the field's curl through that face, which grows with its area and
+ * with |k|. */
 #include "core/body.h"
 
 #include <math.h>

@@ -26,7 +26,7 @@ struct scene_build {
     struct scene_counts counts;
     uint64_t not_simple;
     uint64_t n_rgb_limited; /* colours of corners or vertices beyond their range */
-    double rgb_most;        /* the end of it, in the file: 1 or 255 */
+    double rgb_most;        /* the greatest value that their range allows in the file, 1 or 255 */
     /* the next polygon, room by build_corners */
     uint32_t *corner;      /* indices into the scene, which the reader has checked */
     float (*corner_uv)[2]; /* where has_uv: their texture coordinates */
@@ -70,7 +70,7 @@ static inline bool build_wants_colours(const struct scene_build *b)
     return b->spec->textures;
 }
 
-/* The file's name without folders and ending: the object's name where a file has none. */
+/* Returns the file's name without folders and ending. It is the object's name where the file names no object. */
 struct text_span build_base_name(const struct scene_build *b);
 
 /* Limits of a reader in a process of its own: the file's, or the defaults. */

@@ -91,8 +91,9 @@ static void found_add(struct sampling *s, struct found *found, struct span windo
 }
 
 /* Finds the windows of a piece of a stretch. Returns where the next piece begins. If this piece cuts a window, the
- * next piece begins where that window begins, so that it contains the whole window. Else it begins so far back that a
- * window can begin there. A window with more samples than a piece is cut. */
+ * next piece begins where that window begins, so that it contains the whole window. Otherwise the next piece begins
+ * w->before samples before the end of this one, since the window of a later signal can begin there. A window with more
+ * samples than a piece is cut. */
 static int64_t find_windows(struct sampling *s, struct span piece, int64_t stretch_end, struct found *found)
 {
     const struct waveform *w = s->w;
@@ -118,7 +119,7 @@ static int64_t find_windows(struct sampling *s, struct span piece, int64_t stret
     return open.end;
 }
 
-/* Does the same for a fixed window. It is kept whole: a piece that cuts it is followed by one that begins at it. */
+/* Does the same for a fixed window. To keep the window whole, the piece after one that cuts it begins at the window. */
 static int64_t find_gate(struct sampling *s, struct span piece, struct found *found)
 {
     const struct span gate = {s->w->gate_begin, s->w->gate_end};

@@ -82,8 +82,9 @@ __attribute__((target("sse4.2"))) uint32_t crc32c_hw(uint32_t crc, const void *d
     return ~crc;
 }
 
-/* Folding replaces a piece of 128 bits by a piece N bits further on. That is the sum of the products of its halves with
- * x^(N+63) and x^(N-1) mod P, bits reflected. Here each vector has four pieces, and four vectors go on at once. */
+/* Folding replaces a piece of 128 bits by a piece N bits further on. The new piece is the sum of two products: those of
+ * the old piece's halves with x^(N+63) and x^(N-1) mod P, bits reflected. Here each vector has four pieces, and four
+ * vectors go on at once. */
 enum { FOLD = 64, FOLDS = 4 * FOLD, FOLD_LEAST = 2 * FOLDS };
 #define FOLD_ONE_LO  0x1c19243b00000000
 #define FOLD_ONE_HI  0x75bba45b00000000

@@ -9,7 +9,7 @@
 #define HOKUYO     "Hokuyo Automatic Co.,Ltd."
 #define HOKUYO_NEW "Hokuyo Automatic Co., Ltd."
 
-/* Sources: SCIP.md. Texts that no source has for a model are those of its nearest relative there. */
+/* Sources: SCIP.md. If no source has a text of a model, the model gets the text of the most similar one. */
 #define SPEED_IN_WORDS .speed_before = "Initial(", .speed_after = "[rpm])", .at_default = "<-Default setting by user"
 #define SPEED_ALONE    .speed_before = "", .speed_after = "", .at_default = ""
 #define STATES_IN_WORDS .mode_booting = "BOOTING", .mode_fault = "ERROR", \

@@ -58,8 +58,8 @@ struct talk_options {
 /* How messages of a protocol are told apart. Bytes are those of one direction, len >= 1. */
 struct talk_kind {
     const char *name;
-    /* Length of the first message of a client; 0: it is not whole yet. NULL: a message is what the capture has as
-     * one. */
+    /* Length of the first message of a client; 0: it is not whole yet. NULL: the bytes of each packet in the
+     * capture are a message. */
     size_t (*request_len)(const uint8_t *bytes, size_t len);
     size_t (*answer_len)(const uint8_t *bytes, size_t len);
     /* Whether a message answers a request, or belongs to the stream that a request began. NULL: the device speaks in

@@ -33,7 +33,7 @@ enum { MOST_AT_ONCE = 64 };
 
 struct position {
     struct protocol_host host;
-    int64_t power_ns; /* device time of power-up, with which its converters were calibrated */
+    int64_t power_ns; /* device time of power-up; it counts as the last ADC calibration */
     int64_t next_ns;  /* device time of the next packet */
 };
 

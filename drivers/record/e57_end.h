@@ -12,7 +12,8 @@ enum {
 }; /* bytes that are enough for the XML section, and for each scan in it */
 
 /* Writes the XML section, cuts the file after it, then writes the headers of the scans. The file's own header comes
- * last, once all that is on the disk. report: its stop gives up; may be NULL. */
+ * last, once all that is on the disk. report may be NULL. Returns SH_ESTOPPED where the report's stop
+ * says so. */
 int e57_end(struct e57_pages *pages, const struct e57_facts *facts, const struct sh_report *report, struct sh_err *err);
 
 #endif

@@ -71,7 +71,7 @@ struct usbip_conn {
 void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device, int *taken);
 /* Imports the device without a request, for a host that begins with URBs. */
 void usbip_conn_import(struct usbip_conn *conn);
-/* Reads and acts until nothing is left, go_on returns 0 or the connection is full; some hundred times at most. */
+/* Reads and acts until nothing is left, go_on returns 0 or the connection is full, but at most 256 times. */
 void usbip_conn_read(struct usbip_conn *conn, const struct usb_owner *owner);
 /* Whether so many replies wait for the host that nothing more is read until it takes some. */
 int usbip_conn_is_full(const struct usbip_conn *conn);
@@ -117,7 +117,7 @@ void usbip_queue_clear(struct usbip_conn *conn);
 
 /* ---- usbip_ops.c */
 
-/* Returns how many bytes the operation has, as far as those in conn->head say it. */
+/* Returns how many bytes conn->head needs: the operation's header, and once that is there, the whole operation. */
 uint32_t usbip_op_need(const struct usbip_conn *conn);
 /* Carries out the operation, whose bytes are all in conn->head. */
 void usbip_op_take(struct usbip_conn *conn);

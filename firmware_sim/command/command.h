@@ -15,7 +15,7 @@
  *   time      TIME?  TIME:UTC?  TIME:GPS?  TIME:PTP?  TIME:STEP  TIME:SHIFt  TIME:SERVer
  *
  * Headers have a short form (the capitals) and a long one, in any case. HEAD:STATION has no short one: STAT
- * is STATe. A query ends in '?'. Settings have both forms.
+ * is STATe. A query ends in '?'. Each setting has a command and a query.
  *
  * Values. A number may be MIN, MAX or DEF, and so may the parameter of a setting's query ("HEAD:PRR? MAX").
  * MIN and MAX are the limits as the profile and the other settings leave them now, so they are never refused.
@@ -196,7 +196,7 @@ struct command_device {
     char utc[40], gps[40]; /* the same as time of day, by the clock of the head; empty: unknown */
     char ptp[128];         /* its PTP follower then; empty: it has none */
     struct command_time_server server, server_default, server_configured; /* now; at power-up; of the configuration */
-    int asks_server; /* 1: TIME:SERVer may be CLIENT: there is somebody who asks */
+    int asks_server; /* 1: the loop can ask a time server, so TIME:SERVer may be CLIENT */
     struct command_time_answers answers;
     int64_t shift_ns;                        /* how far the scanner's clock is ahead of that of power-up */
     int keeps;                               /* 1: the head can keep settings without power */
@@ -226,7 +226,7 @@ enum command_effect {
     COMMAND_FAULTS,  /* faults were added or taken out */
     COMMAND_CLOCK,   /* the scanner's clock was set */
     COMMAND_SERVER,  /* its time server has changed */
-    COMMAND_REPLAY,  /* a recording goes on at another time or speed, or repeats otherwise */
+    COMMAND_REPLAY,  /* a recording goes on at another time or speed, or its loop was set */
     COMMAND_RELEASE, /* control was given back */
 };
 

@@ -175,7 +175,7 @@ static enum native_ptp_servo take_rate(struct ptp *ptp, int64_t t_ns, int64_t of
 }
 
 /* The PI controller of ptp.h, with 3/10 and 7/10 of the offset per interval. Where the rate is at its limit, the
- * estimate stays: it would wind up. */
+ * estimate stays as it is: otherwise it would wind up. */
 static enum native_ptp_servo take_locked(struct ptp *ptp, int64_t t_ns, int64_t offset_ns)
 {
     const head_clock_wide per_interval = (head_clock_wide)offset_ns * PPT, whole = 10 * ptp->cfg->sync_ms * MS_NS;

@@ -74,8 +74,8 @@ static void replay_add(struct replay *r, const uint8_t *frame, uint32_t len, uin
 }
 
 /* Readers have not seen the frames that were skipped. So they get descriptor, emitter and anchor, like a reader that
- * joins late. After a jump in time they are no repetition: earlier pulses of the same scan follow, and a reader takes
- * these for another scan unless a descriptor says before that something begins. */
+ * joins late. After a jump in time these frames are sent without REPEAT, since earlier pulses of the same scan may
+ * follow. A reader takes earlier pulses for those of another scan, unless a descriptor without REPEAT comes before. */
 static void add_front(struct replay *r, uint64_t tick)
 {
     uint8_t frame[REPLAY_FRONT_ROOM];

@@ -177,8 +177,8 @@ static int take_steps(struct site *site, const struct sh_report *report, struct 
     if (rc == SH_OK && site->moving) rc = site_load_platform(site, report, err);
     if (rc == SH_OK) rc = site_set_up_tripods(site, report, err);
     if (rc == SH_OK && site->cfg->output.colour != COLOUR_NONE) rc = site_set_up_colours(site, report, err);
-    if (rc == SH_OK)
-        rc = site_check_plausibility(site, report, err); /* before beams are chosen: slow if little is in view */
+    /* Plausibility is checked before beams are chosen, since choosing takes long if little is in view. */
+    if (rc == SH_OK) rc = site_check_plausibility(site, report, err);
     if (rc == SH_OK) rc = site_georeference(site, report, err);
     if (rc == SH_OK) rc = site_choose_methods(site, report, err);
     if (rc == SH_OK) rc = site_plan_sight(site, report, err);

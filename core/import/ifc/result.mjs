@@ -67,7 +67,8 @@ export function fail(error) {
   process.exit(1)
 }
 
-// Multiplies the points of `local`, stride numbers each, by a 4 x 4 matrix in columns, in double.
+// Multiplies points by a 4 x 4 matrix, given column by column, in double. A point takes `stride` numbers of `local`;
+// the first three are x, y and z.
 export function placed(local, stride, m) {
   const n = local.length / stride, vertex = new Float64Array(3 * n)
   let largest = 0

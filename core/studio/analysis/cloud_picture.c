@@ -74,7 +74,7 @@ static void cloud_picture_fill(const struct cloud_picture_spec *spec, const stru
     }
 }
 
-/* White is transparent, and the ramp has no white. */
+/* A pixel without points is white, which the ramp lacks. In reports white is transparent. */
 static void colour_of(const struct pixel *pixel, double most, uint8_t rgb[3])
 {
     memset(rgb, pixel->n_none > 0 ? 0 : 255, 3);

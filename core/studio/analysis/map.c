@@ -76,7 +76,7 @@ void map_free(struct map *map)
     free(map);
 }
 
-/* Column and row count from min_m. Returns 0 outside the area, and for NaN. */
+/* Finds the pixel of a place. Columns and rows are numbered from min_m on. Returns 0 outside the area, and for NaN. */
 static int locate(const struct map *map, double x_m, double y_m, uint32_t *column, uint32_t *row)
 {
     if (!(x_m >= map->min_m[0] && x_m <= map->max_m[0] && y_m >= map->min_m[1] && y_m <= map->max_m[1])) return 0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* .gltf, .glb and .fbx through Assimp's exporter: the mesh as a scene of Assimp's, one mesh and one node a part. The
- * exporter's files are ours (assimp_files.h), so that they appear whole or not at all. */
+/* Writes .gltf, .glb and .fbx through Assimp's exporter. The mesh becomes a scene of Assimp, with one mesh and one node
+ * for each part. The exporter writes its files through assimp_files.h, so that they appear whole or not at all. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

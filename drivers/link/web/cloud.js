@@ -187,7 +187,7 @@ export class Cloud {
     this.changed?.();
   }
 
-  // All blocks of a scan have one start, so that times of points keep their distances.
+  // All blocks of a scan have one start, so that differences between times of its points stay right.
   #began({scan, station, began_s = 0}) {
     return this.blocks.findLast((block) => block.scan === scan && block.station === station)?.began_s ?? began_s;
   }

@@ -67,7 +67,7 @@ class BlockPart {
   #upload() {
     const {gl, mode} = this.points;
     const {block} = this;
-    if (block.closed && !this.#closed) { // they are in another order now
+    if (block.closed && !this.#closed) { // its points are in another order now
       this.#closed = true;
       this.#capacity = this.#held = this.#valued = this.#timed = 0;
     }

@@ -168,7 +168,7 @@ static void take_sidecars(struct inputs *in, const char *path)
         take_file(in, in->cache->known[at].sidecar[i], in->cache->known[at].sidecar[i + 1]);
 }
 
-/* A key under scene.meshes may also be a list of copies. It is searched, too, and names no other file. */
+/* Files under scene.meshes are meshes, and lists of copies. Such a list is searched, too, but names no other file. */
 static int take_input(void *ctx, const char *key, const char *path, int is_written)
 {
     struct inputs *in = ctx;

@@ -259,8 +259,9 @@ const struct app_command app_init = {
         "MESH is a file .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif. Its unit and axes come from the format where\n"
         "that defines them (glTF, Collada, IFC, GeoTIFF), or from the file (FBX). Else metres and z up are assumed, "
         "or\n"
-        "millimetres where the mesh would be larger than 2 km; a warning says so. Coordinates of a projected system\n"
-        "(large numbers beside the mesh's size), and a mesh that would be a thin plate in millimetres, are metres.\n"
+        "millimetres where the mesh would be larger than 2 km; a warning says so. Metres are assumed, too, for\n"
+        "coordinates of a projected system (large compared with the mesh), and for a mesh that would be a thin plate\n"
+        "in millimetres.\n"
         "\n"
         "The station is put above a floor inside, or on open ground, or outside facing the mesh: where most rays over\n"
         "the view of the head hit the mesh. The configuration has comments; change the values that don't fit.\n",

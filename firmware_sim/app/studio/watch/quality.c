@@ -28,7 +28,7 @@ void watch_publish(struct watch *w)
     struct scanhead_stats stats;
     struct sh_err err;
     if (w->at.scan == 0) return;
-    /* Where memory is short now, the figures before stay. */
+    /* Where memory is short now, the earlier figures stay. */
     if (watch_sample_compare(w, &err) == SH_OK && watch_sample_figures(w, &err) == SH_OK) {
         w->at.seen_share = watch_seen_count(&w->seen, w->at.station, w->site->n_stations);
         scanhead_get_stats(w->sh, &stats);
