@@ -11,7 +11,7 @@ done
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 . tests/tap.sh
-for name in status batch coverage init report scan_meshes; do
+for name in status batch coverage init report scan_meshes view_file save surfaces loopback report_tables files colours; do
     check "$name" "$programs/test_$name"
 done
 echo "1..$tests"
