@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* These tests measure how well each detector ranges, against theory and against another decomposition, and where it
- * is biased. The tables are those of core/waveform/README.md. Statistics of n pulses are allowed 4.75 of their
+ * is biased. The tables are those of core/waveform/DETECTION.md. Statistics of n pulses are allowed 4.75 of their
  * standard errors. */
 #include <math.h>
 #include <stdio.h>

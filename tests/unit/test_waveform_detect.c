@@ -327,7 +327,7 @@ static void a_saturated_echo_is_flagged_and_ranged(void **state)
 
 /* Only the digits are at their limit, of 100 thresholds: the receiver takes 400, so it is not blind for 40 ns after. A
  * wall 3 m behind the target stays an echo of its own. Ranges are within 4 deviations of `threshold`, the roughest:
- * 14 mm at an amplitude of 24 (core/waveform/README.md). */
+ * 14 mm at an amplitude of 24 (core/waveform/DETECTION.md). */
 static void a_receiver_that_does_not_saturate_is_not_blind(void **state)
 {
     (void)state;
