@@ -4,6 +4,8 @@
  * The bytes are written out by hand from the layouts of USB 2.0 (tables 9-8, 9-10, 9-12, 9-13) and CDC 1.20 (tables 15
  * to 18 and PSTN 1.20, tables 3 and 4). The figures are those of real devices: a TiM571 by its `lsusb -v` in
  * uos/sick_tim issue 29, an URG's device descriptor by UrgNetwork/urg_library issue 29. */
+#include <endian.h>
+
 #include "tests/unit/usb_host.h"
 
 #include "drivers/usb/head_device.h"
@@ -203,8 +205,13 @@ static void test_port(void **state)
     assert_int_equal(rig.head.personality->n_sessions, 1);
     assert_int_equal(control(&rig, 0x21, 0x22, 1, 0, 0), 0);
     assert_true(rig.head.session[0].open);
+    const uint32_t in = usb_device_epoch(rig.head.device, CONSOLE_IN);
+    const uint32_t heard = usb_device_epoch(rig.head.device, CONSOLE_OUT);
     assert_int_equal(control(&rig, 0x21, 0x22, 0, 0, 0), 0);
     assert_false(rig.head.session[0].open);
+    assert_int_not_equal(usb_device_epoch(rig.head.device, CONSOLE_IN),
+                         in); /* what is on its way is not the next one's */
+    assert_int_not_equal(usb_device_epoch(rig.head.device, CONSOLE_OUT), heard);
     send(&rig, &out, CONSOLE_OUT, "VV\n");
     assert_true(rig.head.session[0].open);
     assert_int_equal(usb_device_read(rig.head.device, CONSOLE_OUT, text, sizeof text), 3);
@@ -215,7 +222,8 @@ static void test_port(void **state)
     usb_device_free(rig.head.device);
 }
 
-/* Any bit rate, 8N1, is set as drivers do (PSTN 1.20, table 17), and read back. */
+/* Any bit rate is set as drivers do, and read back. PSTN 1.20, table 17: 1, 1.5 or 2 stop bits are 0 to 2, parities 0 to
+ * 4; and there are 5 to 8 data bits, or 16. */
 static void test_line_coding(void **state)
 {
     (void)state;
@@ -232,6 +240,21 @@ static void test_line_coding(void **state)
         assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
         assert_memory_equal(rig.in, coding, 7);
     }
+    static const struct {
+        uint8_t stop_bits, parity, bits;
+        int want;
+    } forms[] = {{2, 4, 8, 0},          {3, 4, 8, USB_STALL}, {2, 5, 8, USB_STALL}, {0, 0, 4, USB_STALL},
+                 {1, 3, 5, 0},          {0, 1, 6, 0},         {0, 2, 7, 0},         {0, 0, 9, USB_STALL},
+                 {0, 0, 15, USB_STALL}, {0, 0, 16, 0},        {0, 0, 17, USB_STALL}};
+    uint8_t last[7] = {0};
+    for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
+        const uint8_t coding[7] = {1, 2, 3, 4, forms[i].stop_bits, forms[i].parity, forms[i].bits};
+        memcpy(rig.in, coding, 7);
+        assert_int_equal(control(&rig, 0x21, 0x20, 0, 0, 7), forms[i].want);
+        if (forms[i].want == 0) memcpy(last, coding, 7);
+        assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
+        assert_memory_equal(rig.in, last, 7); /* a refused one changes nothing */
+    }
     static const uint8_t at_rest[7] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8}; /* 115200: configured anew nobody has set it */
     assert_int_equal(control(&rig, 0x00, 9, 1, 0, 0), 0);
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
@@ -240,6 +263,51 @@ static void test_line_coding(void **state)
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 2), 2); /* a host may read a part, or ask for more */
     assert_memory_equal(rig.in, ((const uint8_t[]){0x00, 0xc2, 0xff, 0xff, 0xff, 0xff, 0xff}), 7);
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 64), 7);
+    usb_device_free(rig.head.device);
+}
+
+/* Requests of the native identity's console and stream, right and with one wrong field each. */
+static void test_own_requests(void **state)
+{
+    (void)state;
+    static const struct {
+        unsigned type, request, value, index, length;
+        int want;
+    } cases[] = {
+        {0x21, 0x22, 2, 0, 0, 0}, /* RTS alone */
+        {0x21, 0x22, 3, 0, 0, 0},           {0x21, 0x22, 4, 0, 0, USB_STALL}, {0x21, 0x22, 1, 0, 1, USB_STALL},
+        {0x21, 0x22, 1, 1, 0, USB_STALL},   {0x21, 0x23, 100, 0, 0, 0}, /* break */
+        {0x21, 0x23, 100, 0, 1, USB_STALL}, {0x21, 0x20, 1, 0, 7, USB_STALL}, {0x21, 0x20, 0, 0, 6, USB_STALL},
+        {0x21, 0x20, 0, 0, 8, USB_STALL},   {0xa1, 0x21, 1, 0, 7, USB_STALL}, {0xa1, 0x20, 0, 0, 7, USB_STALL},
+        {0x21, 0x24, 0, 0, 0, USB_STALL},   {0x41, 0x22, 0, 2, 0, 0},         {0x41, 0x22, 2, 2, 0, USB_STALL},
+        {0x41, 0x22, 1, 2, 1, USB_STALL},   {0x41, 0x22, 1, 0, 0, USB_STALL}, {0x41, 0x23, 1, 2, 0, USB_STALL},
+        {0x21, 0x22, 1, 2, 0, USB_STALL}, /* the stream has no DTR */
+        {0xc1, 0x22, 1, 2, 1, USB_STALL},   {0xc1, 0x22, 0, 2, 0, USB_STALL}, {0xc1, 0x22, 0, 2, 2, USB_STALL},
+    };
+    static const uint8_t none[7] = {0};
+    const struct usb_ctrlrequest coding = {.bRequestType = 0x21, .bRequest = 0x20, .wLength = htole16(7)};
+    struct rig rig;
+    rig_open(&rig, USB_PERSONALITY_NATIVE, "S", USB_RATE_HIGH);
+    configure(&rig);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        memcpy(rig.in, none, sizeof none);
+        const int got = control(&rig, cases[i].type, cases[i].request, cases[i].value, cases[i].index, cases[i].length);
+        if (got != cases[i].want) fail_msg("case %zu: %d, not %d", i, got, cases[i].want);
+    }
+    assert_int_equal(rig.head.personality->n_sessions, 2);
+    assert_true(rig.head.session[0].open); /* by 3, and no wrong request has ended it */
+    assert_false(rig.head.session[1].open);
+    /* Where the data of a request are still to come, the answer is that of a right one, and nothing is done. */
+    assert_int_equal(usb_device_control(rig.head.device, &coding, NULL, 7), 0);
+    assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
+    assert_int_equal(le_get32(rig.in), 115200);
+    for (int begun = 0; begun < 3; begun++) { /* a stream that is begun again is one that was begun */
+        memset(rig.in, 0xee, 2);
+        assert_int_equal(control(&rig, 0xc1, 0x22, 0, 2, 1), 1);
+        assert_int_equal(rig.in[0], begun > 0);
+        assert_int_equal(rig.in[1], 0xee);
+        assert_int_equal(control(&rig, 0x41, 0x22, 1, 2, 0), 0);
+    }
     usb_device_free(rig.head.device);
 }
 
@@ -289,9 +357,10 @@ static void test_functions(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_descriptors), cmocka_unit_test(test_strings),     cmocka_unit_test(test_status),
-        cmocka_unit_test(test_port),        cmocka_unit_test(test_line_coding), cmocka_unit_test(test_foreign_requests),
-        cmocka_unit_test(test_functions),
+        cmocka_unit_test(test_descriptors), cmocka_unit_test(test_strings),
+        cmocka_unit_test(test_status),      cmocka_unit_test(test_port),
+        cmocka_unit_test(test_line_coding), cmocka_unit_test(test_foreign_requests),
+        cmocka_unit_test(test_functions),   cmocka_unit_test(test_own_requests),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
