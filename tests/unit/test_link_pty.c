@@ -328,6 +328,7 @@ static void test_removed_symlink(void **state)
     struct pty_device device;
     struct sh_err err = {0};
     struct stat st;
+    const int n_open = count_open();
     snprintf(path, sizeof path, "%s/100%%dB", dir);
     assert_int_equal(pty_device_open(&device, path, &err), SH_OK);
     assert_string_equal(device.path, path);
@@ -338,6 +339,7 @@ static void test_removed_symlink(void **state)
     assert_int_equal(pty_device_renew(&device), SH_OK);
     assert_int_equal(lstat(path, &st), -1);
     pty_device_close(&device);
+    assert_int_equal(count_open(), n_open); /* one terminal after the other, and none at the end */
     assert_int_equal(rmdir(dir), 0);
 }
 

@@ -115,6 +115,9 @@ static void a_datagram_of_ipv6_too(void **state)
     struct sh_err err;
     if (stamped_open("::1", 0, &other, &err) != SH_OK) skip(); /* a machine without IPv6 */
     open_ok("::", 0, &s);
+    struct stamped_socket v4_too; /* an address of IPv6 leaves the port of IPv4 free */
+    open_ok("0.0.0.0", port_of(s.fd), &v4_too);
+    stamped_close(&v4_too);
     struct sockaddr_in6 to = {.sin6_family = AF_INET6, .sin6_port = htons((uint16_t)port_of(s.fd))};
     to.sin6_addr = in6addr_loopback;
     const int64_t before_ns = stamped_now_ns();
