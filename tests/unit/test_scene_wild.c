@@ -166,6 +166,9 @@ static void missing_things_are_named(void **state)
     put("r.mtl", "newmtl red\nKd 1 0 0\nnewmtl Green\nKd 0 1 0\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
                    "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
+    put("r.mtl", "newmtl red\nKd 1 0 0\n");
+    expect_warning("a.obj", "mtllib r.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red# warm\nf 1 2 3\n", /* no blank */
+                   "a.obj: 1 of its surfaces have a material that no library defines; the first: 'red# warm'");
     put("r.mtl", "newmtl red\nKd 255 0 0\nnewmtl green\nKd 0.2\nKd xyz 1 1\n");
     s = take("a.obj", "mtllib r.mtl\n" QUADS);
     assert_int_equal(colour_of(s, 0), -1);
