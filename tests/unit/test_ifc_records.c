@@ -121,19 +121,22 @@ static void styles_are_found(void **state)
                 {7001, "second", {0.0f, 1.0f, 0.0f}, 1.0f},
                 {7002, "", {0.25f, 0.5f, 0.75f}, 0.125f}};
     enum { N = sizeof want / sizeof want[0] };
-    ifc_write_text(text, "IFC4", NULL, NULL, block, 1,
-                   "#7001=IFCBLOCK(#12,1.,1.,1.);\n#7002=IFCBLOCK(#12,1.,1.,1.);\n#7003=IFCBLOCK(#12,1.,1.,1.);\n"
-                   "#7010=IFCCOLOURRGB('c',0.25,0.5,0.75);\n#7011=IFCCOLOURRGB($,-0.5,1.5,0.);\n"
-                   "#7012=IFCCOLOURRGB($,0.,1.,0.5);\n#7013=IFCCOLOURRGB($,0.,1.);\n"
-                   "#7020=IFCSURFACESTYLERENDERING(#7010,0.125,$,$,$,$,$,$,.FLAT.);\n"
-                   "#7021=IFCSURFACESTYLESHADING(#7011,2.);\n#7022=IFCSURFACESTYLESHADING(#7012);\n"
-                   "#7023=IFCSURFACESTYLESHADING(#7013,0.5);\n#7024=IFCSURFACESTYLELIGHTING(#7012,#7012,#7012,#7012);\n"
-                   "#7030=IFCSURFACESTYLE('first',.BOTH.,(#7024,#7020,#7021));\n"
-                   "#7031=IFCSURFACESTYLE('second',.BOTH.,(#7021));\n#7032=IFCSURFACESTYLE('paint',.BOTH.,(#7022));\n"
-                   "#7033=IFCSURFACESTYLE('half',.BOTH.,(#7023));\n#7034=IFCSURFACESTYLE($,.BOTH.,(#7020));\n"
-                   "#7040=IFCPRESENTATIONSTYLEASSIGNMENT((#7031));\n#7041=IFCPRESENTATIONSTYLEASSIGNMENT((#7041));\n"
-                   "#7050=IFCSTYLEDITEM(#7002,(#7034),$);\n#7051=IFCSTYLEDITEM(#7001,(#7030,#7040),'x');\n"
-                   "#7052=IFCSTYLEDITEM($,(#7032),$);\n#7053=IFCSTYLEDITEM(#7003,(#7033,#7041),$);\n");
+    ifc_write_text(
+        text, "IFC4", NULL, NULL, block, 1,
+        "#7001=IFCBLOCK(#12,1.,1.,1.);\n#7002=IFCBLOCK(#12,1.,1.,1.);\n#7003=IFCBLOCK(#12,1.,1.,1.);\n"
+        "#7010=IFCCOLOURRGB('c',0.25,0.5,0.75);\n#7011=IFCCOLOURRGB($,-0.5,1.5,0.);\n"
+        "#7012=IFCCOLOURRGB($,0.,1.,0.5);\n#7013=IFCCOLOURRGB($,0.,1.);\n"
+        "#7020=IFCSURFACESTYLERENDERING(#7010,0.125,$,$,$,$,$,$,.FLAT.);\n"
+        "#7021=IFCSURFACESTYLESHADING(#7011,2.);\n#7022=IFCSURFACESTYLESHADING(#7012);\n"
+        "#7023=IFCSURFACESTYLESHADING(#7013,0.5);\n#7024=IFCSURFACESTYLELIGHTING(#7012,#7012,#7012,#7012);\n"
+        "#7014=IFCCOLOURRGB($,0.25,$,0.5);\n#7025=IFCSURFACESTYLESHADING(#7014,0.5);\n"
+        "#7026=IFCSURFACESTYLESHADING();\n"
+        "#7030=IFCSURFACESTYLE('first',.BOTH.,(#7024,#7020,#7021));\n"
+        "#7031=IFCSURFACESTYLE('second',.BOTH.,(#7021));\n#7032=IFCSURFACESTYLE('paint',.BOTH.,(#7022));\n"
+        "#7033=IFCSURFACESTYLE('half',.BOTH.,(#7023,#7025,#7026));\n#7034=IFCSURFACESTYLE($,.BOTH.,(#7020));\n"
+        "#7040=IFCPRESENTATIONSTYLEASSIGNMENT((#7031));\n#7041=IFCPRESENTATIONSTYLEASSIGNMENT((#7041));\n"
+        "#7050=IFCSTYLEDITEM(#7002,(#7034),$);\n#7051=IFCSTYLEDITEM(#7001,(#7030,#7040),'x');\n"
+        "#7052=IFCSTYLEDITEM($,(#7032),$);\n#7053=IFCSTYLEDITEM(#7003,(#7033,#7041),$);\n");
     if (open_text() != SH_OK) fail_msg("%s", err.text);
     assert_int_equal(records.n_styles, N);
     assert_int_equal(records.n_limited, 1);

@@ -57,6 +57,7 @@ static void holes_are_closed(void **state)
                 }
                 smooth();
                 assert_int_equal(isfinite(depth_m[AT]), n >= 6 && away <= 3);
+                assert_int_equal(near[AT] == AT, !isfinite(depth_m[AT]));
                 assert_int_equal(isinf(depth_m[0]), 1);
             }
     for (int nearest = 0; nearest < 8; nearest++) {
@@ -66,6 +67,14 @@ static void holes_are_closed(void **state)
         smooth();
         assert_int_equal(near[AT], (Y + 2 * side[nearest][1]) * W + X + 2 * side[nearest][0]);
         assert_true(depth_m[AT] == 5); /* its neighbours are holes, so nothing smoothes it */
+    }
+    static const int beside[4][2] = {{1, Y}, {W - 2, Y}, {X, 1}, {X, H - 2}};
+    for (int i = 0; i < 4; i++) { /* the image's own edge is a side */
+        clear();
+        for (int k = 0; k < 8; k++)
+            put(beside[i][0] + side[k][0], beside[i][1] + side[k][1], 10);
+        smooth();
+        assert_true(isfinite(depth_m[beside[i][1] * W + beside[i][0]]));
     }
     for (int x = 0; x < W; x += W - 1) { /* beyond the image there is no side */
         clear();
@@ -90,11 +99,14 @@ static void surfaces_are_smoothed(void **state)
             for (int x = 0; x < W; x++)
                 put(x, y, 10 + ((along ? y : x) % 2 ? -e : e));
         smooth();
-        for (int y = 8; y < H - 8; y++)
-            for (int x = 8; x < W - 8; x++) {
-                const double want = ((along ? y : x) % 2 ? -1.0 : 1.0) * (double)e / 49.0;
-                assert_true(fabs((double)depth_m[y * W + x] - 10.0 - want) < 5e-6); /* floats at 10: 1e-6, some times */
-            }
+        for (int i = 0; i < W * H; i++) {
+            const int x = i % W, y = i / W, at = along ? y : x, n = along ? H : W;
+            const int last = along ? (H - 1 - y) * W + x : y * W + W - 1 - x;
+            const double off = (double)depth_m[i] - 10.0, want = (at % 2 ? -1.0 : 1.0) * (double)e / 49.0;
+            /* floats at 10 are good to 1e-6, some times; both ends are alike, but one is up where the other is down */
+            assert_true(fabs(off + (double)depth_m[last] - 10.0) < 5e-6);
+            assert_true(at < 8 || at >= n - 8 || fabs(off - want) < 5e-6);
+        }
         assert_true(along || depth_m[20 * W] == 10 + e); /* there is nothing on one side of it */
     }
     for (int y = 0; y < H; y++)
@@ -161,6 +173,18 @@ static void planes_face_the_light(void **state)
         }
 }
 
+/* A sheet before a wall is as light at its edge as in its middle: the slope is that of its own surface. */
+static void an_edge_is_no_slope(void **state)
+{
+    (void)state;
+    for (int i = 0; i < W * H; i++)
+        depth_m[i] = i % W < W / 2 || i / W < H / 2 ? 10.0f : 9.5f;
+    shade(1.0);
+    for (int y = H / 2; y < H; y++)
+        for (int x = W / 2; x < W; x++)
+            assert_true(fabs((double)light[y * W + x] - (0.62 + 0.38 * 0.674)) < 1e-3); /* seen straight on */
+}
+
 /* Where there is no surface it is light, and so is everything without shading. A place by itself has no slope. */
 static void places_without_neighbours(void **state)
 {
@@ -179,9 +203,8 @@ static void places_without_neighbours(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(holes_are_closed),
-        cmocka_unit_test(surfaces_are_smoothed),
-        cmocka_unit_test(planes_face_the_light),
+        cmocka_unit_test(holes_are_closed),          cmocka_unit_test(surfaces_are_smoothed),
+        cmocka_unit_test(planes_face_the_light),     cmocka_unit_test(an_edge_is_no_slope),
         cmocka_unit_test(places_without_neighbours),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
