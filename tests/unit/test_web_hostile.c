@@ -40,10 +40,9 @@ static int send_raw(struct bench *bench, const char *place, const char *text, si
     return status;
 }
 
-#define HOST "Host: @\r\n"
-#define UPGRADE                                                                  \
-    "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n" \
-    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+#define HOST    "Host: @\r\n"
+#define ASKS    "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: "
+#define UPGRADE ASKS "AAAAAAAAAAAAAAAAAAAAAA==\r\n"
 #define CASE(text, status, why)             \
     {                                       \
         text, sizeof(text) - 1, status, why \
@@ -106,6 +105,13 @@ static const struct {
          426, WEBSOCKETS),
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n\r\n",
          400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAA!==\r\n\r\n", 400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAAA=A\r\n\r\n", 400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAA==\r\n\r\n", 400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAAA===\r\n\r\n", 400, KEY),
+    CASE("GET /%4g HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("GET /%g4 HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("GET /% HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
     CASE("HEAD /ws HTTP/1.1\r\n" HOST UPGRADE "\r\n", 426, NULL),
     CASE("GET /ws HTTP/1.0\r\n" HOST UPGRADE "\r\n", 426, WEBSOCKETS),
     CASE("GET /ws HTTP/1.1\r\n" HOST UPGRADE "Sec-WebSocket-Protocol: bare\r\n\r\n", 400, PROTOCOL),
@@ -164,7 +170,8 @@ static void test_requests(void **state)
     bench_close(&bench);
 }
 
-/* The owner gets a path of 255 bytes and a query of 1023 whole, counted without %XX. A longer query is refused. */
+/* The owner gets a path of 255 bytes and a query of 1023 whole, counted without %XX. A longer path is cut, and a longer
+ * query is refused. */
 static void test_longest(void **state)
 {
     (void)state;
@@ -177,6 +184,12 @@ static void test_longest(void **state)
                                   QUERY - 1, 0);
     assert_int_equal(send_raw(&bench, place, text, len, answer, sizeof answer), 200);
     assert_string_equal(strstr(answer, "\r\n\r\n"), want);
+    for (int more = 1; more <= 2; more++) {
+        snprintf(want, sizeof want, "\r\n\r\n/echo\n%0*d?q", PATH - 6, 0);
+        len = (size_t)snprintf(text, sizeof text, "GET /echo%%0a%0*d?q HTTP/1.1\r\n" HOST "\r\n", PATH - 6 + more, 0);
+        assert_int_equal(send_raw(&bench, place, text, len, answer, sizeof answer), 200);
+        assert_string_equal(strstr(answer, "\r\n\r\n"), want);
+    }
     len = (size_t)snprintf(text, sizeof text, "GET /echo?%0*d HTTP/1.1\r\n" HOST "\r\n", QUERY + 1, 0);
     assert_int_equal(send_raw(&bench, place, text, len, answer, sizeof answer), 400);
     expect_body(answer, "the query after ? has more than 1023 bytes");
