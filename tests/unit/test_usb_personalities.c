@@ -314,7 +314,7 @@ static void test_line_coding(void **state)
     usb_device_free(rig.head.device);
 }
 
-/* What cut a session off is told once, and only where one was open. */
+/* The reason why a session was cut off is told once, and only where one was open. */
 static void test_cut(void **state)
 {
     (void)state;

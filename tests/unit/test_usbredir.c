@@ -7,7 +7,7 @@
 
 #include "core/rng.h"
 
-/* What the channel says of the device must be what its descriptors say (USB 2.0, 9.6). An endpoint's place in the
+/* The channel has to describe the device as its descriptors do (USB 2.0, 9.6). An endpoint's place in the
  * channel's arrays is its number, or 16 more for IN; both of number 0 are the control endpoint. */
 static void expect_as_described(struct guest *g)
 {
