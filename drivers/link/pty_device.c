@@ -128,7 +128,6 @@ static int symlink_is_ours(const struct pty_device *device)
 
 int pty_device_open(struct pty_device *device, const char *path, struct sh_err *err)
 {
-    memset(device, 0, sizeof *device);
     const char *name = path[0] != '\0' ? path : "(no symlink)";
     if (pair_open(&device->master, device->slave, sizeof device->slave) != 0)
         return sh_fail(err, SH_EIO, "link pty:%s: no pseudo terminal: %s", name, strerror(errno));

@@ -22,7 +22,6 @@ static void usb_core_finish(struct usb_device *device, struct usb_pipe *pipe, en
     pipe->first = transfer->next;
     if (pipe->first == NULL) pipe->last = NULL;
     pipe->used = 0;
-    transfer->next = NULL;
     transfer->status = status;
     device->complete(device->host_ctx, transfer);
 }
@@ -151,7 +150,6 @@ void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer)
     transfer->actual = 0;
     transfer->zero_packet = 0;
     transfer->epoch = pipe->epoch;
-    transfer->next = NULL;
     transfer->status = USB_OK;
     if (pipe->row == NULL || pipe->halted || pipe->gone_due) {
         transfer->status = pipe->row == NULL || pipe->gone_due ? USB_GONE : USB_STALLED;
@@ -178,7 +176,6 @@ int usb_device_cancel(struct usb_device *device, uint64_t id)
             if (pipe->last == at) pipe->last = before;
             at->actual = before == NULL ? pipe->used : 0;
             if (before == NULL) pipe->used = 0;
-            at->next = NULL;
             at->status = USB_CANCELLED;
             device->complete(device->host_ctx, at);
             finish_empty(device, pipe);

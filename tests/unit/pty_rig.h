@@ -21,6 +21,9 @@ const char *pty_path(const struct bench *bench);
 
 int client_open(const struct bench *bench);
 
+/* Returns how many descriptors this process has open. */
+int count_open(void);
+
 /* Returns 1 when nothing happens for a while: no state keeps poll awake. */
 int is_calm(struct bench *bench, uint32_t want_write);
 

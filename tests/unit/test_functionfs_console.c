@@ -4,6 +4,7 @@
  * others come after them. */
 #include "tests/unit/usb_host.h"
 
+#include <netinet/in.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -34,17 +35,16 @@ static void control(struct port *port, unsigned type, unsigned request, unsigned
     assert_int_equal(usb_device_control(port->head.device, &setup, NULL, 0), 0);
 }
 
-static int open_port_of(void **state, int type)
+/* pair: the console's descriptor, and the host's. */
+static int open_port_on(void **state, const int pair[2])
 {
     static struct port port;
     const struct usb_identity id = {.vid = 1, .pid = 1, .highest = USB_RATE_HIGH};
     struct sh_err err = {0, ""};
-    int pair[2];
     memset(&port, 0, sizeof port);
     *state = &port;
     if (scanhead_usb_create(usb_personality_get(USB_PERSONALITY_NATIVE), &id, &port.head, &err) != SH_OK)
         fail_msg("%s", err.text);
-    assert_int_equal(socketpair(AF_UNIX, type | SOCK_NONBLOCK, 0, pair), 0);
     port.console.device = port.head.device;
     port.console.fd = pair[0];
     port.host = pair[1];
@@ -56,9 +56,35 @@ static int open_port_of(void **state, int type)
     return 0;
 }
 
+static int open_port_of(void **state, int type)
+{
+    int pair[2];
+    assert_int_equal(socketpair(AF_UNIX, type | SOCK_NONBLOCK, 0, pair), 0);
+    return open_port_on(state, pair);
+}
+
 static int open_port(void **state)
 {
     return open_port_of(state, SOCK_STREAM);
+}
+
+/* A socket of TCP counts what waits in bytes, as a tty does. Its host takes some KiB, and then no more. */
+static int open_port_of_bytes(void **state)
+{
+    const int least = 1, much = 1 << 17;
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t len = sizeof at;
+    int pair[2], listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(listener, (struct sockaddr *)&at, len), 0);
+    assert_int_equal(listen(listener, 1), 0);
+    assert_int_equal(getsockname(listener, (struct sockaddr *)&at, &len), 0);
+    pair[1] = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(setsockopt(pair[1], SOL_SOCKET, SO_RCVBUF, &least, sizeof least), 0);
+    assert_int_equal(connect(pair[1], (struct sockaddr *)&at, len), 0);
+    pair[0] = accept4(listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    assert_int_equal(setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &much, sizeof much), 0);
+    close(listener);
+    return open_port_on(state, pair);
 }
 
 /* Here each write is a packet of its own, as it is a request of its own in the kernel's tty. */
@@ -175,6 +201,52 @@ static void a_slow_client_keeps_its_session(void **state)
     assert_int_equal(client_reads(port, bytes, sizeof bytes), 3); /* nothing else goes before it */
 }
 
+/* A client stops reading while the head goes on writing. Its port counts as closed all the same: what it takes counts, and
+ * not what waits. TURNS: what it has already got may be acknowledged between two seconds here, which is no more than
+ * once for each of its last two packets. */
+static void writing_is_not_taking(void **state)
+{
+    enum { FULL = 65536, TURNS = 6 };
+    struct port *port = *state;
+    client_says(port, "SCAN:STAR\n");
+    for (size_t n = 0; n < FULL;) {
+        const size_t more = head_says(port, bytes, 1000);
+        assert_true(more > 0);
+        n += more;
+    }
+    for (int i = 0; i < TURNS && port->head.session[CONSOLE].open; i++) {
+        second_passes(port);
+        if (port->head.session[CONSOLE].open) assert_int_equal(head_says(port, "0123456789", 10), 10);
+    }
+    assert_int_equal(port->head.session[CONSOLE].open, 0);
+}
+
+/* The port takes a part of the frame that comes first in a new session, and later the rest of it. */
+static void a_lead_in_goes_in_parts(void **state)
+{
+    enum { PART = 10 };
+    struct port *port = *state;
+    client_says(port, "SCAN:STAR\n");
+    fill(port);
+    second_passes(port);
+    second_passes(port);
+    assert_int_equal(port->head.session[CONSOLE].open, 0);
+    client_says(port, "*IDN?\n"); /* there is no room for the frame */
+    assert_true((ffs_console_events(&port->console) & POLLOUT) != 0);
+    assert_int_equal(port->console.lead_pos, 0);
+    const uint32_t lead_len = port->console.lead_len;
+    port->console.lead_pos = PART;
+    size_t old = 0;
+    for (ssize_t n; (n = recv(port->host, bytes, sizeof bytes, MSG_DONTWAIT)) > 0;)
+        old += (size_t)n;
+    assert_true(old > 0);
+    assert_int_equal(head_says(port, "new", 3), 3);
+    assert_int_equal(ffs_console_events(&port->console), POLLIN);
+    assert_int_equal(client_reads(port, bytes, sizeof bytes), lead_len - PART + 3);
+    assert_memory_equal(bytes, port->console.lead + PART, lead_len - PART);
+    assert_memory_equal(bytes + lead_len - PART, "new", 3);
+}
+
 /* The tty has 16 requests, and shows that nobody reads only when all are in use. So texts use them up, byte by byte if
  * they are short. A KiB and more go out at once. */
 static void a_short_text_takes_all_requests(void **state)
@@ -223,6 +295,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(what_waits_at_a_close_is_void, open_port, close_port),
         cmocka_unit_test_setup_teardown(a_slow_client_keeps_its_session, open_port, close_port),
+        cmocka_unit_test_setup_teardown(writing_is_not_taking, open_port_of_bytes, close_port),
+        cmocka_unit_test_setup_teardown(a_lead_in_goes_in_parts, open_port, close_port),
         cmocka_unit_test_setup_teardown(a_short_text_takes_all_requests, open_port_of_packets, close_port),
         cmocka_unit_test(a_missing_tty_is_reported),
     };

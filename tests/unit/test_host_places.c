@@ -169,6 +169,44 @@ static void test_emitter(void **state)
     scanhead_close(sh);
 }
 
+/* A client reads each figure of an emitter, with every beam of its firing sequence from the first to the last. */
+static void test_beams(void **state)
+{
+    (void)state;
+    enum { N = 3 };
+    static const struct native_beam beam[N] = {{-15000000, 1500000, 0}, {1000000, -250000, 2304}, {15000001, 0, 4608}};
+    const struct native_emitter emitter = {.kind = NATIVE_EMIT_BEAMS,
+                                           .steps = 0,
+                                           .turn = -1,
+                                           .echoes = 3,
+                                           .n_beams = N,
+                                           .sequence_ns_num = 55296,
+                                           .sequence_ns_den = 7};
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    struct scanhead_emitter is;
+    assert_int_equal(scanhead_get_emitter(sh, &is), SCANHEAD_ESTATE);
+    put_descriptor(head, 0, 1, 0);
+    put(head, native_encode_emitter(out, sizeof out, &emitter, beam, 1, 0), 0);
+    for (int i = 0; i < 2; i++)
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
+    assert_int_equal(scanhead_get_emitter(sh, &is), 0);
+    assert_int_equal(is.kind, SCANHEAD_EMIT_BEAMS);
+    assert_int_equal(is.steps, 0);
+    assert_int_equal(is.turn, -1);
+    assert_int_equal(is.echoes, 3);
+    assert_true(is.sequence_ns_num == 55296 && is.sequence_ns_den == 7);
+    assert_int_equal(is.n_beams, N);
+    for (int i = 0; i < N; i++) {
+        assert_true(fabs(is.beam[i].elevation_deg - 1e-6 * beam[i].elevation_udeg) < 1e-12);
+        assert_true(fabs(is.beam[i].azimuth_deg - 1e-6 * beam[i].azimuth_udeg) < 1e-12);
+        assert_int_equal(is.beam[i].offset_ns, beam[i].offset_ns);
+    }
+    close(head);
+    scanhead_close(sh);
+}
+
 /* Each of the three events has the head's clock: PPS in whole seconds, the others in ns. Adjusted standard GPS time is
  * 1e9 s less. */
 static void test_clock(void **state)
@@ -309,7 +347,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_antimeridian), cmocka_unit_test(test_until),    cmocka_unit_test(test_followers),
         cmocka_unit_test(test_emitter),      cmocka_unit_test(test_clock),    cmocka_unit_test(test_short_turn),
-        cmocka_unit_test(test_poses),        cmocka_unit_test(test_line_end),
+        cmocka_unit_test(test_poses),        cmocka_unit_test(test_line_end), cmocka_unit_test(test_beams),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -107,6 +107,67 @@ static void products_are_found(void **state)
     ifc_records_close(&records);
 }
 
+/* The ways to a style: IFC4 has the styles in the styled item, IFC2X3 has an assignment between. Transparency may be
+ * missing. Values beyond 0 to 1 are limited, and the style is counted. What has no whole colour is no style. */
+static void styles_are_found(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t item;
+        const char *name;
+        float colour[3], clear;
+    } want[] = {{0, "paint", {0.0f, 1.0f, 0.5f}, 0.0f},
+                {7001, "first", {0.25f, 0.5f, 0.75f}, 0.125f},
+                {7001, "second", {0.0f, 1.0f, 0.0f}, 1.0f},
+                {7002, "", {0.25f, 0.5f, 0.75f}, 0.125f}};
+    enum { N = sizeof want / sizeof want[0] };
+    ifc_write_text(
+        text, "IFC4", NULL, NULL, block, 1,
+        "#7001=IFCBLOCK(#12,1.,1.,1.);\n#7002=IFCBLOCK(#12,1.,1.,1.);\n#7003=IFCBLOCK(#12,1.,1.,1.);\n"
+        "#7010=IFCCOLOURRGB('c',0.25,0.5,0.75);\n#7011=IFCCOLOURRGB($,-0.5,1.5,0.);\n"
+        "#7012=IFCCOLOURRGB($,0.,1.,0.5);\n#7013=IFCCOLOURRGB($,0.,1.);\n"
+        "#7020=IFCSURFACESTYLERENDERING(#7010,0.125,$,$,$,$,$,$,.FLAT.);\n"
+        "#7021=IFCSURFACESTYLESHADING(#7011,2.);\n#7022=IFCSURFACESTYLESHADING(#7012);\n"
+        "#7023=IFCSURFACESTYLESHADING(#7013,0.5);\n#7024=IFCSURFACESTYLELIGHTING(#7012,#7012,#7012,#7012);\n"
+        "#7014=IFCCOLOURRGB($,0.25,$,0.5);\n#7025=IFCSURFACESTYLESHADING(#7014,0.5);\n"
+        "#7026=IFCSURFACESTYLESHADING();\n"
+        "#7030=IFCSURFACESTYLE('first',.BOTH.,(#7024,#7020,#7021));\n"
+        "#7031=IFCSURFACESTYLE('second',.BOTH.,(#7021));\n#7032=IFCSURFACESTYLE('paint',.BOTH.,(#7022));\n"
+        "#7033=IFCSURFACESTYLE('half',.BOTH.,(#7023,#7025,#7026));\n#7034=IFCSURFACESTYLE($,.BOTH.,(#7020));\n"
+        "#7040=IFCPRESENTATIONSTYLEASSIGNMENT((#7031));\n#7041=IFCPRESENTATIONSTYLEASSIGNMENT((#7041));\n"
+        "#7050=IFCSTYLEDITEM(#7002,(#7034),$);\n#7051=IFCSTYLEDITEM(#7001,(#7030,#7040),'x');\n"
+        "#7052=IFCSTYLEDITEM($,(#7032),$);\n#7053=IFCSTYLEDITEM(#7003,(#7033,#7041),$);\n");
+    if (open_text() != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(records.n_styles, N);
+    assert_int_equal(records.n_limited, 1);
+    size_t at[N] = {0, 1, 2, 3}, first;
+    if (strcmp(records.style[1].name, "second") == 0) at[1] = 2, at[2] = 1; /* those of one item have no order */
+    for (size_t i = 0; i < N; i++) {
+        const struct ifc_style *is = &records.style[at[i]];
+        assert_int_equal(is->item, want[i].item);
+        assert_string_equal(is->name, want[i].name);
+        assert_memory_equal(is->colour, want[i].colour, sizeof want[i].colour);
+        assert_true(is->clear == want[i].clear);
+    }
+    assert_int_equal(ifc_styles_of(&records, 7001, &first), 2);
+    assert_int_equal(first, 1);
+    assert_int_equal(ifc_styles_of(&records, 7002, &first), 1);
+    assert_int_equal(first, 3);
+    assert_int_equal(ifc_styles_of(&records, 7003, &first), 0);
+    /* A product without a style of its own has a material's. Readers round colours to 8 bits, 1/255 at most. */
+    const struct ifc_product *p = ifc_records_product(&records, 1000);
+    assert_non_null(p);
+    for (int k = 0; k < 3; k++) {
+        float colour[4] = {0.0f, 1.0f, 0.5f, 1.0f};
+        colour[k] += k == 1 ? -1.0f / 255 : 1.0f / 255;
+        assert_ptr_equal(ifc_style_by_colour(&records, p, colour), &records.style[0]);
+        colour[k] += k == 1 ? -1.0f / 255 : 1.0f / 255;
+        assert_null(ifc_style_by_colour(&records, p, colour));
+    }
+    assert_null(ifc_style_by_colour(&records, p, (const float[4]){0.25f, 0.5f, 0.75f, 1.0f})); /* another item's */
+    ifc_records_close(&records);
+}
+
 /* Only radii count, not the heights of 30 m and 40 m of a cylinder and a cone, nor the 90 at which a pipe's curve ends. */
 static void heights_are_no_radii(void **state)
 {
@@ -323,6 +384,7 @@ int main(void)
         cmocka_unit_test(texts_are_whole),
         cmocka_unit_test(units_are_read),
         cmocka_unit_test(products_are_found),
+        cmocka_unit_test(styles_are_found),
         cmocka_unit_test(heights_are_no_radii),
         cmocka_unit_test(openings_without_a_wall_are_found),
         cmocka_unit_test(what_is_not_whole_is_refused),

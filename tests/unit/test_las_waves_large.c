@@ -74,8 +74,81 @@ static void test_kinds(void **state)
     las_waves_close(&waves);
 }
 
+/* Puts a window, which must get the packet of that kind, new or not. */
+static void put(struct las_waves *waves, const struct scanhead_wave *wave, uint32_t kind, int want_new)
+{
+    struct sh_err err = {0};
+    struct las_packet packet;
+    int is_new = !want_new;
+    assert_int_equal(las_waves_put(waves, 1, wave, &packet, &is_new, &err), 0);
+    assert_int_equal(packet.kind, kind);
+    assert_int_equal(is_new, want_new);
+}
+
+/* A digitiser of its own takes a kind. When all 255 are taken, windows that fit none are counted, and left out. Points in
+ * one window share its packet. */
+static void test_no_kind_left(void **state)
+{
+    (void)state;
+    static uint8_t sample[2 * 8];
+    struct scanhead_wave wave = {.n = 4, .sample = sample, .bits = 12, .count_signal = 1};
+    struct las_waves waves = {.n_kinds = 0};
+    struct sh_err err = {0};
+    assert_int_equal(las_waves_open(&waves, rig_path("a.las"), &err), 0);
+    for (uint32_t kind = 1; kind <= LAS_KINDS; kind++) {
+        wave.pulse = wave.sample_ps = kind;
+        put(&waves, &wave, kind, 1);
+    }
+    const uint64_t len = waves.file.written + waves.file.len;
+    put(&waves, &wave, LAS_KINDS, 0); /* the same window */
+    assert_int_equal(waves.file.written + waves.file.len, len);
+    for (uint32_t i = 1; i <= 2; i++) {
+        wave.sample_ps = LAS_KINDS + i;
+        wave.pulse++;
+        put(&waves, &wave, 0, 0);
+        assert_int_equal(waves.n_kindless, i);
+    }
+    wave.sample_ps = 2;
+    wave.pulse++;
+    wave.n = 8; /* longer than the kind of its digitiser */
+    put(&waves, &wave, 0, 0);
+    assert_int_equal(waves.n_kindless, 3);
+    assert_int_equal(waves.file.written + waves.file.len, len);
+    wave.n = 3; /* one sample follows */
+    put(&waves, &wave, 2, 0);
+    assert_int_equal(waves.n_filled, 1);
+    assert_int_equal(waves.n_fill, 1);
+    assert_int_equal(waves.file.written + waves.file.len, len + 2 * 4);
+    las_waves_close(&waves);
+}
+
+/* The file of packets has become shorter before it is copied, by no doing of ours. */
+static void test_cut_before_copy(void **state)
+{
+    (void)state;
+    static uint8_t sample[2 * 8];
+    const struct scanhead_wave wave = {.n = 8, .sample = sample, .sample_ps = 1000, .bits = 12, .count_signal = 1};
+    struct las_waves waves = {.n_kinds = 0};
+    struct outfile to;
+    struct sh_err err = {0};
+    char want[200];
+    assert_int_equal(las_waves_open(&waves, rig_path("a.las"), &err), 0);
+    assert_int_equal(outfile_open(&to, rig_path("b.las"), &err), 0);
+    put(&waves, &wave, 1, 1);
+    assert_int_equal(las_waves_end(&waves, &err), 0);
+    assert_int_equal(las_waves_copy(&waves, &to, NULL, &err), 0);
+    assert_int_equal(to.written + to.len, LAS_WAVES_HEAD_LEN + sizeof sample);
+    assert_int_equal(ftruncate(waves.file.fd, LAS_WAVES_HEAD_LEN), 0);
+    assert_int_equal(las_waves_copy(&waves, &to, NULL, &err), SH_EIO);
+    snprintf(want, sizeof want, "%s: cannot be read: it became shorter", rig_path("a.wdp.part"));
+    assert_string_equal(err.text, want);
+    outfile_close(&to, OUTFILE_DROP, NULL);
+    las_waves_close(&waves);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_large), cmocka_unit_test(test_kinds)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_large), cmocka_unit_test(test_kinds),
+                                       cmocka_unit_test(test_no_kind_left), cmocka_unit_test(test_cut_before_copy)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -320,6 +320,29 @@ static void test_no_new_symlink(void **state)
     assert_int_equal(rmdir(dir), 0);
 }
 
+/* A user has removed the symlink. It does not come back with a new terminal, nor at the end. Its name is no format. */
+static void test_removed_symlink(void **state)
+{
+    (void)state;
+    char *dir = test_dir(), path[128];
+    struct pty_device device;
+    struct sh_err err = {0};
+    struct stat st;
+    const int n_open = count_open();
+    snprintf(path, sizeof path, "%s/100%%dB", dir);
+    assert_int_equal(pty_device_open(&device, path, &err), SH_OK);
+    assert_string_equal(device.path, path);
+    assert_int_equal(lstat(path, &st), 0);
+    assert_int_equal(pty_device_renew(&device), SH_OK);
+    assert_int_equal(lstat(path, &st), 0);
+    assert_int_equal(unlink(path), 0);
+    assert_int_equal(pty_device_renew(&device), SH_OK);
+    assert_int_equal(lstat(path, &st), -1);
+    pty_device_close(&device);
+    assert_int_equal(count_open(), n_open); /* one terminal after the other, and none at the end */
+    assert_int_equal(rmdir(dir), 0);
+}
+
 static void test_exclusive(void **state)
 {
     (void)state;
@@ -345,8 +368,8 @@ int main(void)
         cmocka_unit_test(test_fresh_for_next), cmocka_unit_test(test_written_and_gone),
         cmocka_unit_test(test_unseen_change),  cmocka_unit_test(test_nothing_of_the_one_before),
         cmocka_unit_test(test_no_descriptors), cmocka_unit_test(test_symlink),
-        cmocka_unit_test(test_left_symlink),   cmocka_unit_test(test_exclusive),
-        cmocka_unit_test(test_no_new_symlink),
+        cmocka_unit_test(test_left_symlink),   cmocka_unit_test(test_removed_symlink),
+        cmocka_unit_test(test_exclusive),      cmocka_unit_test(test_no_new_symlink),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* The pty link: clients come and go at moments when the terminal is not watched. The link's own calls of the kernel go
  * through here, so that a client can act within them. */
+#include <dlfcn.h>
 #include <poll.h>
 #include <sys/inotify.h>
 #include <sys/syscall.h>
+#include <termios.h>
 
 #include "tests/unit/pty_rig.h"
 
@@ -11,10 +13,12 @@ static struct bench bench;
 static int visitor = -1;             /* a client's descriptor */
 static void (*when_unwatched)(void); /* called once, after the watch is taken away */
 static void (*between_looks)(void);  /* called once, after poll has looked at all descriptors but the last */
+static int looks_for_bytes_first;    /* then poll has looked at the last one for bytes, too, but not for a hang-up */
 
 static int comes_early; /* a client opens the terminal just before it is watched for the first time */
 static int is_full;     /* the system has no more watches */
 static int has_no_pair; /* nor terminals */
+static int is_no_tty;   /* what it takes for one has no settings */
 
 static void call_once(void (**what)(void))
 {
@@ -37,6 +41,15 @@ int posix_openpt(int flags)
     return has_no_pair ? -1 : open("/dev/ptmx", flags);
 }
 
+int tcgetattr(int fd, struct termios *settings)
+{
+    int (*real)(int, struct termios *);
+    void *found = dlsym(RTLD_NEXT, "tcgetattr");
+    memcpy(&real, &found, sizeof real);
+    errno = ENOTTY;
+    return is_no_tty ? -1 : real(fd, settings);
+}
+
 int inotify_rm_watch(int fd, int watch)
 {
     int rc = (int)syscall(SYS_inotify_rm_watch, fd, watch);
@@ -52,6 +65,8 @@ int poll(struct pollfd *fds, nfds_t n, int timeout_ms)
     int before = ppoll(fds, n - 1, &none, NULL);
     call_once(&between_looks);
     int last = ppoll(fds + n - 1, 1, &none, NULL);
+    if (looks_for_bytes_first) fds[n - 1].revents &= (short)~POLLIN;
+    looks_for_bytes_first = 0;
     return before < 0 || last < 0 ? -1 : before + last;
 }
 
@@ -144,6 +159,69 @@ static void test_came_unwatched_left_between_looks(void **state)
     bench_close(&bench);
 }
 
+static void say_and_leave(void)
+{
+    assert_int_equal(write(visitor, "*RST\n", 5), 5);
+    leave();
+}
+
+/* A client writes and leaves after the look for bytes, and before that for a hang-up. What it wrote is of its session. */
+static void test_wrote_between_looks(void **state)
+{
+    (void)state;
+    begin();
+    between_looks = say_and_leave;
+    looks_for_bytes_first = 1;
+    assert_int_equal(read_to_end(&bench), 5);
+    assert_null(between_looks);
+    bench.n_queue = 0;
+    assert_true(is_calm(&bench, 1));
+    expect_served(client_open(&bench));
+    bench_close(&bench);
+}
+
+/* The caller has room for one event at a time, and gets all in their order. */
+static void test_one_event_at_a_time(void **state)
+{
+    (void)state;
+    static const enum link_event_kind want[] = {LINK_CLOSED, LINK_OPENED, LINK_CLOSED};
+    struct link_event event;
+    begin();
+    leave();
+    come();
+    leave();
+    for (size_t i = 0; i < sizeof want / sizeof want[0]; i++) {
+        assert_int_equal(bench.ops->poll(bench.link, bench.wake, 0, WAIT_MS, &event, 1), 1);
+        assert_int_equal(event.kind, want[i]);
+        assert_int_equal(event.session, 0);
+        assert_string_equal(event.peer, pty_path(&bench));
+    }
+    assert_int_equal(bench.ops->poll(bench.link, bench.wake, 0, 0, &event, 1), 0);
+    expect_served(client_open(&bench));
+    bench_close(&bench);
+}
+
+/* The system has no terminal at all, or none that works. The error names the link by its symlink, if it has one, and no
+ * descriptor is left open. */
+static void test_no_terminal(void **state)
+{
+    (void)state;
+    const struct link_spec named = {.type = LINK_PTY, .path = "t"};
+    const int n_open = count_open();
+    has_no_pair = 1;
+    expect_refused(&plain, SH_EIO, "link pty:(no symlink): no pseudo terminal: No space left on device");
+    expect_refused(&named, SH_EIO, "link pty:t: no pseudo terminal: No space left on device");
+    has_no_pair = 0;
+    is_full = 1;
+    expect_refused(&plain, SH_EIO, "inotify on /dev/pts/");
+    is_full = 0;
+    is_no_tty = 1;
+    expect_refused(&named, SH_EIO, "link pty:t: /dev/pts/");
+    expect_refused(&plain, SH_EIO, " cannot be set up: Inappropriate ioctl for device");
+    is_no_tty = 0;
+    assert_int_equal(count_open(), n_open);
+}
+
 /* The symlink is there before the watch: so may be a client that waits for it. */
 static void test_came_with_the_symlink(void **state)
 {
@@ -212,6 +290,9 @@ int main(void)
         cmocka_unit_test(test_written_and_gone_unwatched),
         cmocka_unit_test(test_next_after_written_and_gone),
         cmocka_unit_test(test_came_unwatched_left_between_looks),
+        cmocka_unit_test(test_wrote_between_looks),
+        cmocka_unit_test(test_one_event_at_a_time),
+        cmocka_unit_test(test_no_terminal),
         cmocka_unit_test(test_came_with_the_symlink),
         cmocka_unit_test(test_plugged_in_unwatched),
         cmocka_unit_test(test_cut_off_unwatched),

@@ -119,30 +119,64 @@ static void colours_come_with_materials(void **state)
     scene_free(s);
 }
 
-/* A colour of light, not of a surface. */
-static void colours_beyond_their_range_are_left_out(void **state)
+/* Loads a triangle of Collada, whose material `glow` has a colour and more, in XML. */
+static struct scene *load_glow(const char *colour, const char *more)
 {
-    (void)state;
     static const char whole[] = COLLADA_TRIANGLE("0 0 0 1 0 0 0 1 0");
     const char *geometry = strstr(whole, "<library_geometries>"), *count = strstr(whole, " count=\"1\"><input");
     const char *end = strstr(whole, "/></node>");
     char text[4096];
     snprintf(text, sizeof text,
              "%.*s<library_effects><effect id=\"e\"><profile_COMMON><technique sid=\"t\"><lambert><diffuse>"
-             "<color>2 0.5 0.5 1</color></diffuse></lambert></technique></profile_COMMON></effect></library_effects>"
+             "<color>%s 1</color></diffuse>%s</lambert></technique></profile_COMMON></effect></library_effects>"
              "<library_materials><material id=\"m\" name=\"glow\"><instance_effect url=\"#e\"/></material>"
              "</library_materials>%.*s material=\"slot\"%.*s><bind_material><technique_common>"
              "<instance_material symbol=\"slot\" target=\"#m\"/></technique_common></bind_material>"
              "</instance_geometry>%s",
-             (int)(geometry - whole), whole, (int)(count - geometry), geometry, (int)(end - count), count,
+             (int)(geometry - whole), whole, colour, more, (int)(count - geometry), geometry, (int)(end - count), count,
              end + strlen("/>"));
     struct scene *s = load_text("a.dae", text);
     assert_string_equal(s->surface[0].material, "glow");
-    assert_int_equal(s->surface[0].has_colour, 0);
-    assert_int_equal(n_warnings, 1);
-    if (strstr(warnings, "1 material with a colour beyond 0 to 1, which is left out; the first is 'glow'") == NULL)
-        fail_msg("%s", warnings);
-    scene_free(s);
+    return s;
+}
+
+/* One beyond 0 to 1 is a colour of light, not of a surface. */
+static void colours_beyond_their_range_are_left_out(void **state)
+{
+    (void)state;
+    static const char *const wrong[] = {"2 0.5 0.5", "0.5 1.5 0.5", "0.5 0.5 -0.5"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        struct scene *s = load_glow(wrong[i], "");
+        assert_int_equal(s->surface[0].has_colour, 0);
+        assert_int_equal(n_warnings, 1);
+        if (strstr(warnings, "1 material with a colour beyond 0 to 1, which is left out; the first is 'glow'") == NULL)
+            fail_msg("%s", warnings);
+        scene_free(s);
+    }
+}
+
+/* Colours of Collada are as they are shown. A_ONE: what is opaque has 1. */
+static void colours_and_transparency_of_collada(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *opacity;
+        float clear;
+    } cases[] = {{"1", 0.0f}, {"0.25", 0.75f}, {"0", 1.0f}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char more[200];
+        snprintf(more, sizeof more,
+                 "<transparent opaque=\"A_ONE\"><color>0 0 0 1</color></transparent>"
+                 "<transparency><float>%s</float></transparency>",
+                 cases[i].opacity);
+        struct scene *s = load_glow("0 0.25 1", more);
+        const struct scene_surface *surface = &s->surface[0];
+        assert_int_equal(n_warnings, 0);
+        assert_int_equal(surface->has_colour, 1);
+        assert_true(surface->colour[0] == 0.0f && surface->colour[1] == 0.25f && surface->colour[2] == 1.0f);
+        assert_true(surface->clear == cases[i].clear);
+        scene_free(s);
+    }
 }
 
 static void broken_files_are_refused(void **state)
@@ -396,6 +430,7 @@ int main(void)
         cmocka_unit_test(single_precision_within_the_tree),
         cmocka_unit_test(colours_come_with_materials),
         cmocka_unit_test(colours_beyond_their_range_are_left_out),
+        cmocka_unit_test(colours_and_transparency_of_collada),
         cmocka_unit_test(broken_files_are_refused),
         cmocka_unit_test(boxes),
         cmocka_unit_test(units),

@@ -118,6 +118,29 @@ static void libraries_are_found(void **state)
     check_red_green("comment.obj", "mtllib a.mtl # lib\nusemtl red # warm\n" QUADS);
 }
 
+/* Names of materials in quotes, on either side, and with a # that begins no comment. */
+static void materials_are_found(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *in_library[2], *in_file[2];
+    } cases[] = {{{"\"red\"", "green"}, {"red", "green"}},
+                 {{"red", "green"}, {"\"red\"", "\"green\""}},
+                 {{"r", "\"g\""}, {"\"r\"", "\"g\""}},
+                 {{"\"\"", "\"g\""}, {"\"\"", "g"}},
+                 {{"Material #25", "Material"}, {"Material #25", "Material # made by hand"}},
+                 {{"\"red", "red\""}, {"\"red", "red\""}}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char library[200], text[300];
+        snprintf(library, sizeof library, "newmtl %s\nKd 1 0 0\nnewmtl %s\nKd 0 1 0\n", cases[i].in_library[0],
+                 cases[i].in_library[1]);
+        snprintf(text, sizeof text, "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl %s\nf 1 2 3\nusemtl %s\nf 3 2 1\n",
+                 cases[i].in_file[0], cases[i].in_file[1]);
+        put("a.mtl", library);
+        check_red_green("names.obj", text);
+    }
+}
+
 static void expect_warning(const char *name, const char *text, const char *expected)
 {
     struct scene *s = take(name, text);
@@ -143,6 +166,9 @@ static void missing_things_are_named(void **state)
     put("r.mtl", "newmtl red\nKd 1 0 0\nnewmtl Green\nKd 0 1 0\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
                    "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
+    put("r.mtl", "newmtl red\nKd 1 0 0\n");
+    expect_warning("a.obj", "mtllib r.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red# warm\nf 1 2 3\n", /* no blank */
+                   "a.obj: 1 of its surfaces have a material that no library defines; the first: 'red# warm'");
     put("r.mtl", "newmtl red\nKd 255 0 0\nnewmtl green\nKd 0.2\nKd xyz 1 1\n");
     s = take("a.obj", "mtllib r.mtl\n" QUADS);
     assert_int_equal(colour_of(s, 0), -1);
@@ -359,6 +385,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(libraries_are_found),
+        cmocka_unit_test(materials_are_found),
         cmocka_unit_test(long_names_keep_their_colours),
         cmocka_unit_test(missing_things_are_named),
         cmocka_unit_test(textures_are_found),

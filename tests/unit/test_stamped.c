@@ -115,6 +115,9 @@ static void a_datagram_of_ipv6_too(void **state)
     struct sh_err err;
     if (stamped_open("::1", 0, &other, &err) != SH_OK) skip(); /* a machine without IPv6 */
     open_ok("::", 0, &s);
+    struct stamped_socket v4_too; /* an address of IPv6 leaves the port of IPv4 free */
+    open_ok("0.0.0.0", port_of(s.fd), &v4_too);
+    stamped_close(&v4_too);
     struct sockaddr_in6 to = {.sin6_family = AF_INET6, .sin6_port = htons((uint16_t)port_of(s.fd))};
     to.sin6_addr = in6addr_loopback;
     const int64_t before_ns = stamped_now_ns();
@@ -157,6 +160,24 @@ static void lost_datagrams_are_counted(void **state)
     stamped_close(&s);
     assert_int_equal(stamped_dropped(&s), 0);
     close(sender);
+}
+
+/* The system may give a socket up to 16 MiB for what waits. To a program without privileges it gives less. */
+static void it_has_the_largest_buffer(void **state)
+{
+    (void)state;
+    const int size = 16 << 20, other = bound(SOCK_DGRAM, "127.0.0.1");
+    struct stamped_socket s;
+    int is = 0, most = 0;
+    socklen_t len = sizeof is;
+    if (setsockopt(other, SOL_SOCKET, SO_RCVBUFFORCE, &size, sizeof size) != 0)
+        setsockopt(other, SOL_SOCKET, SO_RCVBUF, &size, sizeof size);
+    assert_int_equal(getsockopt(other, SOL_SOCKET, SO_RCVBUF, &most, &len), 0);
+    open_ok("127.0.0.1", 0, &s);
+    assert_int_equal(getsockopt(s.fd, SOL_SOCKET, SO_RCVBUF, &is, &len), 0);
+    assert_int_equal(is, most);
+    stamped_close(&s);
+    close(other);
 }
 
 /* Two programs may read a group, each on the interface that it names. */
@@ -256,6 +277,7 @@ int main(void)
         cmocka_unit_test(a_datagram_has_its_addresses_and_time),
         cmocka_unit_test(a_datagram_of_ipv6_too),
         cmocka_unit_test(lost_datagrams_are_counted),
+        cmocka_unit_test(it_has_the_largest_buffer),
         cmocka_unit_test(a_group_has_several_readers),
         cmocka_unit_test(refusals_name_what_is_allowed),
         cmocka_unit_test(a_stream_has_times_and_an_end),

@@ -69,6 +69,14 @@ static void test_stream_begun_again(void **state)
     begin_stream(&c, 1);
     expect(&bench, LINK_OPENED);
     expect_text(&c, "frames");
+    begin_stream(&c, 1);
+    expect(&bench, LINK_CLOSED);
+    expect(&bench, LINK_OPENED);
+    client_configure(&c); /* this ends it, and begins none */
+    expect(&bench, LINK_CLOSED);
+    bench_expect_notice(&bench, "configured the device again");
+    assert_int_equal(bench_poll(&bench, 0, 0), 0);
+    assert_int_equal(bench.ops->write(bench.link, STREAM, "x", 1), SH_ECLOSED);
     close(c.fd);
     bench_close(&bench);
 }

@@ -4,6 +4,8 @@
  * The bytes are written out by hand from the layouts of USB 2.0 (tables 9-8, 9-10, 9-12, 9-13) and CDC 1.20 (tables 15
  * to 18 and PSTN 1.20, tables 3 and 4). The figures are those of real devices: a TiM571 by its `lsusb -v` in
  * uos/sick_tim issue 29, an URG's device descriptor by UrgNetwork/urg_library issue 29. */
+#include <endian.h>
+
 #include "tests/unit/usb_host.h"
 
 #include "drivers/usb/head_device.h"
@@ -203,8 +205,13 @@ static void test_port(void **state)
     assert_int_equal(rig.head.personality->n_sessions, 1);
     assert_int_equal(control(&rig, 0x21, 0x22, 1, 0, 0), 0);
     assert_true(rig.head.session[0].open);
+    const uint32_t in = usb_device_epoch(rig.head.device, CONSOLE_IN);
+    const uint32_t heard = usb_device_epoch(rig.head.device, CONSOLE_OUT);
     assert_int_equal(control(&rig, 0x21, 0x22, 0, 0, 0), 0);
     assert_false(rig.head.session[0].open);
+    assert_int_not_equal(usb_device_epoch(rig.head.device, CONSOLE_IN),
+                         in); /* what is on its way is not the next one's */
+    assert_int_not_equal(usb_device_epoch(rig.head.device, CONSOLE_OUT), heard);
     send(&rig, &out, CONSOLE_OUT, "VV\n");
     assert_true(rig.head.session[0].open);
     assert_int_equal(usb_device_read(rig.head.device, CONSOLE_OUT, text, sizeof text), 3);
@@ -215,7 +222,56 @@ static void test_port(void **state)
     usb_device_free(rig.head.device);
 }
 
-/* Any bit rate, 8N1, is set as drivers do (PSTN 1.20, table 17), and read back. */
+/* A port tells its serial state (PSTN 1.20, table 30) when it comes to life, and to each client that opens it by DTR:
+ * carrier and data set ready. */
+static void test_serial_state(void **state)
+{
+    (void)state;
+    static const uint8_t ready[10] = {0xa1, 0x20, 0, 0, CONSOLE_INTERFACE, 0, 2, 0, 3, 0};
+    static const struct {
+        unsigned value; /* bit 0: DTR */
+        int want;
+    } steps[] = {{1, 1}, {1, 0}, {3, 0}, {0, 0}, {2, 0}, {3, 1}};
+    struct rig rig;
+    uint8_t bytes[16];
+    struct usb_transfer note = {.endpoint = CONSOLE_NOTIFY, .length = sizeof bytes, .data = bytes};
+    rig_open(&rig, USB_PERSONALITY_NATIVE, "S", USB_RATE_HIGH);
+    configure(&rig);
+    scanhead_usb_update(&rig.head); /* nobody listens yet: it is kept */
+    for (size_t i = 0; i <= sizeof steps / sizeof steps[0]; i++) {
+        if (i > 0) assert_int_equal(control(&rig, 0x21, 0x22, steps[i - 1].value, CONSOLE_INTERFACE, 0), 0);
+        n_done = 0;
+        memset(bytes, 0xee, sizeof bytes);
+        usb_device_submit(rig.head.device, &note);
+        scanhead_usb_update(&rig.head);
+        if (i > 0 && !steps[i - 1].want) {
+            assert_int_equal(n_done, 0);
+            assert_int_equal(usb_device_cancel(rig.head.device, note.id), 1);
+            continue;
+        }
+        assert_int_equal(n_done, 1);
+        assert_int_equal(note.actual, sizeof ready);
+        assert_memory_equal(bytes, ready, sizeof ready);
+    }
+    /* Either interface ends the session when it is set anew. Only the control one is the port's life. */
+    for (unsigned interface = CONSOLE_DATA_INTERFACE + 1; interface-- > 0;) {
+        memcpy(rig.in, ((const uint8_t[]){1, 2, 3, 4, 0, 0, 8}), 7);
+        assert_int_equal(control(&rig, 0x21, 0x20, 0, CONSOLE_INTERFACE, 7), 0);
+        assert_int_equal(control(&rig, 0x01, USB_REQ_SET_INTERFACE, 0, interface, 0), 0);
+        assert_false(rig.head.session[0].open);
+        assert_int_equal(control(&rig, 0xa1, 0x21, 0, CONSOLE_INTERFACE, 7), 7);
+        assert_int_equal(rig.in[0], interface == CONSOLE_INTERFACE ? 0x00 : 1); /* at rest, or as it was set */
+        n_done = 0;
+        usb_device_submit(rig.head.device, &note);
+        scanhead_usb_update(&rig.head);
+        assert_int_equal(n_done, interface == CONSOLE_INTERFACE);
+        usb_device_cancel(rig.head.device, note.id);
+    }
+    usb_device_free(rig.head.device);
+}
+
+/* Any bit rate is set as drivers do, and read back. PSTN 1.20, table 17: 1, 1.5 or 2 stop bits are 0 to 2, parities 0 to
+ * 4; and there are 5 to 8 data bits, or 16. */
 static void test_line_coding(void **state)
 {
     (void)state;
@@ -232,6 +288,21 @@ static void test_line_coding(void **state)
         assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
         assert_memory_equal(rig.in, coding, 7);
     }
+    static const struct {
+        uint8_t stop_bits, parity, bits;
+        int want;
+    } forms[] = {{2, 4, 8, 0},          {3, 4, 8, USB_STALL}, {2, 5, 8, USB_STALL}, {0, 0, 4, USB_STALL},
+                 {1, 3, 5, 0},          {0, 1, 6, 0},         {0, 2, 7, 0},         {0, 0, 9, USB_STALL},
+                 {0, 0, 15, USB_STALL}, {0, 0, 16, 0},        {0, 0, 17, USB_STALL}};
+    uint8_t last[7] = {0};
+    for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
+        const uint8_t coding[7] = {1, 2, 3, 4, forms[i].stop_bits, forms[i].parity, forms[i].bits};
+        memcpy(rig.in, coding, 7);
+        assert_int_equal(control(&rig, 0x21, 0x20, 0, 0, 7), forms[i].want);
+        if (forms[i].want == 0) memcpy(last, coding, 7);
+        assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
+        assert_memory_equal(rig.in, last, 7); /* a refused one changes nothing */
+    }
     static const uint8_t at_rest[7] = {0x00, 0xc2, 0x01, 0x00, 0, 0, 8}; /* 115200: configured anew nobody has set it */
     assert_int_equal(control(&rig, 0x00, 9, 1, 0, 0), 0);
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
@@ -240,6 +311,85 @@ static void test_line_coding(void **state)
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 2), 2); /* a host may read a part, or ask for more */
     assert_memory_equal(rig.in, ((const uint8_t[]){0x00, 0xc2, 0xff, 0xff, 0xff, 0xff, 0xff}), 7);
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 64), 7);
+    usb_device_free(rig.head.device);
+}
+
+/* The reason why a session was cut off is told once, and only where one was open. */
+static void test_cut(void **state)
+{
+    (void)state;
+    static const char *const why[] = {
+        "the host configured the device again: sessions ended, the device stays plugged in",
+        "the host reset the bus: sessions ended, the device stays plugged in", "unplugged: sessions ended"};
+    struct rig rig;
+    rig_open(&rig, USB_PERSONALITY_HOKUYO, "", USB_RATE_FULL);
+    for (int way = 0; way < 3; way++)
+        for (int open = 0; open < 2; open++) {
+            configure(&rig);
+            assert_int_equal(control(&rig, 0x21, 0x22, (unsigned)open, 0, 0), 0);
+            if (way == 0) assert_int_equal(control(&rig, 0, USB_REQ_SET_CONFIGURATION, 0, 0, 0), 0);
+            if (way <= 1) usb_device_reset(rig.head.device); /* after way 0 no session is left for it */
+            if (way == 2) usb_device_attach(rig.head.device, USB_RATE_FULL, rig_complete, &n_done);
+            const char *is = scanhead_usb_cut(&rig.head);
+            if (open)
+                assert_string_equal(is, why[way]);
+            else
+                assert_null(is);
+            assert_null(scanhead_usb_cut(&rig.head));
+        }
+    usb_device_free(rig.head.device);
+}
+
+/* Requests of the native identity's console and stream, right and with one wrong field each. */
+static void test_own_requests(void **state)
+{
+    (void)state;
+    static const struct {
+        unsigned type, request, value, index, length;
+        int want;
+    } cases[] = {
+        {0x21, 0x22, 2, 0, 0, 0}, /* RTS alone */
+        {0x21, 0x22, 3, 0, 0, 0},           {0x21, 0x22, 4, 0, 0, USB_STALL}, {0x21, 0x22, 1, 0, 1, USB_STALL},
+        {0x21, 0x22, 1, 1, 0, USB_STALL},   {0x21, 0x23, 100, 0, 0, 0}, /* break */
+        {0x21, 0x23, 100, 0, 1, USB_STALL}, {0x21, 0x20, 1, 0, 7, USB_STALL}, {0x21, 0x20, 0, 0, 6, USB_STALL},
+        {0x21, 0x20, 0, 0, 8, USB_STALL},   {0xa1, 0x21, 1, 0, 7, USB_STALL}, {0xa1, 0x20, 0, 0, 7, USB_STALL},
+        {0x21, 0x24, 0, 0, 0, USB_STALL},   {0x41, 0x22, 0, 2, 0, 0},         {0x41, 0x22, 2, 2, 0, USB_STALL},
+        {0x41, 0x22, 1, 2, 1, USB_STALL},   {0x41, 0x22, 1, 0, 0, USB_STALL}, {0x41, 0x23, 1, 2, 0, USB_STALL},
+        {0x21, 0x22, 1, 2, 0, USB_STALL}, /* the stream has no DTR */
+        {0xc1, 0x22, 1, 2, 1, USB_STALL},   {0xc1, 0x22, 0, 2, 0, USB_STALL}, {0xc1, 0x22, 0, 2, 2, USB_STALL},
+    };
+    static const uint8_t valid[7] = {0, 0, 0, 0, 0, 0, 8};
+    const struct usb_ctrlrequest coding = {.bRequestType = 0x21, .bRequest = 0x20, .wLength = htole16(7)};
+    struct rig rig;
+    rig_open(&rig, USB_PERSONALITY_NATIVE, "S", USB_RATE_HIGH);
+    configure(&rig);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        memcpy(rig.in, valid, sizeof valid);
+        const int got = control(&rig, cases[i].type, cases[i].request, cases[i].value, cases[i].index, cases[i].length);
+        if (got != cases[i].want) fail_msg("case %zu: %d, not %d", i, got, cases[i].want);
+    }
+    assert_int_equal(rig.head.personality->n_sessions, 2);
+    assert_true(rig.head.session[0].open); /* by 3, and no wrong request has ended it */
+    assert_false(rig.head.session[1].open);
+    /* Where the data of a request are still to come, the answer is that of a right one, and nothing is done. */
+    assert_int_equal(usb_device_control(rig.head.device, &coding, NULL, 7), 0);
+    assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
+    assert_int_equal(le_get32(rig.in), 115200);
+    for (int begun = 0; begun < 3; begun++) { /* a stream that is begun again is one that was begun */
+        memset(rig.in, 0xee, 2);
+        assert_int_equal(control(&rig, 0xc1, 0x22, 0, 2, 1), 1);
+        assert_int_equal(rig.in[0], begun > 0);
+        assert_int_equal(rig.in[1], 0xee);
+        assert_int_equal(control(&rig, 0x41, 0x22, 1, 2, 0), 0);
+    }
+    /* After a reset that no transfer has told of, the next one would; but not that of a new reader. */
+    uint8_t bytes[8];
+    struct usb_transfer in = {.endpoint = STREAM_IN, .length = sizeof bytes, .data = bytes};
+    usb_device_set_gone_due(rig.head.device, STREAM_IN, 1);
+    assert_int_equal(control(&rig, 0x41, 0x22, 1, 2, 0), 0);
+    n_done = 0;
+    usb_device_submit(rig.head.device, &in);
+    assert_int_equal(n_done, 0);
     usb_device_free(rig.head.device);
 }
 
@@ -289,9 +439,11 @@ static void test_functions(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_descriptors), cmocka_unit_test(test_strings),     cmocka_unit_test(test_status),
-        cmocka_unit_test(test_port),        cmocka_unit_test(test_line_coding), cmocka_unit_test(test_foreign_requests),
-        cmocka_unit_test(test_functions),
+        cmocka_unit_test(test_descriptors),      cmocka_unit_test(test_strings),
+        cmocka_unit_test(test_status),           cmocka_unit_test(test_port),
+        cmocka_unit_test(test_line_coding),      cmocka_unit_test(test_serial_state),
+        cmocka_unit_test(test_foreign_requests), cmocka_unit_test(test_cut),
+        cmocka_unit_test(test_functions),        cmocka_unit_test(test_own_requests),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

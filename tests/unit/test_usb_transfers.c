@@ -247,6 +247,64 @@ static void test_gone(void **state)
     free(host);
 }
 
+/* Where an interface ends, what was under way ends with it: half-read transfers, short packets and a halt that were asked
+ * for, a zero-length packet. The epoch is a new one. When it begins again, all is as at first. */
+static void test_begun_again(void **state)
+{
+    (void)state;
+    struct host *host = configured(USB_RATE_HIGH);
+    assert_int_equal(host->n_changes, 1); /* the model's only interface */
+    host_submit(host, 1, 0x02, pattern, 100);
+    host_submit(host, 2, 0x02, pattern, 100);
+    assert_int_equal(usb_device_read(host->device, 0x02, back, 30), 30);
+    host_submit(host, 3, 0x81, NULL, 512);
+    assert_int_equal(usb_device_write(host->device, 0x81, pattern, 512), 512); /* a zero-length packet is due */
+    host_expect(host, 3, USB_OK, 512);
+    usb_device_shorten(host->device, 0x81, 1);
+    usb_device_set_gone_due(host->device, 0x81, 1);
+    const uint32_t out = usb_device_epoch(host->device, 0x02), in = usb_device_epoch(host->device, 0x81);
+    assert_int_equal(host_control(host, 1, USB_REQ_SET_INTERFACE, 0, 0, 0, NULL), 0);
+    assert_int_equal(host->n_changes, 3);
+    assert_int_equal(usb_device_end(host->device), USB_END_CONFIGURED);
+    host_expect(host, 1, USB_GONE, 30);
+    host_expect(host, 2, USB_GONE, 0);
+    assert_int_not_equal(usb_device_epoch(host->device, 0x02), out);
+    assert_int_not_equal(usb_device_epoch(host->device, 0x81), in);
+    host_submit(host, 4, 0x02, pattern + 100, 100);
+    assert_int_equal(usb_device_read(host->device, 0x02, back, 200), 100); /* from its first byte */
+    assert_memory_equal(back, pattern + 100, 100);
+    host_expect(host, 4, USB_OK, 100);
+    host_submit(host, 5, 0x81, NULL, 512);
+    assert_int_equal(host->n_done, 0);
+    assert_int_equal(usb_device_write(host->device, 0x81, pattern, 100), 100);
+    host_expect(host, 5, USB_OK, 100);
+    usb_device_reset(host->device);
+    assert_int_equal(host->n_changes, 4);
+    assert_int_equal(usb_device_end(host->device), USB_END_RESET);
+    host_submit(host, 6, 0x81, NULL, 512); /* the endpoint is there no more */
+    host_expect(host, 6, USB_GONE, 0);
+    host_free(host);
+}
+
+/* A suspended device is unplugged, or its bus is reset: suspended no more, it writes again. */
+static void test_suspended(void **state)
+{
+    (void)state;
+    struct host *host = configured(USB_RATE_HIGH);
+    for (int reset = 0; reset < 2; reset++) {
+        usb_device_suspend(host->device, 1);
+        if (reset)
+            usb_device_reset(host->device);
+        else
+            host_attach(host, USB_RATE_HIGH);
+        host_configure(host);
+        host_submit(host, 1, 0x81, NULL, 512);
+        assert_int_equal(usb_device_write(host->device, 0x81, pattern, 5), 5);
+        host_expect(host, 1, USB_OK, 5);
+    }
+    host_free(host);
+}
+
 static void test_epochs(void **state)
 {
     (void)state;
@@ -275,9 +333,10 @@ static void test_epochs(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_fill), cmocka_unit_test(test_zero_packet), cmocka_unit_test(test_overflow),
-        cmocka_unit_test(test_out),  cmocka_unit_test(test_cancel),      cmocka_unit_test(test_halt),
-        cmocka_unit_test(test_gone), cmocka_unit_test(test_epochs),
+        cmocka_unit_test(test_fill),      cmocka_unit_test(test_zero_packet), cmocka_unit_test(test_overflow),
+        cmocka_unit_test(test_out),       cmocka_unit_test(test_cancel),      cmocka_unit_test(test_halt),
+        cmocka_unit_test(test_gone),      cmocka_unit_test(test_epochs),      cmocka_unit_test(test_begun_again),
+        cmocka_unit_test(test_suspended),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The points of a scan that a page's figures are made of: where there are too many, those of every second pulse stay,
- * whole and in their order. */
+ * whole and in their order. And the page's scene, with bodies that move. */
+#include <math.h>
+
+#include "core/bytes.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "tests/unit/site_rig.h"
 
@@ -96,9 +99,53 @@ static void a_full_sample_takes_no_more(void **state)
     close_sample();
 }
 
+/* The bodies of the page's scene are where they are at the first stop, 2 s after the trajectory's start. The first one
+ * has then turned by 90 degrees, clockwise from above, about (5, 5), and moved by 2 m along x; the second by 1 m along z.
+ * Corners are relative to the middle of what stands, (0.5, 0.5, 0). */
+static void bodies_are_where_they_are_at_the_first_stop(void **state)
+{
+    (void)state;
+    enum { N = 10, HEAD = 40 };
+    static const float corner[N][3] = {{-0.5f, -0.5f, 0}, {0.5f, -0.5f, 0}, {0.5f, 0.5f, 0}, {-0.5f, 0.5f, 0},
+                                       {6.5f, 3.5f, 0},   {6.5f, 2.5f, 0},  {7.5f, 3.5f, 0}, {-0.5f, -0.5f, 2},
+                                       {0.5f, -0.5f, 2},  {-0.5f, 0.5f, 2}};
+    static const uint32_t bodies[6] = {4, 5, 6, 7, 8, 9};
+    struct site *site;
+    struct web_body body;
+    write_in("quad.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
+    write_in("turns.obj", "v 6 5 0\nv 7 5 0\nv 6 6 0\nf 1 2 3\n");
+    write_in("lifts.obj", "v 0 0 1\nv 1 0 1\nv 0 1 1\nf 1 2 3\n");
+    write_in("test.yaml",
+             "head: {profile: full-sweep}\nscene:\n  meshes:\n    - {file: quad.obj, up: z, scale: 1}\n"
+             "    - {file: turns.obj, up: z, scale: 1, turn_deg_s: 45, pivot_m: [5, 5, 0], move_m_s: [1, 0, 0]}\n"
+             "    - {file: lifts.obj, up: z, scale: 1, move_m_s: [0, 0, 0.5]}\n"
+             "platform: {kind: stops, step_s: 1, start_s: 2, end_s: 2}\nstations: [{position_m: [0.5, 0.5, 1]}]\n");
+    if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load_for(cfg, SITE_WRITTEN_OUT, NULL, NULL, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    memset(&w, 0, sizeof w);
+    w.site = site;
+    w.options.scene_triangles = 1000;
+    if (watch_make_scene(&w, &err) != SH_OK || watch_get_scene(&w, &body, &err) != SH_OK) fail_msg("%s", err.text);
+    const uint8_t *at = (const uint8_t *)body.bytes;
+    assert_string_equal(body.type, "application/octet-stream");
+    assert_int_equal(body.len, HEAD + 12 * N + 12 * 4);
+    assert_int_equal(le_get32(at + 8), N);
+    assert_int_equal(le_get32(at + 12), 4);
+    assert_true(le_get_double(at + 16) == 0.5 && le_get_double(at + 24) == 0.5 && le_get_double(at + 32) == 0.0);
+    for (int v = 0; v < N; v++)
+        for (int i = 0; i < 3; i++) /* floats near 8 are rounded by 5e-7, and the turn is a few roundings of doubles */
+            assert_true(fabs((double)(le_get_float(at + HEAD + 12 * v + 4 * i) - corner[v][i])) < 1e-6);
+    for (int i = 0; i < 6; i++) /* after the quad's two triangles */
+        assert_int_equal(le_get32(at + HEAD + 12 * N + 24 + 4 * i), bodies[i]);
+    free(body.bytes);
+    free(w.scene_bytes);
+    site_free(site);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(half_of_the_pulses_stay),
-                                       cmocka_unit_test(a_full_sample_takes_no_more)};
+                                       cmocka_unit_test(a_full_sample_takes_no_more),
+                                       cmocka_unit_test(bodies_are_where_they_are_at_the_first_stop)};
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

@@ -40,62 +40,82 @@ static int send_raw(struct bench *bench, const char *place, const char *text, si
     return status;
 }
 
-#define HOST "Host: @\r\n"
-#define UPGRADE                                                                  \
-    "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n" \
-    "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
-#define CASE(text, status)             \
-    {                                  \
-        text, sizeof(text) - 1, status \
+#define HOST    "Host: @\r\n"
+#define ASKS    "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: "
+#define UPGRADE ASKS "AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+#define CASE(text, status, why)             \
+    {                                       \
+        text, sizeof(text) - 1, status, why \
     }
+#define CONTENT    "a request must not have content here"
+#define EXPECT     "only Expect: 100-continue is supported"
+#define HOSTS      "a request must have one Host, the address that scanhead printed, and at most one Origin"
+#define KEY        "Sec-WebSocket-Key must be 16 bytes as base64"
+#define METHODS    "only GET and HEAD are answered; commands go over the WebSocket at /ws"
+#define NOT_HTTP   "this is not a request of HTTP/1.1"
+#define NOT_THIS   "the Host of this request is not this head; use the address that scanhead printed"
+#define NO_PATH    "a path must begin with /, and %XX in it must be a byte in hexadecimal, but not 0"
+#define PROTOCOL   "the subprotocol must be scanhead-native-1, or not given"
+#define VERSIONS   "only HTTP/1.0 and HTTP/1.1 are supported"
+#define WEBSOCKETS "/ws takes only a WebSocket of version 13, subprotocol scanhead-native-1"
 
 static const struct {
     const char *text;
     size_t len;
     int status;
+    const char *why; /* what the answer says; NULL: no words */
 } requests[] = {
-    CASE("CONNECT x:1 HTTP/1.1\r\n" HOST "\r\n", 405),
-    CASE("OPTIONS * HTTP/1.1\r\n" HOST "\r\n", 405),
-    CASE("FOO / HTTP/1.1\r\n" HOST "\r\n", 405),
-    CASE("POST / HTTP/1.1\r\n" HOST "Expect: 100-continue\r\nContent-Length: 5\r\n\r\n", 405),
-    CASE("GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\nHost: localhost:99999\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\nHost: local host\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST "nonsense\r\n", 400), /* the link does not wait for more */
-    CASE("GET / HTTP/1.1\r\n" HOST "X: a\0b", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST "X: a\rb\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST " folded\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\nHost : @\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST HOST "\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST "Origin: http://elsewhere.example\r\nOrigin: http://@\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n\r\n", 400),
-    CASE("GET /\r\n", 400), /* HTTP/0.9 */
-    CASE("GET foo HTTP/1.1\r\n" HOST "\r\n", 400),
-    CASE("GET /%00 HTTP/1.1\r\n" HOST "\r\n", 400),
-    CASE("GET /%4 HTTP/1.1\r\n" HOST "\r\n", 400),
-    CASE("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 505),
-    CASE("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03UUUUUUUU", 400), /* TLS */
-    CASE("GET / HTTP/1.1\r\n" HOST "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 413),
-    CASE("GET / HTTP/1.1\r\n" HOST "Transfer-Encoding: chunked\r\nContent-Length: 5\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: 5\r\nExpect: 100-continue\r\n\r\n", 413),
-    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: 0\r\nContent-Length: 0\r\n\r\n", 400),
-    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: -1\r\n\r\n", 400),
-    CASE("GET /scene HTTP/1.1\r\n" HOST "Expect: tea\r\n\r\n", 417),
-    CASE("GET /scene HTTP/1.1\r\n" HOST "Expect: 100-continue\r\n\r\n", 200),
-    CASE("GET /scene HTTP/1.1\r\n" HOST "Content-Length: 0\r\n\r\n", 200),
-    CASE("GET /scene HTTP/1.1\nHost: @\n\n", 200),
-    CASE("\r\n\r\nGET /scene HTTP/1.1\r\n" HOST "\r\n", 200),
-    CASE("GET /sc%65ne HTTP/1.0\r\n" HOST "\r\n", 200),
-    CASE("GET http://@/scene HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n", 200),
-    CASE("GET http://elsewhere.example/scene HTTP/1.1\r\n" HOST "\r\n", 421),
-    CASE("GET /scene HTTP/1.0\r\n\r\n", 421),
-    CASE("GET /scene HTTP/1.0\r\nOrigin: http://\r\n\r\n", 0), /* an Origin is never that of no Host: no byte */
+    CASE("CONNECT x:1 HTTP/1.1\r\n" HOST "\r\n", 405, METHODS),
+    CASE("OPTIONS * HTTP/1.1\r\n" HOST "\r\n", 405, METHODS),
+    CASE("FOO / HTTP/1.1\r\n" HOST "\r\n", 405, METHODS),
+    CASE("POST / HTTP/1.1\r\n" HOST "Expect: 100-continue\r\nContent-Length: 5\r\n\r\n", 405, METHODS),
+    CASE("GET / HTTP/1.1\r\nHost: localhost:18080abc\r\n\r\n", 400, HOSTS),
+    CASE("GET / HTTP/1.1\r\nHost: localhost:99999\r\n\r\n", 400, HOSTS),
+    CASE("GET / HTTP/1.1\r\nHost: local host\r\n\r\n", 400, HOSTS),
+    CASE("GET / HTTP/1.1\r\n" HOST "nonsense\r\n", 400, NOT_HTTP), /* the link does not wait for more */
+    CASE("GET / HTTP/1.1\r\n" HOST "X: a\0b", 400, NOT_HTTP),
+    CASE("GET / HTTP/1.1\r\n" HOST "X: a\rb\r\n", 400, NOT_HTTP),
+    CASE("GET / HTTP/1.1\r\n" HOST " folded\r\n\r\n", 400, NOT_HTTP),
+    CASE("GET / HTTP/1.1\r\nHost : @\r\n\r\n", 400, NOT_HTTP),
+    CASE("GET / HTTP/1.1\r\n" HOST HOST "\r\n", 400, HOSTS),
+    CASE("GET / HTTP/1.1\r\n" HOST "Origin: http://elsewhere.example\r\nOrigin: http://@\r\n\r\n", 400, HOSTS),
+    CASE("GET / HTTP/1.1\r\n\r\n", 400, HOSTS),
+    CASE("GET /\r\n", 400, NOT_HTTP), /* HTTP/0.9 */
+    CASE("GET foo HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("GET /%00 HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("GET /%4 HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", 505, VERSIONS),
+    CASE("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03UUUUUUUU", 400, NOT_HTTP), /* TLS */
+    CASE("GET / HTTP/1.1\r\n" HOST "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n", 413, CONTENT),
+    CASE("GET / HTTP/1.1\r\n" HOST "Transfer-Encoding: chunked\r\nContent-Length: 5\r\n\r\n", 400, CONTENT),
+    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: 5\r\nExpect: 100-continue\r\n\r\n", 413, CONTENT),
+    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: 0\r\nContent-Length: 0\r\n\r\n", 400, NOT_HTTP),
+    CASE("GET / HTTP/1.1\r\n" HOST "Content-Length: -1\r\n\r\n", 400, NOT_HTTP),
+    CASE("GET /scene HTTP/1.1\r\n" HOST "Expect: tea\r\n\r\n", 417, EXPECT),
+    CASE("GET /scene HTTP/1.1\r\n" HOST "Expect: 100-continue\r\n\r\n", 200, NULL),
+    CASE("GET /scene HTTP/1.1\r\n" HOST "Content-Length: 0\r\n\r\n", 200, NULL),
+    CASE("GET /scene HTTP/1.1\nHost: @\n\n", 200, NULL),
+    CASE("\r\n\r\nGET /scene HTTP/1.1\r\n" HOST "\r\n", 200, NULL),
+    CASE("GET /sc%65ne HTTP/1.0\r\n" HOST "\r\n", 200, NULL),
+    CASE("GET http://@/scene HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n", 200, NULL),
+    CASE("GET http://elsewhere.example/scene HTTP/1.1\r\n" HOST "\r\n", 421, NOT_THIS),
+    CASE("GET /scene HTTP/1.0\r\n\r\n", 421, NOT_THIS),
+    CASE("GET /scene HTTP/1.0\r\nOrigin: http://\r\n\r\n", 0, NULL), /* an Origin is never that of no Host: no byte */
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 8\r\n\r\n",
-         426),
+         426, WEBSOCKETS),
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n\r\n",
-         400),
-    CASE("HEAD /ws HTTP/1.1\r\n" HOST UPGRADE "\r\n", 426),
-    CASE("GET /ws HTTP/1.0\r\n" HOST UPGRADE "\r\n", 426),
+         400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAA!==\r\n\r\n", 400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAAA=A\r\n\r\n", 400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAA==\r\n\r\n", 400, KEY),
+    CASE("GET /ws HTTP/1.1\r\n" HOST ASKS "AAAAAAAAAAAAAAAAAAAAAA===\r\n\r\n", 400, KEY),
+    CASE("GET /%4g HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("GET /%g4 HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("GET /% HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
+    CASE("HEAD /ws HTTP/1.1\r\n" HOST UPGRADE "\r\n", 426, NULL),
+    CASE("GET /ws HTTP/1.0\r\n" HOST UPGRADE "\r\n", 426, WEBSOCKETS),
+    CASE("GET /ws HTTP/1.1\r\n" HOST UPGRADE "Sec-WebSocket-Protocol: bare\r\n\r\n", 400, PROTOCOL),
+    CASE("GET /scene?%zz HTTP/1.1\r\n" HOST "\r\n", 400, NO_PATH),
 };
 
 /* Words of a status are those of RFC 9110, section 15. */
@@ -123,6 +143,15 @@ static void expect_words(int status, const char *answer)
     }
 }
 
+/* The body of a refusal is its reason, in a line. */
+static void expect_body(const char *answer, const char *why)
+{
+    const char *body = strstr(answer, "\r\n\r\n");
+    assert_non_null(body);
+    assert_int_equal(strncmp(body + 4, why, strlen(why)), 0);
+    assert_string_equal(body + 4 + strlen(why), "\n");
+}
+
 static void test_requests(void **state)
 {
     (void)state;
@@ -134,9 +163,36 @@ static void test_requests(void **state)
         if (status != requests[i].status) fail_msg("%s: %d, not %d", requests[i].text, status, requests[i].status);
         if (status != 0) assert_non_null(strstr(answer, "connection: close"));
         expect_words(status, answer);
+        if (requests[i].why != NULL) expect_body(answer, requests[i].why);
         if (status == 405) assert_non_null(strstr(answer, "\r\nallow: GET, HEAD\r\n"));
         if (status == 426) assert_non_null(strstr(answer, "\r\nsec-websocket-version: 13\r\n"));
     }
+    bench_close(&bench);
+}
+
+/* The owner gets a path of 255 bytes and a query of 1023 whole, counted without %XX. A longer path is cut, and a longer
+ * query is refused. */
+static void test_longest(void **state)
+{
+    (void)state;
+    enum { PATH = 255, QUERY = 1023 };
+    static char text[3000], answer[3000], want[2000];
+    char place[64];
+    struct bench bench = web_open(place);
+    snprintf(want, sizeof want, "\r\n\r\n/echo%0*d?%0*d", PATH - 5, 7, QUERY, 8);
+    size_t len = (size_t)snprintf(text, sizeof text, "GET /%%65cho%0*d?%0*d%%38 HTTP/1.1\r\n" HOST "\r\n", PATH - 5, 7,
+                                  QUERY - 1, 0);
+    assert_int_equal(send_raw(&bench, place, text, len, answer, sizeof answer), 200);
+    assert_string_equal(strstr(answer, "\r\n\r\n"), want);
+    for (int more = 1; more <= 2; more++) {
+        snprintf(want, sizeof want, "\r\n\r\n/echo\n%0*d?q", PATH - 6, 0);
+        len = (size_t)snprintf(text, sizeof text, "GET /echo%%0a%0*d?q HTTP/1.1\r\n" HOST "\r\n", PATH - 6 + more, 0);
+        assert_int_equal(send_raw(&bench, place, text, len, answer, sizeof answer), 200);
+        assert_string_equal(strstr(answer, "\r\n\r\n"), want);
+    }
+    len = (size_t)snprintf(text, sizeof text, "GET /echo?%0*d HTTP/1.1\r\n" HOST "\r\n", QUERY + 1, 0);
+    assert_int_equal(send_raw(&bench, place, text, len, answer, sizeof answer), 400);
+    expect_body(answer, "the query after ? has more than 1023 bytes");
     bench_close(&bench);
 }
 
@@ -248,9 +304,9 @@ static void test_who_makes_room(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_requests),           cmocka_unit_test(test_many),
-        cmocka_unit_test(test_nobody_is_shut_out), cmocka_unit_test(test_one_address),
-        cmocka_unit_test(test_who_makes_room),
+        cmocka_unit_test(test_requests),    cmocka_unit_test(test_longest),
+        cmocka_unit_test(test_many),        cmocka_unit_test(test_nobody_is_shut_out),
+        cmocka_unit_test(test_one_address), cmocka_unit_test(test_who_makes_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

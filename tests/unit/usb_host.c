@@ -36,8 +36,13 @@ struct host *host_new(const struct usb_model *model, enum usb_rate highest, enum
     struct sh_err err = {0, ""};
     assert_non_null(host);
     if (usb_device_create(model, &id, &hooks, host, &host->device, &err) != SH_OK) fail_msg("%s", err.text);
-    usb_device_attach(host->device, rate, host_complete, host);
+    host_attach(host, rate);
     return host;
+}
+
+void host_attach(struct host *host, enum usb_rate rate)
+{
+    usb_device_attach(host->device, rate, host_complete, host);
 }
 
 void host_free(struct host *host)

@@ -33,6 +33,9 @@ int host_request(void *ctx, const struct usb_ctrlrequest *setup, uint8_t *data);
 
 struct host *host_new(const struct usb_model *model, enum usb_rate highest, enum usb_rate rate);
 
+/* Plugs it in once more, as at first. */
+void host_attach(struct host *host, enum usb_rate rate);
+
 void host_free(struct host *host);
 
 /* Makes a control transfer. out: wLength bytes for OUT. Received bytes are in host_in, whose further bytes must not

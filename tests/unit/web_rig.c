@@ -8,9 +8,18 @@
 #include <string.h>
 #include <sys/socket.h>
 
+static int echo(const char *path, const char *query, struct web_body *out)
+{
+    *out = (struct web_body){.type = "text/plain"};
+    const int len = asprintf(&out->bytes, "%s?%s", path, query);
+    out->len = len > 0 ? (size_t)len : 0;
+    return len > 0 ? SH_OK : SH_ENOMEM;
+}
+
 static int get(void *ctx, const char *path, const char *query, struct web_body *out, struct sh_err *err)
 {
     (void)ctx;
+    if (strncmp(path, "/echo", 5) == 0) return echo(path, query, out);
     if (strcmp(path, "/scene") != 0) return SH_EINPUT;
     if (strcmp(query, "a=1&b=2&c=3") == 0) return sh_fail(err, SH_EINPUT, "three words");
     if (strcmp(query, "n=x") == 0) return sh_fail(err, SH_EINPUT, "n=x: not a number");

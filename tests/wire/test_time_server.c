@@ -3,6 +3,8 @@
  * are computed here from the request that came and the delay that the scanner reports. */
 #include <endian.h>
 #include <math.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 
 #include "drivers/protocol/cola_clock.h"
 #include "tests/wire/cola_client.h"
@@ -301,6 +303,40 @@ static void it_never_floods_a_server(void **state)
     scanner_end();
 }
 
+/* Leaves the head without a free descriptor. Returns its limit as it was. */
+static struct rlimit take_descriptors(void)
+{
+    char path[64];
+    struct rlimit before, none;
+    struct stat st;
+    int next = 0;
+    do
+        snprintf(path, sizeof path, "/proc/%d/fd/%d", (int)head.pid, next++);
+    while (lstat(path, &st) == 0);
+    assert_int_equal(prlimit(head.pid, RLIMIT_NOFILE, NULL, &before), 0);
+    none = (struct rlimit){.rlim_cur = (rlim_t)next - 1, .rlim_max = before.rlim_max};
+    assert_int_equal(prlimit(head.pid, RLIMIT_NOFILE, &none, NULL), 0);
+    return before;
+}
+
+/* The head has no socket for its requests. It says so, and tries again after the time between two of them. */
+static void it_tries_again_without_a_way(void **state)
+{
+    struct scanhead_frame frame;
+    scanner_start(state, "");
+    struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
+    cola_client_expect(&scanner, "sWN TSCTCupdatetime 1", "sWA TSCTCupdatetime");
+    const struct rlimit before = take_descriptors();
+    cola_client_expect(&scanner, "sWN TSCRole 1", "sWA TSCRole");
+    until_state(sh, "SILENT");
+    client_until_soon(sh, SCANHEAD_EV_ERROR, &frame);
+    assert_non_null(strstr(frame.event_text, "127.0.0.1: there is no way to this server"));
+    assert_int_equal(prlimit(head.pid, RLIMIT_NOFILE, &before, NULL), 0);
+    serve(sh, server_wait(), at(SERVER_S), "SET");
+    scanhead_close(sh);
+    scanner_end();
+}
+
 /* Adds a fault, and waits until the command has taken effect: 100 ms of the head's time. */
 static void inject(struct scanhead *sh, const char *fault)
 {
@@ -346,6 +382,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(wrong_servers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_kiss_slows_it_down, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(it_never_floods_a_server, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(it_tries_again_without_a_way, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(injected_faults, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests_name("time server", tests, NULL, NULL);
