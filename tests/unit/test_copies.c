@@ -228,6 +228,9 @@ static void bounds_are_exact(void **state)
     struct pair p;
     state_now = 11;
     scatter(place, here);
+    memcpy(place[0].at_m, ((const double[3]){-300, 200, 10}), sizeof place[0].at_m); /* the outermost two */
+    memcpy(place[PLACES - 1].at_m, ((const double[3]){100, -400, 70}), sizeof place[0].at_m);
+    double all_lo[3] = {-50, -50, 0}, all_hi[3] = {50, 50, 0}; /* the ground */
     open_pair(&p, place, PLACES, 0, here);
     for (uint32_t k = 0; k < PLACES; k++) {
         const struct scene_copy *copy = &p.scene[0]->copied[0].copy[k];
@@ -240,9 +243,12 @@ static void bounds_are_exact(void **state)
             }
         for (int i = 0; i < 3; i++) {
             assert_true(copy->min_m[i] == lo[i] && copy->max_m[i] == hi[i]);
-            assert_true(p.scene[0]->min_m[i] <= lo[i] && p.scene[0]->max_m[i] >= hi[i]);
+            all_lo[i] = fmin(all_lo[i], lo[i]);
+            all_hi[i] = fmax(all_hi[i], hi[i]);
         }
     }
+    assert_memory_equal(p.scene[0]->min_m, all_lo, sizeof all_lo);
+    assert_memory_equal(p.scene[0]->max_m, all_hi, sizeof all_hi);
     close_pair(&p);
 }
 

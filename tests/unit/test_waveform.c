@@ -275,6 +275,7 @@ static void change(struct waveform_spec *s, int k)
     case 23: s->noise = (double)NAN; break;
     case 24: s->shape = WAVEFORM_TABLE, s->table = measured, s->n_table = 2000, s->table_step_s = 1e-9; break;
     case 25: s->after_s = 1e-4; break;
+    case 26: s->before_s = 9e-6, s->sample_s = 0.333e-9; break;
     default: break;
     }
 }
@@ -310,7 +311,8 @@ static void limits_are_told(void **state)
         "samples of 0.1 ns long; at most 4096 are allowed",
         "noise of nan times the threshold: 0 to 1e+06 is allowed",
         "a pulse's table of 2000 values: 2 to 1024 are allowed",
-        "time kept after an echo of 100000 ns: 0 to 10000 is allowed"};
+        "time kept after an echo of 100000 ns: 0 to 10000 is allowed",
+        "9000 ns kept before an echo and 8 ns after it: together at most 681.984 ns, 2048 samples"};
     for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
         struct waveform_spec spec = waveform_rig_spec();
         struct waveform *w = NULL;
