@@ -286,6 +286,30 @@ static void edges_out_of_reach(void **state)
     }
 }
 
+/* An edge goes by from the right, 5 m ahead, to the left, 15 m ahead. It crosses the axis at 10 m, and the footprint of
+ * 0.1 m from 9.83 to 10.17 m. So up to 9.6 m nothing crosses it, although the edge is nearer beside it. */
+static void an_edge_that_crosses_far_away(void **state)
+{
+    (void)state;
+    static const double corner[3][3] = {{3.0, 5.0, 0.0}, {-3.0, 15.0, 0.0}, {0.0, 10.0, 8.0}};
+    static const uint32_t triangle[1][3] = {{0, 1, 2}};
+    struct beam beam;
+    struct beam_sight sight;
+    struct beam_line line[BEAM_MAX_LINES];
+    struct beam_outlines *o;
+    struct sh_err err;
+    double next_m;
+    beam_init(&beam, 0.0, 0.02, 4e-9);
+    struct scene *scene = made_scene(&(struct scene_arrays){corner, 3, triangle, 1, NULL, NULL, 0});
+    const struct beam_outlines_spec spec = {scene, STATION, &beam, 100.0, NULL, NULL};
+    assert_int_equal(beam_outlines_create(&spec, NULL, &o, &err), SH_OK);
+    scene_free(scene);
+    assert_int_equal(lines_ahead(o, &beam, 9.6, &sight, line, &next_m), 0);
+    assert_int_equal(lines_ahead(o, &beam, 10.1, &sight, line, &next_m), 1);
+    assert_true(line[0].h < 1e-6);
+    beam_outlines_free(o);
+}
+
 static void see_a_step_or_none(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
 {
     const int *is_step = ctx;
@@ -339,6 +363,7 @@ int main(void)
         cmocka_unit_test(lines_across_a_footprint),
         cmocka_unit_test(lines_that_do_not_count),
         cmocka_unit_test(as_many_lines_as_there_is_room_for),
+        cmocka_unit_test(an_edge_that_crosses_far_away),
         cmocka_unit_test(edges_out_of_reach),
         cmocka_unit_test(a_step_all_along),
     };
