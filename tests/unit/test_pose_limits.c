@@ -109,6 +109,23 @@ static void samples_of_a_long_way(void **state)
                 ": the path is too long: 11888221 samples every 0.02 s or 0.01 m; allowed are 10000000");
 }
 
+/* 4,004 legs of 999,000 s leave 4,000 s for a pause. Up to there the way is only too long to be sampled. */
+static void the_longest_time(void **state)
+{
+    (void)state;
+    enum { POINTS = 4005 };
+    char *lines = malloc(POINTS * 32), *p = lines;
+    for (int i = 0; i < POINTS; i++)
+        p += sprintf(p, "%d,0,0,0.001,0\n", 999 * i);
+    const size_t last = strlen("0\n");
+    strcpy(p - last, "3999.5\n");
+    expect_file(1, "x_m,y_m,z_m,speed_m_s,pause_s", lines, ": the path is too long: ");
+    strcpy(p - last, "4000.5\n");
+    expect_file(1, "x_m,y_m,z_m,speed_m_s,pause_s", lines,
+                "line 4006: 4e+09 s from the first way-point on; allowed 4e+09");
+    free(lines);
+}
+
 static void wrong_samples(void **state)
 {
     (void)state;
@@ -167,11 +184,9 @@ static void lengths_of_quaternions(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples),
-        cmocka_unit_test(waypoints),
-        cmocka_unit_test(wrong_samples),
-        cmocka_unit_test(samples_of_a_long_way),
-        cmocka_unit_test(lengths_of_quaternions),
+        cmocka_unit_test(samples),          cmocka_unit_test(waypoints),
+        cmocka_unit_test(wrong_samples),    cmocka_unit_test(samples_of_a_long_way),
+        cmocka_unit_test(the_longest_time), cmocka_unit_test(lengths_of_quaternions),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }
