@@ -236,13 +236,105 @@ static void rings_of_sub_rays(void **state)
     assert_true(fabs(beam_end_error(4) - 0.12) < 0.005 && fabs(beam_end_error(12) - 0.05) < 0.005);
 }
 
+/* ---- parts */
+
+/* Sums the part of the disc on one side of each line, on a grid: bit i of `sides` says whether it is beyond line i. */
+static struct beam_part on_grid(const struct beam_line *line, uint32_t n, uint32_t sides)
+{
+    enum { STEPS = 500 };
+    struct beam_part p = {0};
+    for (int i = 0; i < STEPS; i++)
+        for (int k = 0; k < STEPS; k++) {
+            const double x = (2.0 * i + 1.0) / STEPS - 1.0, y = (2.0 * k + 1.0) / STEPS - 1.0;
+            uint32_t at = 0;
+            if (x * x + y * y > 1.0) continue;
+            for (uint32_t m = 0; m < n; m++)
+                at |= (uint32_t)(line[m].n[0] * x + line[m].n[1] * y > line[m].h) << m;
+            if (at != sides) continue;
+            const double energy = density(x * x + y * y) * 4.0 / STEPS / STEPS;
+            p.energy += energy;
+            p.x += energy * x;
+            p.y += energy * y;
+            p.xx += energy * x * x;
+            p.xy += energy * x * y;
+            p.yy += energy * y * y;
+        }
+    if (p.energy < 1e-9) return p;
+    p.x /= p.energy;
+    p.y /= p.energy;
+    p.xx = p.xx / p.energy - p.x * p.x;
+    p.xy = p.xy / p.energy - p.x * p.y;
+    p.yy = p.yy / p.energy - p.y * p.y;
+    return p;
+}
+
+static int is_like(const struct beam_part *a, const struct beam_part *b, double most)
+{
+    return fabs(a->energy - b->energy) < most && fabs(a->x - b->x) < most && fabs(a->y - b->y) < most &&
+           fabs(a->xx - b->xx) < most && fabs(a->xy - b->xy) < most && fabs(a->yy - b->yy) < most;
+}
+
+/* Each part is one of those that the lines make, and the parts together are the whole footprint. Lines that don't cross
+ * in the disc cut it in closed form. Where they do, 469 places stand for it: an edge takes up to half a row of places
+ * to either side, of 0.09 radii. */
+static void parts_of_a_footprint(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t n, parts;
+        struct beam_line line[3];
+        double most;
+    } is[] = {{0, 1, {{.h = 0.0}}, 1e-3},
+              {1, 2, {{{0.6, 0.8}, 0.25}}, 1e-3},
+              {2, 3, {{{0.6, 0.8}, 0.1}, {{0.6, 0.8}, 0.5}}, 1e-3},    /* one cap within the other */
+              {2, 3, {{{0.6, 0.8}, 0.6}, {{0.64, 0.768}, 0.2}}, 1e-3}, /* likewise, the other way round */
+              {2, 3, {{{0.6, 0.8}, 0.3}, {{-0.6, -0.8}, 0.4}}, 1e-3},  /* side by side */
+              {2, 3, {{{1.0, 0.0}, 0.8}, {{0.0, 1.0}, 0.8}}, 1e-3},
+              {2, 4, {{{1.0, 0.0}, 0.2}, {{0.0, 1.0}, 0.3}}, 0.05},
+              {3, 4, {{{1.0, 0.0}, 0.3}, {{-1.0, 0.0}, 0.2}, {{0.8, 0.6}, 0.7}}, 0.05}};
+    struct beam beam;
+    static struct beam_pattern fine;
+    static struct beam_parts parts;
+    const double half_t = 0.5 * mean_over_t(itself, 0.0);
+    beam_init(&beam, 0.007, 0.00035, 4e-9);
+    beam_rings(BEAM_FINE_RINGS, &fine);
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        double energy = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
+        uint32_t found = 0, whole = 0;
+        assert_int_equal(beam_cut(&beam, &fine, is[i].line, is[i].n, 1, &parts), 0);
+        for (uint32_t sides = 0; sides < 1U << is[i].n; sides++) {
+            const struct beam_part want = on_grid(is[i].line, is[i].n, sides);
+            if (want.energy < 0.01) continue;
+            uint32_t k = 0;
+            while (k < parts.n && !is_like(&parts.part[k], &want, is[i].most))
+                k++;
+            if (k == parts.n) fail_msg("case %zu: no part of energy %g at %g %g", i, want.energy, want.x, want.y);
+            if (sides == 0) whole = k;
+            found++;
+        }
+        assert_true(found <= parts.n && found + 1 >= is[i].parts);
+        assert_int_equal(parts.centre, whole);
+        for (uint32_t k = 0; k < parts.n; k++) {
+            const struct beam_part *p = &parts.part[k];
+            energy += p->energy;
+            x += p->energy * p->x;
+            y += p->energy * p->y;
+            xx += p->energy * (p->xx + p->x * p->x);
+            xy += p->energy * (p->xy + p->x * p->y);
+            yy += p->energy * (p->yy + p->y * p->y);
+        }
+        assert_true(fabs(energy - 1.0) < 1e-5 && fabs(x) < 1e-5 && fabs(y) < 1e-5);
+        assert_true(fabs(xx - half_t) < 1e-5 && fabs(xy) < 1e-5 && fabs(yy - half_t) < 1e-5);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parts_beyond_a_line),  cmocka_unit_test(widths_by_definition),
         cmocka_unit_test(means_on_a_plane),     cmocka_unit_test(widths_on_a_plane),
         cmocka_unit_test(ranges_within_a_part), cmocka_unit_test(axes_across_a_direction),
-        cmocka_unit_test(rings_of_sub_rays),
+        cmocka_unit_test(rings_of_sub_rays),    cmocka_unit_test(parts_of_a_footprint),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
