@@ -47,6 +47,7 @@ static void specs(void **state)
         const char *says;
     } is[] = {
         {{.station_m = {INFINITY, 0, 0}}, "georef: station position x is not a finite number of metres"},
+        {{.station_m = {0, -INFINITY, 0}}, "georef: station position y is not a finite number of metres"},
         {{.station_m = {0, 0, NAN}}, "georef: station position z is not a finite number of metres"},
         {{.crs = (enum georef_crs)4}, "georef: coordinate reference system 4; allowed local, ecef, utm, geodetic"},
         {{.crs = GEOREF_UTM, .utm_zone = 61}, "georef: UTM zone 61; allowed 1 to 60, or 0: by position"},
@@ -99,8 +100,13 @@ static void zones_that_do_not_reach(void **state)
     georef = make(GEOREF_UTM, 48, 9, 0, 32);
     expect_begin(georef_recentre(georef, (const double[3]){9e6, 20, 30}, &moved, &err),
                  "georef: the zone (EPSG 32632) does not reach 9000000 20 30 m (", ")");
-    refused(georef_recentre(georef, (const double[3]){10, NAN, 30}, &moved, &err),
-            "georef: centre y is not a finite number");
+    for (int k = 0; k < 3; k++) {
+        double centre_m[3] = {10, 20, 30};
+        char says[64];
+        centre_m[k] = (double)NAN;
+        snprintf(says, sizeof says, "georef: centre %c is not a finite number", "xyz"[k]);
+        refused(georef_recentre(georef, centre_m, &moved, &err), says);
+    }
     georef_free(georef);
 }
 
@@ -156,13 +162,17 @@ static void polynomials_near_a_pole(void **state)
 static void grids(void **state)
 {
     (void)state;
-    static const double here[3] = {5e5, 5.3e6, 0.0}, none[3] = {0.0, INFINITY, 0.0};
+    static const double here[3] = {5e5, 5.3e6, 0.0};
     struct georef_place at;
     refused(georef_locate_utm(61, 1, here, &at, &err), "UTM zone 61; allowed 1 to 60, or 0: UPS");
     refused(georef_locate_utm(-1, 1, here, &at, &err), "UTM zone -1; allowed 1 to 60, or 0: UPS");
-    refused(georef_locate_utm(60, 1, none, &at, &err), "UTM coordinates are not finite numbers of metres");
-    refused(georef_locate_utm(0, 1, none, &at, &err), "UPS coordinates are not finite numbers of metres");
-    refused(georef_locate_ecef(none, &at, &err), "ECEF coordinates are not finite numbers of metres");
+    for (int k = 0; k < 3; k++) {
+        double none[3] = {5e5, 5.3e6, 0.0};
+        none[k] = (double)INFINITY;
+        refused(georef_locate_utm(60, 1, none, &at, &err), "UTM coordinates are not finite numbers of metres");
+        refused(georef_locate_utm(0, 1, none, &at, &err), "UPS coordinates are not finite numbers of metres");
+        refused(georef_locate_ecef(none, &at, &err), "ECEF coordinates are not finite numbers of metres");
+    }
     expect_begin(georef_locate_utm(60, 0, (const double[3]){9e6, 2e6, 0}, &at, &err),
                  "9000000.000 E 2000000.000 N is not in UTM zone 60S (", ")");
     expect_begin(georef_locate_utm(0, 1, (const double[3]){9e6, 2e6, 0}, &at, &err),
@@ -175,13 +185,17 @@ static void grids(void **state)
 static void frames(void **state)
 {
     (void)state;
-    static const double here[3] = {0.0, 0.0, 0.0}, none[3] = {0.0, 0.0, NAN};
+    static const double here[3] = {0.0, 0.0, 0.0};
     const struct georef_place munich = {48, 11, 500}, south = {-85, 30, 0};
     struct geoframe frame;
     struct georef_place at;
     double p[3];
-    refused(geoframe_set_tangent(&frame, none, &munich, 0.0, &err),
-            "the anchor's origin or direction is not a finite number");
+    for (int k = 0; k < 3; k++) {
+        double none[3] = {0.0, 0.0, 0.0};
+        none[k] = (double)NAN;
+        refused(geoframe_set_tangent(&frame, none, &munich, 0.0, &err),
+                "the anchor's origin or direction is not a finite number");
+    }
     refused(geoframe_set_tangent(&frame, here, &munich, INFINITY, &err),
             "the anchor's origin or direction is not a finite number");
     refused(geoframe_set_grid(&frame, 61, 1, &err), "UTM zone 61; allowed 1 to 60, or 0: UPS");
