@@ -4,8 +4,7 @@
 #include <math.h>
 
 #include "core/light.h"
-#include "core/waveform/waveform_inside.h"
-#include "tests/unit/waveform_rig.h"
+#include "tests/unit/finder_rig.h"
 
 enum { SHAPES = 2 };
 
@@ -75,7 +74,7 @@ static void figures_of_the_pulse(void **state)
     for (int shape = 0; shape < SHAPES; shape++) {
         struct waveform_spec spec;
         struct waveform *w = open_shape(shape, &spec);
-        const struct finder *f = &w->finder;
+        const struct finder *f = finder_rig_of(w);
         const double rise = crossing(&spec, 0.5, -1), fall = crossing(&spec, 0.5, 1), width = fall - rise;
         const double top = 4095.0, step = 0.01;
         double area = 0.0, square = 0.0, cube = 0.0;
@@ -117,8 +116,8 @@ static void a_limited_receiver(void **state)
     spec.saturation = 60.0;
     spec.dead_s = 7e-9;
     struct waveform *w = waveform_rig_open(&spec);
-    near(w->finder.limit, 60.0 - 5.0 * w->finder.noise, 1e-9);
-    assert_int_equal(w->finder.blind, 7);
+    near(finder_rig_of(w)->limit, 60.0 - 5.0 * finder_rig_of(w)->noise, 1e-9);
+    assert_int_equal(finder_rig_of(w)->blind, 7);
     waveform_free(w);
 }
 
@@ -134,14 +133,14 @@ static void values_of_a_term(void **state)
         const double rise = crossing(&spec, 0.5, -1), fall = crossing(&spec, 0.5, 1);
         const double sigma = (fall - rise) / 2.3548200450309493, middle = 0.5 * (rise + fall);
         for (double d = -3.0; d < 5.0; d += 0.37) {
-            const double want = pulse_at(&spec, middle + d * sigma), value = finder_value(&w->finder, d);
+            const double want = pulse_at(&spec, middle + d * sigma), value = finder_value(finder_rig_of(w), d);
             const double slope =
                 (pulse_at(&spec, middle + (d + 0.01) * sigma) - pulse_at(&spec, middle + (d - 0.01) * sigma)) / 0.02;
             near(value, want, 1e-3);
-            near(finder_fall(&w->finder, d, value), -slope, 3e-3);
+            near(finder_fall(finder_rig_of(w), d, value), -slope, 3e-3);
         }
         for (double part = 0.02; part < 1.0; part += 0.07)
-            near(finder_lead(&w->finder, part), -crossing(&spec, part, -1), 5e-3 * (fall - rise));
+            near(finder_lead(finder_rig_of(w), part), -crossing(&spec, part, -1), 5e-3 * (fall - rise));
         waveform_free(w);
     }
 }
@@ -157,7 +156,7 @@ static void echoes_of_planes(void **state)
         struct waveform *w = open_shape(shape, &spec);
         const double width = crossing(&spec, 0.5, 1) - crossing(&spec, 0.5, -1);
         for (int k = 0; k < FINDER_SPREADS; k += 2) {
-            const struct finder_spread *s = &w->finder.spread[k];
+            const struct finder_spread *s = &finder_rig_of(w)->spread[k];
             const double extent = tilts[k] * width, step = 0.02 * s->width;
             double top = 0.0, square = 0.0, n = 0.0, tail = 0.0;
             for (double x = -2.0 * s->width; x < 2.0 * s->width; x += step)
@@ -166,7 +165,7 @@ static void echoes_of_planes(void **state)
             near(echo_at(&spec, extent, s->width - s->half_lead), 0.5 * top, 3e-3 * top);
             for (double x = -(extent + 3.0 * width); x < extent + 5.0 * width; x += step) {
                 const double d = (x - s->lag) / s->sigma;
-                const double rest = echo_at(&spec, extent, x) / top - finder_value(&w->finder, d) / s->gain;
+                const double rest = echo_at(&spec, extent, x) / top - finder_value(finder_rig_of(w), d) / s->gain;
                 if (fabs(d) > FINDER_NEAR) tail = fmax(tail, rest);
                 if (fabs(d) > FINDER_NEAR) continue;
                 square += rest * rest;
@@ -199,21 +198,21 @@ static void echoes_between_tilts(void **state)
     (void)state;
     struct waveform_spec spec;
     struct waveform *w = open_shape(1, &spec);
-    const struct finder_spread *s = w->finder.spread;
+    const struct finder_spread *s = finder_rig_of(w)->spread;
     for (int key = 0; key < 2; key++) {
         struct finder_spread got;
         for (int k = 0; k + 1 < FINDER_SPREADS; k++)
             for (double u = 0.25; u < 1.0; u += 0.25) {
                 const double from = key == FINDER_SIGMA ? s[k].sigma : s[k].width,
                              to = key == FINDER_SIGMA ? s[k + 1].sigma : s[k + 1].width;
-                finder_find(&w->finder, (enum finder_key)key, from + u * (to - from), &got);
+                finder_find(finder_rig_of(w), (enum finder_key)key, from + u * (to - from), &got);
                 expect_spread(&got, &s[k], &s[k + 1], u);
             }
         for (int end = 0; end < 2; end++) {
             const struct finder_spread *last = &s[end ? FINDER_SPREADS - 1 : 0];
             const double ratio = end ? 1.5 : 0.8;
-            finder_find(&w->finder, (enum finder_key)key, ratio * (key == FINDER_SIGMA ? last->sigma : last->width),
-                        &got);
+            finder_find(finder_rig_of(w), (enum finder_key)key,
+                        ratio * (key == FINDER_SIGMA ? last->sigma : last->width), &got);
             near(got.sigma, ratio * last->sigma, 1e-9);
             near(got.width, ratio * last->width, 1e-9);
             near(got.half_lead, ratio * last->half_lead, 1e-9);

@@ -3,8 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/waveform/waveform_inside.h"
-#include "tests/unit/waveform_rig.h"
+#include "tests/unit/finder_rig.h"
 
 enum { N = 64 };
 
@@ -37,7 +36,7 @@ static void add(double at, double sigma, double peak)
 
 static struct finder_run window(uint32_t n)
 {
-    return (struct finder_run){&w->finder, y, n, NULL, 0.0};
+    return (struct finder_run){finder_rig_of(w), y, n, NULL, 0.0};
 }
 
 /* The parabola through three logarithms is a Gaussian's own. */
@@ -152,7 +151,7 @@ static void maxima_stand_out(void **state)
 {
     (void)state;
     const struct finder_run run = window(N);
-    const double sigmas = 6.5 * w->finder.noise;
+    const double sigmas = 6.5 * finder_rig_of(w)->noise;
     struct finder_peak peak[4];
     for (int weak = 0; weak < 2; weak++) {
         const double second = weak ? 0.8 : 8.0, prominence = weak ? sigmas : 0.15 * second;
@@ -200,7 +199,7 @@ static void one_term_is_fitted(void **state)
 {
     (void)state;
     const struct finder_run run = window(N);
-    const double pulse = w->finder.spread[0].sigma;
+    const double pulse = finder_rig_of(w)->spread[0].sigma;
     struct finder_term g;
     for (double at = 29.5; at < 30.5; at += 0.17)
         for (double wider = 0.8; wider < 2.0; wider += 0.2) {
@@ -233,9 +232,9 @@ static void one_term_is_fitted(void **state)
 static void a_limit_of_noise(void **state)
 {
     (void)state;
-    const double noise2 = w->finder.noise * w->finder.noise;
+    const double noise2 = finder_rig_of(w)->noise * finder_rig_of(w)->noise;
     for (int n = 2; n <= 100; n += 14) {
-        const double half = 0.5 * n * finder_noise2(&w->finder, n) / noise2;
+        const double half = 0.5 * n * finder_noise2(finder_rig_of(w), n) / noise2;
         double term = exp(-half), share = 0.0;
         for (int k = 0; k < n / 2; k++) {
             share += term;
