@@ -310,6 +310,43 @@ static void an_edge_that_crosses_far_away(void **state)
     beam_outlines_free(o);
 }
 
+/* An edge with a triangle on each side is no outline, unless one kind of surface ends there. One with both triangles on
+ * one side is: beyond it something else is seen. Corners at the same place are one. */
+static void triangles_on_both_sides(void **state)
+{
+    (void)state;
+    static const uint16_t label[2] = {0, 1}, kinds[2][2] = {{3, 3}, {3, 4}};
+    static const struct scene_surface surface[2] = {{.object = "a"}, {.object = "b"}};
+    static const uint32_t triangle[2][3] = {{0, 1, 2}, {3, 5, 4}};
+    static const struct {
+        double third_m[3];
+        int kind; /* -1: all surfaces are of one kind */
+        int lines;
+    } is[] = {{{-10, 10, 0}, -1, -1}, {{-10, 10, 0}, 0, -1}, {{-10, 10, 0}, 1, 1},
+              {{10, 12, 0}, -1, 1},   {{10, 12, 0}, 0, 1},   {{10, 12, 0}, 1, 1}};
+    struct beam beam;
+    struct beam_sight sight;
+    struct beam_line line[BEAM_MAX_LINES];
+    double next_m;
+    beam_init(&beam, 0.0, 0.02, 4e-9);
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        const double *t = is[i].third_m;
+        const double corner[6][3] = {{0.05, 10, -2}, {0.05, 10, 2}, {10, 10, 0},
+                                     {0.05, 10, -2}, {0.05, 10, 2}, {t[0], t[1], t[2]}};
+        struct beam_outlines *o;
+        struct sh_err err;
+        struct scene *scene = made_scene(&(struct scene_arrays){corner, 6, triangle, 2, label, surface, 2});
+        const struct beam_outlines_spec spec = {scene, STATION, &beam, 100.0, is[i].kind < 0 ? NULL : kinds[is[i].kind],
+                                                NULL};
+        assert_int_equal(beam_outlines_create(&spec, NULL, &o, &err), SH_OK);
+        scene_free(scene);
+        const int found = lines_ahead(o, &beam, 90.0, &sight, line, &next_m);
+        if (found != is[i].lines) fail_msg("case %zu: %d", i, found);
+        if (found == 1) expect_line(&beam, &sight, &line[0], 0.05, 10.0);
+        beam_outlines_free(o);
+    }
+}
+
 static void see_a_step_or_none(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
 {
     const int *is_step = ctx;
@@ -364,6 +401,7 @@ int main(void)
         cmocka_unit_test(lines_that_do_not_count),
         cmocka_unit_test(as_many_lines_as_there_is_room_for),
         cmocka_unit_test(an_edge_that_crosses_far_away),
+        cmocka_unit_test(triangles_on_both_sides),
         cmocka_unit_test(edges_out_of_reach),
         cmocka_unit_test(a_step_all_along),
     };
