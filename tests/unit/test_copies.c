@@ -252,6 +252,34 @@ static void bounds_are_exact(void **state)
     close_pair(&p);
 }
 
+/* The plane of a triangle of a copy has the triangle's corners on it, and a normal of twice its area (core/bvh.h).
+ * Rounding: corners of up to 100 m. */
+static void planes_of_copies(void **state)
+{
+    (void)state;
+    static const double here[3] = {0, 0, 0};
+    struct scene_place place[PLACES];
+    struct pair p;
+    double origin_m[3];
+    state_now = 12;
+    scatter(place, here);
+    open_pair(&p, place, PLACES, 0, here);
+    bvh_origin(p.bvh[0], origin_m);
+    for (uint32_t t = 0; t < p.scene[0]->n_all; t++) {
+        struct bvh_plane plane;
+        double corner[3][3], n[3];
+        bvh_get_plane(p.bvh[0], t, &plane);
+        for (int c = 0; c < 3; c++)
+            vec3_sub(p.scene[1]->vertex_m[p.scene[1]->triangle[t][c]], origin_m, corner[c]);
+        vec3_normal(corner[0], corner[1], corner[2], n);
+        const double twice_area = vec3_length(n);
+        assert_true(vec3_distance(plane.n, n) < 1e-11 * (1.0 + twice_area));
+        for (int c = 0; c < 3; c++)
+            assert_true(fabs(vec3_dot(plane.n, corner[c]) - plane.d) < 1e-11 * (1.0 + 100.0 * twice_area));
+    }
+    close_pair(&p);
+}
+
 static void names_say_which_copy(void **state)
 {
     (void)state;
@@ -303,6 +331,7 @@ int main(void)
         cmocka_unit_test(the_first_of_equal_copies_is_hit),
         cmocka_unit_test(a_copy_turns_clockwise),
         cmocka_unit_test(bounds_are_exact),
+        cmocka_unit_test(planes_of_copies),
         cmocka_unit_test(names_say_which_copy),
         cmocka_unit_test(counts_of_copied_meshes),
     };
