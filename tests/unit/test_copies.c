@@ -265,6 +265,7 @@ static void planes_of_copies(void **state)
     scatter(place, here);
     open_pair(&p, place, PLACES, 0, here);
     bvh_origin(p.bvh[0], origin_m);
+    assert_int_equal(scene_n_kept(p.scene[0]), 2 + 24); /* the ground, and one tree */
     for (uint32_t t = 0; t < p.scene[0]->n_all; t++) {
         struct bvh_plane plane;
         double corner[3][3], n[3];
