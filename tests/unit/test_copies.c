@@ -228,6 +228,9 @@ static void bounds_are_exact(void **state)
     struct pair p;
     state_now = 11;
     scatter(place, here);
+    memcpy(place[0].at_m, ((const double[3]){-300, 200, 10}), sizeof place[0].at_m); /* the outermost two */
+    memcpy(place[PLACES - 1].at_m, ((const double[3]){100, -400, 70}), sizeof place[0].at_m);
+    double all_lo[3] = {-50, -50, 0}, all_hi[3] = {50, 50, 0}; /* the ground */
     open_pair(&p, place, PLACES, 0, here);
     for (uint32_t k = 0; k < PLACES; k++) {
         const struct scene_copy *copy = &p.scene[0]->copied[0].copy[k];
@@ -240,8 +243,40 @@ static void bounds_are_exact(void **state)
             }
         for (int i = 0; i < 3; i++) {
             assert_true(copy->min_m[i] == lo[i] && copy->max_m[i] == hi[i]);
-            assert_true(p.scene[0]->min_m[i] <= lo[i] && p.scene[0]->max_m[i] >= hi[i]);
+            all_lo[i] = fmin(all_lo[i], lo[i]);
+            all_hi[i] = fmax(all_hi[i], hi[i]);
         }
+    }
+    assert_memory_equal(p.scene[0]->min_m, all_lo, sizeof all_lo);
+    assert_memory_equal(p.scene[0]->max_m, all_hi, sizeof all_hi);
+    close_pair(&p);
+}
+
+/* The plane of a triangle of a copy has the triangle's corners on it, and a normal of twice its area (core/bvh.h).
+ * Rounding: corners of up to 100 m. */
+static void planes_of_copies(void **state)
+{
+    (void)state;
+    static const double here[3] = {0, 0, 0};
+    struct scene_place place[PLACES];
+    struct pair p;
+    double origin_m[3];
+    state_now = 12;
+    scatter(place, here);
+    open_pair(&p, place, PLACES, 0, here);
+    bvh_origin(p.bvh[0], origin_m);
+    assert_int_equal(scene_n_kept(p.scene[0]), 2 + 24); /* the ground, and one tree */
+    for (uint32_t t = 0; t < p.scene[0]->n_all; t++) {
+        struct bvh_plane plane;
+        double corner[3][3], n[3];
+        bvh_get_plane(p.bvh[0], t, &plane);
+        for (int c = 0; c < 3; c++)
+            vec3_sub(p.scene[1]->vertex_m[p.scene[1]->triangle[t][c]], origin_m, corner[c]);
+        vec3_normal(corner[0], corner[1], corner[2], n);
+        const double twice_area = vec3_length(n);
+        assert_true(vec3_distance(plane.n, n) < 1e-11 * (1.0 + twice_area));
+        for (int c = 0; c < 3; c++)
+            assert_true(fabs(vec3_dot(plane.n, corner[c]) - plane.d) < 1e-11 * (1.0 + 100.0 * twice_area));
     }
     close_pair(&p);
 }
@@ -297,6 +332,7 @@ int main(void)
         cmocka_unit_test(the_first_of_equal_copies_is_hit),
         cmocka_unit_test(a_copy_turns_clockwise),
         cmocka_unit_test(bounds_are_exact),
+        cmocka_unit_test(planes_of_copies),
         cmocka_unit_test(names_say_which_copy),
         cmocka_unit_test(counts_of_copied_meshes),
     };

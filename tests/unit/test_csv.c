@@ -8,6 +8,8 @@
 #include "core/csv.h"
 #include "tests/common/cases.h"
 
+#define DIGITS_63 "123456789012345678901234567890123456789012345678901234567890123"
+
 static const char *const known[] = {"t", "x", "y", NULL};
 static char path[] = "/tmp/scanhead-csv-XXXXXX";
 static struct csv csv;
@@ -53,9 +55,13 @@ static void values_go_to_their_columns(void **state)
     assert_true(csv_next(&csv, &err) == 1 && csv.value[1] == -0.25);
     assert_int_equal(csv_next(&csv, &err), 0);
     csv_close(&csv);
+    assert_int_equal(open_text("t,x\n " DIGITS_63 "\t, \t2 \n"), SH_OK); /* blanks don't count */
+    assert_true(csv_next(&csv, &err) == 1 && csv.value[1] == 2.0);
+    assert_true(csv.value[0] == 123456789012345678901234567890123456789012345678901234567890123.0);
+    csv_close(&csv);
 }
 
-/* Each diagnostic has the file, the line, and what is allowed there. */
+/* A cell has up to 63 bytes. Each diagnostic has the file, the line, and what is allowed there. */
 static void diagnostics_have_lines(void **state)
 {
     (void)state;
@@ -71,7 +77,12 @@ static void diagnostics_have_lines(void **state)
                {"t,x\n1,2m\n", ", line 2", "x is not a finite decimal number: \"2m\""},
                {"t,x\n0x1,2\n", ", line 2", "t is not a finite decimal number: \"0x1\""},
                {"t,x\n1,inf\n", ", line 2", "x is not a finite decimal number: \"inf\""},
-               {"t,x\n1,nan\n", ", line 2", "x is not a finite decimal number: \"nan\""}};
+               {"t,x\n1,nan\n", ", line 2", "x is not a finite decimal number: \"nan\""},
+               {"t,x\n1,1e999\n", ", line 2", "x is not a finite decimal number: \"1e999\""},
+               {"t,x\n1,\"2\"\n", ", line 2", "x is not a finite decimal number: \"\"2\"\""},
+               {"t," DIGITS_63 "\n", ", line 1", "column \"" DIGITS_63 "\" is unknown; allowed t, x, y"},
+               {"t,1" DIGITS_63 "\n", ", line 1", "a column's name is too long"},
+               {"t,x\n1,1" DIGITS_63 "\n", ", line 2", "x is not a finite decimal number: \"...\""}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
         char want[256];
         int code = open_text(bad[i].text);

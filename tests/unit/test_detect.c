@@ -274,14 +274,14 @@ static void zones_fold(void **state)
 {
     (void)state;
     const double zone_m = 299792458.0 / 2.0 / 1.2e6;
-    const double in[] = {1.0,         100.0,       zone_m + 50.0, 3.0 * zone_m + 2.0, 0.4, 2.0 * zone_m + 0.4,
-                         (double)NAN, 4.5 * zone_m};
-    const double folded[] = {1.0, 100.0, 50.0, 2.0, (double)NAN, (double)NAN, (double)NAN, 0.5 * zone_m};
-    double range_m[8];
+    const double in[] = {1.0,          100.0, zone_m + 50.0, 3.0 * zone_m + 2.0, 0.4, 2.0 * zone_m + 0.4, (double)NAN,
+                         4.5 * zone_m, 0.5};
+    const double folded[] = {1.0, 100.0, 50.0, 2.0, (double)NAN, (double)NAN, (double)NAN, 0.5 * zone_m, 0.5};
+    double range_m[9]; /* the last is the least range itself */
     for (int how = 0; how < 3; how++) {
         memcpy(range_m, in, sizeof in);
-        detect_zones((enum detect_ambiguity)how, 1.0 / 1.2e6, 4, 0.5, 8, range_m);
-        for (int i = 0; i < 8; i++) {
+        detect_zones((enum detect_ambiguity)how, 1.0 / 1.2e6, 4, 0.5, 9, range_m);
+        for (int i = 0; i < 9; i++) {
             int lost = isnan(folded[i]) || (how == DETECT_RESOLVED && i == 7); /* beyond its zones */
             double expected = how == DETECT_AMBIGUITY_NONE ? in[i]
                               : lost                       ? (double)NAN

@@ -260,6 +260,39 @@ static void runs_say_the_same(void **state)
     assert_int_equal(schedule_longest_run(&seg, 100), 1);
 }
 
+/* The time from one firing sequence to the next, as a fraction in lowest terms; without a table that of a pulse. */
+static void sequences_last_a_ratio_of_nanoseconds(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t prr_uhz;
+        uint64_t num, den;
+    } is[] = {{300000000000, 10000, 3}, {1000000000000, 1000, 1}, {2200000000000, 5000, 11}, {1, 1000000000000000, 1}};
+    struct emitter e;
+    struct schedule_segment seg;
+    uint64_t num, den;
+    for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
+        struct schedule_spec spec = plain_schedule(1);
+        spec.prr_uhz = is[i].prr_uhz;
+        spec.lines_uhz = 1;
+        schedule_start(&seg, &spec);
+        schedule_sequence_ns(&seg, &num, &den);
+        assert_int_equal(num, is[i].num);
+        assert_int_equal(den, is[i].den);
+    }
+    vlp16(&e);
+    struct schedule_spec spec = turning(&e, 20000000);
+    schedule_start(&seg, &spec);
+    schedule_sequence_ns(&seg, &num, &den);
+    assert_true(num == 55296 && den == 1);
+    static const struct emitter_beam beams[2] = {{0, 0, 0}, {0, 0, 9}};
+    assert_int_equal(emitter_set_beams(&e, beams, 2, 12500, 1, NULL), SH_OK);
+    spec = turning(&e, 20000000);
+    schedule_start(&seg, &spec);
+    schedule_sequence_ns(&seg, &num, &den);
+    assert_true(num == 25 && den == 2);
+}
+
 /* ---- refusals */
 
 static void refused(const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps, const char *says)
@@ -298,6 +331,7 @@ int main(void)
         cmocka_unit_test(a_window_cuts_turns),
         cmocka_unit_test(beams_turn_either_way),
         cmocka_unit_test(runs_say_the_same),
+        cmocka_unit_test(sequences_last_a_ratio_of_nanoseconds),
         cmocka_unit_test(tables_that_do_not_fit_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -141,6 +141,25 @@ static void test_sight_pays(void **state)
     choose_sight(&need, &(struct plan_sight_found){.one = 0.5, .few = 0.5}, "none", "a map saves nothing");
 }
 
+/* A fifth of the saving must be left after the cost (core/plan/README.md). Where all pulses hit one triangle each, a map
+ * saves the difference of two costs (core/plan/cost.h); it may pay where all rays are near borders. */
+static void test_sight_pays_to_a_pulse(void **state)
+{
+    (void)state;
+    const struct plan_ray_cost *ray = &plan_ray_costs[2];
+    const double build_ns = PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * SIGHT.n_triangles;
+    const double least = build_ns / (0.8 * (ray->hit - PLAN_COST_SIGHT_ONE));
+    const double may = build_ns / (0.8 * (ray->hit + ray->border - PLAN_COST_SIGHT_ONE));
+    struct plan_sight_need need = SIGHT;
+    struct plan_row row;
+    for (int more = 0; more < 2; more++) {
+        need.pulses = least * (more ? 1.000001 : 0.999999);
+        assert_int_equal(plan_sight_choose(&need, &(struct plan_sight_found){.one = 1.0}, &row), more);
+        need.pulses = may * (more ? 1.000001 : 0.999999);
+        assert_int_equal(plan_sight_may_pay(&need), more);
+    }
+}
+
 /* Rays have the cost of packets of that width, or of the next smaller one in the table. Rays that meet nothing have no
  * other costs, so a map's saving differs by just that. A nanosecond in 1e9 pulses is allowed. */
 static void test_sight_packets(void **state)
@@ -217,6 +236,7 @@ int main(void)
         cmocka_unit_test(test_what_cannot_be_had),
         cmocka_unit_test(test_cast),
         cmocka_unit_test(test_sight_pays),
+        cmocka_unit_test(test_sight_pays_to_a_pulse),
         cmocka_unit_test(test_sight_packets),
         cmocka_unit_test(test_sight_costs),
         cmocka_unit_test(test_sight_forced),

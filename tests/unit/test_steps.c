@@ -3,6 +3,7 @@
 #include "tests/unit/schedule_rig.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 /* ---- planar heads */
@@ -158,6 +159,40 @@ static void odd_steps_are_rounded(void **state)
     assert_null(strstr(text, "does not divide"));
 }
 
+/* The text of each kind; where there is less room, it ends earlier. */
+static void emitters_are_described(void **state)
+{
+    (void)state;
+    static const struct emitter_beam beams[2] = {{0, 0, 0}, {0, 0, 9}};
+    static const char *const texts[] = {
+        "",
+        "planar, steps 44..725 of 1024 a turn, 384 ahead, counter-clockwise",
+        "beams, 2 in a sequence of 12.5 ns, turning clockwise",
+        "sphere, 181 rings 1 deg apart, of 360 steps of 1 deg",
+        "sphere, 31 rings 1 deg apart, of 360 steps of 1 deg; elevations -10 to 20 deg",
+        "sphere, a circle at 7.25 deg, of 360 steps of 1 deg",
+        "sphere, 27 rings 6.92308 deg apart, of 51 steps of 7.05882 deg; 7 deg, as asked, does not divide 180 deg",
+        "directions, a list of 5"};
+    struct emitter e[8] = {[7] = {0}};
+    struct sh_err err;
+    emitter_set_planar(&e[1], 1024, 44, 725, 384, -1);
+    assert_int_equal(emitter_set_beams(&e[2], beams, 2, 12500, 1, &err), SH_OK);
+    for (int k = 3; k < 7; k++)
+        emitter_set_sphere(&e[k], k == 6 ? 7000000 : 1000000);
+    assert_int_equal(emitter_set_rings(&e[4], -10000000, 20000000, &err), SH_OK);
+    assert_int_equal(emitter_set_rings(&e[5], 7250000, 7250000, &err), SH_OK);
+    emitter_set_directions(&e[7], NULL, 5);
+    for (int k = 0; k < 8; k++)
+        for (size_t room = 1; room < 200; room++) {
+            char text[201], want[201];
+            memset(text, '#', sizeof text);
+            emitter_describe(&e[k], text, room);
+            snprintf(want, room, "%s", texts[k]);
+            assert_string_equal(text, want);
+            assert_int_equal(text[room], '#');
+        }
+}
+
 static void a_list_goes_row_by_row(void **state)
 {
     (void)state;
@@ -185,7 +220,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_turn_has_its_steps),          cmocka_unit_test(a_window_is_whole_steps),
         cmocka_unit_test(a_planar_head_keeps_its_steps), cmocka_unit_test(a_sphere_goes_from_pole_to_pole),
-        cmocka_unit_test(odd_steps_are_rounded),         cmocka_unit_test(a_list_goes_row_by_row),
+        cmocka_unit_test(odd_steps_are_rounded),         cmocka_unit_test(emitters_are_described),
+        cmocka_unit_test(a_list_goes_row_by_row),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -243,6 +243,40 @@ static void no_extent_is_a_point(void **state)
     waveform_free(w);
 }
 
+/* A measured pulse counts by its shape, in any scale, wherever its largest value stands: that of the signal is the
+ * return's amplitude. */
+static void a_table_has_any_scale(void **state)
+{
+    (void)state;
+    static const double shapes[3][4] = {{1.0, 0.75, 0.5, 0.25}, {0.25, 0.5, 0.75, 1.0}, {0.5, 1.0, 0.5, 0.25}};
+    for (int k = 0; k < 3; k++) {
+        struct waveform *w[2];
+        double scaled[4], most = 0.0;
+        const struct waveform_return r = {10.0, 5.0, 0.0, WAVEFORM_POINT};
+        for (int i = 0; i < 4; i++)
+            scaled[i] = 512.0 * shapes[k][i];
+        for (int big = 0; big < 2; big++) {
+            struct waveform_spec spec = waveform_rig_spec();
+            spec.shape = WAVEFORM_TABLE;
+            spec.table = big ? scaled : shapes[k];
+            spec.n_table = 4;
+            spec.table_step_s = 4e-9;
+            spec.sample_s = 0.25e-9;
+            spec.bandwidth_hz = 1e9;
+            w[big] = waveform_rig_open(&spec);
+        }
+        assert_true(waveform_pulse_area_s(w[0]) == waveform_pulse_area_s(w[1]));
+        for (double r_m = 7.0; r_m < 13.0; r_m += 0.01) {
+            const double signal = waveform_signal(w[0], &r, 1, r_m);
+            assert_true(waveform_signal(w[1], &r, 1, r_m) == signal);
+            most = fmax(most, signal);
+        }
+        assert_true(most <= 5.0 && most > 0.85 * 5.0); /* the receiver lowers a peak of one point */
+        waveform_free(w[0]);
+        waveform_free(w[1]);
+    }
+}
+
 /* Each change makes the plain spec wrong; the text has the figure, and what is allowed. */
 /* clang-format off */
 static void change(struct waveform_spec *s, int k)
@@ -275,6 +309,7 @@ static void change(struct waveform_spec *s, int k)
     case 23: s->noise = (double)NAN; break;
     case 24: s->shape = WAVEFORM_TABLE, s->table = measured, s->n_table = 2000, s->table_step_s = 1e-9; break;
     case 25: s->after_s = 1e-4; break;
+    case 26: s->before_s = 9e-6, s->sample_s = 0.333e-9; break;
     default: break;
     }
 }
@@ -310,7 +345,8 @@ static void limits_are_told(void **state)
         "samples of 0.1 ns long; at most 4096 are allowed",
         "noise of nan times the threshold: 0 to 1e+06 is allowed",
         "a pulse's table of 2000 values: 2 to 1024 are allowed",
-        "time kept after an echo of 100000 ns: 0 to 10000 is allowed"};
+        "time kept after an echo of 100000 ns: 0 to 10000 is allowed",
+        "9000 ns kept before an echo and 8 ns after it: together at most 681.984 ns, 2048 samples"};
     for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
         struct waveform_spec spec = waveform_rig_spec();
         struct waveform *w = NULL;
@@ -381,9 +417,10 @@ static void named_limits_are_taken(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(samples_have_the_energy),        cmocka_unit_test(shapes_are_the_closed_forms),
-        cmocka_unit_test(the_centroid_is_the_range),      cmocka_unit_test(spreads_are_the_closed_forms),
-        cmocka_unit_test(no_extent_is_a_point),           cmocka_unit_test(limits_are_told),
-        cmocka_unit_test(the_coarsest_sampling_is_taken), cmocka_unit_test(named_limits_are_taken)};
+        cmocka_unit_test(samples_have_the_energy),   cmocka_unit_test(shapes_are_the_closed_forms),
+        cmocka_unit_test(the_centroid_is_the_range), cmocka_unit_test(spreads_are_the_closed_forms),
+        cmocka_unit_test(no_extent_is_a_point),      cmocka_unit_test(a_table_has_any_scale),
+        cmocka_unit_test(limits_are_told),           cmocka_unit_test(the_coarsest_sampling_is_taken),
+        cmocka_unit_test(named_limits_are_taken)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
