@@ -311,6 +311,28 @@ static void a_cable_is_pulled_once(void **state)
     close_it(f);
 }
 
+/* A link that can't fall silent is unplugged instead, and one that can't do that either goes on. */
+static void a_cable_is_an_unplugging_where_need_be(void **state)
+{
+    (void)state;
+    struct fault cable = fault_of_kind(FAULT_CABLE);
+    cable.at = 1;
+    cable.for_ms = HOUR_MS;
+    struct faulty_link *f = open_with(&cable, 1);
+    f->can = LINK_FAULT_BIT(LINK_FAULT_UNPLUG);
+    write_it(f, 1, "a\n\n");
+    assert_int_equal(faulty_pass(f, 1, owner.now_ns), SH_ECLOSED);
+    expect_fault(0, LINK_FAULT_UNPLUG, 1, 0, HOUR_MS);
+    assert_true(f->session[0].is_gone && f->session[1].is_gone);
+    close_it(f);
+    f = open_with(&cable, 1);
+    f->can = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT);
+    write_it(f, 1, "a\n\n");
+    assert_int_equal(faulty_pass(f, 1, owner.now_ns), 1);
+    assert_true(inner.n_faults == 0 && inner.n_out == 3 && n_notes == 0);
+    close_it(f);
+}
+
 static int connect_to(struct faulty_link *f, int session)
 {
     struct link_event events[4];
@@ -387,6 +409,7 @@ int main(void)
         cmocka_unit_test(an_unplugged_link_comes_back),
         cmocka_unit_test(an_act_that_fails_is_told),
         cmocka_unit_test(a_cable_is_pulled_once),
+        cmocka_unit_test(a_cable_is_an_unplugging_where_need_be),
         cmocka_unit_test(clients_are_turned_away),
         cmocka_unit_test(a_plugged_device_begins_anew),
     };
