@@ -148,6 +148,12 @@ static void wrong_targets_are_refused(void **state)
          "scene.target.objects[0]: no object fits \"tre\"; allowed names of the scene's 5 objects, similar ones are "
          "\"tree\""},
         {"{objects: [tree, \"xyzzy*\"]}", "scene.target.objects[1]: no object fits \"xyzzy*\""},
+        /* nearest first: letters in any case, without wildcards, or to the beginning of the name */
+        {"{objects: [HOU]}", "similar ones are \"house\""},
+        {"{objects: [\"*Fl?\"]}", "similar ones are \"flag\""},
+        {"{objects: [hoXY]}", "similar ones are \"house\""},
+        {"{objects: [caree]}", "similar ones are \"tree\", \"car\""},
+        {"{objects: [treehouse]}", "5 objects, as \"house\", \"tree\", \"cube\""},
         {"{objects: [flag]}", "none of them stands still; allowed with an object that does, or with others: hide"},
         {"{others: hide}", "scene.target.others: given, but there are no scene.target.objects"},
         {"{objects: tree}", "scene.target.objects: here stands a single value; allowed a list of 0 to 64"},
