@@ -45,10 +45,8 @@ static const struct protocol_ops *ops_of(const struct link_spec *link)
 
 int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need)
 {
-    for (uint32_t i = 0; i < cfg->n_links; i++) {
-        const struct protocol_ops *ops = ops_of(&cfg->link[i]);
-        if (ops != NULL && is_spoken_on(&cfg->link[i]) && (ops->needs & need) != 0) return (int)i;
-    }
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (is_spoken_on(&cfg->link[i]) && (ops_of(&cfg->link[i])->needs & need) != 0) return (int)i;
     return -1;
 }
 
@@ -123,10 +121,6 @@ static int check_link_alone(struct cfg_reader *rd, struct link_spec *link, uint3
     const struct protocol_ops *ops = ops_of(link);
     char allowed[64];
     if (!CFG_ITEM_SOUND(rd, i, "links[]")) return 0; /* with all its keys */
-    if (ops == NULL) {
-        cfg_fail_item(rd, PROTOCOL_KEY, i, "this build does not have it");
-        return 0;
-    }
     if (!is_spoken_on(link)) {
         cfg_fail_item(
             rd, PROTOCOL_KEY, i, "protocol %s is not available on a %s link; allowed %s", ops->name,

@@ -28,7 +28,7 @@ static void put_protocols(const struct config_profile *p, FILE *out)
     fputs("  protocols ", out);
     for (int id = 0; id < PROTOCOL_N; id++) {
         const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
-        if (ops != NULL && cfg_protocol_fits(ops, &p->emitter)) fprintf(out, "%s %s", n++ > 0 ? "," : "", ops->name);
+        if (cfg_protocol_fits(ops, &p->emitter)) fprintf(out, "%s %s", n++ > 0 ? "," : "", ops->name);
     }
     fputc('\n', out);
 }

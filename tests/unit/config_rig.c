@@ -138,6 +138,14 @@ void assert_loads(int code)
     if (code != SH_OK) fail_msg("%s", err.text);
 }
 
+void expect_only(const char *place, const char *key, const char *text)
+{
+    char want[1200];
+    snprintf(want, sizeof want, "%s%s: %s", place, key, text);
+    if (err.code != SH_EINPUT || strcmp(err.text, want) != 0) fail_msg("\"%s\"\nexpected \"%s\"", err.text, want);
+    if (diagnostics.n != 1) fail_msg("%s; also %s", text, diagnostics.err[1].text);
+}
+
 void assert_says(const char *fragment)
 {
     assert_int_equal(err.code, SH_EINPUT);

@@ -60,6 +60,9 @@ void place_in_profile(const char *key, char *buf, size_t len);
 
 void assert_loads(int code);
 
+/* Exactly one diagnostic is there, and it is whole: place, key and text. place: "FILE:LINE: " or "--set ". */
+void expect_only(const char *place, const char *key, const char *text);
+
 void assert_says(const char *fragment);
 
 int set_up(void **state);
