@@ -1,0 +1,167 @@
+/* SPDX-License-Identifier: MIT */
+/* Rows of a site's plan that say what is set, without a choice; the likely cause of a slow scan; the plan in one line. */
+#include "tests/unit/site_rig.h"
+
+#include "firmware_sim/site/plan_rows.h"
+
+static struct site *site;
+
+static void plan(const char *head, const char *rest)
+{
+    char text[2048];
+    write_in("floor.obj", "v -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\nf 1 2 3 4\n");
+    snprintf(
+        text, sizeof text,
+        "head: {%s}\nscene:\n  meshes: [{file: floor.obj, up: z, scale: 1}]\nbeam: {mode: single}\ncast: {sight: off}\n%s\n",
+        head, rest);
+    write_in("test.yaml", text);
+    site_free(site);
+    site = NULL;
+    if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load_for(cfg, SITE_FOR_PLAN, NULL, &report, &site, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+static const struct plan_row *row_of(const char *stage)
+{
+    for (size_t i = 0; i < site->plan.n; i++)
+        if (strcmp(site->plan.row[i].stage, stage) == 0) return &site->plan.row[i];
+    return NULL;
+}
+
+static void expect_row(const char *stage, const char *method, const char *why)
+{
+    const struct plan_row *row = row_of(stage);
+    if (row == NULL) fail_msg("no row %s", stage);
+    assert_string_equal(row->method, method);
+    assert_string_equal(row->why, why);
+}
+
+#define STATION "stations: [{position_m: [0, 0, 2]}]\n"
+
+/* 105 of 240 deg of each pulse rate are used. */
+static void programs_and_ranges_have_their_figures(void **state)
+{
+    (void)state;
+    plan("profile: riegl-vz600i, prr_hz: 600000, range_max_m: 300", STATION);
+    expect_row("program", "600 kHz",
+               "15 echoes, 0.5 to 300 m, 262.5 kHz used; riegl-vz600i also has 140, 1200, 2200 kHz");
+    expect_row("range", "0.5 to 300 m",
+               "head.range_min_m, range_max_m: there is no echo outside of them; the profile has 0.5 to 1000 m");
+    assert_null(row_of("emitter"));
+    assert_null(row_of("tripod"));
+    plan("profile: any-rate", STATION);
+    assert_null(row_of("program"));
+    assert_null(row_of("range"));
+}
+
+static void heads_without_a_pan_say_how_they_fire(void **state)
+{
+    (void)state;
+    char why[160];
+    plan("profile: sick-lms111", STATION);
+    emitter_describe(&site->emitter, why, sizeof why);
+    expect_row("emitter", "planar", why);
+}
+
+static void the_plan_fits_a_line(void)
+{
+    char text[256], want[256];
+    const struct site_plan *p = &site->plan;
+    for (int polar = 0; polar < 2; polar++) {
+        cfg->output.layout = polar ? LINE_POLAR : LINE_GEO;
+        site_plan_text(site, text, sizeof text);
+        snprintf(want, sizeof want, "sight %s; beam single; optics none; georef %s", p->sight.method,
+                 polar ? "none" : site->station[0].plan.method);
+        assert_string_equal(text, want);
+    }
+}
+
+/* One row for all stations where they have the same method, with the largest of their errors. */
+static void stations_share_a_row(void **state)
+{
+    (void)state;
+    static const char two[] = "stations:\n  - {name: near, position_m: [0, 0, 2]}\n"
+                              "  - {name: far, position_m: [20, 0, 2]}\noutput: {layout: geo}\n";
+    plan("profile: any-rate", two);
+    const struct plan_row *row = row_of("georef");
+    assert_non_null(row);
+    assert_int_equal(strncmp(row->why, "all stations: ", 14), 0);
+    for (uint32_t i = 0; i < 2; i++)
+        assert_true(row->error_m >= site->station[i].plan.error_m);
+    /* Plans of other methods have a row each. */
+    strcpy(site->station[1].plan.method, "other");
+    assert_int_equal(site_plan_rows(site, &err), SH_OK);
+    row = row_of("georef");
+    assert_int_equal(strncmp(row[0].why, "station 1 near: ", 16), 0);
+    assert_int_equal(strncmp(row[1].why, "station 2 far: ", 15), 0);
+    assert_string_equal(row[1].method, "other");
+    assert_string_equal(row[1].stage, "georef");
+    plan("profile: any-rate", STATION "output: {layout: geo}\n");
+    assert_null(strstr(row_of("georef")->why, "station"));
+    the_plan_fits_a_line();
+}
+
+static void a_tripod_has_a_row(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *stations, *method, *begins;
+    } rows[] = {
+        {"stations: [{position_m: [0, 0, 2], tripod: {leg_m: 2.5, legs: on}}]\n", "legs",
+         "legs of 2.5 m in view, top "},
+        {"stations: [{position_m: [0, 0, 2]}, {name: a, position_m: [3, 0, 2], tripod: {leg_m: 2.5}}]\n", "cone",
+         "legs of 2.5 m, top "},
+        {"stations: [{name: b, position_m: [0, 0, 2], tripod: {leg_m: 2.25}}, {position_m: [3, 0, 2], tripod: {leg_m: 2.5}}]\n",
+         "cone", "b: legs of 2.25 m, top "},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        plan("profile: any-rate", rows[i].stations);
+        const struct plan_row *row = row_of("tripod");
+        assert_non_null(row);
+        assert_string_equal(row->method, rows[i].method);
+        if (strncmp(row->why, rows[i].begins, strlen(rows[i].begins)) != 0) fail_msg("%s", row->why);
+    }
+}
+
+static void a_slow_scan_has_a_likely_cause(void **state)
+{
+    (void)state;
+    static const struct {
+        enum beam_mode beam;
+        uint32_t depth, n_movers;
+        const char *says;
+    } rows[] = {
+        {BEAM_RINGS, 2, 1, "likely the sub-rays of footprints: beam.mode single has none"},
+        {BEAM_SINGLE, 1, 1, "likely glass and mirrors: optics.depth 0 leaves them out"},
+        {BEAM_SINGLE, 0, 1, "likely the 1 meshes that move, which are cast by themselves"},
+        {BEAM_SINGLE, 0, 0, "likely many triangles that lie over one another as seen from the head"},
+    };
+    struct site *one = calloc(1, sizeof *one);
+    assert_non_null(one);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[128];
+        one->plan.methods = (struct plan_methods){.beam = rows[i].beam, .depth = rows[i].depth};
+        one->n_movers = rows[i].n_movers;
+        site_cost_reason(one, text, sizeof text);
+        assert_string_equal(text, rows[i].says);
+    }
+    free(one);
+}
+
+static int tear_down(void **state)
+{
+    site_free(site);
+    return site_rig_teardown(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(programs_and_ranges_have_their_figures),
+        cmocka_unit_test(heads_without_a_pan_say_how_they_fire),
+        cmocka_unit_test(stations_share_a_row),
+        cmocka_unit_test(a_tripod_has_a_row),
+        cmocka_unit_test(a_slow_scan_has_a_likely_cause),
+    };
+    return cmocka_run_group_tests_name("rows of a plan", tests, site_rig_setup, tear_down);
+}
