@@ -18,7 +18,8 @@ static void plan(const char *head, const char *rest)
     site_free(site);
     site = NULL;
     if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK) fail_msg("%s", err.text);
-    if (site_load_for(cfg, SITE_FOR_PLAN, NULL, &report, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load(cfg, &report, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_plan_rows(site, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
 static const struct plan_row *row_of(const char *stage)
