@@ -150,11 +150,36 @@ static void sets_are_refused_word_by_word(void **state)
                 "client, but loop.pace is fast; allowed with realtime, as a server's time runs on");
 }
 
+/* A long value is cut to 60 bytes, but not within a character of UTF-8, and its control characters are replaced. */
+static void values_are_shown_safe_and_short(void **state)
+{
+    (void)state;
+    char set[128], text[256], value[80];
+    for (int len = 59; len <= 62; len++) {
+        memset(value, 'x', sizeof value);
+        value[len] = '\0';
+        snprintf(set, sizeof set, "head.lines_hz=%s", value);
+        snprintf(text, sizeof text, "\"%.*s%s\" is not a number; allowed 3 to 240 Hz", len < 60 ? len : 60, value,
+                 len > 60 ? "..." : "");
+        load_set(set);
+        expect_only("--set ", "head.lines_hz", text);
+    }
+    memcpy(value + 59, "\xc3\xbcx", 4); /* two bytes, which would be cut in the middle */
+    snprintf(set, sizeof set, "head.lines_hz=%s", value);
+    snprintf(text, sizeof text, "\"%.59s...\" is not a number; allowed 3 to 240 Hz", value);
+    load_set(set);
+    expect_only("--set ", "head.lines_hz", text);
+    load_set("head.lines_hz=\x01"
+             "a\x1f\x7f~");
+    expect_only("--set ", "head.lines_hz", "\"?a??~\" is not a number; allowed 3 to 240 Hz");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(profiles_are_refused_word_by_word),
         cmocka_unit_test(so_many_beams_fire_so_often),
+        cmocka_unit_test(values_are_shown_safe_and_short),
         cmocka_unit_test(sets_are_refused_word_by_word),
     };
     return cmocka_run_group_tests_name("messages of head profiles", tests, set_up, tear_down);

@@ -277,6 +277,31 @@ static void settings_become_lengths(void **state)
     }
 }
 
+/* What a configuration says of ranges, noise and step are the settings of power-up. */
+static void keys_become_settings(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"head={profile: riegl-vz600i, range_min_m: 2.5, range_max_m: 123.456789012}",
+                                       "noise.range=on", "noise.angle=on", "noise.sigma_m=0.0125",
+                                       "noise.ball.radius_m=0.5"};
+    write_file(config_path, base, strlen(base));
+    assert_loads(load_sets(sets, 5));
+    const struct head_settings *s = &cfg->head.settings;
+    assert_true(s->range_min_nm == 2500000000 && s->range_max_nm == 123456789012);
+    assert_true(s->noise == RANGE_NOISE_ON && s->angle_noise == 1 && s->step_udeg == 0 && s->waves == 0);
+    assert_true(s->sigma_nm == 12500000 && s->ball_nm == 500000000);
+    static const char *const none[] = {"head={profile: riegl-vz600i}"};
+    assert_loads(load_sets(none, 1));
+    assert_true(s->noise == RANGE_NOISE_OFF && s->angle_noise == 0 && s->ball_nm == 0);
+    assert_true(s->range_min_nm == 500000000 && s->range_max_nm == 1000000000000);
+    static const char *const planar[] = {"head={profile: sick-lms111}"};
+    assert_loads(load_sets(planar, 1));
+    assert_int_equal(s->step_udeg, 500000);
+    static const char *const round[] = {"head={profile: sphere, step_deg: 2.2}"};
+    assert_loads(load_sets(round, 1));
+    assert_int_equal(s->step_udeg, 2200000); /* as it was asked for */
+}
+
 /* A station in UTM takes zone and hemisphere from an anchor in UTM, north or south. */
 static void stations_take_the_grid_of_the_anchor(void **state)
 {
@@ -325,12 +350,19 @@ static void all_stations_are_checked(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(set_changes_values),          cmocka_unit_test(set_takes_long_names),
-        cmocka_unit_test(set_appends_elements),        cmocka_unit_test(set_refuses),
-        cmocka_unit_test(a_name_has_a_longest_length), cmocka_unit_test(yaml_replaces),
-        cmocka_unit_test(yaml_replaces_scanners),      cmocka_unit_test(tolerances_follow_the_plan),
-        cmocka_unit_test(settings_become_lengths),     cmocka_unit_test(stations_take_the_grid_of_the_anchor),
-        cmocka_unit_test(a_full_list_takes_no_more),   cmocka_unit_test(all_stations_are_checked),
+        cmocka_unit_test(set_changes_values),
+        cmocka_unit_test(set_takes_long_names),
+        cmocka_unit_test(set_appends_elements),
+        cmocka_unit_test(set_refuses),
+        cmocka_unit_test(a_name_has_a_longest_length),
+        cmocka_unit_test(yaml_replaces),
+        cmocka_unit_test(yaml_replaces_scanners),
+        cmocka_unit_test(tolerances_follow_the_plan),
+        cmocka_unit_test(settings_become_lengths),
+        cmocka_unit_test(keys_become_settings),
+        cmocka_unit_test(stations_take_the_grid_of_the_anchor),
+        cmocka_unit_test(a_full_list_takes_no_more),
+        cmocka_unit_test(all_stations_are_checked),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
