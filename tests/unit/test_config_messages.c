@@ -11,6 +11,7 @@ static void expect_at(int line, const char *key, const char *text)
 }
 
 /* clang-format off */
+#define RATES "allowed 100000 to 1200000 Hz"
 #define AT_16(text) "output:", text "\noutput:"
 #define AT_17(text) "crs: local", text
 #define AT_12(text) "heading_deg: 90", text
@@ -28,6 +29,34 @@ static const struct {
     int line;
     const char *key, *text;
 } edits[] = {
+    /* values of other kinds */
+    {PRR, "  prr_hz: [1]\n", 3, "head.prr_hz", "here stands a list; " RATES},
+    {PRR, "  prr_hz: {a: 1}\n", 3, "head.prr_hz", "here stands a section with keys; " RATES},
+    {PRR, "  prr_hz:\n", 3, "head.prr_hz", "here stands nothing; " RATES},
+    {PRR, "  prr_hz: \"5\"\n", 3, "head.prr_hz", "\"5\" is a text in quotes or of several lines; " RATES},
+    {PRR, "  prr_hz: !!int 5\n", 3, "head.prr_hz", "\"5\" is a value with a tag, which is not supported; " RATES},
+    {PRR, "  prr_hz: 500000.0000001\n", 3, "head.prr_hz", "\"500000.0000001\" is finer than 6 decimals; " RATES},
+    {PRR, "  prr_hz: 1e30\n", 3, "head.prr_hz", "\"1e30\" is out of range; " RATES},
+    {PRR, "  prr_hz: 5 kHz\n", 3, "head.prr_hz", "\"5 kHz\" is not a number; " RATES},
+    {"[1, 2, 3]", "[1, 2]", 11, "stations[0].position_m", "has 2 numbers instead of 3; allowed [x, y, z], each -1000000000 to 1000000000 m"},
+    {"[1, 2, 3]", "[1, [2], 3]", 11, "stations[0].position_m", "here stands a list; allowed [x, y, z], each -1000000000 to 1000000000 m"},
+    {AT_17("colour: range\n  colour_limits: [1]"), 18, "output.colour_limits",
+     "has 1 numbers instead of 2; allowed [low, high], each -1000000000 to 1000000000"},
+    {"links:\n  - type: tcp\n    port: 0\n", "links: [{type: null}, {type: null}, {type: null}, {type: null}, {type: null}, "
+     "{type: null}, {type: null}, {type: null}, {type: null}]\n", 13, "links", "9 elements are too many; allowed a list of 0 to 8"},
+    {"  - type: tcp\n    port: 0\n", "  - 5\n", 14, "links[0]", "here stands a single value; allowed a section with keys"},
+    {"type: tcp", "type: uart", 14, "links[0].type", "\"uart\" is not known; allowed null, file, pty, tcp, usb, udp, web"},
+    {"port: 0", "port: 1.5", 15, "links[0].port", "\"1.5\" is not a whole number; allowed a whole number, 0 to 65535"},
+    {AT_16("loop: !map {late_ms: 1}"), 16, "loop", "has a tag; allowed none"},
+    {AT_16("head: {frames: 1}"), 16, "head", "given twice, first on line 1; allowed once"},
+    {AT_16("loop: {late_ms: 1,\n  queue_ms: 10, late_ms: 2}"), 17, "loop.late_ms", "given twice, first on line 16; allowed once"},
+    {"scale: 1", "scale: 1\n      copies: []", 10, "scene.meshes[0].copies",
+     "a list of 0 copies; allowed 1 to 256 of all meshes together, more in a CSV file"},
+    {"scale: 1", "scale: 1\n      copies: [5]", 10, "scene.meshes[0].copies[0]",
+     "here stands a single value; allowed a section with offset_m, turn_deg, scale"},
+    {"      scale: 1\n", "", 7, "scene.meshes[0].scale", "missing, and it has no default; allowed 1e-09 to 1000000000 m/unit"},
+    {AT_16("fields: [{number: 1, shape: polygon, points_m: [[0, 1], [1]]}]"), 16, "fields[0].points_m",
+     "point 2 is not two numbers; allowed [[x, y], ...], each -1000 to 1000 m"},
     {LINES, "  line_start_deg: 20\n  line_stop_deg: 20\n", 5, "head.line_stop_deg",
      "the line goes from 20 to 20 deg; allowed a line_start_deg below 20, or a line_stop_deg above 20"},
     {LINES, "  line_start_deg: 60\n", 4, "head.line_start_deg",

@@ -4,10 +4,27 @@
 #include "tests/unit/config_rig.h"
 
 /* clang-format off */
+#define FARTHEST "{ value: 130, from: quoted, source: \"a reseller's page\" }"
+#define FIGURE "allowed { value: V, from: data sheet }, or from: quoted, from: assumed"
 #define ONE_STEP "; steps_per_turn, 1440, divided by it must be a whole number that also divides first_step, last_step and front_step"
 static const struct {
     const char *head, *old, *with, *key, *text;
 } profiles[] = {
+    {"leica-rtc360", FARTHEST, "130", "range_max_m", "here stands a single value; " FIGURE},
+    {"leica-rtc360", FARTHEST, "{ value: 130 }", "range_max_m", "\"from\" is missing; " FIGURE},
+    {"leica-rtc360", FARTHEST, "{ from: assumed }", "range_max_m", "\"value\" is missing; " FIGURE},
+    {"leica-rtc360", FARTHEST, "{ value: 130, from: hearsay }", "range_max_m",
+     "\"from\" must say where the figure is from; allowed data sheet, quoted, assumed"},
+    {"leica-rtc360", FARTHEST, "{ value: 130, from: assumed, note: }", "range_max_m",
+     "\"note\" must say something in words; allowed a text in one line"},
+    {"leica-rtc360", FARTHEST, "{ value: 130, from: assumed, source: \"a\\nb\" }", "range_max_m",
+     "\"source\" must say something in words; allowed a text in one line"},
+    {"leica-rtc360", FARTHEST, "{ value: 1, value: 2, from: assumed }", "range_max_m",
+     "a key that is unknown or given twice; " FIGURE ", then source, note"},
+    {"leica-rtc360", "definition: 1/e2 }", "defined: 1/e2 }", "beam_exit_m",
+     "a key that is unknown or given twice; " FIGURE ", then source, note, definition"},
+    {"leica-rtc360", "definition: 1/e2,", "definition: 1/e3,", "beam_divergence_rad",
+     "\"definition\" must say how the width is defined; allowed 1/e2, 1/e, FWHM, half angle 1/e2"},
     {"leica-rtc360", "facets: { value: 1,", "facets: { value: 2,", "fov_max_deg",
      "a field of view of 300 deg does not fit into a sweep; allowed up to 180 deg, 360 / facets * optical_gain"},
     {"leica-rtc360", "optical_gain: { value: 1,", "optical_gain: { value: 2,", "optical_gain",
@@ -96,6 +113,18 @@ static void sets_are_refused_word_by_word(void **state)
         int n;
         const char *key, *text;
     } rows[] = {
+        {{"links[2].type=tcp"},
+         1,
+         "links[2].type",
+         "links has 1 element; allowed indices 0 to 1, the last appends one"},
+        {{"links[].type=tcp"}, 1, "links[].type", "no index; allowed as in links[0].type"},
+        {{"links.type=tcp"}, 1, "links.type", "unknown key; links is a list; allowed an index, as in links[0]"},
+        {{"head.prr_hz.x=1"},
+         1,
+         "head.prr_hz.x",
+         "unknown key; head.prr_hz has no keys that can be set; allowed head.prr_hz=VALUE"},
+        {{"head"}, 1, "head", "no '='; allowed KEY=VALUE, as in head.prr_hz=300000"},
+        {{"=5"}, 1, "=5", "no key; allowed KEY=VALUE, as in head.prr_hz=300000"},
         {{"links=[{type: tcp, protocol: scip}]"},
          1,
          "links[0].protocol",

@@ -206,6 +206,20 @@ static void profiles_are_listed(void **state)
     FILE *out = open_memstream(&text, &len);
     assert_int_equal(config_list_profiles("config/heads", out, &err), n);
     fclose(out);
+    static const char *const whole[] = {
+        "any-rate: scanhead any rate\n"
+        "  line       -40 to 60 deg; pan 0 to 360 deg, up to 150 deg/s; 3 to 240 lines/s\n"
+        "  beam       exit 7 mm 1/e2, divergence 0.35 mrad 1/e2, 1550 nm\n"
+        "  noise      3 mm at 100 m\n"
+        "  protocols  native, nmea\n"
+        "  pulse rate, kHz      used kHz echoes   nearest  reach\n"
+        "  100 to 1200                500     15     1.5 m  800 m on 90 %, 400 m on 20 %\n",
+        "\n  planar     1440 steps a turn, 0 to 1080 cast, 540 ahead, counter-clockwise; 25 to 50 lines/s\n",
+        "\n  beams      16 beams, 55296 ns a sequence, clockwise; 5 to 20 lines/s\n",
+        "\n  sphere     360 pulses a ring, 181 rings; any step by head.step_deg; 1 to 1000 lines/s\n",
+    };
+    for (size_t i = 0; i < sizeof whole / sizeof *whole; i++)
+        if (strstr(text, whole[i]) == NULL) fail_msg("not listed: %s", whole[i]);
     /* A head with programs: each with rate, used rate, echoes, nearest range and reach. */
     const char *head = strstr(text, "\nriegl-vz400i: RIEGL VZ-400i\n");
     assert_non_null(head);
