@@ -240,10 +240,51 @@ static void devices_refuse_word_by_word(void **state)
                    5);
 }
 
+/* Ranges and noise are planned, so they rest in a scan, as the station does. HELP? says so, too. */
+static void settings_rest_in_a_scan_or_do_not(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *header, *value;
+        int rests;
+    } rows[] = {{"HEAD:PRR", "5000", 0},         {"HEAD:LINes", "50", 0},       {"HEAD:PAN", "5", 0},
+                {"HEAD:STATION", "2", 1},        {"SCAN:LINE:STARt", "-20", 0}, {"SCAN:LINE:STOP", "40", 0},
+                {"SCAN:PAN:STARt", "5", 0},      {"SCAN:PAN:STOP", "100", 0},   {"SCAN:FRAMes", "3", 0},
+                {"SCAN:ECHoes", "FIRSt", 0},     {"SCAN:WAVeform", "ON", 0},    {"HEAD:RANGe:MIN", "3", 1},
+                {"HEAD:RANGe:MAX", "30", 1},     {"HEAD:NOISe", "ON", 1},       {"HEAD:NOISe:ANGLe", "ON", 1},
+                {"HEAD:NOISe:SIGMa", "0.25", 1}, {"HEAD:NOISe:BALL", "0.5", 1}, {"HEAD:PHASe", "5", 0},
+                {"HEAD:PHASe:LOCK", "ON", 0}};
+    static const enum head_state scans[] = {HEAD_SPIN_UP, HEAD_SCANNING};
+    for (size_t i = 0; i < N_OF(rows); i++)
+        for (int k = 0; k < 2; k++) {
+            struct command_device dev = command_test_device();
+            char line[64], want[160];
+            dev.limits.waves_most = dev.limits.phase_lock_most = 1;
+            snprintf(line, sizeof line, "HELP? %s", rows[i].header);
+            const char *help = say(&dev, 1, line);
+            assert_int_equal(strstr(help, "\"all\"") == NULL, rows[i].rests);
+            if (rows[i].rests) assert_non_null(strstr(help, "\"off boot idle spin-down fault\""));
+            dev.state = scans[k];
+            snprintf(line, sizeof line, "%s %s", rows[i].header, rows[i].value);
+            snprintf(want, sizeof want, CONFLICT "%s can't change in state %s\"", rows[i].header,
+                     head_state_name(dev.state));
+            if (rows[i].rests) {
+                expect_refused(&dev, 1, &(struct refused){line, want}, 1);
+                continue;
+            }
+            const struct head_settings before = dev.settings;
+            expect(&dev, line, "OK");
+            assert_memory_not_equal(&before, &dev.settings, sizeof before);
+            snprintf(line, sizeof line, "%s?", rows[i].header);
+            expect(&dev, line, rows[i].value);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lines_are_refused_word_by_word),
+        cmocka_unit_test(settings_rest_in_a_scan_or_do_not),
         cmocka_unit_test(devices_refuse_word_by_word),
     };
     return cmocka_run_group_tests_name("messages of commands", tests, NULL, NULL);

@@ -223,6 +223,14 @@ static void who_asks_holds_the_site_of_now(void **state)
     assert_true(at.place.position_m[2] == 0.4 && at.place.heading_deg == 90.0 && fabs(at.height_m - 2.2) < 1e-9);
     device_get_station(rig->device, 1, &at);
     assert_true(!at.has_tripod && strcmp(at.name, "far") == 0 && rig->site->n_stations == 2);
+    assert_true(at.served && at.place.position_m[0] == 0.5);
+    /* Who has asked holds nothing afterwards. */
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.3,90,0,0");
+    assert_true(rig_claim(rig));
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.2,90,0,0");
+    assert_true(rig_claim(rig));
+    const struct device_version *old = rig->device->moves.old;
+    assert_true(old == NULL || old->next == NULL); /* that of the tick before at most */
     rig_close(rig);
 }
 
