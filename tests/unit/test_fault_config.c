@@ -237,6 +237,10 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
     assert_int_equal(cfg->faults.n, 3); /* the list is as it was */
     snprintf(path, sizeof path, "%s/none.yaml", dir);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    assert_int_equal(config_add_scenario(cfg, "nosuch", &wrong), SH_EINPUT);
+    static const char unknown[] = "nosuch: no such scenario; allowed the path of a file, or one of these: ";
+    assert_int_equal(strncmp(wrong.err[0].text, unknown, sizeof unknown - 1), 0);
+    assert_true(wrong.n == 1 && cfg->faults.n == 3);
     assert_int_equal(load_edited("output:", "faults:\n  - {kind: drop, link: 2}\noutput:"), SH_EINPUT);
     assert_says(":17: faults[0].link: there is no link 2");
 }

@@ -157,6 +157,10 @@ static const struct {
     /* 5010 m / (2^32 - 1) = 1.1665e-6 m */
     {"profile: far.yaml", STATION SINGLE "output: {scale_m: 1.166e-6}\nnoise: {ball: {radius_m: 10}}\n",
      "FILE: output.scale_m: 1.166e-06: ranges up to 5010 m do not fit into 32 bits; allowed 0 (automatic) and from 1.17e-06 m on"},
+    /* 2800 m / 2^31 = 1.304e-6 m */
+    {"profile: riegl-vz400i", STATION SINGLE "platform: {kind: live, reach_m: 2000}\noutput: {layout: geo, scale_m: 1e-6}\n",
+     "FILE: output.scale_m: station station-1: coordinates up to 2800 m from their anchor do not fit into 31 bits at 1e-06 m "
+     "per count; at least 1.31e-06 m"},
     {"profile: any-rate", "stations: [{position_m: [0, 0, 2], tripod: {leg_m: 2, head_above_m: 3}}]\n" SINGLE,
      "FILE: stations[0] (station-1): tripod.head_above_m: 3 m, but the head is 2 m above the ground; allowed is less than that"},
     {"profile: any-rate", "stations: [{name: gate, position_m: [3, 4, -1], instrument_height_m: 1.5}]\n" SINGLE,
