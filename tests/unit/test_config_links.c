@@ -5,6 +5,9 @@
 
 #include "drivers/protocol/protocol.h"
 #include "drivers/usb/personalities.h"
+#include "firmware_sim/config/check_links.h"
+#include "firmware_sim/config/keys.h"
+#include "firmware_sim/config/table/reader.h"
 #include "tests/unit/config_rig.h"
 
 static void load_link(const char *head, const char *links)
@@ -86,6 +89,24 @@ static void a_serial_is_told_from_others(void **state)
     assert_string_equal(cfg->link[1].whose, want);
 }
 
+/* Long paths differ mostly at their ends: 287 bytes of those are used. */
+static void a_long_path_is_cut_at_its_beginning(void **state)
+{
+    (void)state;
+    static struct cfg_reader rd;
+    cfg_reader_init(&rd, "long.yaml", &cfg_config_table, cfg, &diagnostics);
+    for (size_t len = 286; len <= 290; len++) {
+        struct link_spec link = {.protocol = PROTOCOL_NATIVE};
+        char want[400];
+        for (size_t i = 0; i < len; i++)
+            cfg->file[i] = (char)('a' + i % 26);
+        cfg->file[len] = '\0';
+        cfg_set_usb_identity(&rd, cfg, &link, 7);
+        snprintf(want, sizeof want, "7 %s", cfg->file + (len > 287 ? len - 287 : 0));
+        assert_string_equal(link.whose, want);
+    }
+}
+
 /* Typed from drivers/protocol/README.md and the manuals: n null, f file, p pty, t tcp, u usb, d udp, w web. */
 static void protocols_are_spoken_on_their_links(void **state)
 {
@@ -130,6 +151,7 @@ int main(void)
         cmocka_unit_test(a_link_has_as_many_clients_as_its_device),
         cmocka_unit_test(a_usb_link_is_the_device_of_its_protocol),
         cmocka_unit_test(a_serial_is_told_from_others),
+        cmocka_unit_test(a_long_path_is_cut_at_its_beginning),
         cmocka_unit_test(protocols_are_spoken_on_their_links),
     };
     return cmocka_run_group_tests_name("links of a configuration", tests, set_up, tear_down);
