@@ -168,7 +168,7 @@ static void stations_of_other_scanners_are_elsewhere(void **state)
     (void)state;
     static const char *const sets[] = {"stations[1]={position_m: [0, 0, 0], scanner: {head: {prr_hz: 600000}}}",
                                        "stations[2]={position_m: [5, 0, 0]}", "head.station=1"};
-    static const char *const other[] = {sets[0], sets[1], "head.station=2"};
+    const char *const other[] = {sets[0], sets[1], "head.station=2"};
     write_file(config_path, base, strlen(base));
     struct head_limits l = limits_with(sets, 3);
     assert_true(l.n_stations == 3 && l.elsewhere == 2);
