@@ -302,6 +302,19 @@ static void keys_become_settings(void **state)
     assert_int_equal(s->step_udeg, 2200000); /* as it was asked for */
 }
 
+/* Frames that an animation is scanned at become seconds. */
+static void frames_become_seconds(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform={kind: stops, waypoints: [{t_s: 0, position_m: [0, 0, 2]}, {t_s: 9, "
+                                       "position_m: [1, 0, 2]}], frames_per_s: 8, first_frame: 4, last_frame: 34, "
+                                       "frame_step: 2}"};
+    write_file(config_path, base, strlen(base));
+    assert_loads(load_sets(sets, 1));
+    const struct config_platform *p = &cfg->platform;
+    assert_true(p->has_end && p->start_s == 0.5 && p->end_s == 4.25 && p->step_s == 0.25);
+}
+
 /* A station in UTM takes zone and hemisphere from an anchor in UTM, north or south. */
 static void stations_take_the_grid_of_the_anchor(void **state)
 {
@@ -350,19 +363,13 @@ static void all_stations_are_checked(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(set_changes_values),
-        cmocka_unit_test(set_takes_long_names),
-        cmocka_unit_test(set_appends_elements),
-        cmocka_unit_test(set_refuses),
-        cmocka_unit_test(a_name_has_a_longest_length),
-        cmocka_unit_test(yaml_replaces),
-        cmocka_unit_test(yaml_replaces_scanners),
-        cmocka_unit_test(tolerances_follow_the_plan),
-        cmocka_unit_test(settings_become_lengths),
-        cmocka_unit_test(keys_become_settings),
-        cmocka_unit_test(stations_take_the_grid_of_the_anchor),
-        cmocka_unit_test(a_full_list_takes_no_more),
-        cmocka_unit_test(all_stations_are_checked),
+        cmocka_unit_test(set_changes_values),          cmocka_unit_test(set_takes_long_names),
+        cmocka_unit_test(set_appends_elements),        cmocka_unit_test(set_refuses),
+        cmocka_unit_test(a_name_has_a_longest_length), cmocka_unit_test(yaml_replaces),
+        cmocka_unit_test(yaml_replaces_scanners),      cmocka_unit_test(tolerances_follow_the_plan),
+        cmocka_unit_test(settings_become_lengths),     cmocka_unit_test(keys_become_settings),
+        cmocka_unit_test(frames_become_seconds),       cmocka_unit_test(stations_take_the_grid_of_the_anchor),
+        cmocka_unit_test(a_full_list_takes_no_more),   cmocka_unit_test(all_stations_are_checked),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
