@@ -2,11 +2,16 @@
 /* Rows of a site's plan that say what is set, without a choice; the likely cause of a slow scan; the plan in one line. */
 #include "tests/unit/site_rig.h"
 
+#include <math.h>
+
+#include "core/bvh.h"
+#include "core/plan.h"
 #include "firmware_sim/site/plan_rows.h"
+#include "firmware_sim/site/waves.h"
 
 static struct site *site;
 
-static void plan(const char *head, const char *rest)
+static void plan_with(const char *head, const char *rest, const char *const *sets, int n)
 {
     char text[2048];
     write_in("floor.obj", "v -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\nf 1 2 3 4\n");
@@ -17,9 +22,14 @@ static void plan(const char *head, const char *rest)
     write_in("test.yaml", text);
     site_free(site);
     site = NULL;
-    if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+    if (config_load(config_path, sets, n, cfg, &err) != SH_OK) fail_msg("%s", err.text);
     if (site_load(cfg, &report, &site, &err) != SH_OK) fail_msg("%s", err.text);
     if (site_plan_rows(site, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+static void plan(const char *head, const char *rest)
+{
+    plan_with(head, rest, NULL, 0);
 }
 
 static const struct plan_row *row_of(const char *stage)
@@ -102,6 +112,45 @@ static void stations_share_a_row(void **state)
     the_plan_fits_a_line();
 }
 
+/* Returns the setting of a second floor, which moves. */
+static const char *mover_setting(void)
+{
+    static char text[256];
+    const int n = (int)(strrchr(config_path, '/') - config_path);
+    snprintf(text, sizeof text,
+             "scene.meshes[1]={file: %.*s/floor.obj, up: z, scale: 1, move_m_s: [0, 0, 1], cycle_s: 1}", n,
+             config_path);
+    return text;
+}
+
+/* How far points may be from where their georeference is: within the scene and within the head's range, with a margin;
+ * those of movers, and of a head that others move, within the head's range alone. */
+static void georeferences_have_an_extent(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"scene.anchor={source: explicit, lat_deg: 48, lon_deg: 11, height_m: 500}",
+                                "output={layout: geo, crs: utm}", mover_setting()};
+    static const struct {
+        const char *head, *rest, *extent;
+    } rows[] = {
+        {"profile: any-rate, range_max_m: 100", STATION, " within 42.893 m, 2.05 m up or down"},
+        {"profile: any-rate, range_max_m: 100", "stations: [{position_m: [-10, 5, 1]}]\n",
+         " within 53.725 m, 1.04 m up or down"},
+        {"profile: any-rate, range_max_m: 100", STATION "noise: {range: on, sigma_m: 0.05}\n",
+         " within 43.558 m, 2.52 m up or down"},
+        {"profile: any-rate, range_max_m: 1.6", STATION, " within 1.616 m, 1.616 m up or down"},
+        {"profile: any-rate, range_max_m: 10", STATION "platform: {kind: live, reach_m: 5}\n",
+         " within 15.15 m, 2.05 m up or down"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        plan_with(rows[i].head, rows[i].rest, sets, 2);
+        const char *why = row_of("georef")->why, *extent = strstr(why, " within ");
+        if (extent == NULL || strcmp(extent, rows[i].extent) != 0) fail_msg("%zu: %s", i, why);
+    }
+    plan_with("profile: any-rate, range_max_m: 20", STATION, sets, 3);
+    assert_non_null(strstr(row_of("georef")->why, " within 20.2 m, 20.2 m up or down"));
+}
+
 static void a_tripod_has_a_row(void **state)
 {
     (void)state;
@@ -122,6 +171,27 @@ static void a_tripod_has_a_row(void **state)
         assert_string_equal(row->method, rows[i].method);
         if (strncmp(row->why, rows[i].begins, strlen(rows[i].begins)) != 0) fail_msg("%s", row->why);
     }
+}
+
+/* A pulse is cast into each body that moves, too; a recorded wave costs what its row says. */
+static void a_pulse_costs_all_that_it_meets(void **state)
+{
+    (void)state;
+    const char *const sets[] = {mover_setting(), "signal.model=on", "waveform.send=on"};
+    struct bvh_info bvh;
+    plan("profile: any-rate", STATION);
+    bvh_get_info(site->bvh, &bvh);
+    const double alone_ns = site_planned_ns(site);
+    plan_with("profile: any-rate", STATION, sets, 1);
+    assert_int_equal(site->n_movers, 1);
+    assert_true(fabs(site_planned_ns(site) - alone_ns - plan_pulse_ns(2, bvh.packet)) < 1e-6);
+    assert_true(site_wave_ns(site) == 0.0);
+    plan_with("profile: riegl-vz400i", STATION, sets + 1, 1);
+    const double plain_ns = site_planned_ns(site);
+    plan_with("profile: riegl-vz400i", STATION, sets + 1, 2);
+    const double wave_ns = row_of("waveform")->cost_ns;
+    assert_true(wave_ns > 0.0 && wave_ns == site_wave_ns(site));
+    assert_true(fabs(site_planned_ns(site) - plain_ns - wave_ns) < 1e-6);
 }
 
 static void a_slow_scan_has_a_likely_cause(void **state)
@@ -161,7 +231,9 @@ int main(void)
         cmocka_unit_test(programs_and_ranges_have_their_figures),
         cmocka_unit_test(heads_without_a_pan_say_how_they_fire),
         cmocka_unit_test(stations_share_a_row),
+        cmocka_unit_test(georeferences_have_an_extent),
         cmocka_unit_test(a_tripod_has_a_row),
+        cmocka_unit_test(a_pulse_costs_all_that_it_meets),
         cmocka_unit_test(a_slow_scan_has_a_likely_cause),
     };
     return cmocka_run_group_tests_name("rows of a plan", tests, site_rig_setup, tear_down);

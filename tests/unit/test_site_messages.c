@@ -100,6 +100,9 @@ static const struct {
     {"profile: sick-lms111", 1, STATION SINGLE "inputs: [{input: 1, from_s: 1, until_s: 2}]\n"
      "fields: [{number: 1, shape: segment, angles_deg: [0, 90], radii_m: [0, 1]}]\n",
      {"FILE: fields and inputs: no link has protocol: cola, so nothing evaluates them"}},
+    {"profile: any-rate", 1, STATION SINGLE "surfaces: [{object: floor, mirror: 0.9}]\nplan: {tolerance_m: 1, echo_tolerance: 1}\n",
+     {"FILE: plan.tolerance_m and plan.echo_tolerance allow glass and mirrors to be treated as other surfaces; set "
+      "optics.depth to follow them"}},
     /* 82 gaps from pole to pole, 180 / 82 deg each */
     {"profile: sphere, step_deg: 2.2", 1, STATION SINGLE,
      {"FILE: head.step_deg: 2.2 deg does not divide 180 and 360 deg: 82 steps of 2.19512195 deg are used from ring to ring, "
