@@ -183,6 +183,31 @@ static void refusals_have_their_numbers(void **state)
     }
 }
 
+/* Between two mirrors pulses go to and fro. Echoes are separate from half of a pulse's length on. */
+static void mirrors_that_face_each_other_are_told(void **state)
+{
+    (void)state;
+    char text[1024];
+    struct cast_setup setup;
+    write_in("hall.obj", "o hall\nv -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\nv -30 -30 4\nv 30 -30 4\nv 30 30 4\n"
+                         "v -30 30 4\nf 1 2 3 4\nf 8 7 6 5\n");
+    snprintf(
+        text, sizeof text,
+        "head: {profile: any-rate}\nscene:\n  meshes: [{file: hall.obj, up: z, scale: 1}]\ncast: {sight: off}\n" STATION
+            SINGLE "surfaces: [{object: hall, mirror: 0.9, reflectance: 0.1}]\n");
+    write_in("test.yaml", text);
+    site_free(site);
+    site = NULL;
+    clear_warned();
+    if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load(cfg, &report, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    expect_warning("FILE: paths of pulses meet more glass and mirrors than the 4 surfaces that are followed");
+    site_cast_setup(site, 0, &setup);
+    assert_non_null(setup.detect);
+    assert_int_equal(setup.detect->depth, 4);
+    assert_true(cfg->profile.pulse_width_ns == 4.0 && fabs(setup.detect->separation_m - 0.599584916) < 1e-12);
+}
+
 static void casters_get_what_is_set(void **state)
 {
     (void)state;
@@ -230,6 +255,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(warnings_have_their_numbers),
         cmocka_unit_test(refusals_have_their_numbers),
+        cmocka_unit_test(mirrors_that_face_each_other_are_told),
         cmocka_unit_test(casters_get_what_is_set),
     };
     return cmocka_run_group_tests_name("messages of a site", tests, site_rig_setup, tear_down);
