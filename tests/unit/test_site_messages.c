@@ -244,6 +244,22 @@ static void casters_get_what_is_set(void **state)
     assert_true(setup.mirror_counts == 4294967296.0 && setup.pan_counts == 4294967296.0); /* ideal encoders */
 }
 
+static void casters_get_the_noise_of_a_ball(void **state)
+{
+    (void)state;
+    struct cast_setup setup;
+    assert_int_equal(load("profile: any-rate", 1,
+                          STATION SINGLE
+                          "noise: {ball: {radius_m: 0.5, distance_1_m: 0.25, factor: [1, 2, 3], axes: beam}}\n"),
+                     SH_OK);
+    site_cast_setup(site, 0, &setup);
+    assert_true(setup.detect != NULL && setup.detect->ball != NULL);
+    const struct detect_ball *ball = setup.detect->ball;
+    assert_true(ball->radius_m == 0.5 && ball->per_distance_1_m == 0.25 && ball->local);
+    for (int i = 0; i < 3; i++)
+        assert_true(ball->factor[i] == i + 1);
+}
+
 static int tear_down(void **state)
 {
     site_free(site);
@@ -253,10 +269,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(warnings_have_their_numbers),
-        cmocka_unit_test(refusals_have_their_numbers),
-        cmocka_unit_test(mirrors_that_face_each_other_are_told),
-        cmocka_unit_test(casters_get_what_is_set),
+        cmocka_unit_test(warnings_have_their_numbers),           cmocka_unit_test(refusals_have_their_numbers),
+        cmocka_unit_test(mirrors_that_face_each_other_are_told), cmocka_unit_test(casters_get_what_is_set),
+        cmocka_unit_test(casters_get_the_noise_of_a_ball),
     };
     return cmocka_run_group_tests_name("messages of a site", tests, site_rig_setup, tear_down);
 }
