@@ -76,11 +76,10 @@ static int has_gap(const struct line_writer *w)
     return w->gap[LINE_PLAIN] != 0 || w->gap[LINE_REMARK] != 0;
 }
 
-/* Takes the line that stands for dropped ones; empty where there are none. */
+/* Takes the line that stands for dropped ones, of which there are some. */
 static size_t take_gap(struct line_writer *w, char text[LINE_GAP_BYTES])
 {
-    text[0] = '\0';
-    if (has_gap(w)) w->spec.gap(text, w->gap);
+    w->spec.gap(text, w->gap);
     memset(w->gap, 0, sizeof w->gap);
     return strlen(text);
 }

@@ -76,9 +76,8 @@ static int cut_lines(const struct command_device *dev, const char *text, struct 
             snprintf(why, len, "allowed are %d lines of up to %d bytes", MAX_LINES, COMMAND_MAX_LINE);
             return -1;
         }
-        char *line = lines->line[lines->n++];
+        char *line = lines->line[lines->n++]; /* all zeros */
         memcpy(line, text, n);
-        line[n] = '\0';
         const struct command_row *row = row_of(line);
         if (row == NULL || !is_stored(dev, row)) {
             snprintf(why, len, "'%.80s' is no setting that this head stores", line);

@@ -52,7 +52,7 @@ void cfg_check_readable(struct cfg_reader *rd, const char *key, uint32_t item, c
     if (file != NULL)
         fclose(file);
     else
-        cfg_fail_key(rd, key, item, "%.200s: %s; allowed a %s file that can be read", path, why, kind);
+        cfg_fail_item(rd, key, item, "%.200s: %s; allowed a %s file that can be read", path, why, kind);
 }
 
 void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg)
@@ -60,8 +60,8 @@ void cfg_check_copies(struct cfg_reader *rd, const struct config *cfg)
     static const char path[] = "scene.meshes[].copies";
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++) {
         const struct config_mesh *mesh = &cfg->scene.mesh[i];
-        if (mesh->copy_labels && !cfg_is_given(rd, path, i))
-            cfg_fail_key(rd, "scene.meshes[].copy_labels", i, "on, but the mesh has no copies; allowed with copies");
+        if (mesh->copy_labels && !cfg_is_item_given(rd, path, i))
+            cfg_fail_item(rd, "scene.meshes[].copy_labels", i, "on, but the mesh has no copies; allowed with copies");
         if (mesh->copies[0] != '\0') cfg_check_readable(rd, path, i, mesh->copies, "CSV");
     }
 }

@@ -24,7 +24,7 @@
 /* Returns the key to name where two contradict each other: the first, unless only the second was given. */
 static const char *given_of(const struct cfg_reader *rd, const char *first, const char *second)
 {
-    return !cfg_is_given(rd, first, 0) && cfg_is_given(rd, second, 0) ? second : first;
+    return !cfg_is_given(rd, first) && cfg_is_given(rd, second) ? second : first;
 }
 
 /* Checks settings against the limits of the head profile that their rows in keys.c name (min_key, max_key). */
@@ -39,7 +39,7 @@ static void check_limits(struct cfg_reader *rd, const struct config *cfg)
         char from[40] = "";
         if (low < high) snprintf(from, sizeof from, "%.15g to ", from_micro(low));
         if (value < low || value > high)
-            cfg_fail_key(rd, key->path, 0, "%.15g is outside the limits of head profile %s; allowed %s%.15g %s",
+            cfg_fail_key(rd, key->path, "%.15g is outside the limits of head profile %s; allowed %s%.15g %s",
                          from_micro(value), cfg->profile.name, from, from_micro(high), key->unit);
     }
 }
@@ -48,28 +48,28 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct head_settings *s = &cfg->head.settings;
     const int64_t span_udeg = s->pan_stop_udeg - s->pan_start_udeg;
-    if (s->prr_uhz < s->lines_uhz && CFG_SOUND(rd, 0, "head.prr_hz", "head.lines_hz"))
-        cfg_fail_key(rd, given_of(rd, "head.prr_hz", "head.lines_hz"), 0,
+    if (s->prr_uhz < s->lines_uhz && CFG_SOUND(rd, "head.prr_hz", "head.lines_hz"))
+        cfg_fail_key(rd, given_of(rd, "head.prr_hz", "head.lines_hz"),
                      "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed a prr_hz of at least "
                      "%.15g, or a lines_hz of at most %.15g",
                      from_micro(s->prr_uhz), from_micro(s->lines_uhz), from_micro(s->lines_uhz),
                      from_micro(s->prr_uhz));
-    if (!cfg_line_has_width(cfg) && CFG_SOUND(rd, 0, "head.line_start_deg", "head.line_stop_deg"))
+    if (!cfg_line_has_width(cfg) && CFG_SOUND(rd, "head.line_start_deg", "head.line_stop_deg"))
         cfg_fail_key(
-            rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"), 0,
+            rd, given_of(rd, "head.line_stop_deg", "head.line_start_deg"),
             "the line goes from %.15g to %.15g deg; allowed a line_start_deg %s %.15g, or a "
             "line_stop_deg %s %.15g",
             from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg),
             cfg->profile.emitter.kind == EMITTER_SPHERE ? "other than" : "below", from_micro(s->line_stop_udeg),
             cfg->profile.emitter.kind == EMITTER_SPHERE ? "other than" : "above", from_micro(s->line_start_udeg));
-    if ((span_udeg < 0 || span_udeg > 360000000) && CFG_SOUND(rd, 0, "head.pan_start_deg", "head.pan_stop_deg"))
-        cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"), 0,
+    if ((span_udeg < 0 || span_udeg > 360000000) && CFG_SOUND(rd, "head.pan_start_deg", "head.pan_stop_deg"))
+        cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"),
                      "the pan goes from %.15g to %.15g deg; allowed a pan_stop_deg of %.15g to %.15g",
                      from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg), from_micro(s->pan_start_udeg),
                      from_micro(s->pan_start_udeg) + 360.0);
     if (s->station > cfg->n_stations && cfg->platform.kind != PLATFORM_STOPS &&
-        CFG_SOUND(rd, 0, "stations", "platform.kind"))
-        cfg_fail_key(rd, "head.station", 0, "there is no station %u; allowed 1 to %u", s->station, cfg->n_stations);
+        CFG_SOUND(rd, "stations", "platform.kind"))
+        cfg_fail_key(rd, "head.station", "there is no station %u; allowed 1 to %u", s->station, cfg->n_stations);
 }
 
 static void check_mesh(struct cfg_reader *rd, const struct config_mesh *mesh, uint32_t i)
@@ -87,7 +87,7 @@ static void check_mesh(struct cfg_reader *rd, const struct config_mesh *mesh, ui
     if (is_known)
         cfg_check_readable(rd, path, i, mesh->file, "mesh");
     else
-        cfg_fail_key(rd, path, i, "\"%s\" has no known ending; allowed%s", cfg_show(mesh->file, shown), allowed);
+        cfg_fail_item(rd, path, i, "\"%s\" has no known ending; allowed%s", cfg_show(mesh->file, shown), allowed);
 }
 
 static void check_names(struct cfg_reader *rd, struct config *cfg)
@@ -97,7 +97,7 @@ static void check_names(struct cfg_reader *rd, struct config *cfg)
         if (station->name[0] == '\0') snprintf(station->name, sizeof station->name, "station-%u", i + 1);
         for (uint32_t k = 0; k < i; k++)
             if (strcmp(cfg->station[k].name, station->name) == 0)
-                cfg_fail_key(rd, "stations[].name", i, "stations[%u] has the same name; allowed different names", k);
+                cfg_fail_item(rd, "stations[].name", i, "stations[%u] has the same name; allowed different names", k);
     }
 }
 
@@ -105,24 +105,23 @@ static void check_colour(struct cfg_reader *rd, struct config *cfg)
 {
     struct config_output *o = &cfg->output;
     const double *c = o->colour_rgb, *l = o->colour_limits;
-    o->colour_limited = cfg_is_given(rd, "output.colour_limits", 0);
+    o->colour_limited = cfg_is_given(rd, "output.colour_limits");
     if (c[0] != floor(c[0]) || c[1] != floor(c[1]) || c[2] != floor(c[2]))
-        cfg_fail_key(rd, "output.colour_rgb", 0, "[%.9g, %.9g, %.9g]; allowed whole numbers from 0 to 255", c[0], c[1],
+        cfg_fail_key(rd, "output.colour_rgb", "[%.9g, %.9g, %.9g]; allowed whole numbers from 0 to 255", c[0], c[1],
                      c[2]);
-    if (!CFG_SOUND(rd, 0, "output.colour")) return;
-    if (cfg_is_given(rd, "output.colour_rgb", 0) && o->colour != COLOUR_SOLID)
-        cfg_fail_key(rd, "output.colour_rgb", 0, "a colour, but output.colour is %s; allowed only with colour: solid",
+    if (!CFG_SOUND(rd, "output.colour")) return;
+    if (cfg_is_given(rd, "output.colour_rgb") && o->colour != COLOUR_SOLID)
+        cfg_fail_key(rd, "output.colour_rgb", "a colour, but output.colour is %s; allowed only with colour: solid",
                      colour_words[o->colour]);
     if (o->colour_limited && !colour_has_limits(o->colour))
-        cfg_fail_key(rd, "output.colour_limits", 0,
+        cfg_fail_key(rd, "output.colour_limits",
                      "limits, but output.colour is %s; allowed only with colour: range, height, frame",
                      colour_words[o->colour]);
-    else if (o->colour_limited && !(l[0] < l[1]) && CFG_SOUND(rd, 0, "output.colour_limits"))
-        cfg_fail_key(rd, "output.colour_limits", 0, "[%.9g, %.9g]; allowed a second number above the first", l[0],
-                     l[1]);
+    else if (o->colour_limited && !(l[0] < l[1]) && CFG_SOUND(rd, "output.colour_limits"))
+        cfg_fail_key(rd, "output.colour_limits", "[%.9g, %.9g]; allowed a second number above the first", l[0], l[1]);
     if (o->colour == COLOUR_FRAME && cfg->platform.kind != PLATFORM_TRAJECTORY &&
-        cfg->platform.kind != PLATFORM_STOPS && CFG_SOUND(rd, 0, "platform.kind"))
-        cfg_fail_key(rd, "output.colour", 0,
+        cfg->platform.kind != PLATFORM_STOPS && CFG_SOUND(rd, "platform.kind"))
+        cfg_fail_key(rd, "output.colour",
                      "frame, but points have no frame scalar: platform.kind is %s; allowed with trajectory, stops",
                      cfg_word(rd, "platform.kind", (int)cfg->platform.kind));
 }
@@ -132,23 +131,23 @@ static void check_output(struct cfg_reader *rd, struct config *cfg)
     const struct config_output *output = &cfg->output;
     const int bits = output->layout == LINE_POLAR ? 32 : 31; /* a range has no sign */
     const double counts = ldexp(1.0, bits);
-    cfg->output.layout_given = cfg_is_given(rd, "output.layout", 0);
+    cfg->output.layout_given = cfg_is_given(rd, "output.layout");
     check_colour(rd, cfg);
-    if (!cfg_is_given(rd, "output.tolerance_m", 0)) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
-    if (!cfg_is_given(rd, "scene.tolerance_m", 0))
-        cfg->scene.tolerance_m = cfg_is_given(rd, "plan.tolerance_m", 0) ? 0.1 * cfg->plan.range_m : 1.0;
-    cfg->optics.depth_given = cfg_is_given(rd, "optics.depth", 0);
-    if (output->utm_zone != 0 && output->crs != GEOREF_UTM && CFG_SOUND(rd, 0, "output.crs"))
-        cfg_fail_key(rd, "output.utm_zone", 0, "a zone, but output.crs is not utm; allowed only with crs: utm");
+    if (!cfg_is_given(rd, "output.tolerance_m")) cfg->output.tolerance_m = fmax(1e-7, 1e-3 * cfg->plan.range_m);
+    if (!cfg_is_given(rd, "scene.tolerance_m"))
+        cfg->scene.tolerance_m = cfg_is_given(rd, "plan.tolerance_m") ? 0.1 * cfg->plan.range_m : 1.0;
+    cfg->optics.depth_given = cfg_is_given(rd, "optics.depth");
+    if (output->utm_zone != 0 && output->crs != GEOREF_UTM && CFG_SOUND(rd, "output.crs"))
+        cfg_fail_key(rd, "output.utm_zone", "a zone, but output.crs is not utm; allowed only with crs: utm");
     if (output->heights == HEIGHTS_GEOID && output->crs != GEOREF_UTM && output->crs != GEOREF_GEODETIC &&
-        CFG_SOUND(rd, 0, "output.crs"))
-        cfg_fail_key(rd, "output.heights", 0,
+        CFG_SOUND(rd, "output.crs"))
+        cfg_fail_key(rd, "output.heights",
                      "geoid, but output.crs has no heights; allowed only with crs: utm, geodetic");
     if (output->scale_m != 0.0 && output->scale_m < 1e-6)
-        cfg_fail_key(rd, "output.scale_m", 0, "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
+        cfg_fail_key(rd, "output.scale_m", "%.10g is out of range; allowed 0 (automatic) or 1e-6 to 1 m",
                      output->scale_m);
     else if (output->scale_m != 0.0 && cfg_has_profile(rd) && cfg->profile.range_max_m / output->scale_m >= counts)
-        cfg_fail_key(rd, "output.scale_m", 0,
+        cfg_fail_key(rd, "output.scale_m",
                      "%.10g is too fine: %.10g m of head profile %s do not fit into %d bits; allowed above %.4g to "
                      "1 m, or 0 (automatic)",
                      output->scale_m, cfg->profile.range_max_m, cfg->profile.name, bits,
@@ -182,9 +181,9 @@ const char *config_rays_move(const struct config *cfg)
 static void check_sight(struct cfg_reader *rd, const struct config *cfg)
 {
     const char *why = config_rays_move(cfg);
-    if (cfg->cast.sight != CHOICE_ON || !CFG_SOUND(rd, 0, "platform.kind", "beam.mode")) return;
+    if (cfg->cast.sight != CHOICE_ON || !CFG_SOUND(rd, "platform.kind", "beam.mode")) return;
     if (why == NULL && cfg->beam.mode == BEAM_RINGS) why = "beam.mode is rings, which have no ray for the centre";
-    if (why != NULL) cfg_fail_key(rd, "cast.sight", 0, "on, but %s; allowed auto, off", why);
+    if (why != NULL) cfg_fail_key(rd, "cast.sight", "on, but %s; allowed auto, off", why);
 }
 
 static const double LEAST_PULSE_NS = 0.1; /* 15 mm of range */
@@ -199,12 +198,12 @@ static void check_beam(struct cfg_reader *rd, const struct config *cfg)
     const int has_footprint = config_has_footprint(cfg);
     if (cfg->beam.mode == BEAM_SINGLE) return;
     if (cfg_has_profile(rd) && !has_footprint && cfg->beam.mode != BEAM_AUTO)
-        cfg_fail_key(rd, "beam.mode", 0, "head profile %s has no footprint; allowed single", p->name);
-    else if (cfg->beam.mode == BEAM_ADAPTIVE && why != NULL && CFG_SOUND(rd, 0, "platform.kind"))
-        cfg_fail_key(rd, "beam.mode", 0, "adaptive, but %s; allowed single, rings, auto", why);
+        cfg_fail_key(rd, "beam.mode", "head profile %s has no footprint; allowed single", p->name);
+    else if (cfg->beam.mode == BEAM_ADAPTIVE && why != NULL && CFG_SOUND(rd, "platform.kind"))
+        cfg_fail_key(rd, "beam.mode", "adaptive, but %s; allowed single, rings, auto", why);
     else if (cfg_has_profile(rd) && has_footprint && p->pulse_width_ns < LEAST_PULSE_NS)
         cfg_fail_key(
-            rd, "beam.mode", 0,
+            rd, "beam.mode",
             "pulse_width_ns of head profile %s is %.10g: too short to separate echoes of a footprint; allowed single, "
             "or a pulse_width_ns of at least %.10g",
             p->name, p->pulse_width_ns, LEAST_PULSE_NS);
@@ -213,7 +212,7 @@ static void check_beam(struct cfg_reader *rd, const struct config *cfg)
 void cfg_check_loop(struct cfg_reader *rd, const struct config *cfg)
 {
     if (fmod(1e9, cfg->loop.tick_hz) == 0.0 && floor(cfg->loop.tick_hz) == cfg->loop.tick_hz) return;
-    cfg_fail_key(rd, "loop.tick_hz", 0,
+    cfg_fail_key(rd, "loop.tick_hz",
                  "%.15g does not divide 1e9; allowed a divisor of 1e9 from 100 to 10000 Hz, such as 500, 1000, 2000",
                  cfg->loop.tick_hz);
 }
@@ -225,35 +224,34 @@ static void check_time(struct cfg_reader *rd, const struct config *cfg)
     char shown[CFG_SHOW_MAX];
     const int link = cfg_link_that_needs(cfg, PROTOCOL_NEEDS_TIME);
     if (epoch_parse(cfg->time.epoch, utc_table_builtin(), &source, NULL, &why) != SH_OK)
-        cfg_fail_key(rd, "time.epoch", 0,
+        cfg_fail_key(rd, "time.epoch",
                      "\"%s\": %.80s; allowed none, utc, tai, or a time after 1980-01-06 such as 2026-01-01T00:00:00Z",
                      cfg_show(cfg->time.epoch, shown), why.text);
-    else if (source == EPOCH_NONE && link >= 0 && CFG_SOUND(rd, 0, "time.epoch"))
-        cfg_fail_key(rd, "links[].protocol", (uint32_t)link,
-                     "%s, but the time is not known; required is time.epoch: utc, tai, or a time such as "
-                     "2026-01-01T00:00:00Z",
-                     cfg_word(rd, "links[].protocol", cfg->link[link].protocol));
-    else if (source == EPOCH_NONE && cfg->time.ptp.follower && CFG_SOUND(rd, 0, "time.epoch"))
-        cfg_fail_key(rd, "time.ptp.follower", 0,
+    else if (source == EPOCH_NONE && link >= 0 && CFG_SOUND(rd, "time.epoch"))
+        cfg_fail_item(rd, "links[].protocol", (uint32_t)link,
+                      "%s, but the time is not known; required is time.epoch: utc, tai, or a time such as "
+                      "2026-01-01T00:00:00Z",
+                      cfg_word(rd, "links[].protocol", cfg->link[link].protocol));
+    else if (source == EPOCH_NONE && cfg->time.ptp.follower && CFG_SOUND(rd, "time.epoch"))
+        cfg_fail_key(rd, "time.ptp.follower",
                      "is on, but the time is not known; required is time.epoch: utc, tai, or a time such as "
                      "2026-01-01T00:00:00Z");
     if (1000 % cfg->gnss.rate_hz != 0 || cfg->gnss.rate_hz == 8)
-        cfg_fail_key(rd, "gnss.rate_hz", 0, "%u is not a rate of the receiver; allowed 1, 2, 4, 5, 10 or 20 Hz",
+        cfg_fail_key(rd, "gnss.rate_hz", "%u is not a rate of the receiver; allowed 1, 2, 4, 5, 10 or 20 Hz",
                      cfg->gnss.rate_hz);
     if (cfg->gnss.quality == 3)
         cfg_fail_key(
-            rd, "gnss.quality", 0,
+            rd, "gnss.quality",
             "3 is not a fix of position; allowed 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float");
 }
 
 static void check_target(struct cfg_reader *rd, const struct config *cfg)
 {
-    if (cfg_is_given(rd, "scene.target.others", 0) && cfg->scene.target.n_objects == 0)
-        cfg_fail_key(rd, "scene.target.others", 0,
-                     "given, but there are no scene.target.objects; allowed with objects");
+    if (cfg_is_given(rd, "scene.target.others") && cfg->scene.target.n_objects == 0)
+        cfg_fail_key(rd, "scene.target.others", "given, but there are no scene.target.objects; allowed with objects");
     for (uint32_t i = 0; i < cfg->scene.target.n_objects; i++)
         if (cfg->scene.target.object[i][0] == '\0')
-            cfg_fail_key(rd, "scene.target.objects[]", i, "empty; allowed a name, with * and ?");
+            cfg_fail_item(rd, "scene.target.objects[]", i, "empty; allowed a name, with * and ?");
 }
 
 void cfg_check(struct cfg_reader *rd, struct config *cfg)

@@ -103,17 +103,17 @@ static void check_keys(struct cfg_reader *rd, const struct fault *f, uint32_t i)
     const enum fault_place place = fault_place_of(f->kind);
     const char *keys = kinds[f->kind].keys, *name = fault_names[f->kind];
     for (size_t k = 0; k < CFG_LEN(when); k++)
-        if (cfg_is_given(rd, when[k].path, i) && (when[k].places & 1U << place) == 0)
-            cfg_fail_key(rd, when[k].path, i, "%s has no such key; allowed %s", name,
-                         place == FAULT_AT_MOMENT
-                             ? "from_s, until_s, from_pulse, until_pulse"
-                             : "link, at, from, until, every, probability, count, seed, from_s, until_s");
+        if (cfg_is_item_given(rd, when[k].path, i) && (when[k].places & 1U << place) == 0)
+            cfg_fail_item(rd, when[k].path, i, "%s has no such key; allowed %s", name,
+                          place == FAULT_AT_MOMENT
+                              ? "from_s, until_s, from_pulse, until_pulse"
+                              : "link, at, from, until, every, probability, count, seed, from_s, until_s");
     for (size_t k = 0; k < CFG_LEN(what); k++) {
         char path[CFG_PATH_MAX];
         snprintf(path, sizeof path, "faults[].%s", what[k]);
-        if (cfg_is_given(rd, path, i) && !cfg_list_has(keys, what[k]))
-            cfg_fail_key(rd, path, i, "%s has no such key; allowed %s", name,
-                         keys != NULL ? keys : "only keys that say when and where");
+        if (cfg_is_item_given(rd, path, i) && !cfg_list_has(keys, what[k]))
+            cfg_fail_item(rd, path, i, "%s has no such key; allowed %s", name,
+                          keys != NULL ? keys : "only keys that say when and where");
     }
 }
 
@@ -128,38 +128,38 @@ static void check_values(struct cfg_reader *rd, const struct fault *f, uint32_t 
     const char *name = fault_names[f->kind];
     const char *most_ms = find_most_ms(f->kind);
     if (kinds[f->kind].n_max > 0.0 && (double)f->n > kinds[f->kind].n_max)
-        cfg_fail_key(rd, "faults[].n", i, "%u is too many for %s; allowed up to %.0f", f->n, name,
-                     kinds[f->kind].n_max);
-    if (kinds[f->kind].needs_ms && f->for_ms <= 0.0 && CFG_SOUND(rd, i, "faults[].for_ms"))
-        cfg_fail_key(rd, cfg_is_given(rd, "faults[].for_ms", i) ? "faults[].for_ms" : "faults[].kind", i,
-                     "%s needs for_ms; allowed above 0 to %s ms", name, most_ms);
+        cfg_fail_item(rd, "faults[].n", i, "%u is too many for %s; allowed up to %.0f", f->n, name,
+                      kinds[f->kind].n_max);
+    if (kinds[f->kind].needs_ms && f->for_ms <= 0.0 && CFG_ITEM_SOUND(rd, i, "faults[].for_ms"))
+        cfg_fail_item(rd, cfg_is_item_given(rd, "faults[].for_ms", i) ? "faults[].for_ms" : "faults[].kind", i,
+                      "%s needs for_ms; allowed above 0 to %s ms", name, most_ms);
     if (f->for_ms > strtod(most_ms, NULL))
-        cfg_fail_key(rd, "faults[].for_ms", i, "%.10g is too long for %s; allowed above 0 to %s ms", f->for_ms, name,
-                     most_ms);
-    if (f->at != 0 && (cfg_is_given(rd, "faults[].from", i) || cfg_is_given(rd, "faults[].until", i) ||
-                       cfg_is_given(rd, "faults[].every", i)))
-        cfg_fail_key(rd, "faults[].at", i, "is a single number; allowed only without from, until and every");
+        cfg_fail_item(rd, "faults[].for_ms", i, "%.10g is too long for %s; allowed above 0 to %s ms", f->for_ms, name,
+                      most_ms);
+    if (f->at != 0 && (cfg_is_item_given(rd, "faults[].from", i) || cfg_is_item_given(rd, "faults[].until", i) ||
+                       cfg_is_item_given(rd, "faults[].every", i)))
+        cfg_fail_item(rd, "faults[].at", i, "is a single number; allowed only without from, until and every");
     if (f->until != 0 && f->until < f->from)
-        cfg_fail_key(rd, "faults[].until", i, "is before from, which is %llu; allowed is that number or more",
-                     (unsigned long long)f->from);
+        cfg_fail_item(rd, "faults[].until", i, "is before from, which is %llu; allowed is that number or more",
+                      (unsigned long long)f->from);
     if (f->until_s > 0.0 && f->until_s <= f->from_s)
-        cfg_fail_key(rd, "faults[].until_s", i, "is not after from_s, which is %.10g s; allowed is a later time",
-                     f->from_s);
+        cfg_fail_item(rd, "faults[].until_s", i, "is not after from_s, which is %.10g s; allowed is a later time",
+                      f->from_s);
     if (f->kind == FAULT_PTP_JITTER && (f->ns < 0.0 || f->ns > 1e9))
-        cfg_fail_key(rd, "faults[].ns", i, "%.10g is out of range for %s; allowed 0 to 1e9 ns", f->ns, name);
+        cfg_fail_item(rd, "faults[].ns", i, "%.10g is out of range for %s; allowed 0 to 1e9 ns", f->ns, name);
     if (f->until_pulse < f->from_pulse)
-        cfg_fail_key(rd, "faults[].until_pulse", i,
-                     "is before from_pulse, which is %llu; allowed is that number or more",
-                     (unsigned long long)f->from_pulse);
+        cfg_fail_item(rd, "faults[].until_pulse", i,
+                      "is before from_pulse, which is %llu; allowed is that number or more",
+                      (unsigned long long)f->from_pulse);
 }
 
 void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list)
 {
     for (uint32_t i = 0; i < list->n; i++) {
         struct fault *f = &list->fault[i];
-        if (!cfg_is_given(rd, "faults[].until_pulse", i)) f->until_pulse = UINT64_MAX;
-        if (!cfg_is_given(rd, "faults[].byte", i)) f->byte = -1;
-        if (!CFG_SOUND(rd, i, "faults[].kind")) continue;
+        if (!cfg_is_item_given(rd, "faults[].until_pulse", i)) f->until_pulse = UINT64_MAX;
+        if (!cfg_is_item_given(rd, "faults[].byte", i)) f->byte = -1;
+        if (!CFG_ITEM_SOUND(rd, i, "faults[].kind")) continue;
         check_keys(rd, f, i);
         check_values(rd, f, i);
     }
@@ -191,14 +191,15 @@ static void check_needs(struct cfg_reader *rd, const struct config *cfg, const s
 {
     const char *name = fault_names[f->kind];
     if (needs_time(f->kind) && (cfg->time.epoch[0] == '\0' || strcmp(cfg->time.epoch, "none") == 0))
-        cfg_fail_key(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none", name);
+        cfg_fail_item(rd, "faults[].kind", i, "%s needs a time of day; allowed where time.epoch is not none", name);
     if (needs_ptp(f->kind) && !cfg->time.ptp.follower)
-        cfg_fail_key(rd, "faults[].kind", i, "%s needs a follower of PTP; allowed where time.ptp.follower is on", name);
-    if (needs_server(f->kind) && !can_ask_server(cfg) && CFG_SOUND(rd, 0, "links", "loop.pace"))
-        cfg_fail_key(rd, "faults[].kind", i,
-                     "%s needs a scanner that can ask a time server; allowed with a link of protocol: cola, and "
-                     "loop.pace: realtime",
-                     name);
+        cfg_fail_item(rd, "faults[].kind", i, "%s needs a follower of PTP; allowed where time.ptp.follower is on",
+                      name);
+    if (needs_server(f->kind) && !can_ask_server(cfg) && CFG_SOUND(rd, "links", "loop.pace"))
+        cfg_fail_item(rd, "faults[].kind", i,
+                      "%s needs a scanner that can ask a time server; allowed with a link of protocol: cola, and "
+                      "loop.pace: realtime",
+                      name);
 }
 
 /* Returns whether faults of the kind can strike on the link. */
@@ -213,15 +214,15 @@ void cfg_check_fault_links(struct cfg_reader *rd, const struct config *cfg, cons
 {
     for (uint32_t i = 0; i < list->n; i++) {
         const struct fault *f = &list->fault[i];
-        if (!CFG_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
+        if (!CFG_ITEM_SOUND(rd, i, "faults[].kind", "faults[].link")) continue;
         if (!cfg->has_no_head) check_needs(rd, cfg, f, i);
         if (cfg->links_are_not_here) continue; /* checked with the scanner that has the links */
         if (f->link > cfg->n_links)
-            cfg_fail_key(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
+            cfg_fail_item(rd, "faults[].link", i, "there is no link %u; allowed 0 to %u", f->link, cfg->n_links);
         else if (f->link != 0 && fault_place_of(f->kind) != FAULT_AT_MOMENT &&
                  !link_has_fault(&cfg->link[f->link - 1], f->kind))
-            cfg_fail_key(rd, "faults[].link", i, "link %u can't have %s; allowed 0, or a link that can", f->link,
-                         fault_names[f->kind]);
+            cfg_fail_item(rd, "faults[].link", i, "link %u can't have %s; allowed 0, or a link that can", f->link,
+                          fault_names[f->kind]);
     }
 }
 

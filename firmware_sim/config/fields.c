@@ -26,14 +26,14 @@ static const struct {
 static void check_keys(struct cfg_reader *rd, const struct config_field *f, uint32_t i)
 {
     for (size_t k = 0; k < sizeof owned / sizeof owned[0]; k++) {
-        const int given = cfg_is_given(rd, owned[k].path, i);
+        const int given = cfg_is_item_given(rd, owned[k].path, i);
         if (given && owned[k].shape != f->shape)
-            cfg_fail_key(rd, owned[k].path, i, "given, but the field is a %s; allowed with shape: %s",
-                         cfg_word(rd, "fields[].shape", (int)f->shape),
-                         cfg_word(rd, "fields[].shape", (int)owned[k].shape));
+            cfg_fail_item(rd, owned[k].path, i, "given, but the field is a %s; allowed with shape: %s",
+                          cfg_word(rd, "fields[].shape", (int)f->shape),
+                          cfg_word(rd, "fields[].shape", (int)owned[k].shape));
         if (!given && owned[k].shape == f->shape && owned[k].needed)
-            cfg_fail_key(rd, owned[k].path, i, "missing; required with shape: %s",
-                         cfg_word(rd, "fields[].shape", (int)f->shape));
+            cfg_fail_item(rd, owned[k].path, i, "missing; required with shape: %s",
+                          cfg_word(rd, "fields[].shape", (int)f->shape));
     }
 }
 
@@ -49,13 +49,13 @@ static void check_polygon(struct cfg_reader *rd, const struct config_field *f, u
 {
     const uint32_t n = f->points_m.n;
     double most_um2 = 0.0;
-    if (f->shape != FIELD_POLYGON || !cfg_is_given(rd, "fields[].points_m", i)) return;
-    if (n < 3) cfg_fail_key(rd, "fields[].points_m", i, "%u corners; allowed 3 to %d", n, CONFIG_MAX_POINTS);
+    if (f->shape != FIELD_POLYGON || !cfg_is_item_given(rd, "fields[].points_m", i)) return;
+    if (n < 3) cfg_fail_item(rd, "fields[].points_m", i, "%u corners; allowed 3 to %d", n, CONFIG_MAX_POINTS);
     for (uint32_t k = 1; k + 1 < n; k++)
         most_um2 = fmax(most_um2, fabs(triangle_um2(f, k)));
     if (n >= 3 && most_um2 < 1.0)
-        cfg_fail_key(rd, "fields[].points_m", i,
-                     "its %u corners enclose no area; allowed are corners that do not lie on one line", n);
+        cfg_fail_item(rd, "fields[].points_m", i,
+                      "its %u corners enclose no area; allowed are corners that do not lie on one line", n);
 }
 
 static void check_values(struct cfg_reader *rd, const struct config_field *f, uint32_t i)
@@ -63,12 +63,12 @@ static void check_values(struct cfg_reader *rd, const struct config_field *f, ui
     const double span_deg = f->angles_deg[1] - f->angles_deg[0];
     check_polygon(rd, f, i);
     if (f->shape == FIELD_SEGMENT && (span_deg < 0.0 || span_deg > 360.0))
-        cfg_fail_key(rd, "fields[].angles_deg", i, "%.10g to %.10g; allowed a second angle of 0 to 360 deg more",
-                     f->angles_deg[0], f->angles_deg[1]);
+        cfg_fail_item(rd, "fields[].angles_deg", i, "%.10g to %.10g; allowed a second angle of 0 to 360 deg more",
+                      f->angles_deg[0], f->angles_deg[1]);
     if (f->shape == FIELD_SEGMENT && f->radii_m[0] > f->radii_m[1])
-        cfg_fail_key(rd, "fields[].radii_m", i,
-                     "%.10g to %.10g; allowed an outer radius that is not below the inner one", f->radii_m[0],
-                     f->radii_m[1]);
+        cfg_fail_item(rd, "fields[].radii_m", i,
+                      "%.10g to %.10g; allowed an outer radius that is not below the inner one", f->radii_m[0],
+                      f->radii_m[1]);
 }
 
 static int make_rectangle(const struct config_field *f, struct cola_field *field)
@@ -87,10 +87,10 @@ static void check_reach(struct cfg_reader *rd, const struct config_field *f, uin
 {
     struct cola_field made;
     memset(&made, 0, sizeof made);
-    if (f->shape != FIELD_RECTANGLE || !cfg_is_given(rd, "fields[].size_m", i)) return;
+    if (f->shape != FIELD_RECTANGLE || !cfg_is_item_given(rd, "fields[].size_m", i)) return;
     if (make_rectangle(f, &made) != 0)
-        cfg_fail_key(rd, "fields[].size_m", i,
-                     "the rectangle reaches farther than x or y of 1000 m; allowed up to that");
+        cfg_fail_item(rd, "fields[].size_m", i,
+                      "the rectangle reaches farther than x or y of 1000 m; allowed up to that");
 }
 
 static void check_number(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct cola_model *model)
@@ -98,30 +98,29 @@ static void check_number(struct cfg_reader *rd, const struct config *cfg, uint32
     const uint32_t number = cfg->field[i].number, most = model->n_records;
     for (uint32_t k = 0; k < i; k++)
         if (cfg->field[k].number == number)
-            cfg_fail_key(rd, "fields[].number", i, "%u is the number of fields[%u], too; allowed once", number, k);
+            cfg_fail_item(rd, "fields[].number", i, "%u is the number of fields[%u], too; allowed once", number, k);
     if (most != 0 && number > most)
-        cfg_fail_key(rd, "fields[].number", i, "%u, but a %s has %u fields; allowed 1 to %u", number,
-                     cfg->profile.model, most, most);
-    if (cfg_is_given(rd, "fields[].output", i) && model->ports != COLA_PORTS_LMS)
-        cfg_fail_key(rd, "fields[].output", i,
-                     "given, but a %s has an output for each field of a set; allowed with an "
-                     "LMS1xx",
-                     cfg->profile.model);
+        cfg_fail_item(rd, "fields[].number", i, "%u, but a %s has %u fields; allowed 1 to %u", number,
+                      cfg->profile.model, most, most);
+    if (cfg_is_item_given(rd, "fields[].output", i) && model->ports != COLA_PORTS_LMS)
+        cfg_fail_item(rd, "fields[].output", i,
+                      "given, but a %s has an output for each field of a set; allowed with an "
+                      "LMS1xx",
+                      cfg->profile.model);
 }
 
 void cfg_check_fields(struct cfg_reader *rd, const struct config *cfg)
 {
     for (uint32_t i = 0; i < cfg->n_inputs; i++)
-        if (cfg->input[i].until_s <= cfg->input[i].from_s && CFG_SOUND(rd, i, "inputs[]"))
-            cfg_fail_key(rd, "inputs[].until_s", i, "%.10g s, but it begins at %.10g s; allowed a later time",
-                         cfg->input[i].until_s, cfg->input[i].from_s);
+        if (cfg->input[i].until_s <= cfg->input[i].from_s && CFG_ITEM_SOUND(rd, i, "inputs[]"))
+            cfg_fail_item(rd, "inputs[].until_s", i, "%.10g s, but it begins at %.10g s; allowed a later time",
+                          cfg->input[i].until_s, cfg->input[i].from_s);
     if (cfg->n_fields == 0 || cfg->links_are_not_here || !cfg_has_profile(rd)) return; /* fields belong to links */
     const struct cola_model *model = cola_model_find(cfg->profile.model);
     if (model->n_records == 0)
-        cfg_fail_key(rd, "fields", 0, "a %s evaluates no fields; allowed with another head.profile",
-                     cfg->profile.model);
+        cfg_fail_key(rd, "fields", "a %s evaluates no fields; allowed with another head.profile", cfg->profile.model);
     for (uint32_t i = 0; i < cfg->n_fields; i++) {
-        if (!CFG_SOUND(rd, i, "fields[]")) continue;
+        if (!CFG_ITEM_SOUND(rd, i, "fields[]")) continue;
         check_keys(rd, &cfg->field[i], i);
         check_values(rd, &cfg->field[i], i);
         check_reach(rd, &cfg->field[i], i);

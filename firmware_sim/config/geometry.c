@@ -36,28 +36,28 @@ static int stands_before(const struct config_emitter *c, uint32_t i)
 static void check_one(struct cfg_reader *rd, const struct config_profile *p, uint32_t i)
 {
     const struct config_geometry *g = &p->arrangement.geometry[i];
-    if (!CFG_SOUND(rd, i, "geometries[].lines_hz", "geometries[].steps_per_turn")) return;
+    if (!CFG_ITEM_SOUND(rd, i, "geometries[].lines_hz", "geometries[].steps_per_turn")) return;
     if (g->lines_uhz < p->lines_min_uhz || g->lines_uhz > p->lines_max_uhz)
-        cfg_fail_key(rd, "geometries[].lines_hz", i,
-                     "%.15g is outside of lines_min_hz and lines_max_hz; allowed %.15g to %.15g Hz",
-                     from_micro(g->lines_uhz), from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz));
+        cfg_fail_item(rd, "geometries[].lines_hz", i,
+                      "%.15g is outside of lines_min_hz and lines_max_hz; allowed %.15g to %.15g Hz",
+                      from_micro(g->lines_uhz), from_micro(p->lines_min_uhz), from_micro(p->lines_max_uhz));
     else if (!divides_all(&p->arrangement, g->steps_per_turn))
-        cfg_fail_key(
+        cfg_fail_item(
             rd, "geometries[].steps_per_turn", i,
             "%u; the head's steps_per_turn (%u) divided by this number must be a whole number that also divides "
             "first_step, last_step and front_step",
             g->steps_per_turn, p->arrangement.steps_per_turn);
     else if (stands_before(&p->arrangement, i))
-        cfg_fail_key(rd, "geometries[].lines_hz", i, "this geometry is given twice; allowed once");
+        cfg_fail_item(rd, "geometries[].lines_hz", i, "this geometry is given twice; allowed once");
 }
 
 void cfg_check_geometries(struct cfg_reader *rd, struct config_profile *p)
 {
     const struct config_emitter *c = &p->arrangement;
-    if (c->n_geometries == 0 || !CFG_SOUND(rd, 0, "lines_min_hz", "lines_max_hz")) return;
+    if (c->n_geometries == 0 || !CFG_SOUND(rd, "lines_min_hz", "lines_max_hz")) return;
     for (uint32_t i = 0; i < c->n_geometries; i++)
         check_one(rd, p, i);
-    if (!CFG_SOUND(rd, 0, "geometries")) return;
+    if (!CFG_SOUND(rd, "geometries")) return;
     for (uint32_t i = 0; i < c->n_geometries; i++) {
         const int64_t prr_uhz = c->geometry[i].lines_uhz * c->geometry[i].steps_per_turn;
         if (i == 0) p->prr_min_uhz = p->prr_max_uhz = prr_uhz;
@@ -83,9 +83,9 @@ void cfg_choose_geometry(struct cfg_reader *rd, struct config *cfg)
 {
     struct config_profile *p = &cfg->profile;
     struct config_head *h = &cfg->head;
-    const int rate = cfg_is_given(rd, "head.lines_hz", 0), step = cfg_is_given(rd, "head.step_deg", 0);
+    const int rate = cfg_is_given(rd, "head.lines_hz"), step = cfg_is_given(rd, "head.step_deg");
     char list[HEAD_MAX_RATES * 64];
-    if (!CFG_SOUND(rd, 0, "head.lines_hz", "head.step_deg")) return;
+    if (!CFG_SOUND(rd, "head.lines_hz", "head.step_deg")) return;
     for (uint32_t i = 0; i < p->arrangement.n_geometries; i++) {
         const struct config_geometry *g = &p->arrangement.geometry[i];
         if ((rate && g->lines_uhz != h->settings.lines_uhz) ||
@@ -93,14 +93,14 @@ void cfg_choose_geometry(struct cfg_reader *rd, struct config *cfg)
             continue;
         config_set_steps(p, g->steps_per_turn);
         h->settings.lines_uhz = g->lines_uhz;
-        if (!cfg_is_given(rd, "head.prr_hz", 0)) h->settings.prr_uhz = g->lines_uhz * g->steps_per_turn;
+        if (!cfg_is_given(rd, "head.prr_hz")) h->settings.prr_uhz = g->lines_uhz * g->steps_per_turn;
         return;
     }
     list_of(&p->arrangement, list, sizeof list);
     if (rate && step)
-        cfg_fail_key(rd, "head.step_deg", 0, "%.15g, with a lines_hz of %.15g; allowed with head profile %s: %s",
+        cfg_fail_key(rd, "head.step_deg", "%.15g, with a lines_hz of %.15g; allowed with head profile %s: %s",
                      from_micro(h->step_udeg), from_micro(h->settings.lines_uhz), p->name, list);
     else
-        cfg_fail_key(rd, step ? "head.step_deg" : "head.lines_hz", 0, "%.15g; allowed with head profile %s: %s",
+        cfg_fail_key(rd, step ? "head.step_deg" : "head.lines_hz", "%.15g; allowed with head profile %s: %s",
                      from_micro(step ? h->step_udeg : h->settings.lines_uhz), p->name, list);
 }

@@ -45,10 +45,8 @@ static const struct protocol_ops *ops_of(const struct link_spec *link)
 
 int cfg_link_that_needs(const struct config *cfg, enum protocol_needs need)
 {
-    for (uint32_t i = 0; i < cfg->n_links; i++) {
-        const struct protocol_ops *ops = ops_of(&cfg->link[i]);
-        if (ops != NULL && is_spoken_on(&cfg->link[i]) && (ops->needs & need) != 0) return (int)i;
-    }
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (is_spoken_on(&cfg->link[i]) && (ops_of(&cfg->link[i])->needs & need) != 0) return (int)i;
     return -1;
 }
 
@@ -66,14 +64,13 @@ static const char *link_protocol_place_of(const struct cfg_reader *rd, const cha
 static void check_stream(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
     char where[40];
-    if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && cfg->output.layout != LINE_POLAR &&
-        CFG_SOUND(rd, 0, "output.layout"))
-        cfg_fail_key(rd, PROTOCOL_KEY, i, "%s needs ranges, but output.layout is geo%s; required is layout: polar",
-                     ops->name, link_protocol_place_of(rd, "output.layout", where));
+    if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && cfg->output.layout != LINE_POLAR && CFG_SOUND(rd, "output.layout"))
+        cfg_fail_item(rd, PROTOCOL_KEY, i, "%s needs ranges, but output.layout is geo%s; required is layout: polar",
+                      ops->name, link_protocol_place_of(rd, "output.layout", where));
     if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && cfg->head.settings.echoes == BEAM_FIRST)
-        cfg_fail_key(rd, PROTOCOL_KEY, i,
-                     "%s has no first echoes, but beam.echoes is first%s; required is all, last or strongest",
-                     ops->name, link_protocol_place_of(rd, "beam.echoes", where));
+        cfg_fail_item(rd, PROTOCOL_KEY, i,
+                      "%s has no first echoes, but beam.echoes is first%s; required is all, last or strongest",
+                      ops->name, link_protocol_place_of(rd, "beam.echoes", where));
 }
 
 static int has_kind(const struct protocol_ops *ops, const struct emitter *emitter)
@@ -94,24 +91,25 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
     char where[40], allowed[64];
     if (!cfg_has_profile(rd) || cfg_protocol_fits(ops, emitter)) return;
     if (cfg->link[i].protocol == PROTOCOL_CAPTURE) {
-        cfg_fail_key(rd, PROTOCOL_KEY, i, "capture is for `run FILE.pcap`; allowed for a head are all other protocols");
+        cfg_fail_item(rd, PROTOCOL_KEY, i,
+                      "capture is for `run FILE.pcap`; allowed for a head are all other protocols");
         return;
     }
     link_protocol_place_of(rd, "head.profile", where);
     if (!has_kind(ops, emitter))
-        cfg_fail_key(rd, PROTOCOL_KEY, i,
-                     "protocol %s does not support head profile %s%s, whose emitter is %s; allowed emitters: %s",
-                     ops->name, cfg->profile.name, where, emitter_names[emitter->kind],
-                     cfg_list_kinds(ops->emitters, emitter_names, allowed, sizeof allowed));
+        cfg_fail_item(rd, PROTOCOL_KEY, i,
+                      "protocol %s does not support head profile %s%s, whose emitter is %s; allowed emitters: %s",
+                      ops->name, cfg->profile.name, where, emitter_names[emitter->kind],
+                      cfg_list_kinds(ops->emitters, emitter_names, allowed, sizeof allowed));
     else
-        cfg_fail_key(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
-                     ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
+        cfg_fail_item(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
+                      ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
 }
 
 /* The default source port is that of the real device's packets. */
 static void set_source_port(const struct cfg_reader *rd, struct link_spec *link, uint32_t i)
 {
-    if (link->type != LINK_UDP || cfg_is_given(rd, "links[].source_port", i)) return;
+    if (link->type != LINK_UDP || cfg_is_item_given(rd, "links[].source_port", i)) return;
     if (link->protocol == PROTOCOL_VELODYNE) link->source_port = VELODYNE_DATA_PORT;
     if (link->protocol == PROTOCOL_VELODYNE_POSITION) link->source_port = VELODYNE_POSITION_PORT;
     link->usual_port = 1;
@@ -122,24 +120,20 @@ static int check_link_alone(struct cfg_reader *rd, struct link_spec *link, uint3
 {
     const struct protocol_ops *ops = ops_of(link);
     char allowed[64];
-    if (!CFG_SOUND(rd, i, "links[]")) return 0; /* a key of this link has a diagnostic */
-    if (ops == NULL) {
-        cfg_fail_key(rd, PROTOCOL_KEY, i, "this build does not have it");
-        return 0;
-    }
+    if (!CFG_ITEM_SOUND(rd, i, "links[]")) return 0; /* a key of this link has a diagnostic */
     if (!is_spoken_on(link)) {
-        cfg_fail_key(
+        cfg_fail_item(
             rd, PROTOCOL_KEY, i, "protocol %s is not available on a %s link; allowed %s", ops->name,
             cfg_word(rd, "links[].type", (int)link->type),
             cfg_list_kinds(ways[link->protocol], cfg_find(&rd->table, "links[].type")->names, allowed, sizeof allowed));
         return 0;
     }
     if (link->dialect != PROTOCOL_DIALECT_ANY && link->protocol != PROTOCOL_COLA)
-        cfg_fail_key(rd, "links[].dialect", i, "%s, but the protocol is %s; allowed with protocol: cola, or any",
-                     cfg_word(rd, "links[].dialect", link->dialect), ops->name);
+        cfg_fail_item(rd, "links[].dialect", i, "%s, but the protocol is %s; allowed with protocol: cola, or any",
+                      cfg_word(rd, "links[].dialect", link->dialect), ops->name);
     set_source_port(rd, link, i);
     /* The real device turns a second client away. */
-    if (link->protocol == PROTOCOL_SCIP && !cfg_is_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;
+    if (link->protocol == PROTOCOL_SCIP && !cfg_is_item_given(rd, "links[].max_sessions", i)) link->max_sessions = 1;
     return 1;
 }
 

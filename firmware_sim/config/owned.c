@@ -35,8 +35,8 @@ static int check_owned(struct cfg_reader *rd, const char *section, uint32_t item
         const struct cfg_key *key = &rd->table.keys[i];
         const unsigned kinds = is_backend ? key->of_backend : key->of;
         if (kinds == 0 || (kinds & CFG_KIND(kind)) || cfg_word_below(key->path, section) == NULL) continue;
-        if (!cfg_is_given(rd, key->path, item)) continue;
-        cfg_fail_key(rd, key->path, item, "%s has no such key; allowed %s", name, allowed);
+        if (!cfg_is_item_given(rd, key->path, item)) continue;
+        cfg_fail_item(rd, key->path, item, "%s has no such key; allowed %s", name, allowed);
         fits = 0;
     }
     return fits;
@@ -45,21 +45,22 @@ static int check_owned(struct cfg_reader *rd, const char *section, uint32_t item
 static void check_usb_link(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t i)
 {
     char owner[64];
-    const int has_port = cfg_is_given(rd, "links[].port", i), has_address = cfg_is_given(rd, "links[].address", i);
-    const int is_redir = link->backend == USB_BACKEND_USBREDIR, has_path = cfg_is_given(rd, "links[].path", i);
+    const int has_port = cfg_is_item_given(rd, "links[].port", i),
+              has_address = cfg_is_item_given(rd, "links[].address", i);
+    const int is_redir = link->backend == USB_BACKEND_USBREDIR, has_path = cfg_is_item_given(rd, "links[].path", i);
     cfg_set_usb_identity(rd, cfg, link, i);
     if (link->backend == USB_BACKEND_USBIP && !has_port) link->port = USB_BACKEND_USBIP_PORT;
-    if (!CFG_SOUND(rd, i, "links[].backend")) return;
+    if (!CFG_ITEM_SOUND(rd, i, "links[].backend")) return;
     snprintf(owner, sizeof owner, "the back end %s", cfg_word(rd, "links[].backend", link->backend));
     if (!check_owned(rd, "links[]", i, 1, link->backend, owner)) return;
     if (has_path && (has_port || has_address))
-        cfg_fail_key(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
+        cfg_fail_item(rd, "links[].path", i, "both a path and a port or address; allowed one of them");
     else if (link->backend == USB_BACKEND_USBIP && link->attach && (has_port || has_address))
-        cfg_fail_key(rd, "links[].attach", i, "an attached device does not listen; allowed without port and address");
+        cfg_fail_item(rd, "links[].attach", i, "an attached device does not listen; allowed without port and address");
     else if (is_redir && !has_path && !has_port)
-        cfg_fail_key(rd, "links[].backend", i, "usbredir needs a path or a port; allowed with one of them");
+        cfg_fail_item(rd, "links[].backend", i, "usbredir needs a path or a port; allowed with one of them");
     else if (is_redir && link->attach && !has_path && link->port == 0)
-        cfg_fail_key(rd, "links[].port", i, "0, but the head must connect to this port; allowed 1 to 65535");
+        cfg_fail_item(rd, "links[].port", i, "0, but the head must connect to this port; allowed 1 to 65535");
 }
 
 /* Returns whether both listen on one port of one address; 0.0.0.0 is all addresses. */
@@ -76,22 +77,22 @@ static void check_link(struct cfg_reader *rd, struct config *cfg, uint32_t i)
 {
     struct link_spec *link = &cfg->link[i];
     char owner[64];
-    if (!CFG_SOUND(rd, i, "links[].type")) return;
+    if (!CFG_ITEM_SOUND(rd, i, "links[].type")) return;
     snprintf(owner, sizeof owner, "a %s link", cfg_word(rd, "links[].type", (int)link->type));
     if (!check_owned(rd, "links[]", i, 0, (int)link->type, owner)) return;
     if (link->type == LINK_FILE && link->path[0] == '\0')
-        cfg_fail_key(rd, "links[].path", i, "missing; a file link requires the path of the file to write");
+        cfg_fail_item(rd, "links[].path", i, "missing; a file link requires the path of the file to write");
     for (uint32_t k = 0; k < i; k++) {
         if (link->path[0] != '\0' && strcmp(cfg->link[k].path, link->path) == 0)
-            cfg_fail_key(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
-        if (listens_as(link, &cfg->link[k]) && CFG_SOUND(rd, k, "links[].type", "links[].port"))
-            cfg_fail_key(rd, "links[].port", i, "links[%u] listens on the same port; allowed a port of its own, or 0",
-                         k);
+            cfg_fail_item(rd, "links[].path", i, "links[%u] has the same path; allowed a path of its own", k);
+        if (listens_as(link, &cfg->link[k]) && CFG_ITEM_SOUND(rd, k, "links[].type", "links[].port"))
+            cfg_fail_item(rd, "links[].port", i, "links[%u] listens on the same port; allowed a port of its own, or 0",
+                          k);
     }
     if (link->type == LINK_USB) check_usb_link(rd, cfg, link, i);
-    if (link->type == LINK_UDP && link->port == 0 && CFG_SOUND(rd, i, "links[].port"))
-        cfg_fail_key(rd, cfg_is_given(rd, "links[].port", i) ? "links[].port" : "links[].type", i,
-                     "a udp link needs the port of its receiver; allowed 1 to 65535");
+    if (link->type == LINK_UDP && link->port == 0 && CFG_ITEM_SOUND(rd, i, "links[].port"))
+        cfg_fail_item(rd, cfg_is_item_given(rd, "links[].port", i) ? "links[].port" : "links[].type", i,
+                      "a udp link needs the port of its receiver; allowed 1 to 65535");
 }
 
 void cfg_check_links(struct cfg_reader *rd, struct config *cfg)

@@ -16,8 +16,8 @@
 static int fail_required(struct cfg_reader *rd, const char *path, uint32_t item, const char *why)
 {
     char allowed[CFG_ALLOWED_MAX];
-    return cfg_fail_key(rd, path, item, "missing, and %s; required, %s", why,
-                        cfg_allowed(cfg_find(&rd->table, path), rd->profile, allowed));
+    return cfg_fail_item(rd, path, item, "missing, and %s; required, %s", why,
+                         cfg_allowed(cfg_find(&rd->table, path), rd->profile, allowed));
 }
 
 static void check_anchor(struct cfg_reader *rd, struct config *cfg)
@@ -42,15 +42,15 @@ static void check_anchor(struct cfg_reader *rd, struct config *cfg)
     };
     const char *source = cfg_word(rd, "scene.anchor.source", (int)cfg->scene.anchor.source);
     char why[64], has[64] = "";
-    cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m", 0);
-    if (!CFG_SOUND(rd, 0, "scene.anchor.source")) return;
+    cfg->scene.anchor.height_given = cfg_is_given(rd, "scene.anchor.height_m");
+    if (!CFG_SOUND(rd, "scene.anchor.source")) return;
     for (size_t k = 0; k < CFG_LEN(keys); k++)
         if (keys[k].taken & 1u << cfg->scene.anchor.source)
             cfg_list_add(has, sizeof has, strrchr(keys[k].path, '.') + 1);
     for (size_t k = 0; k < CFG_LEN(keys); k++) {
-        int given = cfg_is_given(rd, keys[k].path, 0);
+        int given = cfg_is_given(rd, keys[k].path);
         if (given && !(keys[k].taken & 1u << cfg->scene.anchor.source))
-            cfg_fail_key(rd, keys[k].path, 0, "an anchor of source %s has no such key; allowed %s", source,
+            cfg_fail_key(rd, keys[k].path, "an anchor of source %s has no such key; allowed %s", source,
                          has[0] != '\0' ? has : "source alone");
         snprintf(why, sizeof why, "the anchor's source is %s", source);
         if (!given && (keys[k].required & 1u << cfg->scene.anchor.source)) fail_required(rd, keys[k].path, 0, why);
@@ -74,18 +74,18 @@ static int find_form(struct cfg_reader *rd, struct config_station *station, uint
     const char *first = NULL;
     station->place = PLACE_NONE;
     for (size_t k = 0; k < CFG_LEN(form_keys); k++) {
-        if (!cfg_is_given(rd, form_keys[k].path, i)) continue;
+        if (!cfg_is_item_given(rd, form_keys[k].path, i)) continue;
         if (first != NULL && station->place != form_keys[k].place)
-            return cfg_fail_key(
+            return cfg_fail_item(
                 rd, form_keys[k].path, i,
                 "given together with %s; allowed one of lat_deg with lon_deg, easting_m with northing_m, ecef_m",
                 strrchr(first, '.') + 1);
         first = form_keys[k].path;
         station->place = form_keys[k].place;
     }
-    if (!cfg_is_given(rd, "stations[].height_m", i)) return SH_OK;
+    if (!cfg_is_item_given(rd, "stations[].height_m", i)) return SH_OK;
     if (station->place == PLACE_ECEF)
-        return cfg_fail_key(rd, "stations[].height_m", i, "ecef_m also gives the height; allowed one of them");
+        return cfg_fail_item(rd, "stations[].height_m", i, "ecef_m also gives the height; allowed one of them");
     if (station->place == PLACE_NONE) station->place = PLACE_GEODETIC;
     return SH_OK;
 }
@@ -99,7 +99,7 @@ static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct
     int from_anchor = cfg->scene.anchor.source == ANCHOR_UTM;
     for (size_t k = 0; k < CFG_LEN(form_keys); k++) {
         const char *path = form_keys[k].path;
-        if (form_keys[k].place != station->place || cfg_is_given(rd, path, i)) continue;
+        if (form_keys[k].place != station->place || cfg_is_item_given(rd, path, i)) continue;
         if (from_anchor && strcmp(path, "stations[].utm_zone") == 0)
             station->utm_zone = cfg->scene.anchor.utm_zone;
         else if (from_anchor && strcmp(path, "stations[].hemisphere") == 0)
@@ -108,7 +108,7 @@ static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct
             return fail_required(rd, path, i, why[station->place]);
     }
     int has_height = station->place == PLACE_GEODETIC || station->place == PLACE_UTM;
-    if (has_height && !cfg_is_given(rd, "stations[].height_m", i))
+    if (has_height && !cfg_is_item_given(rd, "stations[].height_m", i))
         return fail_required(rd, "stations[].height_m", i, why[station->place]);
     return SH_OK;
 }
@@ -120,15 +120,15 @@ static int check_station(struct cfg_reader *rd, const struct config *cfg, struct
 {
     int code = find_form(rd, station, i);
     int anchored = cfg->scene.anchor.source != ANCHOR_NONE, nowhere = station->place == PLACE_NONE;
-    station->has_position = cfg_is_given(rd, "stations[].position_m", i);
-    station->has_instrument_height = cfg_is_given(rd, "stations[].instrument_height_m", i);
+    station->has_position = cfg_is_item_given(rd, "stations[].position_m", i);
+    station->has_instrument_height = cfg_is_item_given(rd, "stations[].instrument_height_m", i);
     if (code == SH_OK && !nowhere) code = complete_form(rd, cfg, station, i);
-    if (code != SH_OK || !CFG_SOUND(rd, i, "stations[]", "scene.anchor.source")) return code;
+    if (code != SH_OK || !CFG_ITEM_SOUND(rd, i, "stations[]", "scene.anchor.source")) return code;
     if (!station->has_position && (!anchored || nowhere))
         return fail_required(rd, "stations[].position_m", i,
                              anchored ? "no place on the Earth is given" : "there is no scene.anchor to compute it");
     if (anchored && station->has_position && !nowhere)
-        return cfg_fail_key(
+        return cfg_fail_item(
             rd, "stations[].position_m", i,
             "given together with a place on the Earth, but scene.anchor computes one from the other; allowed one of "
             "them");

@@ -112,21 +112,21 @@ static void allow_profiles(const struct profile_dirs *dirs, char *buf, size_t le
 static void check_order(struct cfg_reader *rd, const char *low_key, double low, const char *high_key, double high,
                         int strictly)
 {
-    if (low < high || (low == high && !strictly) || !CFG_SOUND(rd, 0, low_key, high_key)) return;
-    cfg_fail_key(rd, low_key, 0, "%.15g is too large; allowed %s %.15g", low, strictly ? "below" : "at most", high);
+    if (low < high || (low == high && !strictly) || !CFG_SOUND(rd, low_key, high_key)) return;
+    cfg_fail_key(rd, low_key, "%.15g is too large; allowed %s %.15g", low, strictly ? "below" : "at most", high);
 }
 
 static void check_sweep(struct cfg_reader *rd, const struct config_profile *p)
 {
     double sweep_deg = 360.0 / p->facets * p->optical_gain,
            fov_deg = (double)(p->fov_max_udeg - p->fov_min_udeg) * 1e-6;
-    if (!CFG_SOUND(rd, 0, "facets", "optical_gain")) return;
+    if (!CFG_SOUND(rd, "facets", "optical_gain")) return;
     if (sweep_deg > 360.0)
-        cfg_fail_key(rd, "optical_gain", 0, "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360",
+        cfg_fail_key(rd, "optical_gain", "a sweep of 360 / facets * optical_gain is %.10g deg; allowed up to 360",
                      sweep_deg);
     /* 1e-9 allows for rounding, which is far below one micro-degree. */
-    else if (fov_deg > sweep_deg + 1e-9 && CFG_SOUND(rd, 0, "fov_min_deg", "fov_max_deg"))
-        cfg_fail_key(rd, "fov_max_deg", 0,
+    else if (fov_deg > sweep_deg + 1e-9 && CFG_SOUND(rd, "fov_min_deg", "fov_max_deg"))
+        cfg_fail_key(rd, "fov_max_deg",
                      "a field of view of %.10g deg does not fit into a sweep; allowed up to %.10g deg, "
                      "360 / facets * optical_gain",
                      fov_deg, sweep_deg);
@@ -138,12 +138,12 @@ static void check_line_head(struct cfg_reader *rd, const struct config_profile *
     const double lines_min_hz = from_micro(p->lines_min_uhz), prr_max_hz = from_micro(p->prr_max_uhz);
     const double pan_min_deg = from_micro(p->pan_min_udeg), pan_max_deg = from_micro(p->pan_max_udeg);
     check_order(rd, "prr_min_hz", from_micro(p->prr_min_uhz), "prr_max_hz", prr_max_hz, 0);
-    if (prr_max_hz < lines_min_hz && CFG_SOUND(rd, 0, "prr_max_hz", "lines_min_hz"))
-        cfg_fail_key(rd, "prr_max_hz", 0, "less than a pulse per line; allowed at least %.15g", lines_min_hz);
+    if (prr_max_hz < lines_min_hz && CFG_SOUND(rd, "prr_max_hz", "lines_min_hz"))
+        cfg_fail_key(rd, "prr_max_hz", "less than a pulse per line; allowed at least %.15g", lines_min_hz);
     check_order(rd, "fov_min_deg", from_micro(p->fov_min_udeg), "fov_max_deg", from_micro(p->fov_max_udeg), 1);
     if ((p->pan_min_udeg >= p->pan_max_udeg || p->pan_max_udeg - p->pan_min_udeg > 360000000) &&
-        CFG_SOUND(rd, 0, "pan_min_deg", "pan_max_deg"))
-        cfg_fail_key(rd, "pan_max_deg", 0, "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
+        CFG_SOUND(rd, "pan_min_deg", "pan_max_deg"))
+        cfg_fail_key(rd, "pan_max_deg", "%.15g does not fit; allowed above %.15g, up to %.15g", pan_max_deg,
                      pan_min_deg, pan_min_deg + 360.0);
     check_sweep(rd, p);
 }
@@ -151,7 +151,7 @@ static void check_line_head(struct cfg_reader *rd, const struct config_profile *
 static void check_profile(struct cfg_reader *rd, struct config_profile *p)
 {
     cfg_check_emitter(rd, p);
-    if (p->arrangement.kind == EMITTER_LINE && CFG_SOUND(rd, 0, "emitter")) check_line_head(rd, p);
+    if (p->arrangement.kind == EMITTER_LINE && CFG_SOUND(rd, "emitter")) check_line_head(rd, p);
     check_order(rd, "lines_min_hz", from_micro(p->lines_min_uhz), "lines_max_hz", from_micro(p->lines_max_uhz), 0);
     check_order(rd, "range_min_m", p->range_min_m, "range_max_m", p->range_max_m, 1);
     check_order(rd, "range_sigma_floor_m", p->range_sigma_floor_m, "range_sigma_m", p->range_sigma_m, 0);
@@ -197,7 +197,7 @@ static int fail_lookup(struct cfg_reader *rd, struct config *cfg, const struct p
 {
     char allowed[CFG_ALLOWED_MAX + 16], shown[CFG_SHOW_MAX];
     allow_profiles(dirs, allowed, sizeof allowed);
-    return cfg_fail_key(rd, "head.profile", 0, "no profile \"%s\"; %s", cfg_show(cfg->profile_file, shown), allowed);
+    return cfg_fail_key(rd, "head.profile", "no profile \"%s\"; %s", cfg_show(cfg->profile_file, shown), allowed);
 }
 
 static int find_profile(struct cfg_reader *rd, struct config *cfg)
@@ -216,7 +216,7 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
                      from_set || cfg->profile_file[0] == '/' ? "" : cfg_dir_of(cfg->file, base), cfg->profile_file);
         if (access(path, F_OK) != 0) continue;
         if (strlen(path) >= sizeof cfg->profile_file)
-            return cfg_fail_key(rd, "head.profile", 0, "its path is too long; allowed up to %zu bytes",
+            return cfg_fail_key(rd, "head.profile", "its path is too long; allowed up to %zu bytes",
                                 sizeof cfg->profile_file - 1);
         memcpy(cfg->profile_file, path, strlen(path) + 1);
         return SH_OK;
@@ -227,9 +227,9 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
 void cfg_load_profile(struct cfg_reader *rd, struct config *cfg)
 {
     struct cfg_reader profile_rd;
-    if (!CFG_SOUND(rd, 0, "head.profile")) return;
+    if (!CFG_SOUND(rd, "head.profile")) return;
     if (cfg->profile_file[0] == '\0')
-        cfg_fail_key(rd, "head.profile", 0, "missing; required is the name of a profile, or a path that ends in .yaml");
+        cfg_fail_key(rd, "head.profile", "missing; required is the name of a profile, or a path that ends in .yaml");
     else if (find_profile(rd, cfg) == SH_OK)
         rd->profile_read = read_profile(&profile_rd, cfg->profile_file, &cfg->profile, rd->diagnostics);
 }

@@ -28,7 +28,7 @@ static void put_protocols(const struct config_profile *p, FILE *out)
     fputs("  protocols ", out);
     for (int id = 0; id < PROTOCOL_N; id++) {
         const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
-        if (ops != NULL && cfg_protocol_fits(ops, &p->emitter)) fprintf(out, "%s %s", n++ > 0 ? "," : "", ops->name);
+        if (cfg_protocol_fits(ops, &p->emitter)) fprintf(out, "%s %s", n++ > 0 ? "," : "", ops->name);
     }
     fputc('\n', out);
 }
@@ -90,7 +90,7 @@ static void put_beam(const struct cfg_reader *rd, const struct config_profile *p
 static void put_errors(const struct cfg_reader *rd, const struct config_profile *p, FILE *out)
 {
     fprintf(out, "  noise      %.3g mm", 1e3 * p->range_sigma_m);
-    if (cfg_is_given(rd, "range_sigma_at_m", 0)) fprintf(out, " at %.4g m", p->range_sigma_at_m);
+    if (cfg_is_given(rd, "range_sigma_at_m")) fprintf(out, " at %.4g m", p->range_sigma_at_m);
     if (p->range_sigma_ppm > 0.0) fprintf(out, " + %.4g ppm", p->range_sigma_ppm);
     if (p->accuracy_m > 0.0 || p->accuracy_ppm > 0.0) fprintf(out, "; accuracy %.3g mm", 1e3 * p->accuracy_m);
     if (p->accuracy_ppm > 0.0) fprintf(out, " + %.4g ppm", p->accuracy_ppm);
@@ -104,7 +104,7 @@ static int has_grade(const struct cfg_reader *rd, size_t row, int grade)
 {
     const struct config_profile *p = rd->base;
     const char *path = rd->table.keys[row].path;
-    for (uint32_t i = 0; strcmp(path, "reaches") == 0 && cfg_is_given(rd, path, 0) && i < p->n_reaches; i++)
+    for (uint32_t i = 0; strcmp(path, "reaches") == 0 && cfg_is_given(rd, path) && i < p->n_reaches; i++)
         if ((int)p->reach[i].from == grade) return 1;
     for (uint32_t i = 0; strcmp(path, "beams") == 0 && i < p->arrangement.n_beams; i++)
         if ((int)p->arrangement.beam[i].from == grade) return 1;

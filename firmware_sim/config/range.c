@@ -11,9 +11,9 @@
 static int check_one(struct cfg_reader *rd, const struct config *cfg, const char *path, double value_m)
 {
     const double low_m = cfg->head.profile_min_m, high_m = cfg->head.profile_max_m;
-    if (!CFG_SOUND(rd, 0, path)) return 0;
+    if (!CFG_SOUND(rd, path)) return 0;
     if (value_m >= low_m && value_m <= high_m) return 1;
-    cfg_fail_key(rd, path, 0, "%.10g is outside the limits of head profile %s; allowed %.10g to %.10g m", value_m,
+    cfg_fail_key(rd, path, "%.10g is outside the limits of head profile %s; allowed %.10g to %.10g m", value_m,
                  cfg->profile.name, low_m, high_m);
     return 0;
 }
@@ -26,8 +26,8 @@ static void limit_program(struct cfg_reader *rd, const struct config *cfg, struc
     program->range_min_m = fmax(program->range_min_m, cfg->head.range_min_m);
     program->range_max_m = fmin(program->range_max_m, cfg->head.range_max_m);
     if (program->range_min_m < program->range_max_m) return;
-    const int is_min = cfg_is_given(rd, "head.range_min_m", 0) && cfg->head.range_min_m >= most_m;
-    cfg_fail_key(rd, is_min ? "head.range_min_m" : "head.range_max_m", 0,
+    const int is_min = cfg_is_given(rd, "head.range_min_m") && cfg->head.range_min_m >= most_m;
+    cfg_fail_key(rd, is_min ? "head.range_min_m" : "head.range_max_m",
                  "%.10g excludes all of the %.10g to %.10g m that the head measures at %.15g Hz; allowed %s %.10g m",
                  is_min ? cfg->head.range_min_m : cfg->head.range_max_m, least_m, most_m, from_micro(program->prr_uhz),
                  is_min ? "below" : "above", is_min ? most_m : least_m);
@@ -49,7 +49,7 @@ void cfg_limit_range(struct cfg_reader *rd, struct config *cfg)
     if (!min_fits || !max_fits || !config_limits_range(cfg)) return;
     if (head->range_min_m >= head->range_max_m) {
         cfg_fail_key(
-            rd, cfg_is_given(rd, "head.range_max_m", 0) ? "head.range_max_m" : "head.range_min_m", 0,
+            rd, cfg_is_given(rd, "head.range_max_m") ? "head.range_max_m" : "head.range_min_m",
             "the head measures from %.10g to %.10g m; allowed a range_min_m below %.10g, or a range_max_m above %.10g",
             head->range_min_m, head->range_max_m, head->range_max_m, head->range_min_m);
         return;

@@ -28,11 +28,11 @@ void cfg_set_usb_identity(struct cfg_reader *rd, const struct config *cfg, struc
     const struct usb_personality *personality = usb_personality_get(id);
     char path[PATH_MAX];
     link->personality = (int)id;
-    if (!cfg_is_given(rd, "links[].vid", item)) link->vid = personality->vid;
-    if (!cfg_is_given(rd, "links[].pid", item)) link->pid = personality->pid;
+    if (!cfg_is_item_given(rd, "links[].vid", item)) link->vid = personality->vid;
+    if (!cfg_is_item_given(rd, "links[].pid", item)) link->pid = personality->pid;
     if (link->serial[0] != '\0') return;
     snprintf(link->serial, sizeof link->serial, "%s", cfg->head.serial);
-    link->own_serial = !cfg_is_given(rd, "head.serial", 0);
+    link->own_serial = !cfg_is_given(rd, "head.serial");
     /* `whose` identifies the head: the configuration's file and the link's place in it. */
     const char *file = realpath(cfg->file, path) != NULL ? path : cfg->file;
     const size_t len = strlen(file), most = sizeof link->whose - 12; /* long paths differ mostly at their ends */

@@ -97,10 +97,8 @@ __attribute__((format(printf, 4, 5))) static int fail_at(const struct settings_f
 static int is_known(const char *name)
 {
     int known = strcmp(name, "head") == 0;
-    for (int id = 0; id < PROTOCOL_N && !known; id++) {
-        const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
-        known = ops != NULL && strcmp(name, ops->name) == 0;
-    }
+    for (int id = 0; id < PROTOCOL_N && !known; id++)
+        known = strcmp(name, protocol_ops_get((enum protocol_id)id)->name) == 0;
     return known;
 }
 

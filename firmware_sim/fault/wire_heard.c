@@ -36,10 +36,7 @@ static void end_line(struct wire_heard *heard)
 
 static void add_byte(struct wire_heard *heard, uint8_t byte)
 {
-    const int ends = byte == '\r' || (byte == '\n' && !heard->last_cr), skips = byte == '\n' && heard->last_cr;
-    heard->last_cr = byte == '\r';
-    if (skips) return;
-    if (ends) {
+    if (byte == '\r' || byte == '\n') { /* CR LF ends a line, and then one without a byte, which gets no answer */
         end_line(heard);
         return;
     }

@@ -16,7 +16,7 @@ struct wire_heard {
     size_t len, room;
     size_t first;           /* begin of the oldest line that is not answered */
     size_t begin, line_len; /* begin and length of the line that has no end yet; only its first part is kept */
-    int is_blank, last_cr;
+    int is_blank;
 };
 
 void wire_heard_add(struct wire_heard *heard, const void *bytes, size_t len);

@@ -52,7 +52,7 @@ int replay_check_links(struct replay *r, const struct native_descriptor *d, cons
     for (uint32_t i = 0; i < cfg->n_links; i++) {
         const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)cfg->link[i].protocol);
         struct sh_err why;
-        if (ops == NULL || ops->passes_native) continue;
+        if (ops->passes_native) continue;
         if (cfg->link[i].protocol == PROTOCOL_CAPTURE)
             return sh_fail(err, SH_EINPUT,
                            "%s: links[%u].protocol capture: %s is a recording, no capture; allowed are "

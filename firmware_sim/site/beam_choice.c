@@ -30,16 +30,13 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
 
 /* ---- beams */
 
-/* Returns why the scene has no outlines; NULL: it has some. Holes that textures cut have none, and those of copies are
- * not made. */
-static const char *has_no_outlines(const struct site *site)
+/* Returns why the scene, in which nothing moves, has no outlines; NULL: it has some. Holes that textures cut have none,
+ * and those of copies are not made. */
+static const char *has_no_outlines(const struct scene *scene)
 {
-    int cutouts = site->scene->cutout != NULL, copies = site->scene->n_copies > 0;
-    for (uint32_t i = 0; i < site->n_movers; i++)
-        cutouts |= site->mover[i].scene->cutout != NULL;
-    return cutouts  ? "outlines of holes that textures cut (scene.cutouts) are not known"
-           : copies ? "outlines of copies (scene.meshes[].copies) are not known"
-                    : NULL;
+    return scene->cutout != NULL ? "outlines of holes that textures cut (scene.cutouts) are not known"
+           : scene->n_copies > 0 ? "outlines of copies (scene.meshes[].copies) are not known"
+                                 : NULL;
 }
 
 /* Returns why a beam is not possible here; NULL: it is. */
@@ -49,7 +46,7 @@ static const char *why_not(const struct site *site, enum beam_mode mode)
     if (!config_has_footprint(site->cfg)) return "the head profile has no footprint";
     if (mode != BEAM_ADAPTIVE) return NULL;
     const char *moves = config_beam_moves(site->cfg);
-    return moves != NULL ? moves : has_no_outlines(site);
+    return moves != NULL ? moves : has_no_outlines(site->scene);
 }
 
 static int make_beam(const struct site *site, struct site_station *s, int adaptive, const struct sh_report *report,
@@ -195,7 +192,7 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
     const struct config *cfg = site->cfg;
     const int forced = cfg->beam.mode != BEAM_AUTO;
     struct beam_choices c = {.n = FOOTPRINT_OPTIONS};
-    const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_no_outlines(site) : NULL;
+    const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_no_outlines(site->scene) : NULL;
     if (why != NULL)
         return sh_fail(err, SH_EINPUT, "%s: beam.mode: adaptive: %s; allowed here are single, rings and auto",
                        cfg->file, why);

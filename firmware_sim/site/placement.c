@@ -231,8 +231,7 @@ int placement_find(const struct config *cfg, uint32_t i, const struct placement_
                    struct placement *out, struct sh_err *err)
 {
     struct sh_err why = {0, ""};
-    memset(out, 0, sizeof *out);
-    out->floor_m = NAN;
+    *out = (struct placement){.floor_m = NAN};
     int rc = site_placement_find(&cfg->station[i], anchor, bvh, out, &why);
     if (rc == SH_OK) return SH_OK;
     return sh_fail(err, rc, "%s: stations[%u] (%s): %.300s", cfg->file, i, cfg->station[i].name, why.text);

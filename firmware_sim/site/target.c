@@ -29,8 +29,8 @@ static size_t distance_of(const char *pattern, const char *name)
     b[n] = '\0';
     if (a[0] != '\0' && strstr(b, a) != NULL) return 0;
     /* A pattern may also be similar to the beginning of the name. */
-    const size_t whole = nearest_distance(a, b), len = strlen(a);
-    if (len < n) b[len] = '\0';
+    const size_t whole = nearest_distance(a, b);
+    b[strlen(a)] = '\0';
     const size_t part = nearest_distance(a, b);
     return whole < part ? whole : part;
 }

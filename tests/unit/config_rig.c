@@ -117,9 +117,33 @@ int load_changed(const char *profile, const char *old, const char *with)
     return load_with_head("mine", "", "");
 }
 
+void place_in_profile(const char *key, char *buf, size_t len)
+{
+    char path[128], start[64];
+    snprintf(path, sizeof path, "%s/heads/mine.yaml", dir);
+    snprintf(start, sizeof start, "\n%.*s:", (int)strcspn(key, "[."), key);
+    char *text = read_source(path), *at = strstr(text, start);
+    for (int item = at != NULL && strchr(key, '[') != NULL ? atoi(strchr(key, '[') + 1) : -1; item >= 0; item--)
+        at = strstr(at + 1, "\n  - ");
+    if (at == NULL) at = strstr(text, "\nmaker:"); /* below the comments */
+    int line = 1;
+    for (const char *p = text; p < at + 1; p++)
+        line += *p == '\n';
+    snprintf(buf, len, "%s:%d: %s: ", path, line, key);
+    free(text);
+}
+
 void assert_loads(int code)
 {
     if (code != SH_OK) fail_msg("%s", err.text);
+}
+
+void expect_only(const char *place, const char *key, const char *text)
+{
+    char want[1200];
+    snprintf(want, sizeof want, "%s%s: %s", place, key, text);
+    if (err.code != SH_EINPUT || strcmp(err.text, want) != 0) fail_msg("\"%s\"\nexpected \"%s\"", err.text, want);
+    if (diagnostics.n != 1) fail_msg("%s; also %s", text, diagnostics.err[1].text);
 }
 
 void assert_says(const char *fragment)

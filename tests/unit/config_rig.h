@@ -54,7 +54,14 @@ char *read_source(const char *path);
 /* Writes a shipped profile with its first `old` replaced as heads/mine.yaml, and loads base with that head. */
 int load_changed(const char *profile, const char *old, const char *with);
 
+/* Writes the beginning of a diagnostic of heads/mine.yaml: "FILE:LINE: KEY: ", with the line of the key, or of its item
+ * in a list; for a key that is missing, that of the first key. */
+void place_in_profile(const char *key, char *buf, size_t len);
+
 void assert_loads(int code);
+
+/* Exactly one diagnostic is there, and it is whole: place, key and text. place: "FILE:LINE: " or "--set ". */
+void expect_only(const char *place, const char *key, const char *text);
 
 void assert_says(const char *fragment);
 

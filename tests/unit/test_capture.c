@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Captures that answer (talk_rig.h). */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -36,6 +37,7 @@ static void test_answers_and_streams(void **state)
     client_open(&c, &m, 0, NULL);
     assert_int_equal(capture_n(c.capture), 1);
     const struct capture_place *place = capture_place(c.capture, 0);
+    assert_true(fabs(capture_duration_s(c.capture) - 0.061) < 1e-12); /* from 1000 to 1061 ms */
     assert_int_equal(place->port, 2112);
     assert_string_equal(place->device, "10.0.0.1");
     assert_string_equal(place->talk.kind->name, "CoLa");

@@ -202,6 +202,17 @@ static void a_spheres_step_divides_half_a_turn(void **ctx)
     expect_error(&dev, 1, "SCAN:STEP 2", CMD_E_SETTINGS, "allowed 1: the platform moves");
 }
 
+/* A step is the part of a turn to the nearest micro-degree, and gives the number of steps back. */
+static void a_step_is_the_nearest_to_its_part_of_a_turn(void **ctx)
+{
+    (void)ctx;
+    for (uint32_t steps = 4; steps <= 18000; steps++) {
+        const int64_t left_udeg = head_step_udeg(steps) * steps - 360000000;
+        if (2 * left_udeg > steps || 2 * left_udeg <= -(int64_t)steps) fail_msg("%u steps", steps);
+        assert_true(steps % 2 != 0 || emitter_sphere_steps(head_step_udeg(steps)) == steps);
+    }
+}
+
 static void steps_of_fixed_patterns_are_readings(void **ctx)
 {
     (void)ctx;
@@ -418,6 +429,7 @@ int main(void)
         cmocka_unit_test(steps_stay_within_the_rates),
         cmocka_unit_test(what_def_answers_can_be_set),
         cmocka_unit_test(a_spheres_step_divides_half_a_turn),
+        cmocka_unit_test(a_step_is_the_nearest_to_its_part_of_a_turn),
         cmocka_unit_test(steps_of_fixed_patterns_are_readings),
         cmocka_unit_test(geometries_go_together),
         cmocka_unit_test(what_can_not_be_planned_is_refused),

@@ -123,7 +123,15 @@ static void standard_texts(void **ctx)
     assert_string_equal(command_error_text(-299), "Execution error");
     assert_string_equal(command_error_text(-399), "Device-specific error");
     assert_string_equal(command_error_text(-499), "Query error");
-    assert_string_equal(command_error_text(9999), "Device-specific error");
+    /* the classes at their ends, SCPI-99 21.8 */
+    static const char *const classes[] = {"Command error", "Execution error", "Device-specific error", "Query error"};
+    for (int k = 0; k < 4; k++) {
+        assert_string_equal(command_error_text(-100 * (k + 1)), classes[k]);
+        assert_string_equal(command_error_text(-100 * (k + 1) - 99), classes[k]);
+    }
+    static const int others[] = {9999, 1, -99, -500};
+    for (int k = 0; k < 4; k++)
+        assert_string_equal(command_error_text(others[k]), "Device-specific error");
 }
 
 /* Feeds the bytes and writes the results: lines as <text>, overruns as !. */

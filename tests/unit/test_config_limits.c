@@ -270,6 +270,18 @@ static void a_limit_is_allowed_and_nothing_beyond(void **state)
     }
 }
 
+/* A loaded configuration and a head profile have the limits of these rows. */
+static void limits_hold_in_files(void **state)
+{
+    (void)state;
+    assert_loads(load_set("loop.ahead_ms=90"));
+    assert_int_equal(load_set("loop.ahead_ms=90.5"), SH_EINPUT);
+    assert_says("--set loop.ahead_ms: \"90.5\" is out of range; allowed 2 to 90 ms");
+    assert_loads(load_changed("leica-rtc360", "max_echoes: { value: 1,", "max_echoes: { value: 15,"));
+    assert_int_equal(load_changed("leica-rtc360", "max_echoes: { value: 1,", "max_echoes: { value: 16,"), SH_EINPUT);
+    assert_says("max_echoes: \"16\" is out of range; allowed a whole number, 1 to 15");
+}
+
 /* A word stands for the value that the rest of the program asks for. */
 static void words_mean_their_values(void **state)
 {
@@ -306,7 +318,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(limits_come_from_somewhere), cmocka_unit_test(no_row_is_left_over),
         cmocka_unit_test(texts_have_the_same_limits), cmocka_unit_test(a_limit_is_allowed_and_nothing_beyond),
-        cmocka_unit_test(words_mean_their_values),
+        cmocka_unit_test(words_mean_their_values),    cmocka_unit_test(limits_hold_in_files),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

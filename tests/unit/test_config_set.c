@@ -277,6 +277,43 @@ static void settings_become_lengths(void **state)
     }
 }
 
+/* What a configuration says of ranges, noise and step are the settings of power-up. */
+static void keys_become_settings(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"head={profile: riegl-vz600i, range_min_m: 2.5, range_max_m: 123.456789012}",
+                                       "noise.range=on", "noise.angle=on", "noise.sigma_m=0.0125",
+                                       "noise.ball.radius_m=0.5"};
+    write_file(config_path, base, strlen(base));
+    assert_loads(load_sets(sets, 5));
+    const struct head_settings *s = &cfg->head.settings;
+    assert_true(s->range_min_nm == 2500000000 && s->range_max_nm == 123456789012);
+    assert_true(s->noise == RANGE_NOISE_ON && s->angle_noise == 1 && s->step_udeg == 0 && s->waves == 0);
+    assert_true(s->sigma_nm == 12500000 && s->ball_nm == 500000000);
+    static const char *const none[] = {"head={profile: riegl-vz600i}"};
+    assert_loads(load_sets(none, 1));
+    assert_true(s->noise == RANGE_NOISE_OFF && s->angle_noise == 0 && s->ball_nm == 0);
+    assert_true(s->range_min_nm == 500000000 && s->range_max_nm == 1000000000000);
+    static const char *const planar[] = {"head={profile: sick-lms111}"};
+    assert_loads(load_sets(planar, 1));
+    assert_int_equal(s->step_udeg, 500000);
+    static const char *const round[] = {"head={profile: sphere, step_deg: 2.2}"};
+    assert_loads(load_sets(round, 1));
+    assert_int_equal(s->step_udeg, 2200000); /* as it was asked for */
+}
+
+/* Frames that an animation is scanned at become seconds. */
+static void frames_become_seconds(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform={kind: stops, frames_per_s: 8, first_frame: 4, last_frame: 34, "
+                                       "frame_step: 2}"};
+    write_file(config_path, base, strlen(base));
+    assert_loads(load_sets(sets, 1));
+    const struct config_platform *p = &cfg->platform;
+    assert_true(p->has_end && p->start_s == 0.5 && p->end_s == 4.25 && p->step_s == 0.25);
+}
+
 /* A station in UTM takes zone and hemisphere from an anchor in UTM, north or south. */
 static void stations_take_the_grid_of_the_anchor(void **state)
 {
@@ -329,7 +366,8 @@ int main(void)
         cmocka_unit_test(set_appends_elements),        cmocka_unit_test(set_refuses),
         cmocka_unit_test(a_name_has_a_longest_length), cmocka_unit_test(yaml_replaces),
         cmocka_unit_test(yaml_replaces_scanners),      cmocka_unit_test(tolerances_follow_the_plan),
-        cmocka_unit_test(settings_become_lengths),     cmocka_unit_test(stations_take_the_grid_of_the_anchor),
+        cmocka_unit_test(settings_become_lengths),     cmocka_unit_test(keys_become_settings),
+        cmocka_unit_test(frames_become_seconds),       cmocka_unit_test(stations_take_the_grid_of_the_anchor),
         cmocka_unit_test(a_full_list_takes_no_more),   cmocka_unit_test(all_stations_are_checked),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -139,6 +139,61 @@ static void a_section_has_its_keys(void **state)
     assert_int_equal(config_print_section("", stdout, &err), SH_EINPUT);
 }
 
+/* A key of each type, and each way in which it may be left out. */
+static void keys_are_described_whole(void **state)
+{
+    (void)state;
+    static const struct {
+        enum config_keys keys;
+        const char *path, *what;
+        int has_value, has_words;
+    } rows[] = {
+        {CONFIG_KEYS, "head", "section", 0, 0},
+        {CONFIG_KEYS, "links", "list; allowed a list of 0 to 8; optional", 0, 0},
+        {CONFIG_KEYS, "stations", "list; allowed a list of 1 to 64; required", 0, 0},
+        {CONFIG_KEYS, "head.start", "switch; allowed on or off; default off", 1, 1},
+        {CONFIG_KEYS, "head.ambiguity", "word; allowed none, folded, resolved; default none", 1, 1},
+        {CONFIG_KEYS, "head.frames", "whole number; allowed a whole number, 0 to 1000000; default 1", 1, 0},
+        {CONFIG_KEYS, "head.step_deg", "number, exact to 1e-6, deg; allowed 0.01 to 90 deg; optional", 1, 0},
+        {CONFIG_KEYS, "head.range_min_m",
+         "number, m; allowed range_min_m to range_max_m of the head profile, in m; default from the head profile, its "
+         "range_min_m",
+         1, 0},
+        {CONFIG_KEYS, "head.prr_hz",
+         "number, exact to 1e-6, Hz; allowed 1 to 10000000 Hz, within the limits of the head profile; default from the "
+         "head profile, its prr_max_hz",
+         1, 0},
+        {CONFIG_KEYS, "stations[].name", "text; allowed text of 1 to 31 bytes; optional", 1, 0},
+        {CONFIG_KEYS, "head.settings_file", "path; allowed a path of 1 to 511 bytes; optional", 1, 0},
+        {CONFIG_KEYS, "output.colour_rgb", "three numbers; allowed [x, y, z], each 0 to 255; default [255, 255, 255]",
+         1, 0},
+        {CONFIG_KEYS, "output.colour_limits",
+         "two numbers; allowed [low, high], each -1000000000 to 1000000000; optional", 1, 0},
+        {CONFIG_KEYS, "fields[].points_m", "list of points, m; allowed [[x, y], ...], each -1000 to 1000 m; optional",
+         1, 0},
+        {CONFIG_KEYS, "faults[].grandmaster",
+         "whole number; allowed 0x1 to 0xffffffffffffffff; default 0x00b0aefffe000002", 1, 0},
+        {CONFIG_PROFILE_KEYS, "steps_per_turn",
+         "whole number; allowed a whole number, 1 to 1000000; required with emitter: planar", 1, 0},
+        {CONFIG_PROFILE_KEYS, "beams", "list; allowed a list of 0 to 128; required with emitter: beams", 0, 0},
+        {CONFIG_PROFILE_KEYS, "beams[].offset_ns",
+         "whole number, ns; allowed a whole number, 0 to 1000000000 ns; required", 1, 0},
+    };
+    struct config_key_text text;
+    for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+        size_t i = 0;
+        while (config_describe_key(rows[k].keys, i, &text) && strcmp(text.path, rows[k].path) != 0)
+            i++;
+        assert_string_equal(text.path, rows[k].path);
+        assert_string_equal(text.what, rows[k].what);
+        assert_int_equal(text.has_value, rows[k].has_value);
+        assert_int_equal(text.words != NULL, rows[k].has_words);
+    }
+    assert_int_equal(config_describe_key(CONFIG_KEYS, cfg_config_table.n, &text), 0);
+    assert_int_equal(config_describe_key(CONFIG_PROFILE_KEYS, cfg_profile_table.n, &text), 0);
+    assert_int_equal(config_describe_key(CONFIG_KEYS, cfg_config_table.n - 1, &text), 1);
+}
+
 /* Whether the error's list of allowed keys has the word, as a whole. */
 static int allows(const char *word)
 {
@@ -246,6 +301,7 @@ int main(void)
         cmocka_unit_test(the_example_loads),
         cmocka_unit_test(the_example_has_every_key),
         cmocka_unit_test(a_section_has_its_keys),
+        cmocka_unit_test(keys_are_described_whole),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

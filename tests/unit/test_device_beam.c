@@ -40,6 +40,7 @@ static void assert_note(uint32_t i, uint32_t fault, int ended, uint64_t pulse)
     assert_int_equal(notes[i].ended, ended);
     assert_true(notes[i].has_pulse);
     assert_int_equal(notes[i].pulse, pulse);
+    assert_true(notes[i].byte == -1 && notes[i].link == 0 && notes[i].session == 0 && notes[i].number == 0);
 }
 
 /* At the head's highest rate there are 2000 pulses a tick. A tick that is cut leaves up to so many, and each later one
@@ -109,6 +110,9 @@ static void faults_end_with_their_scan(void **state)
     rig_wait(rig, NATIVE_EV_SCAN_END, 10);
     assert_note(0, 1, 0, 999);
     assert_note(1, 1, 1, rig->work.pulse_end);
+    assert_int_equal(notes[1].t_ns, (int64_t)rig->next * 1000000);  /* the end of the last tick */
+    assert_string_equal(notes[0].text, "scan 1, at 39.920000 deg"); /* 999 of 3000 pulses of 240 deg from -40 on */
+    assert_string_equal(notes[1].text, "scan 1");
     rig_go_to(rig, rig->next + 100);
     rig_tell(rig, "SCAN:STAR", rig->next - 1);
     rig_wait(rig, NATIVE_EV_SCAN_START, 1000);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Events of errors: their number is limited, and none is forgotten. */
+#include "firmware_sim/device/device_state.h"
 #include "tests/unit/device_rig.h"
 
 /* A tick holds 24 events. The errors of a client that sends them all the time must not displace the scan's end. */
@@ -190,9 +191,31 @@ static void telemetry_has_the_figures_of_its_tick(void **state)
     rig_close(rig);
 }
 
+/* Settings that were accepted may fit no more when the scan begins. 31 bits of 1e-6 m end at 2147 m. */
+static void a_scan_that_cannot_be_planned_is_a_fault(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"output.layout=geo", "output.scale_m=1e-6"};
+    struct rig *rig = rig_open(NULL, sets, 2);
+    rig_go_to(rig, 300);
+    rig->device->cmd.settings.range_max_nm = INT64_C(3000) * 1000000000;
+    rig_tell(rig, "SCAN:START", 300);
+    const struct native_event *error = rig_wait(rig, NATIVE_EV_ERROR, 100);
+    assert_true((int64_t)error->a == CMD_E_SETTINGS && error->b == 0);
+    assert_non_null(strstr(error->text, "output.scale_m"));
+    for (int i = 0; i < 5; i++) {
+        assert_null(rig_event(rig, NATIVE_EV_SCAN_START));
+        assert_true(rig_claim(rig) && !rig->work.scanning);
+    }
+    assert_string_equal(rig_state(rig, rig->next), "fault");
+    assert_int_equal(strncmp(rig_tell(rig, "SYST:ERR?", rig->next), "-221,\"Settings conflict; ", 25), 0);
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_scan_that_cannot_be_planned_is_a_fault),
         cmocka_unit_test(the_last_events_are_said_however_many),
         cmocka_unit_test(errors_are_held_back_by_session),
         cmocka_unit_test(a_replay_says_what_it_refused),

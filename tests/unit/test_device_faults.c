@@ -161,6 +161,9 @@ static void loses_power(void **state)
     assert_string_equal(rig_event(rig, NATIVE_EV_STATE)->text, "boot");
     assert_int_equal(next_state(rig, "idle"), 1500 + BOOT_TICKS);
     assert_string_equal(rig_tell(rig, "HEAD:PRR?", rig->next), "300000");
+    struct device_work now;
+    device_describe_now(rig->device, &now);
+    assert_true(now.descriptor.prr_uhz == 300000000000);
     assert_string_equal(rig_tell(rig, "SYST:CONT?", rig->next), "0");
     assert_string_equal(rig_tell(rig, "SYST:ERR:COUN?", rig->next), "0");
     assert_string_equal(rig_tell(rig, "FAULt:INJected? 1", rig->next), "1");

@@ -333,6 +333,20 @@ static void a_run_has_a_bounded_number_of_faults(void **state)
     fault_board_free(board);
 }
 
+static void items_are_found_by_their_number(void **state)
+{
+    (void)state;
+    static const struct {
+        uint32_t number;
+        char rest[9];
+    } item[3] = {{5, "a"}, {2, "b"}, {9, "c"}};
+    for (uint32_t i = 0; i < 3; i++)
+        assert_ptr_equal(fault_find(item, 3, sizeof *item, item[i].number), &item[i]);
+    assert_null(fault_find(item, 3, sizeof *item, 3));
+    assert_null(fault_find(item, 2, sizeof *item, 9)); /* beyond the last */
+    assert_null(fault_find(item, 0, sizeof *item, 5));
+}
+
 /* A fault that is taken out is forgotten. Those that stay keep their counts, wherever they are in the list. */
 static void a_tally_keeps_what_is_in_the_list(void **state)
 {
@@ -363,6 +377,7 @@ int main(void)
         cmocka_unit_test(numbers_are_at_their_ends_as_said),
         cmocka_unit_test(the_list_changes_and_counts_stay),
         cmocka_unit_test(a_run_has_a_bounded_number_of_faults),
+        cmocka_unit_test(items_are_found_by_their_number),
         cmocka_unit_test(a_tally_keeps_what_is_in_the_list),
         cmocka_unit_test(the_truth_is_written_line_by_line),
         cmocka_unit_test(a_dash_is_standard_output),

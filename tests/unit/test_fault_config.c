@@ -1,41 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults on request as the configuration, scenarios and FAULt:ADD read them: the keys of a kind, their limits, and
- * their defaults. */
+/* Faults on request as the configuration, scenarios and FAULt:ADD read them: refusals, and where they
+ * stand. test_config_fault_kinds.c has the keys of each kind. */
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
-
-/* Kinds with their describing keys, and whether for_ms must be given. They are worked out by hand from
- * fault/README.md. */
-static const struct {
-    const char *kind, *keys;
-    int needs_ms;
-} kinds[] = {
-    {"drop", "", 0},
-    {"duplicate", "n", 0},
-    {"reorder", "n", 0},
-    {"delay", "for_ms", 1},
-    {"jitter", "for_ms", 1},
-    {"truncate", "n", 0},
-    {"flip", "n byte reseal", 0},
-    {"stall", "for_ms", 1},
-    {"split", "n", 0},
-    {"merge", "n", 0},
-    {"garbage", "n", 0},
-    {"no_reply", "", 0},
-    {"late_reply", "for_ms", 1},
-    {"wrong_reply", "", 0},
-    {"echo", "", 0},
-};
-enum { N_KINDS = sizeof kinds / sizeof kinds[0] };
-
-static const struct {
-    const char *key, *value;
-} what[] = {{"n", "5"},          {"byte", "30"}, {"reseal", "on"}, {"for_ms", "3"},
-            {"factor", "0.5"},   {"deg", "1"},   {"hz", "2"},      {"loss_db", "3"},
-            {"jump_s", "1"},     {"ppm", "5"},   {"ns", "7"},      {"grandmaster", "0x123456fffe654321"},
-            {"clock_class", "7"}};
-enum { N_WHAT = sizeof what / sizeof what[0] };
 
 static struct fault fault;
 
@@ -48,13 +16,6 @@ static int read_fault(const char *text)
 static void load_base(void)
 {
     assert_int_equal(load_text(base), SH_OK);
-}
-
-static int has(const char *keys, const char *key)
-{
-    const size_t len = strlen(key);
-    const char *at = strstr(keys, key);
-    return at != NULL && (at == keys || at[-1] == ' ') && (at[len] == ' ' || at[len] == '\0');
 }
 
 /* The scanner that has dates speaks cola; another head has none that a time server could set. */
@@ -97,23 +58,6 @@ static void an_unknown_kind_is_told_all_kinds(void **state)
         if (strstr(err.text, fault_names[k]) == NULL) fail_msg("%s is not in: %s", fault_names[k], err.text);
 }
 
-static void a_kind_has_its_keys_and_no_others(void **state)
-{
-    (void)state;
-    load_base();
-    for (size_t i = 0; i < N_KINDS; i++)
-        for (size_t k = 0; k < N_WHAT; k++) {
-            char text[200], want[120];
-            const int is_ms = strcmp(what[k].key, "for_ms") == 0, allowed = has(kinds[i].keys, what[k].key);
-            snprintf(text, sizeof text, "{kind: %s, %s: %s%s}", kinds[i].kind, what[k].key, what[k].value,
-                     kinds[i].needs_ms && !is_ms ? ", for_ms: 3" : "");
-            const int code = read_fault(text);
-            if ((code == SH_OK) != allowed) fail_msg("%s: %s", text, err.text);
-            snprintf(want, sizeof want, "faults[0].%s: %s has no such key", what[k].key, kinds[i].kind);
-            if (!allowed) assert_says(want);
-        }
-}
-
 /* The keys that say when, of fault/README.md: each place has its own, and a refusal says which. */
 static void a_place_has_its_keys_and_no_others(void **state)
 {
@@ -140,31 +84,6 @@ static void a_place_has_its_keys_and_no_others(void **state)
                      k == 3 ? moment : counted);
             if (!allowed) assert_says(want);
         }
-}
-
-static void what_is_not_given_is_as_said(void **state)
-{
-    (void)state;
-    load_base();
-    for (size_t i = 0; i < N_KINDS; i++) {
-        char text[200];
-        snprintf(text, sizeof text, "{kind: %s%s}", kinds[i].kind, kinds[i].needs_ms ? ", for_ms: 2.5" : "");
-        assert_int_equal(read_fault(text), SH_OK);
-        assert_string_equal(fault_names[fault.kind], kinds[i].kind);
-        assert_true(fault.link == 0 && fault.of == FAULT_OF_STREAM && fault.at == 0 && fault.from == 1 &&
-                    fault.until == 0 && fault.every == 1 && fault.probability == 1.0 && fault.count == 0);
-        assert_true(fault.from_pulse == 0 && fault.until_pulse == UINT64_MAX && fault.from_s == 0.0 &&
-                    fault.until_s == 0.0 && fault.seed == 1 && fault.n == 0 && fault.byte == -1 && !fault.reseal);
-        assert_true(fault.for_ms == (kinds[i].needs_ms ? 2.5 : 0.0));
-    }
-    read_fault("{kind: split}");
-    assert_int_equal(fault_n(&fault), 2);
-    read_fault("{kind: garbage}");
-    assert_int_equal(fault_n(&fault), 16);
-    read_fault("{kind: truncate}");
-    assert_int_equal(fault_n(&fault), 0);
-    read_fault("{kind: flip}");
-    assert_int_equal(fault_n(&fault), 1);
 }
 
 static void wrong_ones_are_refused_with_what_is_allowed(void **state)
@@ -318,6 +237,10 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
     assert_int_equal(cfg->faults.n, 3); /* the list is as it was */
     snprintf(path, sizeof path, "%s/none.yaml", dir);
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    assert_int_equal(config_add_scenario(cfg, "nosuch", &wrong), SH_EINPUT);
+    static const char unknown[] = "nosuch: no such scenario; allowed the path of a file, or one of these: ";
+    assert_int_equal(strncmp(wrong.err[0].text, unknown, sizeof unknown - 1), 0);
+    assert_true(wrong.n == 1 && cfg->faults.n == 3);
     assert_int_equal(load_edited("output:", "faults:\n  - {kind: drop, link: 2}\noutput:"), SH_EINPUT);
     assert_says(":17: faults[0].link: there is no link 2");
 }
@@ -328,9 +251,7 @@ int main(void)
         cmocka_unit_test(an_unknown_kind_is_told_all_kinds),
         cmocka_unit_test(a_time_server_needs_dates),
         cmocka_unit_test(its_faults_need_somebody_who_asks),
-        cmocka_unit_test(a_kind_has_its_keys_and_no_others),
         cmocka_unit_test(a_place_has_its_keys_and_no_others),
-        cmocka_unit_test(what_is_not_given_is_as_said),
         cmocka_unit_test(wrong_ones_are_refused_with_what_is_allowed),
         cmocka_unit_test(a_follower_has_its_own_faults),
         cmocka_unit_test(the_longest_fault_fits_a_command_line),

@@ -284,6 +284,37 @@ static void mixtures_are_what_their_notes_say(void **state)
     assert_true(whole > in / 2);
 }
 
+/* ---- several at one frame */
+
+/* The order of the list counts only among those that strike last; a second split finds one. */
+static void faults_strike_in_their_order(void **state)
+{
+    (void)state;
+    static const struct {
+        enum fault_kind first, second;
+        int reseal;
+        uint32_t n_notes;
+        enum fault_kind noted;
+    } rows[] = {
+        {FAULT_FLIP, FAULT_TRUNCATE, 1, 1, FAULT_TRUNCATE}, /* of a cut frame no checksum can be made right */
+        {FAULT_FLIP, FAULT_TRUNCATE, 0, 2, FAULT_TRUNCATE}, {FAULT_TRUNCATE, FAULT_DROP, 0, 1, FAULT_DROP},
+        {FAULT_GARBAGE, FAULT_FLIP, 1, 2, FAULT_FLIP},      {FAULT_GARBAGE, FAULT_FLIP, 0, 2, FAULT_GARBAGE},
+        {FAULT_SPLIT, FAULT_SPLIT, 0, 1, FAULT_SPLIT},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct fault list[2] = {fault_of_kind(rows[i].first), fault_of_kind(rows[i].second)};
+        list[0].reseal = list[1].reseal = rows[i].reseal;
+        if (rows[i].second == FAULT_SPLIT) list[1].n = 3;
+        rig_open(list, 2, 1);
+        rig_frame(RIG_POINTS);
+        rig_drain();
+        if (rig.n_notes != rows[i].n_notes || rig.note[0].kind != rows[i].noted)
+            fail_msg("row %zu: %u notes, first %d", i, rig.n_notes, (int)rig.note[0].kind);
+        if (rows[i].second == FAULT_SPLIT) assert_int_equal(rig.n_writes, 2);
+        rig_close();
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -292,6 +323,7 @@ int main(void)
         cmocka_unit_test_teardown(what_is_held_when_its_fault_goes_still_comes, rig_teardown),
         cmocka_unit_test_teardown(a_wire_is_full_by_what_only_time_keeps_back, rig_teardown),
         cmocka_unit_test_teardown(an_item_longer_than_usual_is_taken, rig_teardown),
+        cmocka_unit_test_teardown(faults_strike_in_their_order, rig_teardown),
         cmocka_unit_test_teardown(mixtures_are_what_their_notes_say, rig_teardown),
     };
     return cmocka_run_group_tests_name("faults on the wire, more", tests, NULL, NULL);

@@ -125,6 +125,61 @@ static void an_echo_is_that_of_the_replys_own_line(void **state)
     assert_memory_equal(rig.out, "\x02s\n\x03", 4);
 }
 
+/* Blanks get an answer once they are longer than a command may be, and their beginning is the echo. */
+static void blanks_are_a_line_where_they_are_too_long(void **state)
+{
+    (void)state;
+    char blanks[258], want[300];
+    memset(blanks, ' ', sizeof blanks - 1);
+    blanks[sizeof blanks - 1] = '\0';
+    f = fault_of_kind(FAULT_ECHO);
+    rig_open(&f, 1, 1);
+    hear(blanks + 1); /* 256 */
+    hear("\n");
+    rig_reply("to nothing");
+    hear(blanks);
+    hear("\n");
+    rig_reply("too long");
+    rig_drain();
+    snprintf(want, sizeof want, "to nothing\r\n%s\r\ntoo long\r\n", blanks + 1);
+    expect_text(want);
+}
+
+/* 65536 bytes are kept until an answer. With one more, all of them get no echo, and what comes then does. */
+static void so_much_is_heard_and_no_more(void **state)
+{
+    (void)state;
+    enum { MOST = 65536, LINE = 256 };
+    static char bytes[MOST + 1];
+    memset(bytes, 'y', sizeof bytes);
+    f = fault_of_kind(FAULT_ECHO);
+    for (int over = 0; over < 2; over++) {
+        rig_open(&f, 1, 0);
+        wire_heard_add(&rig.heard, bytes, MOST - 1 + (size_t)over);
+        wire_heard_add(&rig.heard, "z", 1);
+        rig_unit(7, 1);
+        rig_drain();
+        assert_int_equal(rig.n_out, (over ? 1 : MOST) + 7);
+        assert_int_equal(rig.out[rig.n_out - 8], 'z');
+        rig_close();
+        for (size_t i = LINE - 1; i < MOST; i += LINE)
+            bytes[i] = '\n';
+        rig_open(&f, 1, 1);
+        wire_heard_add(&rig.heard, bytes, MOST);
+        if (over) wire_heard_add(&rig.heard, "z", 1);
+        rig_reply("a");
+        rig_drain();
+        assert_int_equal(rig.n_out, over ? 3 : LINE + 1 + 3);
+        rig_close();
+        memset(bytes, 'y', sizeof bytes);
+    }
+    rig_open(&f, 1, 0);
+    wire_heard_add(&rig.heard, bytes, MOST + 1); /* too much at once is not kept at all */
+    rig_unit(7, 1);
+    rig_drain();
+    assert_int_equal(rig.n_out, 7);
+}
+
 static void more_than_can_be_heard_does_no_harm(void **state)
 {
     (void)state;
@@ -168,6 +223,8 @@ int main(void)
         cmocka_unit_test_teardown(frames_overtake_a_late_reply_and_replies_do_not, rig_teardown),
         cmocka_unit_test_teardown(a_wrong_reply_is_wrong, rig_teardown),
         cmocka_unit_test_teardown(an_echo_is_that_of_the_replys_own_line, rig_teardown),
+        cmocka_unit_test_teardown(blanks_are_a_line_where_they_are_too_long, rig_teardown),
+        cmocka_unit_test_teardown(so_much_is_heard_and_no_more, rig_teardown),
         cmocka_unit_test_teardown(more_than_can_be_heard_does_no_harm, rig_teardown),
         cmocka_unit_test_teardown(replies_count_from_after_the_command, rig_teardown),
     };

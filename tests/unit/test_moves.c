@@ -223,6 +223,14 @@ static void who_asks_holds_the_site_of_now(void **state)
     assert_true(at.place.position_m[2] == 0.4 && at.place.heading_deg == 90.0 && fabs(at.height_m - 2.2) < 1e-9);
     device_get_station(rig->device, 1, &at);
     assert_true(!at.has_tripod && strcmp(at.name, "far") == 0 && rig->site->n_stations == 2);
+    assert_true(at.served && at.place.position_m[0] == 0.5);
+    /* Who has asked holds nothing afterwards. */
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.3,90,0,0");
+    assert_true(rig_claim(rig));
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.2,90,0,0");
+    assert_true(rig_claim(rig));
+    const struct device_version *old = rig->device->moves.old;
+    assert_true(old == NULL || old->next == NULL); /* that of the tick before at most */
     rig_close(rig);
 }
 
@@ -335,6 +343,41 @@ static void a_replayed_journal_moves_at_the_same_tick(void **state)
     rig_close(rig);
 }
 
+/* In real time all moves of a journal are planned before time begins, in order, each from the one before it. A refused
+ * one is not among them, and one that is there already neither. */
+static void a_journals_moves_are_planned_ahead(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {SHORT};
+    static const double z_m[] = {0.25, 0.5, 0.75};
+    struct rig *rig = rig_idle(&(struct device_options){.journal = journal_path}, sets, 2);
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.25,0,0,0");
+    rig_go_to(rig, 310);
+    expect_moved(rig, "SITE:POSE 2, 0,0,0.5,0,0,0");
+    rig_go_to(rig, 320);
+    expect_refused(rig, "SITE:POSE 1, 1e9,1e9,x,0,0,0", CMD_E_DATA_TYPE, "'x'");
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.75,0,0,0");
+    rig_go_to(rig, 330);
+    rig_close(rig);
+    rig = rig_open(&(struct device_options){.replay = journal_path}, sets, 2);
+    const struct device_moves *moves = &rig->device->moves;
+    for (int i = 0; i < 3; i++) {
+        const struct device_version *next = moves->ahead;
+        struct site_place first, second;
+        int n = 0;
+        for (const struct device_version *v = next; v != NULL; v = v->next)
+            n++;
+        assert_int_equal(n, 3 - i);
+        site_get_place(next->site, 0, &first);
+        site_get_place(next->site, 1, &second);
+        assert_true(first.position_m[2] == z_m[i == 2 ? 2 : 0] && second.position_m[2] == (i > 0 ? z_m[1] : 0.0));
+        rig_go_to(rig, 301 + 10 * (uint64_t)i);
+        assert_ptr_equal(rig->device->site, next->site);
+    }
+    assert_null(moves->ahead);
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -349,6 +392,7 @@ int main(void)
         cmocka_unit_test(a_platforms_stations_stay),
         cmocka_unit_test(settings_hold_at_the_new_place),
         cmocka_unit_test(a_replayed_journal_moves_at_the_same_tick),
+        cmocka_unit_test(a_journals_moves_are_planned_ahead),
     };
     return cmocka_run_group_tests_name("moves", tests, make_folder, remove_folder);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Which devices a recording can be: links of other protocols need what the recorded head may not have. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -56,6 +57,7 @@ static void a_recording_is_the_devices_that_it_can_be(void **state)
         /* the GNSS receiver: any head that knows its time and place, and stands */
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .lat_deg = 50.0, .speed = 1.0},
         {PROTOCOL_NMEA, NATIVE_EMIT_SPHERE, .utc0_ns = SECOND_NS, .lat_deg = -50.0, .speed = 1.0},
+        {PROTOCOL_NMEA, NATIVE_EMIT_BEAMS, 16, .utc0_ns = SECOND_NS, .lat_deg = 50.0, .speed = 1.0},
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = INT64_MIN, .lat_deg = 50.0, .speed = 1.0,
          .says = "nmea: a.shs has no time of day; required is one of a head with time.epoch"},
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .speed = 1.0, .says = "has no place on the Earth"},
@@ -67,6 +69,7 @@ static void a_recording_is_the_devices_that_it_can_be(void **state)
         {PROTOCOL_SCIP, NO_EMITTER, .speed = 1.0,
          .says = "scip: the device can't be the head of a.shs, which has emitter line; allowed is planar"},
         {PROTOCOL_SCIP, NATIVE_EMIT_BEAMS, 16, .speed = 1.0, .says = "emitter beams; allowed is planar"},
+        {PROTOCOL_SCIP, NATIVE_EMIT_SPHERE, .speed = 1.0, .says = "emitter sphere; allowed is planar"},
         {PROTOCOL_COLA, NATIVE_EMIT_PLANAR, .layout = NATIVE_GEO, .speed = 1.0,
          .says = "cola: a.shs has positions instead of ranges (layout geo); required is layout polar"},
         /* a rotor with 16 rings */
@@ -123,9 +126,37 @@ static void fixes_are_at_full_seconds(void **state)
     assert_true(fix.year == 2026 && fix.month == 3 && fix.day == 1 && fix.hour == 12 && fix.minute == 0);
     assert_true(fix.second == 1 && fix.quality == 1);
     assert_true(fix.lat_deg == 49.0 && fix.lon_deg == 8.5 && fix.altitude_m == 110.0);
+    assert_true(fix.talker[0] == 'G' && fix.talker[1] == 'N' && fix.satellites == 12 && fix.hdop == 0.7);
+    assert_true(isnan(fix.course_deg));
+    r->anchor.lat_deg = 0.0; /* no place */
+    assert_int_equal(replay_fix(r, 0, &fix), 1);
+    assert_int_equal(fix.quality, 0);
+    r->anchor.lat_deg = 49.0;
     r->anchor.moving = NATIVE_MOVING; /* its way on the Earth is not known */
     assert_int_equal(replay_fix(r, SECOND_NS, &fix), 1);
     assert_int_equal(fix.quality, 0);
+    replay_end_of(r);
+}
+
+/* A recording may have any number there. Dates begin after 1970-01-01 and end with 2199-12-31 (date -u -d 2200-01-01 +%s).
+ */
+static void dates_are_within_what_a_calendar_has(void **state)
+{
+    (void)state;
+    static const int64_t LAST_NS = INT64_C(7258118400) * SECOND_NS;
+    struct replay *r = replay_with(0, 49.0);
+    struct nmea_fix fix;
+    int64_t hour_ns;
+    assert_int_equal(replay_pps(r, 0, &hour_ns), PROTOCOL_PPS_ABSENT);
+    assert_int_equal(replay_pps(r, 1, &hour_ns), PROTOCOL_PPS_LOCKED);
+    assert_int_equal(hour_ns, 1);
+    r->utc0_ns = LAST_NS - 5;
+    assert_int_equal(replay_date_ns(r, 4), LAST_NS - 1);
+    assert_int_equal(replay_fix(r, 4, &fix), 1);
+    assert_true(fix.year == 2199 && fix.month == 12 && fix.day == 31);
+    assert_true(fix.hour == 23 && fix.minute == 59 && fix.second == 59);
+    assert_int_equal(replay_date_ns(r, 5), 5);
+    assert_int_equal(replay_fix(r, 5, &fix), 0);
     replay_end_of(r);
 }
 
@@ -148,6 +179,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_recording_is_the_devices_that_it_can_be),
         cmocka_unit_test(fixes_are_at_full_seconds),
+        cmocka_unit_test(dates_are_within_what_a_calendar_has),
         cmocka_unit_test(without_a_time_of_day_there_is_none),
     };
     return cmocka_run_group_tests_name("replay links", tests, NULL, NULL);

@@ -161,7 +161,7 @@ static void a_journal_has_the_dates(void **state)
 static void a_client_begins_with_1970(void **state)
 {
     (void)state;
-    static const char *const sets[] = {"ntp.role=client", "time.drift_ppm=-25"};
+    static const char *const sets[] = {"ntp.role=client", "time.drift_ppm=-25", "ntp.max_offset_s=1.25"};
     char path[96];
     snprintf(path, sizeof path, "%s/run.yaml", folder);
     FILE *f = fopen(path, "w");
@@ -172,7 +172,8 @@ static void a_client_begins_with_1970(void **state)
                "links: [{type: tcp, port: 0, protocol: cola}]\n"
                "time: {epoch: 2026-01-01T00:00:00Z}\n");
     assert_int_equal(fclose(f), 0);
-    struct rig *rig = rig_open(NULL, sets, 2);
+    struct rig *rig = rig_open(NULL, sets, 3);
+    assert_string_equal(rig_tell(rig, "TIME:SERV? STATE", 0), "OFF,1250000000,0,0,0,0,0");
     assert_true(device_date_ns(rig->device, 0) == 0);
     assert_true(device_date_ns(rig->device, 2 * S) == 2 * S - 50000);
     rig_close(rig);

@@ -156,6 +156,50 @@ static void a_broken_or_foreign_file_is_refused_and_stays(void **state)
     expect_refused(text, (const char *const[]){":3: too long a setting; allowed are 478", ""});
 }
 
+/* Room for so many names, so much under each, and so long a setting; one more is too much. */
+static void a_file_has_its_limits(void **state)
+{
+    (void)state;
+    static const char *const names[] = {
+        "head", "native", "nmea", "scip", "cola", "velodyne", "velodyne-position", "velodyne-http", "capture"};
+    static const char *const too_many[] = {":11: too many names, or too long a name; allowed are 8 of up to 31 bytes",
+                                           ""};
+    static const char *const too_much[] = {": too much under one name; allowed are 2047 bytes", ""};
+    static char text[2 * SETTINGS_FILE_TEXT];
+    begin();
+    for (int n = 8; n <= 9; n++) {
+        size_t len = (size_t)snprintf(text, sizeof text, "scanhead settings 1\nprofile puck\n");
+        for (int i = 0; i < n; i++)
+            len += (size_t)snprintf(text + len, sizeof text - len, "%s a\n", names[i]);
+        snprintf(text + len, sizeof text - len, "end\n");
+        if (n == 9) {
+            expect_refused(text, too_many);
+            continue;
+        }
+        write_text(text);
+        struct settings_file *file = open_file();
+        expect_stored(file, "velodyne-http", "a\n");
+        close_file(file);
+    }
+    /* Four lines of 478 characters, and one that fills the rest of 2047 bytes; each has its line end. */
+    for (int over = 0; over < 2; over++) {
+        size_t len = (size_t)snprintf(text, sizeof text, "scanhead settings 1\nprofile puck\n");
+        int left = SETTINGS_FILE_TEXT - 1;
+        for (int i = 0; left > 0; i++) {
+            const int most = left > 479 ? 478 : left - 1 + over, n = most < 478 ? most : 478;
+            len += (size_t)snprintf(text + len, sizeof text - len, "head k%d=%0*d\n", i, n - 3, 0);
+            left -= n + 1;
+        }
+        snprintf(text + len, sizeof text - len, "end\n");
+        if (over) {
+            expect_refused(text, too_much);
+            continue;
+        }
+        write_text(text);
+        close_file(open_file());
+    }
+}
+
 /* Also after the file was written anew, which gives it another inode. */
 static void two_heads_have_no_file_in_common(void **state)
 {
@@ -312,6 +356,7 @@ int main(void)
         cmocka_unit_test(nothing_new_is_not_written),
         cmocka_unit_test(wrong_text_is_refused),
         cmocka_unit_test(a_broken_or_foreign_file_is_refused_and_stays),
+        cmocka_unit_test(a_file_has_its_limits),
         cmocka_unit_test(two_heads_have_no_file_in_common),
         cmocka_unit_test(a_file_of_another_is_not_replaced),
         cmocka_unit_test(a_killed_writer_leaves_the_old_file),

@@ -138,6 +138,32 @@ static void targets_are_chosen_in_all_meshes(void **state)
     site_free(site);
 }
 
+/* Of a mesh with copies, each copy of a target counts. */
+static void targets_count_in_all_copies(void **state)
+{
+    (void)state;
+    static const char *const target[] = {"{objects: [b], others: hide}", "{objects: [a], others: hide}",
+                                         "{objects: [\"*\"], others: hide}"};
+    static const uint32_t triangles[] = {6, 3, 9};
+    write_in("cube.obj", "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no b\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 4 5 6\n"
+                         "f 5 7 6\n");
+    for (int i = 0; i < 3; i++) {
+        char text[512];
+        struct site *site;
+        snprintf(text, sizeof text,
+                 "head: {profile: any-rate}\nscene:\n  target: %s\n  meshes:\n    - {file: cube.obj, up: z, scale: 1, "
+                 "copies: [{offset_m: [0, 0, 0]}, {offset_m: [9, 0, 0]}, {offset_m: [18, 0, 0]}]}\n"
+                 "stations: [{position_m: [0, 0, 5]}]\nbeam: {mode: single}\n",
+                 target[i]);
+        assert_loads(load_text(text));
+        if (site_load(cfg, NULL, &site, &err) != SH_OK) fail_msg("%s", err.text);
+        assert_int_equal(site->world->target.triangles, triangles[i]);
+        assert_int_equal(site->world->target.all_triangles, 9);
+        site_free(site);
+    }
+    write_in("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+}
+
 static void wrong_targets_are_refused(void **state)
 {
     (void)state;
@@ -148,6 +174,12 @@ static void wrong_targets_are_refused(void **state)
          "scene.target.objects[0]: no object fits \"tre\"; allowed names of the scene's 5 objects, similar ones are "
          "\"tree\""},
         {"{objects: [tree, \"xyzzy*\"]}", "scene.target.objects[1]: no object fits \"xyzzy*\""},
+        /* nearest first: letters in any case, without wildcards, or to the beginning of the name */
+        {"{objects: [HOU]}", "similar ones are \"house\""},
+        {"{objects: [\"*Fl?\"]}", "similar ones are \"flag\""},
+        {"{objects: [hoXY]}", "similar ones are \"house\""},
+        {"{objects: [caree]}", "similar ones are \"tree\", \"car\""},
+        {"{objects: [treehouse]}", "5 objects, as \"house\", \"tree\", \"cube\""},
         {"{objects: [flag]}", "none of them stands still; allowed with an object that does, or with others: hide"},
         {"{others: hide}", "scene.target.others: given, but there are no scene.target.objects"},
         {"{objects: tree}", "scene.target.objects: here stands a single value; allowed a list of 0 to 64"},
@@ -167,9 +199,8 @@ static void wrong_targets_are_refused(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_left_has_its_own_numbers),
-        cmocka_unit_test(silent_surfaces_give_no_echo),
-        cmocka_unit_test(targets_are_chosen_in_all_meshes),
+        cmocka_unit_test(what_is_left_has_its_own_numbers), cmocka_unit_test(silent_surfaces_give_no_echo),
+        cmocka_unit_test(targets_are_chosen_in_all_meshes), cmocka_unit_test(targets_count_in_all_copies),
         cmocka_unit_test(wrong_targets_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

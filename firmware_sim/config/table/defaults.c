@@ -13,7 +13,7 @@ void cfg_fail_missing(struct cfg_reader *rd, const char *path, uint32_t item)
 {
     const struct cfg_key *key = cfg_find(&rd->table, path);
     char allowed[CFG_ALLOWED_MAX];
-    cfg_fail_key(rd, path, item, "missing, and it has no default; %s", cfg_allowed(key, rd->profile, allowed));
+    cfg_fail_item(rd, path, item, "missing, and it has no default; %s", cfg_allowed(key, rd->profile, allowed));
 }
 
 /* The default replaces a bad value, so that checks that use it can't fail. */

@@ -112,11 +112,10 @@ int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const 
     return 1;
 }
 
-int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+static int fail_at(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, va_list ap)
 {
     const struct cfg_key *key = cfg_find(&rd->table, path);
     char name[2 * CFG_PATH_MAX], of[2 * CFG_PATH_MAX + 48];
-    va_list ap;
     if (is_bad(rd, path, item)) return SH_EINPUT;
     rd->bad[cfg_row(rd, key)][item] = 1;
     cfg_full_name(rd, key, item, name);
@@ -124,8 +123,23 @@ int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const c
         snprintf(of, sizeof of, "%s, for stations[%d].scanner", name, rd->scanner);
         snprintf(name, sizeof name, "%.190s", of);
     }
+    return diagnostics_fail(rd, SH_EINPUT, cfg_where(rd, key, item), name, fmt, ap);
+}
+
+int cfg_fail_item(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+{
+    va_list ap;
     va_start(ap, fmt);
-    int code = diagnostics_fail(rd, SH_EINPUT, cfg_where(rd, key, item), name, fmt, ap);
+    const int code = fail_at(rd, path, item, fmt, ap);
+    va_end(ap);
+    return code;
+}
+
+int cfg_fail_key(struct cfg_reader *rd, const char *path, const char *fmt, ...)
+{
+    va_list ap;
+    va_start(ap, fmt);
+    const int code = fail_at(rd, path, 0, fmt, ap);
     va_end(ap);
     return code;
 }

@@ -8,25 +8,30 @@
 
 struct cfg_reader;
 
-/* Returns whether the key was given. item: its element, from 0, where the path has []; else 0. */
-int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item);
+/* Where a name has `item`, the path has [], and item is the element, from 0. Without it, the key is in no list. */
+
+/* Returns whether the key was given. */
+int cfg_is_given(const struct cfg_reader *rd, const char *path);
+int cfg_is_item_given(const struct cfg_reader *rd, const char *path, uint32_t item);
 /* Returns whether the head profile was read without a diagnostic. */
 int cfg_has_profile(const struct cfg_reader *rd);
 /* Returns the word of a key for its value. */
 const char *cfg_word(const struct cfg_reader *rd, const char *path, int value);
 /* Returns whether all of these keys (of sections: all keys in them) were read without a diagnostic, so that a check can
- * use their values. */
+ * use their values. `item` counts only for paths with []. */
 int cfg_are_sound(const struct cfg_reader *rd, uint32_t item, const char *const *paths, size_t n);
-#define CFG_SOUND(rd, item, ...)                                    \
+#define CFG_ITEM_SOUND(rd, item, ...)                               \
     cfg_are_sound((rd), (item), (const char *const[]){__VA_ARGS__}, \
                   sizeof((const char *const[]){__VA_ARGS__}) / sizeof(const char *))
+#define CFG_SOUND(rd, ...) CFG_ITEM_SOUND(rd, 0, __VA_ARGS__)
 
 /* Adds a diagnostic, "FILE:LINE: KEY: text", at the key's own line, or at the section's where the key is missing.
  * Returns SH_EINPUT; reading goes on after it. Nothing is added where the key, or a section around it, has a diagnostic
  * already: the new one may only be its consequence. */
-int cfg_fail_key(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
+int cfg_fail_key(struct cfg_reader *rd, const char *path, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+int cfg_fail_item(struct cfg_reader *rd, const char *path, uint32_t item, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* Does the same for a key that is not given and has no default. */
+/* Does the same for a key that is not given and has no default. item: 0 where the path has no []. */
 void cfg_fail_missing(struct cfg_reader *rd, const char *path, uint32_t item);
 /* Makes text fit for one line of an error: cuts it, and replaces control characters. buf holds CFG_SHOW_MAX. */
 enum { CFG_SHOW_MAX = 64 };

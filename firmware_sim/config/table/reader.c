@@ -54,7 +54,12 @@ const char *cfg_full_name(const struct cfg_reader *rd, const struct cfg_key *key
     return buf;
 }
 
-int cfg_is_given(const struct cfg_reader *rd, const char *path, uint32_t item)
+int cfg_is_given(const struct cfg_reader *rd, const char *path)
+{
+    return cfg_is_item_given(rd, path, 0);
+}
+
+int cfg_is_item_given(const struct cfg_reader *rd, const char *path, uint32_t item)
 {
     const struct cfg_key *key = cfg_find(&rd->table, path);
     return key != NULL && rd->line[cfg_row(rd, key)][item] != 0; /* a table of some sections lacks other keys */

@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: MIT */
+/* Rows of a site's plan that say what is set, without a choice; the likely cause of a slow scan; the plan in one line. */
+#include "tests/unit/site_rig.h"
+
+#include <math.h>
+
+#include "core/bvh.h"
+#include "core/plan.h"
+#include "firmware_sim/site/plan_rows.h"
+#include "firmware_sim/site/waves.h"
+
+static struct site *site;
+
+static void plan_with(const char *head, const char *rest, const char *const *sets, int n)
+{
+    char text[2048];
+    write_in("floor.obj", "v -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\nf 1 2 3 4\n");
+    snprintf(
+        text, sizeof text,
+        "head: {%s}\nscene:\n  meshes: [{file: floor.obj, up: z, scale: 1}]\nbeam: {mode: single}\ncast: {sight: off}\n%s\n",
+        head, rest);
+    write_in("test.yaml", text);
+    site_free(site);
+    site = NULL;
+    if (config_load(config_path, sets, n, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load(cfg, &report, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_plan_rows(site, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+static void plan(const char *head, const char *rest)
+{
+    plan_with(head, rest, NULL, 0);
+}
+
+static const struct plan_row *row_of(const char *stage)
+{
+    for (size_t i = 0; i < site->plan.n; i++)
+        if (strcmp(site->plan.row[i].stage, stage) == 0) return &site->plan.row[i];
+    return NULL;
+}
+
+static void expect_row(const char *stage, const char *method, const char *why)
+{
+    const struct plan_row *row = row_of(stage);
+    if (row == NULL) fail_msg("no row %s", stage);
+    assert_string_equal(row->method, method);
+    assert_string_equal(row->why, why);
+}
+
+#define STATION "stations: [{position_m: [0, 0, 2]}]\n"
+
+/* 105 of 240 deg of each pulse rate are used. */
+static void programs_and_ranges_have_their_figures(void **state)
+{
+    (void)state;
+    plan("profile: riegl-vz600i, prr_hz: 600000, range_max_m: 300", STATION);
+    expect_row("program", "600 kHz",
+               "15 echoes, 0.5 to 300 m, 262.5 kHz used; riegl-vz600i also has 140, 1200, 2200 kHz");
+    expect_row("range", "0.5 to 300 m",
+               "head.range_min_m, range_max_m: there is no echo outside of them; the profile has 0.5 to 1000 m");
+    assert_null(row_of("emitter"));
+    assert_null(row_of("tripod"));
+    plan("profile: any-rate", STATION);
+    assert_null(row_of("program"));
+    assert_null(row_of("range"));
+}
+
+static void heads_without_a_pan_say_how_they_fire(void **state)
+{
+    (void)state;
+    char why[160];
+    plan("profile: sick-lms111", STATION);
+    emitter_describe(&site->emitter, why, sizeof why);
+    expect_row("emitter", "planar", why);
+}
+
+static void the_plan_fits_a_line(void)
+{
+    char text[256], want[256];
+    const struct site_plan *p = &site->plan;
+    for (int polar = 0; polar < 2; polar++) {
+        cfg->output.layout = polar ? LINE_POLAR : LINE_GEO;
+        site_plan_text(site, text, sizeof text);
+        snprintf(want, sizeof want, "sight %s; beam single; optics none; georef %s", p->sight.method,
+                 polar ? "none" : site->station[0].plan.method);
+        assert_string_equal(text, want);
+    }
+}
+
+/* One row for all stations where they have the same method, with the largest of their errors. */
+static void stations_share_a_row(void **state)
+{
+    (void)state;
+    static const char two[] = "stations:\n  - {name: near, position_m: [0, 0, 2]}\n"
+                              "  - {name: far, position_m: [20, 0, 2]}\noutput: {layout: geo}\n";
+    plan("profile: any-rate", two);
+    const struct plan_row *row = row_of("georef");
+    assert_non_null(row);
+    assert_int_equal(strncmp(row->why, "all stations: ", 14), 0);
+    for (uint32_t i = 0; i < 2; i++)
+        assert_true(row->error_m >= site->station[i].plan.error_m);
+    /* Plans of other methods have a row each. */
+    strcpy(site->station[1].plan.method, "other");
+    assert_int_equal(site_plan_rows(site, &err), SH_OK);
+    row = row_of("georef");
+    assert_int_equal(strncmp(row[0].why, "station 1 near: ", 16), 0);
+    assert_int_equal(strncmp(row[1].why, "station 2 far: ", 15), 0);
+    assert_string_equal(row[1].method, "other");
+    assert_string_equal(row[1].stage, "georef");
+    plan("profile: any-rate", STATION "output: {layout: geo}\n");
+    assert_null(strstr(row_of("georef")->why, "station"));
+    the_plan_fits_a_line();
+}
+
+/* Returns the setting of a second floor, which moves. */
+static const char *mover_setting(void)
+{
+    static char text[256];
+    const int n = (int)(strrchr(config_path, '/') - config_path);
+    snprintf(text, sizeof text,
+             "scene.meshes[1]={file: %.*s/floor.obj, up: z, scale: 1, move_m_s: [0, 0, 1], cycle_s: 1}", n,
+             config_path);
+    return text;
+}
+
+/* How far points may be from where their georeference is: within the scene and within the head's range, with a margin;
+ * those of movers, and of a head that others move, within the head's range alone. */
+static void georeferences_have_an_extent(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"scene.anchor={source: explicit, lat_deg: 48, lon_deg: 11, height_m: 500}",
+                                "output={layout: geo, crs: utm}", mover_setting()};
+    static const struct {
+        const char *head, *rest, *extent;
+    } rows[] = {
+        {"profile: any-rate, range_max_m: 100", STATION, " within 42.893 m, 2.05 m up or down"},
+        {"profile: any-rate, range_max_m: 100", "stations: [{position_m: [-10, 5, 1]}]\n",
+         " within 53.725 m, 1.04 m up or down"},
+        {"profile: any-rate, range_max_m: 100", STATION "noise: {range: on, sigma_m: 0.05}\n",
+         " within 43.558 m, 2.52 m up or down"},
+        {"profile: any-rate, range_max_m: 1.6", STATION, " within 1.616 m, 1.616 m up or down"},
+        {"profile: any-rate, range_max_m: 10", STATION "platform: {kind: live, reach_m: 5}\n",
+         " within 15.15 m, 2.05 m up or down"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        plan_with(rows[i].head, rows[i].rest, sets, 2);
+        const char *why = row_of("georef")->why, *extent = strstr(why, " within ");
+        if (extent == NULL || strcmp(extent, rows[i].extent) != 0) fail_msg("%zu: %s", i, why);
+    }
+    plan_with("profile: any-rate, range_max_m: 20", STATION, sets, 3);
+    assert_non_null(strstr(row_of("georef")->why, " within 20.2 m, 20.2 m up or down"));
+}
+
+static void a_tripod_has_a_row(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *stations, *method, *begins;
+    } rows[] = {
+        {"stations: [{position_m: [0, 0, 2], tripod: {leg_m: 2.5, legs: on}}]\n", "legs",
+         "legs of 2.5 m in view, top "},
+        {"stations: [{position_m: [0, 0, 2]}, {name: a, position_m: [3, 0, 2], tripod: {leg_m: 2.5}}]\n", "cone",
+         "legs of 2.5 m, top "},
+        {"stations: [{name: b, position_m: [0, 0, 2], tripod: {leg_m: 2.25}}, {position_m: [3, 0, 2], tripod: {leg_m: 2.5}}]\n",
+         "cone", "b: legs of 2.25 m, top "},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        plan("profile: any-rate", rows[i].stations);
+        const struct plan_row *row = row_of("tripod");
+        assert_non_null(row);
+        assert_string_equal(row->method, rows[i].method);
+        if (strncmp(row->why, rows[i].begins, strlen(rows[i].begins)) != 0) fail_msg("%s", row->why);
+    }
+}
+
+/* A pulse is cast into each body that moves, too; a recorded wave costs what its row says. */
+static void a_pulse_costs_all_that_it_meets(void **state)
+{
+    (void)state;
+    const char *const sets[] = {mover_setting(), "signal.model=on", "waveform.send=on"};
+    struct bvh_info bvh;
+    plan("profile: any-rate", STATION);
+    bvh_get_info(site->bvh, &bvh);
+    const double alone_ns = site_planned_ns(site);
+    plan_with("profile: any-rate", STATION, sets, 1);
+    assert_int_equal(site->n_movers, 1);
+    assert_true(fabs(site_planned_ns(site) - alone_ns - plan_pulse_ns(2, bvh.packet)) < 1e-6);
+    assert_true(site_wave_ns(site) == 0.0);
+    plan_with("profile: riegl-vz400i", STATION, sets + 1, 1);
+    const double plain_ns = site_planned_ns(site);
+    plan_with("profile: riegl-vz400i", STATION, sets + 1, 2);
+    const double wave_ns = row_of("waveform")->cost_ns;
+    assert_true(wave_ns > 0.0 && wave_ns == site_wave_ns(site));
+    assert_true(fabs(site_planned_ns(site) - plain_ns - wave_ns) < 1e-6);
+}
+
+static void a_slow_scan_has_a_likely_cause(void **state)
+{
+    (void)state;
+    static const struct {
+        enum beam_mode beam;
+        uint32_t depth, n_movers;
+        const char *says;
+    } rows[] = {
+        {BEAM_RINGS, 2, 1, "likely the sub-rays of footprints: beam.mode single has none"},
+        {BEAM_SINGLE, 1, 1, "likely glass and mirrors: optics.depth 0 leaves them out"},
+        {BEAM_SINGLE, 0, 1, "likely the 1 meshes that move, which are cast by themselves"},
+        {BEAM_SINGLE, 0, 0, "likely many triangles that lie over one another as seen from the head"},
+    };
+    struct site *one = calloc(1, sizeof *one);
+    assert_non_null(one);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[128];
+        one->plan.methods = (struct plan_methods){.beam = rows[i].beam, .depth = rows[i].depth};
+        one->n_movers = rows[i].n_movers;
+        site_cost_reason(one, text, sizeof text);
+        assert_string_equal(text, rows[i].says);
+    }
+    free(one);
+}
+
+static int tear_down(void **state)
+{
+    site_free(site);
+    return site_rig_teardown(state);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(programs_and_ranges_have_their_figures),
+        cmocka_unit_test(heads_without_a_pan_say_how_they_fire),
+        cmocka_unit_test(stations_share_a_row),
+        cmocka_unit_test(georeferences_have_an_extent),
+        cmocka_unit_test(a_tripod_has_a_row),
+        cmocka_unit_test(a_pulse_costs_all_that_it_meets),
+        cmocka_unit_test(a_slow_scan_has_a_likely_cause),
+    };
+    return cmocka_run_group_tests_name("rows of a plan", tests, site_rig_setup, tear_down);
+}
