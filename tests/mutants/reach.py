@@ -16,7 +16,7 @@ from build import LIBRARY, Build
 
 LONGEST_S = 900
 START_S = 0.02  # to start any test
-MARKS = "-fprofile-instr-generate -fcoverage-mapping"
+MARKS = "-fprofile-instr-generate -fcoverage-mapping -fcoverage-compilation-dir=."  # so that a copy of BUILD stays valid
 SETTINGS = f"WERROR= CC='ccache clang' CXX='ccache clang++' SAN='{MARKS}' OPT=-O0 CORE_OPT=-O1 CFLAGS='-g1 -w' CXXFLAGS='-g1 -w'"
 
 
@@ -114,7 +114,7 @@ class Reach:
         lines, code, name = {}, [], None
         for line in said.splitlines():
             if line.startswith("SF:"):
-                name = os.path.relpath(line[3:], self.tree.path)
+                name = os.path.relpath(os.path.join(self.tree.path, line[3:]), self.tree.path)
             elif line.startswith("DA:") and name.startswith(trees.PRODUCT):
                 number, count = line[3:].split(",")[:2]
                 code.append(f"{name}:{number}\n")
