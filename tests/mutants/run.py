@@ -63,6 +63,7 @@ class Judge:
             mutant["took_s"] = round(time.monotonic() - begin, 1)
         finally:
             shutil.rmtree(worker, ignore_errors=True)
+            self.tree.remove_strays()
             self.workers.put(worker)
         return mutant
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """This is the copy of the sources that mutants are tried in, with its processes. The copy itself is never changed."""
+import contextlib
 import fcntl
 import glob
 import os
@@ -126,6 +127,13 @@ class Tree:
             target = f"{self.path}/build/{folder}"
             if not os.path.lexists(target) and os.path.isdir(f"{build}/{folder}"):
                 os.symlink(f"{build}/{folder}", target)
+
+    def remove_strays(self):
+        """Removes what a test with a mutant has written into the top folder, such as a file named -; other tests would fail by it."""
+        for name in set(os.listdir(self.path)) - {part.split("/")[0] for part in PARTS} - {"build"}:
+            shutil.rmtree(f"{self.path}/{name}", ignore_errors=True)
+            with contextlib.suppress(FileNotFoundError):  # another worker was faster, or it was a folder
+                os.remove(f"{self.path}/{name}")
 
     # ---- what is in it
 
