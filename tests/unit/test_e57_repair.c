@@ -149,7 +149,7 @@ static void check_bounds(const char *xml)
 /* The file has exactly the first records of each scan, and as many scans. */
 static void check_file(const char *path, int scans, int packets)
 {
-    size_t n[MAX_SCANS] = {0}, at = 0;
+    size_t n[MAX_SCANS] = {0};
     for (int i = 0; i < packets; i++)
         n[packet[i].scan] = packet[i].n;
     e57rig_read(path);
@@ -161,10 +161,8 @@ static void check_file(const char *path, int scans, int packets)
         assert_int_equal(e57rig_n_records, n[k]);
         assert_memory_equal(e57rig_record, truth + truth_from[k], n[k] * sizeof *truth);
         check_bounds(child);
-        at++;
     }
     assert_null(strstr(child + 1, "<vectorChild"));
-    assert_int_equal(at, scans);
 }
 
 static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
@@ -190,13 +188,25 @@ static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
     return 0;
 }
 
+/* Bytes at the end that are in no whole unit: neither zeros that fill the last page, nor the XML, which is renewed. */
+static size_t cut_of(const uint8_t *from, size_t len, int scans, int packets)
+{
+    const size_t there = len / PAGE * CONTENT, begin = scan_begin[scans - 1];
+    const size_t end = packets > 0 && packet[packets - 1].end > begin ? packet[packets - 1].end : begin;
+    size_t at = end;
+    while (at < there && *at_logical(from, at) == 0)
+        at++;
+    if (at == there) return len % PAGE;
+    return *at_logical(from, end) == '<' ? 0 : len - (size_t)(at_logical(from, end) - from);
+}
+
 /* If the same packets are left, the same file comes out, so it is read once. */
 static void check_cut(const char *path, const uint8_t *from, size_t len)
 {
     struct repair repair;
     struct sh_err err;
     int scans, packets;
-    size_t n = 0, now;
+    size_t n = 0, now, again_len;
     expect_of(len, &scans, &packets);
     killed_rig_write(path, from, len);
     int rc = killed_rig_repair(path, &repair, &err);
@@ -211,7 +221,7 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     assert_int_equal(repair.n_kept, n);
     assert_int_equal(repair.n_scans, scans);
     assert_int_equal(repair.was_whole, from == whole && len == whole_len);
-    assert_true(repair.cut_bytes <= len);
+    if (!repair.was_whole) assert_int_equal(repair.cut_bytes, cut_of(from, len, scans, packets));
     uint8_t *file = rig_read(path, &now);
     assert_int_equal(memmem(file, now, MISSING, sizeof MISSING - 1) == NULL, repair.was_whole);
     if (repair.was_whole) {
@@ -224,7 +234,6 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
         assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
         assert_int_equal(repair.was_whole, 1);
         assert_int_equal(repair.n_kept, n);
-        size_t again_len;
         uint8_t *again = rig_read(path, &again_len);
         assert_int_equal(again_len, now);
         assert_memory_equal(again, file, now);

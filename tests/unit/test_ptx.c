@@ -217,21 +217,29 @@ static void test_far(void **state)
     }
 }
 
-/* The padding of earlier files of the recording is gone. */
+/* The padding of earlier files of the recording is gone. In all there are 2^24 places, and 8 more for each shot: two
+ * shots in a grid of 18 lines leave 16 places. */
 static void test_shared_padding(void **state)
 {
     (void)state;
-    struct sh_err err = {0};
-    struct recorder_padding padding = {.n_places = 1 << 24};
-    for (int i = 0; i < 2; i++) {
-        put_shots(0, (const uint32_t[]){0, 40}, (const uint32_t[]){0, 0}, 2);
-        struct recorder_options options = {.padding = i == 0 ? NULL : &padding};
+    static const struct {
+        uint64_t places, shots; /* of earlier files */
+        uint32_t last_line;
+        int two;
+    } rows[] = {{0, 0, 40, 0},       {1 << 24, 0, 40, 1}, {1 << 24, 0, 18, 1},       {1 << 24, 0, 17, 0},
+                {1 << 24, 3, 42, 1}, {1 << 24, 3, 41, 0}, {(1 << 24) - 5, 0, 23, 1}, {(1 << 24) - 5, 0, 22, 0}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct sh_err err = {0};
+        struct recorder_padding padding = {.n_places = rows[i].places, .n_shots = rows[i].shots};
+        put_shots(0, (const uint32_t[]){0, rows[i].last_line}, (const uint32_t[]){0, 0}, 2);
+        const struct recorder_options options = {.padding = i == 0 ? NULL : &padding};
         assert_int_equal(rig_record(rig_path("a.ptx"), options, RIG_KEEP, &err), SH_OK);
-        assert_int_equal(strstr(rig_notes, "1 additional grids begun within a scan") != NULL, i);
+        assert_int_equal(strstr(rig_notes, "1 additional grids begun within a scan") != NULL, rows[i].two);
         unlink(rig_path("a.ptx"));
+        if (i == 0) continue; /* its padding is its own */
+        assert_int_equal(padding.n_shots, rows[i].shots + 2);
+        assert_int_equal(padding.n_places, rows[i].places + (rows[i].two ? 0 : rows[i].last_line - 1));
     }
-    assert_int_equal(padding.n_shots, 2);
-    assert_int_equal(padding.n_places, 1 << 24);
 }
 
 /* Each shot of a line comes to its own place, also in a line that the recorder writes in several pieces. */
