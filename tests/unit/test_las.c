@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* LAS files, field by field at the offsets of the ASPRS specification (LAS 1.4 R15). */
+#include "drivers/record/las_inside.h"
 #include "tests/unit/recorder_rig.h"
 
 enum { HEADER = 375, VLR = 54, POINT = 32 };
@@ -310,6 +311,39 @@ static void test_colour(void **state)
     assert_true(rgb[0] != rgb[1] || rgb[1] != rgb[2]); /* a hue */
 }
 
+/* LAS 1.2 counts points in 32 bits, LAS 1.4 in 64. The stream has 9 points. */
+static void test_most_points(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
+    rig_begin();
+    put_scan(1, 1, &a);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    for (int minor = 2; minor <= 4; minor += 2)
+        for (uint64_t room = 3; room <= 4; room++) {
+            struct scanhead *sh;
+            struct scanhead_frame frame;
+            struct recorder *rec;
+            struct sh_err err = {0};
+            const struct recorder_options options = {.las_minor = minor};
+            const char *path = rig_path("a.las");
+            int rc = SH_OK;
+            assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+            assert_int_equal(recorder_open(recorder_find(path, &err), path, &options, &rec, &err), 0);
+            struct las_facts *facts = &((struct las *)rec)->facts;
+            facts->n_points = UINT32_MAX - room;
+            while (rc == SH_OK && scanhead_next(sh, &frame, -1) == 0)
+                rc = recorder_frame(rec, sh, &frame, &err);
+            assert_int_equal(rc, minor == 2 && room == 3 ? SH_EFORMAT : SH_OK);
+            assert_true(facts->n_points == UINT32_MAX - room + (rc == SH_OK ? 4 : 3));
+            if (rc != SH_OK)
+                assert_non_null(strstr(err.text, "LAS 1.2 holds up to 4294967295 points; use --las-version 1.4"));
+            recorder_close(rec, 0, NULL);
+            scanhead_close(sh);
+        }
+}
+
 static int tear_down(void **state)
 {
     free(las);
@@ -319,9 +353,10 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_header), cmocka_unit_test(test_records),   cmocka_unit_test(test_stations),
-        cmocka_unit_test(test_polar),  cmocka_unit_test(test_no_points), cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_long),   cmocka_unit_test(test_las_12),    cmocka_unit_test(test_colour),
+        cmocka_unit_test(test_header),      cmocka_unit_test(test_records),   cmocka_unit_test(test_stations),
+        cmocka_unit_test(test_polar),       cmocka_unit_test(test_no_points), cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_long),        cmocka_unit_test(test_las_12),    cmocka_unit_test(test_colour),
+        cmocka_unit_test(test_most_points),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

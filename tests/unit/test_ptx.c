@@ -86,6 +86,28 @@ static void test_grid(void **state)
     assert_non_null(strstr(rig_notes, "7 places of the grid without a shot")); /* 16 places, 9 shots */
 }
 
+/* A stream that is joined within a shot, after its first echo: the later ones have no place, and begin no grid. */
+static void test_begins_with_later_echoes(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    const struct rig_point second = {0, 0, 1000, 0, 0, 2, 3}, third = {0, 0, 2000, 0, 0, 3, 3},
+                           next = {0, 0, 3000, 0, 0, 1, 1};
+    memcpy(a.anchor, a.station_m, sizeof a.anchor);
+    for (int n = 2; n <= 3; n++) { /* 2: the frame has nothing else */
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        rig_points(5, 0, 4, (struct rig_point[]){second, third, next}, (uint32_t)n);
+        if (n == 2) rig_points(5, 0, 6, &next, 1);
+        record_text("a.ptx");
+        expect_head(1, 1, "10.000000000 20.000000000 30.000000000");
+        expect_line("0.000000 0.000000 3.000000 1.000000");
+        assert_int_equal(*at, 0);
+        assert_non_null(strstr(rig_notes, "2 echoes left out"));
+    }
+}
+
 static void test_scans(void **state)
 {
     (void)state;
@@ -334,9 +356,16 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_grid),           cmocka_unit_test(test_scans),     cmocka_unit_test(test_polar),
-        cmocka_unit_test(test_poses),          cmocka_unit_test(test_far),       cmocka_unit_test(test_stop),
-        cmocka_unit_test(test_shared_padding), cmocka_unit_test(test_disk_full), cmocka_unit_test(test_long_line),
+        cmocka_unit_test(test_begins_with_later_echoes),
+        cmocka_unit_test(test_grid),
+        cmocka_unit_test(test_scans),
+        cmocka_unit_test(test_polar),
+        cmocka_unit_test(test_poses),
+        cmocka_unit_test(test_far),
+        cmocka_unit_test(test_stop),
+        cmocka_unit_test(test_shared_padding),
+        cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_long_line),
         cmocka_unit_test(test_huge),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
