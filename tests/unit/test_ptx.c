@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* PTX grids, line by line, and the files of true poses. */
+#include "drivers/record/ptx_grid.h"
 #include "tests/unit/recorder_rig.h"
 
 static char *text, *at;
@@ -264,6 +265,30 @@ static void test_shared_padding(void **state)
     }
 }
 
+/* FILE.grid is what a repair needs of a grid that is not in FILE.part yet. It goes where there is no such grid, or no
+ * FILE.part. */
+static void test_grid_stays_for_a_repair(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        const int is_empty = i & 1, has_part = i >> 1;
+        struct sh_err err = {0};
+        struct ptx_grid grid;
+        struct station_pose pose = {0};
+        char path[128], part[140], spool[140];
+        snprintf(path, sizeof path, "%s", rig_path("b.ptx"));
+        snprintf(part, sizeof part, "%s.part", path);
+        snprintf(spool, sizeof spool, "%s.grid", path);
+        assert_int_equal(ptx_grid_open(&grid, path, &err), SH_OK);
+        if (!is_empty) assert_int_equal(ptx_grid_begin(&grid, 0, &pose, 0, &err), SH_OK);
+        if (has_part) fclose(fopen(part, "w"));
+        ptx_grid_close(&grid);
+        assert_int_equal(access(spool, F_OK) == 0, !is_empty && has_part);
+        unlink(part);
+        unlink(spool);
+    }
+}
+
 /* Each shot of a line comes to its own place, also in a line that the recorder writes in several pieces. */
 static void test_long_line(void **state)
 {
@@ -364,6 +389,7 @@ int main(void)
         cmocka_unit_test(test_far),
         cmocka_unit_test(test_stop),
         cmocka_unit_test(test_shared_padding),
+        cmocka_unit_test(test_grid_stays_for_a_repair),
         cmocka_unit_test(test_disk_full),
         cmocka_unit_test(test_long_line),
         cmocka_unit_test(test_huge),
