@@ -394,6 +394,36 @@ static void test_sent_in_pieces(void **state)
     }
 }
 
+static int silent_error;
+
+static ssize_t silent_read(struct host_source *source, void *to, size_t len)
+{
+    (void)source, (void)to, (void)len;
+    errno = silent_error;
+    return -1;
+}
+
+/* The errors say which command, how long, and what the system says. */
+static void test_no_reply(void **state)
+{
+    (void)state;
+    static const struct host_source_ops ops = {
+        .read = silent_read, .write = write_all, .wait = scripted_wait, .close = close_nothing};
+    static const struct {
+        int error, rc;
+        const char *text;
+    } rows[] = {{EAGAIN, SCANHEAD_ETIMEOUT, "tcp:test:1: no reply to 'TIME?' within 7 ms"},
+                {EINVAL, SCANHEAD_EIO, "tcp:test:1: cannot read: Invalid argument"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct scanhead *sh = host_open(&(struct host_source){.ops = &ops, .fd = -1, .name = "tcp:test:1"});
+        char reply[8];
+        silent_error = rows[i].error;
+        assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 7), rows[i].rc);
+        assert_string_equal(scanhead_error(sh), rows[i].text);
+        scanhead_close(sh);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -405,6 +435,7 @@ int main(void)
         cmocka_unit_test(test_tcp6),
         cmocka_unit_test(test_signal),
         cmocka_unit_test(test_sent_in_pieces),
+        cmocka_unit_test(test_no_reply),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

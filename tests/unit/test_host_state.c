@@ -2,6 +2,7 @@
 /* libscanhead: what it says of the head, field by field, after frames whose fields all differ. */
 #include <math.h>
 
+#include "core/bytes.h"
 #include "tests/unit/host_rig.h"
 
 static int head;
@@ -255,11 +256,85 @@ static void test_gps(void **state)
     scanhead_close(sh);
 }
 
+/* A frame whose sums are right, and whose payload is shorter than the tables of the protocol's pages, is refused. */
+static void test_short_payloads(void **state)
+{
+    (void)state;
+    static const struct {
+        int type;
+        uint32_t least; /* bytes, with no record; 0: any payload is right for this library */
+        const char *what;
+    } rows[] = {
+        {NATIVE_DESCRIPTOR, 272, "a wrong descriptor"},
+        {NATIVE_ANCHOR, 280, "a wrong anchor"},
+        {NATIVE_POINTS, 40, "wrong points"},
+        {NATIVE_EVENT, 128, "a wrong event"},
+        {NATIVE_SURFACES, 8, "wrong surface names"},
+        {NATIVE_POSES, 8 + 2 * 80, "wrong poses"},
+        {NATIVE_ATTRIBUTES, 16, "wrong attributes"},
+        {NATIVE_EMITTER, 64, "a wrong emitter"},
+        {NATIVE_COLOURS, 16, "wrong colours"},
+        {NATIVE_WAVES, 32, "wrong waveforms"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct scanhead *sh = open_pair(&head);
+        struct scanhead_frame f;
+        char want[200], source[100];
+        memset(out, 0, 1024);
+        out[0] = NATIVE_SYNC;
+        out[1] = (uint8_t)rows[i].type;
+        out[2] = NATIVE_VERSION;
+        le_put32(out + 4, rows[i].least - 1);
+        native_reseal(out, NATIVE_HEADER_LEN + rows[i].least - 1);
+        put_next(NATIVE_HEADER_LEN + rows[i].least - 1);
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_EFORMAT);
+        assert_int_equal(sscanf(scanhead_error(sh), "%99[^ ]", source), 1);
+        snprintf(want, sizeof want, "%s a frame with a good CRC holds %s", source, rows[i].what);
+        assert_string_equal(scanhead_error(sh), want);
+        close(head);
+        scanhead_close(sh);
+    }
+}
+
+/* Limits of a descriptor. In the polar layout the scales are positive, and a turn has a count at least. */
+static void test_descriptors(void **state)
+{
+    (void)state;
+    static const struct {
+        int geo;
+        double mirror, pan, scale_m;
+        uint32_t n_surfaces;
+        const char *what;
+    } rows[] = {
+        {0, 1, 1, 1e-4, 65535, NULL},
+        {0, 0.99, 1, 1e-4, 1, "a polar descriptor without scales"},
+        {0, 1, 0.99, 1e-4, 1, "a polar descriptor without scales"},
+        {0, 1, 1, 0, 1, "a polar descriptor without scales"},
+        {1, 0, 0, 0, 1, NULL},
+        {0, 1, 1, 1e-4, 65536, "a descriptor with more surfaces than labels"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct scanhead *sh = open_pair(&head);
+        struct scanhead_frame f;
+        struct native_descriptor d = make_descriptor(rows[i].geo, 1);
+        d.mirror_counts_per_turn = rows[i].mirror;
+        d.pan_counts_per_turn = rows[i].pan;
+        d.range_scale_m = rows[i].scale_m;
+        d.n_surfaces = rows[i].n_surfaces;
+        put_next(native_encode_descriptor(out, sizeof out, &d, 1, 0));
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), rows[i].what == NULL ? SCANHEAD_OK : SCANHEAD_EFORMAT);
+        if (rows[i].what != NULL) assert_non_null(strstr(scanhead_error(sh), rows[i].what));
+        close(head);
+        scanhead_close(sh);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_info),   cmocka_unit_test(test_emitter),     cmocka_unit_test(test_rings),
-        cmocka_unit_test(test_losses), cmocka_unit_test(test_anchor_ends), cmocka_unit_test(test_gps),
+        cmocka_unit_test(test_info),           cmocka_unit_test(test_emitter),     cmocka_unit_test(test_rings),
+        cmocka_unit_test(test_losses),         cmocka_unit_test(test_anchor_ends), cmocka_unit_test(test_gps),
+        cmocka_unit_test(test_short_payloads), cmocka_unit_test(test_descriptors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
