@@ -74,6 +74,28 @@ static void test_kinds(void **state)
     las_waves_close(&waves);
 }
 
+/* 255 kinds have a number. What has none is left out, and counted; kinds that are there go on. */
+static void test_kindless(void **state)
+{
+    (void)state;
+    static const uint8_t sample[2] = {1, 0};
+    struct scanhead_wave wave = {.n = 1, .sample = sample, .bits = 12, .count_signal = 1};
+    struct las_waves waves = {.n_kinds = 0};
+    struct las_packet packet;
+    struct sh_err err = {0};
+    int is_new;
+    assert_int_equal(las_waves_open(&waves, rig_path("a.las"), &err), 0);
+    for (uint32_t i = 1; i <= 258; i++) {
+        wave.sample_ps = i != 258 ? i : 255; /* each time between samples is another kind */
+        wave.pulse = i;
+        assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+        assert_int_equal(packet.kind, i <= 255 ? i : i == 258 ? 255 : 0);
+        assert_int_equal(is_new, i <= 255);
+        assert_int_equal(waves.n_kindless, i <= 255 ? 0 : i == 256 ? 1 : 2);
+    }
+    las_waves_close(&waves);
+}
+
 /* What fills a packet up is the count without light, rounded; it is a count that the bits can have. */
 static void test_fill(void **state)
 {
@@ -114,6 +136,6 @@ static void test_fill(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_large), cmocka_unit_test(test_kinds),
-                                       cmocka_unit_test(test_fill)};
+                                       cmocka_unit_test(test_kindless), cmocka_unit_test(test_fill)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -74,6 +74,20 @@ static void test_lengths(void **state)
     assert_int_equal(NATIVE_MAX_TEXT, 512); /* COMMANDS.md: a reply line with its CR LF */
 }
 
+/* How far back the client library looks (LOSSES.md), and the notices that its header numbers. */
+static void test_sequence(void **state)
+{
+    (void)state;
+    assert_true(NATIVE_SEEN == 256 && NATIVE_GAPS == 64 && NATIVE_GAP_MOST == 65536 && NATIVE_LATE_RUN == 256);
+    assert_int_equal(SCANHEAD_NOTICE_GAP, NATIVE_GAP);
+    assert_int_equal(SCANHEAD_NOTICE_REPEATED, NATIVE_REPEATED);
+    assert_int_equal(SCANHEAD_NOTICE_LATE, NATIVE_LATE);
+    assert_int_equal(SCANHEAD_NOTICE_RESTARTED, NATIVE_RESTARTED);
+    assert_int_equal(SCANHEAD_NOTICE_BAD_PAYLOAD, NATIVE_BAD_PAYLOAD);
+    assert_int_equal(SCANHEAD_NOTICE_BAD_BYTES, NATIVE_BAD_BYTES);
+    assert_int_equal(SCANHEAD_NOTICE_CUT, NATIVE_CUT);
+}
+
 /* Values of fields, and bits. */
 static void test_values(void **state)
 {
@@ -108,10 +122,8 @@ static void test_values(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_frames),
-        cmocka_unit_test(test_events),
-        cmocka_unit_test(test_lengths),
-        cmocka_unit_test(test_values),
+        cmocka_unit_test(test_frames),   cmocka_unit_test(test_events), cmocka_unit_test(test_lengths),
+        cmocka_unit_test(test_sequence), cmocka_unit_test(test_values),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -122,8 +122,18 @@ static void planar_heads(void **state)
     }
 }
 
+/* Bytes of the longest unit, as COLA.md, SCIP.md and Velodyne's manual have them. */
+static void longest_units(void **state)
+{
+    (void)state;
+    assert_int_equal(protocol_ops_get(PROTOCOL_SCIP)->max_unit, 59483);
+    assert_int_equal(protocol_ops_get(PROTOCOL_VELODYNE)->max_unit, 1206);
+    assert_int_equal(protocol_ops_get(PROTOCOL_VELODYNE)->n_beams, 16);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(heads_of_velodyne), cmocka_unit_test(planar_heads)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(heads_of_velodyne), cmocka_unit_test(planar_heads),
+                                       cmocka_unit_test(longest_units)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
