@@ -244,6 +244,7 @@ static void test_frame(void **state)
     assert_int_equal(rig_record(path, options, 1, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "points have no frame scalar"));
     unlink(path);
+    free(rig_record_bytes("a.poses.csv", options, NULL)); /* a file without colours needs none */
 }
 
 /* A file holds one kind, unless its colours are computed here. */
