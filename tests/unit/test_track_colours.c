@@ -247,6 +247,37 @@ static void test_frame(void **state)
     free(rig_record_bytes("a.poses.csv", options, NULL)); /* a file without colours needs none */
 }
 
+/* Of a head that moves each point has its own frame scalar and place, whether points wait for colours or not. The scalar
+ * rises by 1 a millisecond, and the head by 1 m; points k are k ms apart, with a range of 1 + k metres along y, which
+ * rises by 9 degrees each. */
+static void test_frames_of_points(void **state)
+{
+    (void)state;
+    const struct native_pose pose[2] = {
+        {.quat = {1, 0, 0, 0}, .frame = 100},
+        {.t_ns = 1000000000, .position_m = {0, 0, 1000}, .quat = {1, 0, 0, 0}, .frame = 1100}};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    a.moving = NATIVE_MOVING;
+    for (unsigned content = 0; content <= (COLOURS | ATTRIBUTES); content++) {
+        rig_begin();
+        put_head(1, content, &a);
+        put(native_encode_poses(out, sizeof out, pose, 2, 0, 0), 0);
+        put_points(0, 0, content, 0);
+        const struct recorder_options options = {.ascii = 1, .columns = PLY_XYZ | PLY_FRAME};
+        char *text = rig_record_bytes("a.ply", options, NULL), *at = body_of(text);
+        for (int k = 0; k < SHOTS; k++) {
+            if (k == 3) continue;
+            const double angle = 9.0 * k * M_PI / 180.0;
+            double x, y, z, frame;
+            assert_int_equal(sscanf(at, "%lf %lf %lf %lf", &x, &y, &z, &frame), 4);
+            assert_true(fabs(frame - (100 + k)) < 1e-9);
+            assert_true(fabs(y - (1.0 + k) * cos(angle)) < 1e-6 && fabs(z - (k + (1.0 + k) * sin(angle))) < 1e-6);
+            at = strchr(at, '\n') + 1;
+        }
+        free(text);
+    }
+}
+
 /* A file holds one kind, unless its colours are computed here. */
 static void test_kinds(void **state)
 {
@@ -309,9 +340,11 @@ static void test_library(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_as_sent), cmocka_unit_test(test_another_choice), cmocka_unit_test(test_formats),
-        cmocka_unit_test(test_range),   cmocka_unit_test(test_height),         cmocka_unit_test(test_frame),
-        cmocka_unit_test(test_kinds),   cmocka_unit_test(test_library),
+        cmocka_unit_test(test_as_sent),          cmocka_unit_test(test_another_choice),
+        cmocka_unit_test(test_formats),          cmocka_unit_test(test_range),
+        cmocka_unit_test(test_height),           cmocka_unit_test(test_frame),
+        cmocka_unit_test(test_frames_of_points), cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_library),
     };
     return cmocka_run_group_tests_name("track_colours", tests, rig_set_up, rig_tear_down);
 }
