@@ -247,31 +247,50 @@ static void test_frame(void **state)
     free(rig_record_bytes("a.poses.csv", options, NULL)); /* a file without colours needs none */
 }
 
-/* Of a head that moves each point has its own frame scalar and place, whether points wait for colours or not. The scalar
- * rises by 1 a millisecond, and the head by 1 m; points k are k ms apart, with a range of 1 + k metres along y, which
- * rises by 9 degrees each. */
+/* Of a head that moves each point has its own frame scalar and place, also where more than a batch of points waits for
+ * colours. The scalar rises by 1 a millisecond, and the head by 1 m; points are 0.05 ms apart, at 1 m along y. */
 static void test_frames_of_points(void **state)
 {
     (void)state;
+    enum { N = 300 };
+    static uint32_t range[N], zero[N], dt[N];
+    static int16_t refl[N], amplitude[N];
+    static uint16_t label[N], width[N];
+    static uint8_t echo[N], rgb[N][3];
     const struct native_pose pose[2] = {
         {.quat = {1, 0, 0, 0}, .frame = 100},
         {.t_ns = 1000000000, .position_m = {0, 0, 1000}, .quat = {1, 0, 0, 0}, .frame = 1100}};
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
     a.moving = NATIVE_MOVING;
+    for (uint32_t i = 0; i < N; i++) {
+        range[i] = 1000;
+        echo[i] = 0x11;
+        dt[i] = 50000 * i;
+    }
     for (unsigned content = 0; content <= (COLOURS | ATTRIBUTES); content++) {
+        const struct line_block block = {.n_pulses = N,
+                                         .n_points = N,
+                                         .dt_ns = dt,
+                                         .a = range,
+                                         .b = zero,
+                                         .c = zero,
+                                         .refl_cdb = refl,
+                                         .echo = echo,
+                                         .label = label,
+                                         .amplitude_cdb = content & ATTRIBUTES ? amplitude : NULL,
+                                         .width_cns = content & ATTRIBUTES ? width : NULL,
+                                         .rgb = content & COLOURS ? rgb : NULL};
         rig_begin();
         put_head(1, content, &a);
         put(native_encode_poses(out, sizeof out, pose, 2, 0, 0), 0);
-        put_points(0, 0, content, 0);
+        put(native_encode_points(out, sizeof out, &block, 0), 0);
         const struct recorder_options options = {.ascii = 1, .columns = PLY_XYZ | PLY_FRAME};
         char *text = rig_record_bytes("a.ply", options, NULL), *at = body_of(text);
-        for (int k = 0; k < SHOTS; k++) {
-            if (k == 3) continue;
-            const double angle = 9.0 * k * M_PI / 180.0;
+        for (int k = 0; k < N; k++) {
             double x, y, z, frame;
             assert_int_equal(sscanf(at, "%lf %lf %lf %lf", &x, &y, &z, &frame), 4);
-            assert_true(fabs(frame - (100 + k)) < 1e-9);
-            assert_true(fabs(y - (1.0 + k) * cos(angle)) < 1e-6 && fabs(z - (k + (1.0 + k) * sin(angle))) < 1e-6);
+            assert_true(fabs(frame - (100 + 0.05 * k)) < 1e-9);
+            assert_true(fabs(x) < 1e-6 && fabs(y - 1) < 1e-6 && fabs(z - 0.05 * k) < 1e-6);
             at = strchr(at, '\n') + 1;
         }
         free(text);
