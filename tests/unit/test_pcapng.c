@@ -204,6 +204,23 @@ static void test_limits(void **state)
     assert_null(why_not(many, len));
     len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
     assert_non_null(strstr(why_not(many, len), "more than 64 interfaces"));
+    /* Another section numbers its interfaces from 0 again. */
+    len = pcapng_put_section(many, NULL);
+    len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
+    len += pcapng_put_section(many + len, NULL);
+    const size_t second = len;
+    len += pcapng_put_packet(many + len, 0, 1, "abcde", 5, 0);
+    assert_non_null(strstr(why_not(many, len), "a packet of an interface that is not described"));
+    len = second + pcapng_put_interface(many + second, PCAPNG_ETHERNET, 0, NULL, NULL);
+    len += pcapng_put_packet(many + len, 0, 1, "abcde", 5, 0);
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    struct sh_err err;
+    size_t used, n_packets = 0;
+    for (size_t at = 0; at < len; at += used)
+        n_packets += pcapng_read(&reader, many + at, len - at, &packet, &used, &err) == PCAPNG_PACKET;
+    assert_int_equal(n_packets, 1);
+    assert_int_equal(packet.link, PCAPNG_ETHERNET);
 }
 
 /* Blocks and options by the numbers of draft-ietf-opsawg-pcapng: if_name 2, if_tsresol 9, opt_comment 1, and
