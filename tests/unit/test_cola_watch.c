@@ -215,14 +215,10 @@ int main(void)
 {
 #define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
-        CASE(inputs_choose_the_set),
-        CASE(a_soiled_window_shows),
-        CASE(an_object_must_stay),
-        CASE(a_field_ends_at_a_kilometre),
-        CASE(small_objects_are_blanked),
-        CASE(an_lms_looks_at_the_echo_that_is_chosen),
-        CASE(a_rectangle_has_a_record),
-        CASE(a_polygon_has_a_record),
+        CASE(inputs_choose_the_set),     CASE(a_soiled_window_shows),
+        CASE(an_object_must_stay),       CASE(a_field_ends_at_a_kilometre),
+        CASE(small_objects_are_blanked), CASE(an_lms_looks_at_the_echo_that_is_chosen),
+        CASE(a_rectangle_has_a_record),  CASE(a_polygon_has_a_record),
     };
     return cmocka_run_group_tests_name("cola watch", tests, NULL, NULL);
 }

@@ -121,8 +121,8 @@ static void test_longest(void **state)
         http_send(text);
         assert_int_equal(http_status(), more ? 431 : 200);
         http_renew();
-        snprintf(text, sizeof text, "POST /cgi/none HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n%0*d",
-                 1024 + more, 1024 + more, 0);
+        snprintf(text, sizeof text, "POST /cgi/none HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n%0*d", 1024 + more,
+                 1024 + more, 0);
         http_send(text);
         assert_int_equal(http_status(), more ? 413 : 404);
     }

@@ -322,8 +322,8 @@ static void a_reboot_begins_anew(void **state)
 {
     (void)state;
     static const struct protocol_rig_reply recorded[] = {{"HEAD:REBOOT", "ERR", -221}, {NULL, NULL, 0}};
-    static const char *const states[] = {
-        "SS500000\n", "TM0\n", "%SL\n", "DB02\n", "BM\nGD0000108001\n", "MD0000108000000\n"};
+    static const char *const states[] = {"SS500000\n",       "TM0\n", "%SL\n", "DB02\n", "BM\nGD0000108001\n",
+                                         "MD0000108000000\n"};
     for (size_t i = 0; i < sizeof states / sizeof *states; i++) {
         scip_open("mine");
         rig.replies = recorded;
