@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What libscanhead says where it refuses something: the whole line, with what, where and what is allowed. */
+/* Messages of libscanhead are compared whole: what is refused, where, and what is allowed. */
 #include <fcntl.h>
 #include <sys/stat.h>
 

@@ -74,7 +74,7 @@ static void test_kinds(void **state)
     las_waves_close(&waves);
 }
 
-/* 255 kinds have a number. What has none is left out, and counted; kinds that are there go on. */
+/* 255 kinds have a number. A waveform without one is left out, and counted; kinds that are there go on. */
 static void test_kindless(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void test_kindless(void **state)
     las_waves_close(&waves);
 }
 
-/* What fills a packet up is the count without light, rounded; it is a count that the bits can have. */
+/* A packet is filled up with the count without light, rounded; it is a count that the bits can have. */
 static void test_fill(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a head makes of a mesh's grid: whether its rows and its lines close into a turn, and which lines are poles. */
+/* The grid of a mesh by the kind of head: do its rows and lines close into a turn, and which lines are poles? */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What recorders and repairs say where they refuse a stream or a file: the whole line, with its numbers. */
+/* Messages of recorders and repairs are compared whole, with their numbers. */
 #include "drivers/record/outfile.h"
 #include "drivers/record/repair.h"
 #include "tests/unit/recorder_rig.h"

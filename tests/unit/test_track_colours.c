@@ -247,7 +247,7 @@ static void test_frame(void **state)
     free(rig_record_bytes("a.poses.csv", options, NULL)); /* a file without colours needs none */
 }
 
-/* Of a head that moves each point has its own frame scalar and place, also where more than a batch of points waits for
+/* If a head moves, each point has its own frame scalar and place, also where more than a batch of points waits for
  * colours. The scalar rises by 1 a millisecond, and the head by 1 m; points are 0.05 ms apart, at 1 m along y. */
 static void test_frames_of_points(void **state)
 {
