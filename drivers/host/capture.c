@@ -93,10 +93,7 @@ static void capture_close(struct host_source *source)
 
 static int capture_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
 {
-    const struct host_capture *c = source->capture;
-    if (c->data_len == 0 && c->start == c->end) return host_fd_ops.wait(source, events, deadline_ns, revents);
-    *revents = events;
-    return 1;
+    return host_fd_ops.wait(source, events, deadline_ns, revents); /* a file can always be read */
 }
 
 static const struct host_source_ops capture_ops = {.read = capture_read, .wait = capture_wait, .close = capture_close};

@@ -284,14 +284,19 @@ static void usb_free(struct host_usb *usb)
     free(usb);
 }
 
-static void usb_close(struct host_source *source)
+/* Undoes usb_transfers_begin and submit_all. */
+static void usb_end(struct host_usb *usb)
 {
-    struct host_usb *usb = source->usb;
     session(usb, 0);
     cancel_write(usb);
     cancel_reads(usb);
     libusb_release_interface(usb->head.handle, usb->head.interface.number);
-    usb_free(usb);
+}
+
+static void usb_close(struct host_source *source)
+{
+    usb_end(source->usb);
+    usb_free(source->usb);
 }
 
 static const struct host_source_ops usb_ops = {
@@ -333,10 +338,10 @@ static int usb_transfers_begin(struct host_usb *usb, const char *name, struct sh
     if (rc == LIBUSB_ERROR_NO_DEVICE) return sh_fail(err, SH_ELOST, "%s: unplugged while it was opened", name);
     if (rc != 0) return sh_fail(err, SH_EIO, "%s: cannot claim the interface: %s", name, libusb_strerror(rc));
     rc = session(usb, 1);
-    if (rc < 0)
-        return sh_fail(err, rc == LIBUSB_ERROR_NO_DEVICE ? SH_ELOST : SH_EIO,
-                       "%s: the head does not open the stream: %s", name, libusb_strerror(rc));
-    return SH_OK;
+    if (rc >= 0) return SH_OK;
+    libusb_release_interface(usb->head.handle, usb->head.interface.number);
+    return sh_fail(err, rc == LIBUSB_ERROR_NO_DEVICE ? SH_ELOST : SH_EIO, "%s: the head does not open the stream: %s",
+                   name, libusb_strerror(rc));
 }
 
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err)
@@ -352,10 +357,7 @@ int host_usb_open(const char *source, struct host_source *out, struct sh_err *er
     if (rc == SH_OK) snprintf(out->name, sizeof out->name, "%s", usb->head.name);
     if (rc == SH_OK) rc = make_transfers(usb, err);
     if (rc == SH_OK) rc = usb_transfers_begin(usb, out->name, err);
-    if (rc == SH_OK && (rc = submit_all(usb, out->name, err)) != SH_OK) {
-        session(usb, 0);
-        cancel_reads(usb);
-    }
+    if (rc == SH_OK && (rc = submit_all(usb, out->name, err)) != SH_OK) usb_end(usb);
     if (rc != SH_OK) {
         usb_free(usb);
         return rc;

@@ -241,8 +241,7 @@ void scip_scans_came(struct scip *s, struct planar_news news)
     const int streams = s->stream.active, waits = s->single.active;
     if ((streams || waits) && news.broken != 0) {
         s->host.count(s->host.ctx, PROTOCOL_UNITS_LOST, news.broken);
-        const uint32_t left_out = s->stream.skip - s->stream.skipped;
-        s->stream.skipped += news.broken < left_out ? news.broken : left_out;
+        s->stream.skipped += news.broken;
     }
     if (!news.whole) return;
     if (waits && s->scan.whole->t0_ns >= s->single.after_ns) {

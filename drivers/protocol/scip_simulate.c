@@ -37,7 +37,6 @@ const char *scip_simulated(struct scip *s)
     if (play->mode < 3 || (s->stream.count != 0 && s->stream.count <= LONG_STREAM)) return NULL;
     if (s->stream.sent < PHASE_SCANS) return NULL;
     if (play->mode != 5 && play->n_waiting < PHASE_SCANS) return play->n_waiting++ == 0 ? "21" : "";
-    play->n_waiting = 0;
     if (play->mode == 3) {
         play->mode = 0;
         return "98";

@@ -94,7 +94,7 @@ static void take_descriptor(struct velodyne *v, const uint8_t *payload, size_t l
     if (d.scan != v->scan) fall_out_of_step(v);
     v->scan = d.scan;
     v->range_units_per_count = d.range_scale_m / 0.002;
-    v->azimuth_per_count = 36000.0 / (d.pan_counts_per_turn > 0.0 ? d.pan_counts_per_turn : 4294967296.0);
+    v->azimuth_per_count = 36000.0 / fmax(d.pan_counts_per_turn, 1.0); /* in the polar layout it is 1 at least */
 }
 
 /* Finds the model by the elevations of the beams in the order of firing, as packets have it. 0: none has them. */

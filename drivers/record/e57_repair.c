@@ -148,7 +148,7 @@ static int look_behind(struct left *l, struct sh_err *err)
     const uint64_t n = l->n_pages * E57_PAGE_CONTENT - l->end, len = l->repair->len;
     const int rc = n > 0 ? get(l, l->end, tail, n < sizeof tail ? (size_t)n : sizeof tail, err) : 1;
     if (rc <= 0) return rc;
-    const int is_zero = tail[0] == 0 && memcmp(tail, tail + 1, sizeof tail - 1) == 0;
+    const int is_zero = repair_is_zero(tail, sizeof tail);
     l->repair->cut_bytes = len - e57_physical(l->end);
     if (n == 0 || (is_zero && n < sizeof tail))
         l->repair->cut_bytes = len - l->n_pages * E57_PAGE;

@@ -37,10 +37,7 @@ int outfile_open(struct outfile *file, const char *path, struct sh_err *err)
         return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
     }
     int rc = newfile_part(file->path, file->part, &file->fd, err);
-    if (rc != 0) {
-        file->fd = -1;
-        outfile_leave(file);
-    }
+    if (rc != 0) outfile_leave(file);
     return rc;
 }
 

@@ -112,6 +112,20 @@ const struct nmea_fix protocol_rig_fix = {.talker = {'G', 'N'},
                                           .course_deg = 90.0,
                                           .sigma_m = {0.01, 0.01, 0.02}};
 
+static struct protocol_rig *opened; /* the last one */
+
+/* A session that does something sooner than its next_ns() said would never be woken for it. */
+static void checked_time(void *protocol, int64_t t_ns)
+{
+    struct protocol_rig *rig = opened;
+    const int64_t next_ns = rig->ops->next_ns(protocol);
+    const uint32_t n_units = rig->n_units, n_lines = rig->n_lines;
+    assert_ptr_equal(protocol, rig->protocol);
+    protocol_ops_get(rig->id)->time(protocol, t_ns);
+    if (next_ns > t_ns && t_ns >= rig->latest_ns) assert_true(rig->n_units == n_units && rig->n_lines == n_lines);
+    rig->latest_ns = t_ns; /* a replayed recording may begin anew, before that */
+}
+
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model)
 {
     struct sh_err err;
@@ -119,8 +133,12 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     rig->cap = 65536;
     rig->bytes = calloc(1, rig->cap + 1);
     assert_non_null(rig->bytes);
-    rig->ops = protocol_ops_get(id);
-    assert_non_null(rig->ops);
+    assert_non_null(protocol_ops_get(id));
+    rig->id = id;
+    rig->checked = *protocol_ops_get(id);
+    if (rig->checked.next_ns != NULL) rig->checked.time = checked_time;
+    rig->ops = &rig->checked;
+    opened = rig;
     rig->room = SIZE_MAX;
     rig->utc0_ns = INT64_MIN;
     rig->pps = PROTOCOL_PPS_LOCKED;

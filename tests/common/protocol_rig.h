@@ -11,8 +11,11 @@
 enum { RIG_UNITS = 4096, RIG_BYTES = 1 << 22, RIG_LINES = 256 };
 
 struct protocol_rig {
-    const struct protocol_ops *ops;
+    const struct protocol_ops *ops; /* &checked */
     void *protocol;
+    enum protocol_id id;
+    struct protocol_ops checked; /* the protocol's own, but time() asserts that next_ns() had foretold what it does */
+    int64_t latest_ns;           /* of time() */
     struct protocol_identity identity;
     struct protocol_spec spec;
     /* what it sent */

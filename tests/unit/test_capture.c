@@ -152,6 +152,32 @@ static void test_turns(void **state)
     client_close(&c);
 }
 
+/* Where nothing shows a request's end, the longest one of the capture that the bytes begin with is taken. A beginning of
+ * one waits for its rest. Other bytes are one unknown request. A request waits until the answer before it has begun. */
+static void test_requests_without_ends(void **state)
+{
+    (void)state;
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 10, 0, "\x01\x02");
+    made_say(&m, 11, 1, "one");
+    made_say(&m, 20, 0, "\x01\x02\x03");
+    made_say(&m, 21, 1, "two");
+    made_say(&m, 30, 0, "\x07\x08\x09");
+    made_say(&m, 31, 1, "three");
+    client_open(&c, &m, 0, NULL);
+    assert_string_equal(client_ask(&c, "\x07\x08", 3), "");
+    assert_int_equal(c.ops->next_ns(c.protocol), INT64_MAX); /* it waits for bytes, not for time */
+    assert_string_equal(client_ask(&c, "\x09", 3), "4:three|");
+    assert_string_equal(client_ask(&c, "\x01\x02\x07\x08\x09", 5), "7:one|9:three|");
+    assert_string_equal(client_ask(&c, "\x01\x02\x03\x01\x02", 5), "12:two|14:one|");
+    assert_int_equal(c.wrong, 0);
+    assert_string_equal(client_ask(&c, "\x01\x09\x01\x02", 5), "");
+    assert_int_equal(c.wrong, 1);
+    assert_string_equal(c.told, "the capture has no such request: 01 09 01 02 ");
+    client_close(&c);
+}
+
 /* Datagrams of two ports keep their times to each other. */
 static void test_datagrams(void **state)
 {
@@ -228,6 +254,7 @@ int main(void)
         cmocka_unit_test(test_segments_in_order),
         cmocka_unit_test(test_scip),
         cmocka_unit_test(test_turns),
+        cmocka_unit_test(test_requests_without_ends),
         cmocka_unit_test(test_datagrams),
         cmocka_unit_test(test_asked_datagrams),
         cmocka_unit_test(test_hostile),

@@ -83,6 +83,26 @@ static void an_object_must_stay(void **state)
     fields_expect("200");
 }
 
+/* A field without an outer edge ends at 1000 m (cola_watch.h). */
+static void a_field_ends_at_a_kilometre(void **state)
+{
+    (void)state;
+    memset(&fields, 0, sizeof fields);
+    fields.field[0].shape = (struct cola_shape){
+        .kind = COLA_SHAPE_SECTOR, .sector = {.span_e4 = COLA_TURN_E4, .inner_um = 0, .outer_um = INT32_MAX}};
+    cola_open_tim("TiM781");
+    fields_open(&fields);
+    static const struct {
+        double range_m;
+        const char *results;
+    } rows[] = {{999.0, "200"}, {1001.0, "100"}, {1000.0, "200"}, {1000.001, "100"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        fields_wall(rows[i].range_m);
+        fields_turn();
+        fields_expect(rows[i].results);
+    }
+}
+
 /* Ten beams of 1/3 degree at 1 m are 58.18 mm wide; a wall of single beams is none. */
 static void small_objects_are_blanked(void **state)
 {
@@ -195,13 +215,10 @@ int main(void)
 {
 #define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
-        CASE(inputs_choose_the_set),
-        CASE(a_soiled_window_shows),
-        CASE(an_object_must_stay),
-        CASE(small_objects_are_blanked),
-        CASE(an_lms_looks_at_the_echo_that_is_chosen),
-        CASE(a_rectangle_has_a_record),
-        CASE(a_polygon_has_a_record),
+        CASE(inputs_choose_the_set),     CASE(a_soiled_window_shows),
+        CASE(an_object_must_stay),       CASE(a_field_ends_at_a_kilometre),
+        CASE(small_objects_are_blanked), CASE(an_lms_looks_at_the_echo_that_is_chosen),
+        CASE(a_rectangle_has_a_record),  CASE(a_polygon_has_a_record),
     };
     return cmocka_run_group_tests_name("cola watch", tests, NULL, NULL);
 }

@@ -149,7 +149,7 @@ static void check_bounds(const char *xml)
 /* The file has exactly the first records of each scan, and as many scans. */
 static void check_file(const char *path, int scans, int packets)
 {
-    size_t n[MAX_SCANS] = {0}, at = 0;
+    size_t n[MAX_SCANS] = {0};
     for (int i = 0; i < packets; i++)
         n[packet[i].scan] = packet[i].n;
     e57rig_read(path);
@@ -161,10 +161,8 @@ static void check_file(const char *path, int scans, int packets)
         assert_int_equal(e57rig_n_records, n[k]);
         assert_memory_equal(e57rig_record, truth + truth_from[k], n[k] * sizeof *truth);
         check_bounds(child);
-        at++;
     }
     assert_null(strstr(child + 1, "<vectorChild"));
-    assert_int_equal(at, scans);
 }
 
 static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
@@ -180,8 +178,7 @@ static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
         return 0;
     }
     if (seen[scans][packets] != NULL) {
-        assert_int_equal(len, seen_len[scans][packets]);
-        assert_memory_equal(file, seen[scans][packets], len);
+        assert_true(len == seen_len[scans][packets] && memcmp(file, seen[scans][packets], len) == 0);
         return 1;
     }
     seen[scans][packets] = malloc(len);
@@ -190,13 +187,25 @@ static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
     return 0;
 }
 
+/* Bytes at the end that are in no whole unit: neither zeros that fill the last page, nor the XML, which is renewed. */
+static size_t cut_of(const uint8_t *from, size_t len, int scans, int packets)
+{
+    const size_t there = len / PAGE * CONTENT, begin = scan_begin[scans - 1];
+    const size_t end = packets > 0 && packet[packets - 1].end > begin ? packet[packets - 1].end : begin;
+    size_t at = end;
+    while (at < there && *at_logical(from, at) == 0)
+        at++;
+    if (at == there) return len % PAGE;
+    return *at_logical(from, end) == '<' ? 0 : len - (size_t)(at_logical(from, end) - from);
+}
+
 /* If the same packets are left, the same file comes out, so it is read once. */
 static void check_cut(const char *path, const uint8_t *from, size_t len)
 {
     struct repair repair;
     struct sh_err err;
     int scans, packets;
-    size_t n = 0, now;
+    size_t n = 0, now, again_len;
     expect_of(len, &scans, &packets);
     killed_rig_write(path, from, len);
     int rc = killed_rig_repair(path, &repair, &err);
@@ -211,7 +220,7 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     assert_int_equal(repair.n_kept, n);
     assert_int_equal(repair.n_scans, scans);
     assert_int_equal(repair.was_whole, from == whole && len == whole_len);
-    assert_true(repair.cut_bytes <= len);
+    if (!repair.was_whole) assert_int_equal(repair.cut_bytes, cut_of(from, len, scans, packets));
     uint8_t *file = rig_read(path, &now);
     assert_int_equal(memmem(file, now, MISSING, sizeof MISSING - 1) == NULL, repair.was_whole);
     if (repair.was_whole) {
@@ -222,12 +231,9 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     if (!already_seen(scans, packets, file, now)) {
         check_file(path, scans, packets);
         assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
-        assert_int_equal(repair.was_whole, 1);
-        assert_int_equal(repair.n_kept, n);
-        size_t again_len;
+        assert_true(repair.was_whole && repair.n_kept == n);
         uint8_t *again = rig_read(path, &again_len);
-        assert_int_equal(again_len, now);
-        assert_memory_equal(again, file, now);
+        assert_true(again_len == now && memcmp(again, file, now) == 0);
         free(again);
     }
     free(file);
@@ -283,8 +289,7 @@ static void test_end(void **state)
         memcpy(part, left, header ? PAGE : left_len / PAGE * PAGE - PAGE);
         killed_rig_write(path, part, whole_len - (header ? 0 : 1));
         assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
-        assert_int_equal(repair.was_whole, 0);
-        assert_int_equal(repair.cut_bytes, 0);
+        assert_true(!repair.was_whole && repair.cut_bytes == 0);
         free(part);
         char *xml = xml_of(path);
         assert_string_equal(xml, want);
@@ -316,11 +321,14 @@ static void test_refused(void **state)
         left[at] ^= 0x40;
         killed_rig_write(path, left, left_len);
         assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
-        assert_non_null(strstr(err.text, "damaged"));
-        assert_null(strchr(err.text, '\n'));
+        char want[200];
+        snprintf(want, sizeof want,
+                 "%s: bytes %zu to %zu are damaged, and the file goes on after them; a repair can only cut "
+                 "its end",
+                 path, at / PAGE * PAGE, at / PAGE * PAGE + PAGE);
+        assert_string_equal(err.text, want);
         uint8_t *now = rig_read(path, &len);
-        assert_int_equal(len, left_len);
-        assert_memory_equal(now, left, len);
+        assert_true(len == left_len && memcmp(now, left, len) == 0);
         free(now);
         left[at] ^= 0x40;
     }

@@ -52,10 +52,12 @@ static const uint8_t *check_front(size_t len, const struct ethernet_end *from, c
     assert_int_equal(ip[0] >> 4, from->is_v6 ? 6 : 4);
     if (from->is_v6) {
         assert_memory_equal(ip, "\x60\0\0\0", 4); /* no class, no label */
+        assert_int_equal(ip[7], 64);
         assert_int_equal(be16(ip + 4), transport_len);
         assert_int_equal(ip[6], protocol);
     } else {
         assert_int_equal(be16(ip + 2), len - 14);
+        assert_memory_equal(ip + 4, "\0\0\x40\0\x40", 5); /* no number, "don't fragment", 64 hops */
         assert_int_equal(ip[9], protocol);
         assert_int_equal(add_bytes(0, ip, 20), 0xffff);
     }
@@ -148,6 +150,12 @@ static void hear(struct heard *h, const struct tcp_talk *talk, int side, size_t 
     assert_int_equal(be32(tcp + 4), h->seq[side]);
     assert_int_equal(be32(tcp + 8), flags == TCP_SYN ? 0 : h->seq[!side]);
     assert_true(n <= ETHERNET_MAX_SEGMENT && len <= 1514);
+    /* Options by RFC 9293 (3.2) and RFC 7323 (2.2): the largest segment, and windows of 65535 << 7, 8 MiB. */
+    static const uint8_t options[] = {2, 4, ETHERNET_MAX_SEGMENT >> 8, ETHERNET_MAX_SEGMENT & 0xff, 1, 3, 3, 7};
+    assert_int_equal(head, (flags & TCP_SYN) != 0 ? 20 + sizeof options : 20);
+    assert_memory_equal(tcp + 20, options, head - 20);
+    assert_int_equal(be16(tcp + 14), 65535);
+    assert_int_equal(be16(tcp + 18), 0); /* nothing is urgent */
     memcpy(h->bytes[side] + h->n[side], tcp + head, n);
     h->n[side] += n;
     h->seq[side] += (uint32_t)n + ((flags & (TCP_SYN | TCP_FIN)) != 0);

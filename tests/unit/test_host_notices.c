@@ -114,6 +114,13 @@ static void test_echo(void **state)
     expect_notice(2, SCANHEAD_NOTICE_UNASKED, 11 + 7 + EVENT + 4, 0, 2);
     assert_int_equal(noticed[2].t_ns, 13);
     assert_int_equal(noticed_stats.unasked, 1);
+    /* Nobody has asked for an identity either. */
+    put_all(head, "Maker,Model,1,2\r\n", 17);
+    put_numbered(head, 5);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(n_noticed, 4);
+    expect_notice(3, SCANHEAD_NOTICE_UNASKED, 11 + 7 + 2 * EVENT + 8, 0, 15);
+    assert_int_equal(noticed_stats.unasked, 2);
     close(head);
     scanhead_close(sh);
 }

@@ -104,7 +104,7 @@ static void test_broken_requests(void **state)
     }
 }
 
-/* A line of 512 bytes without its end, and a head of 4096 bytes with its end, are the longest. */
+/* A line of 512 bytes without its end, a head of 4096 bytes with its end, and a body of 1024 bytes are the longest. */
 static void test_longest(void **state)
 {
     (void)state;
@@ -120,6 +120,11 @@ static void test_longest(void **state)
         assert_int_equal(strlen(text), 4096 + more);
         http_send(text);
         assert_int_equal(http_status(), more ? 431 : 200);
+        http_renew();
+        snprintf(text, sizeof text, "POST /cgi/none HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\n%0*d", 1024 + more,
+                 1024 + more, 0);
+        http_send(text);
+        assert_int_equal(http_status(), more ? 413 : 404);
     }
 }
 

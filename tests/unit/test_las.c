@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* LAS files, field by field at the offsets of the ASPRS specification (LAS 1.4 R15). */
+#include "drivers/record/las_inside.h"
 #include "tests/unit/recorder_rig.h"
 
 enum { HEADER = 375, VLR = 54, POINT = 32 };
@@ -310,6 +311,71 @@ static void test_colour(void **state)
     assert_true(rgb[0] != rgb[1] || rgb[1] != rgb[2]); /* a hue */
 }
 
+/* LAS 1.2 counts points in 32 bits, LAS 1.4 in 64. The stream has 9 points. */
+static void test_most_points(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
+    rig_begin();
+    put_scan(1, 1, &a);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    for (int minor = 2; minor <= 4; minor += 2)
+        for (uint64_t room = 3; room <= 4; room++) {
+            struct scanhead *sh;
+            struct scanhead_frame frame;
+            struct recorder *rec;
+            struct sh_err err = {0};
+            const struct recorder_options options = {.las_minor = minor};
+            const char *path = rig_path("a.las");
+            int rc = SH_OK;
+            assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+            assert_int_equal(recorder_open(recorder_find(path, &err), path, &options, &rec, &err), 0);
+            struct las_facts *facts = &((struct las *)rec)->facts;
+            facts->n_points = UINT32_MAX - room;
+            while (rc == SH_OK && scanhead_next(sh, &frame, -1) == 0)
+                rc = recorder_frame(rec, sh, &frame, &err);
+            assert_int_equal(rc, minor == 2 && room == 3 ? SH_EFORMAT : SH_OK);
+            assert_true(facts->n_points == UINT32_MAX - room + (rc == SH_OK ? 4 : 3));
+            if (rc != SH_OK)
+                assert_non_null(strstr(err.text, "LAS 1.2 holds up to 4294967295 points; use --las-version 1.4"));
+            recorder_close(rec, 0, NULL);
+            scanhead_close(sh);
+        }
+}
+
+/* 32 bits hold 2147483.647 m in steps of 1 mm. The first station's place is where they count from. */
+static void test_too_far(void **state)
+{
+    (void)state;
+    const struct native_anchor first = rig_anchor_of(NATIVE_CRS_UTM, 32632, 7);
+    struct native_anchor a = first;
+    struct sh_err err = {0};
+    char want[400];
+    a.station = 8;
+    a.scale[0] = a.scale[1] = a.scale[2] = 1; /* m; the file keeps the first station's steps */
+    for (int k = 0; k < 3; k++)
+        for (int too_far = 0; too_far < 2; too_far++) {
+            struct rig_point p = {10, 20, 30, 0, 0, 1, 1};
+            *(k == 0 ? &p.a : k == 1 ? &p.b : &p.c) = -2147483 - too_far;
+            rig_begin();
+            put_scan(1, 1, &first);
+            rig_descriptor(1, 2);
+            rig_anchor(&a);
+            rig_points(0, 0, 0, &p, 1);
+            assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, 0, &err),
+                             too_far ? SH_EFORMAT : SH_OK);
+            if (!too_far) continue;
+            snprintf(
+                want, sizeof want,
+                "%s: a point of station 8 at (%.3f %.3f %.3f) is beyond the 2147484 m from the first station that "
+                "LAS can hold in steps of 0.001 m; give the head a coarser output.scale_m, or each station its own "
+                "file",
+                rig_path("a.las"), a.anchor[0] + p.a, a.anchor[1] + p.b, a.anchor[2] + p.c);
+            assert_string_equal(err.text, want);
+        }
+}
+
 static int tear_down(void **state)
 {
     free(las);
@@ -319,9 +385,10 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_header), cmocka_unit_test(test_records),   cmocka_unit_test(test_stations),
-        cmocka_unit_test(test_polar),  cmocka_unit_test(test_no_points), cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_long),   cmocka_unit_test(test_las_12),    cmocka_unit_test(test_colour),
+        cmocka_unit_test(test_header),      cmocka_unit_test(test_records),   cmocka_unit_test(test_stations),
+        cmocka_unit_test(test_polar),       cmocka_unit_test(test_no_points), cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_long),        cmocka_unit_test(test_las_12),    cmocka_unit_test(test_colour),
+        cmocka_unit_test(test_most_points), cmocka_unit_test(test_too_far),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -146,9 +146,47 @@ static void test_cut_before_copy(void **state)
     las_waves_close(&waves);
 }
 
+/* A packet is filled up with the count without light, rounded; it is a count that the bits can have. */
+static void test_fill(void **state)
+{
+    (void)state;
+    enum { N = 600, KIND = 640 }; /* beyond 128 kinds lengths are rounded up */
+    static const struct {
+        unsigned bits;
+        double baseline;
+        uint64_t dark;
+    } rows[] = {{12, 205.4, 205},   {12, 205.6, 206}, {12, -1, 0},   {12, 4095, 4095}, {12, 4096, 4095},
+                {14, 20000, 16383}, {8, 255, 255},    {8, 256, 255}, {8, 200, 200}};
+    static uint8_t sample[2 * N], bytes[2 * KIND];
+    memset(sample, 1, sizeof sample);
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct scanhead_wave wave = {.sample = sample, .sample_ps = 1000, .count_signal = 1};
+        struct las_waves waves = {.n_kinds = 0};
+        struct las_packet packet;
+        struct sh_err err = {0};
+        int is_new;
+        wave.bits = (uint8_t)rows[i].bits;
+        wave.baseline = rows[i].baseline;
+        assert_int_equal(las_waves_open(&waves, rig_path("a.las"), &err), 0);
+        for (uint32_t n = 1; n <= 129; n++) {
+            wave.n = (uint16_t)(n <= 128 ? n : N);
+            wave.pulse = n;
+            assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+        }
+        const size_t width = rows[i].bits == 8 ? 1 : 2;
+        assert_int_equal(packet.len, width * KIND);
+        if (las_waves_end(&waves, &err) != 0) fail_msg("%s", err.text);
+        assert_int_equal(pread(waves.file.fd, bytes, packet.len, (off_t)packet.at), packet.len);
+        for (size_t k = 0; k < KIND; k++)
+            assert_int_equal(rig_uint(bytes + width * k, (int)width), k >= N ? rows[i].dark : width == 1 ? 1 : 0x101);
+        las_waves_close(&waves);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_large), cmocka_unit_test(test_kinds),
-                                       cmocka_unit_test(test_no_kind_left), cmocka_unit_test(test_cut_before_copy)};
+                                       cmocka_unit_test(test_no_kind_left), cmocka_unit_test(test_cut_before_copy),
+                                       cmocka_unit_test(test_fill)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

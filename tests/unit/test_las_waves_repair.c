@@ -220,12 +220,19 @@ static void test_refused(void **state)
     struct repaired file;
     repair_write_file(repair_part, left.data, left.len);
     assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EINPUT);
-    assert_non_null(strstr(repair_err.text, "its waveforms are not there: put "));
+    char want[700];
+    snprintf(
+        want, sizeof want,
+        "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep the points alone",
+        repair_part, wdp_part);
+    assert_string_equal(repair_err.text, want);
     assert_true(fcntl(STDOUT_FILENO, F_GETFD) >= 0); /* only what the repair has opened is closed */
     repair_write_file(wdp_part, left_wdp.data, left_wdp.len);
     repair_write_file(wdp, "other", 5);
     assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_ESTATE);
-    assert_non_null(strstr(repair_err.text, "exists, and is not replaced"));
+    snprintf(want, sizeof want, "%s: %s exists, and is not replaced; move it away, and repeat the command", wdp_part,
+             wdp);
+    assert_string_equal(repair_err.text, want);
     assert_true(fcntl(STDOUT_FILENO, F_GETFD) >= 0);
     assert_int_equal(left_len(wdp_part), left_wdp.len);
     assert_int_equal(left_len(repair_part), left.len);

@@ -101,6 +101,14 @@ static void test_anchor(void **state)
     assert_true(back.scale[0] == 1e-5 && back.scale[1] == 1e-5 && back.scale[2] == 1e-5);
     for (int i = 0; i < 9; i++)
         assert_true(back.axes[i] == (i % 4 == 0));
+    for (size_t k = 0; k < 9; k++) { /* one that is not 0 makes all of them count */
+        const double two = 2;
+        memset(out + 28 + 200, 0, 72);
+        memcpy(out + 28 + 200 + 8 * k, &two, 8);
+        assert_int_equal(native_decode_anchor(p, 280, &back), 0);
+        for (size_t i = 0; i < 9; i++)
+            assert_true(back.axes[i] == (i == k ? 2 : 0));
+    }
 }
 
 static void test_line_end(void **state)

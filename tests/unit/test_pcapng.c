@@ -174,7 +174,10 @@ static void test_limits(void **state)
         {SECTION, 8, 0x1a2b3c4e, "its byte-order mark is wrong"},
         {SECTION, 12, 2, "its version of pcapng is not 1"},
         {SECTION, 12, 0x10001, NULL}, /* version 1.1 */
-        {SECTION, 4, 8, "at byte 0: a block of 8 bytes; allowed are multiples of 4 from 12 to "},
+        {SECTION, 4, 8, "at byte 0: a block of 8 bytes; allowed are multiples of 4 from 12 to 16777216"},
+        {SECTION, 4, 16777216, NULL}, /* more bytes are to come */
+        {SECTION, 4, 16777220, "at byte 0: a block of 16777220 bytes; "},
+        {INTERFACE, 4, 11, "at byte 32: a block of 11 bytes; "},
         {SECTION, 4, 30, "a block of 30 bytes"},
         {SECTION, 4, 12, "the two lengths of a block differ"},
         {PACKET, 8, 1, "a packet of an interface that is not described"},
@@ -201,6 +204,23 @@ static void test_limits(void **state)
     assert_null(why_not(many, len));
     len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
     assert_non_null(strstr(why_not(many, len), "more than 64 interfaces"));
+    /* Another section numbers its interfaces from 0 again. */
+    len = pcapng_put_section(many, NULL);
+    len += pcapng_put_interface(many + len, PCAPNG_USER0, 0, NULL, NULL);
+    len += pcapng_put_section(many + len, NULL);
+    const size_t second = len;
+    len += pcapng_put_packet(many + len, 0, 1, "abcde", 5, 0);
+    assert_non_null(strstr(why_not(many, len), "a packet of an interface that is not described"));
+    len = second + pcapng_put_interface(many + second, PCAPNG_ETHERNET, 0, NULL, NULL);
+    len += pcapng_put_packet(many + len, 0, 1, "abcde", 5, 0);
+    struct pcapng_reader reader = {0};
+    struct pcapng_packet packet;
+    struct sh_err err;
+    size_t used, n_packets = 0;
+    for (size_t at = 0; at < len; at += used)
+        n_packets += pcapng_read(&reader, many + at, len - at, &packet, &used, &err) == PCAPNG_PACKET;
+    assert_int_equal(n_packets, 1);
+    assert_int_equal(packet.link, PCAPNG_ETHERNET);
 }
 
 /* Blocks and options by the numbers of draft-ietf-opsawg-pcapng: if_name 2, if_tsresol 9, opt_comment 1, and
@@ -254,7 +274,9 @@ static void test_pcap(void **state)
         assert_memory_equal(packet.data, "abcde", LEN);
         (is_big ? be_put32 : le_put32)(file + HEAD + 8, (uint32_t)PCAPNG_MAX_BLOCK + 1);
         assert_int_equal(pcap_read(&reader, file + HEAD, RECORD + LEN, &packet, &used, &err), SH_EFORMAT);
-        assert_memory_equal(err.text, "at byte 45: a packet of ", 24);
+        assert_string_equal(err.text, "at byte 45: a packet of 16777217 bytes; allowed are 16777216 at most");
+        (is_big ? be_put32 : le_put32)(file + HEAD + 8, (uint32_t)PCAPNG_MAX_BLOCK);
+        assert_int_equal(pcap_read(&reader, file + HEAD, RECORD + LEN, &packet, &used, &err), PCAPNG_MORE);
         file[is_big ? 5 : 4] = 3;
         reader = (struct pcap_reader){0};
         assert_int_equal(pcap_read(&reader, file, sizeof file, &packet, &used, &err), SH_EFORMAT);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* PTX grids, line by line, and the files of true poses. */
+#include "drivers/record/ptx_grid.h"
 #include "tests/unit/recorder_rig.h"
 
 static char *text, *at;
@@ -84,6 +85,28 @@ static void test_grid(void **state)
     assert_non_null(strstr(rig_notes, "1 echoes left out"));
     assert_non_null(strstr(rig_notes, "1 echoes brighter"));
     assert_non_null(strstr(rig_notes, "7 places of the grid without a shot")); /* 16 places, 9 shots */
+}
+
+/* A stream that is joined within a shot, after its first echo: the later ones have no place, and begin no grid. */
+static void test_begins_with_later_echoes(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    const struct rig_point second = {0, 0, 1000, 0, 0, 2, 3}, third = {0, 0, 2000, 0, 0, 3, 3},
+                           next = {0, 0, 3000, 0, 0, 1, 1};
+    memcpy(a.anchor, a.station_m, sizeof a.anchor);
+    for (int n = 2; n <= 3; n++) { /* 2: the frame has nothing else */
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        rig_points(5, 0, 4, (struct rig_point[]){second, third, next}, (uint32_t)n);
+        if (n == 2) rig_points(5, 0, 6, &next, 1);
+        record_text("a.ptx");
+        expect_head(1, 1, "10.000000000 20.000000000 30.000000000");
+        expect_line("0.000000 0.000000 3.000000 1.000000");
+        assert_int_equal(*at, 0);
+        assert_non_null(strstr(rig_notes, "2 echoes left out"));
+    }
 }
 
 static void test_scans(void **state)
@@ -217,21 +240,53 @@ static void test_far(void **state)
     }
 }
 
-/* The padding of earlier files of the recording is gone. */
+/* The padding of earlier files of the recording is gone. In all there are 2^24 places, and 8 more for each shot: two
+ * shots in a grid of 18 lines leave 16 places. */
 static void test_shared_padding(void **state)
 {
     (void)state;
-    struct sh_err err = {0};
-    struct recorder_padding padding = {.n_places = 1 << 24};
-    for (int i = 0; i < 2; i++) {
-        put_shots(0, (const uint32_t[]){0, 40}, (const uint32_t[]){0, 0}, 2);
-        struct recorder_options options = {.padding = i == 0 ? NULL : &padding};
+    static const struct {
+        uint64_t places, shots; /* of earlier files */
+        uint32_t last_line;
+        int two;
+    } rows[] = {{0, 0, 40, 0},       {1 << 24, 0, 40, 1}, {1 << 24, 0, 18, 1},       {1 << 24, 0, 17, 0},
+                {1 << 24, 3, 42, 1}, {1 << 24, 3, 41, 0}, {(1 << 24) - 5, 0, 23, 1}, {(1 << 24) - 5, 0, 22, 0}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct sh_err err = {0};
+        struct recorder_padding padding = {.n_places = rows[i].places, .n_shots = rows[i].shots};
+        put_shots(0, (const uint32_t[]){0, rows[i].last_line}, (const uint32_t[]){0, 0}, 2);
+        const struct recorder_options options = {.padding = i == 0 ? NULL : &padding};
         assert_int_equal(rig_record(rig_path("a.ptx"), options, RIG_KEEP, &err), SH_OK);
-        assert_int_equal(strstr(rig_notes, "1 additional grids begun within a scan") != NULL, i);
+        assert_int_equal(strstr(rig_notes, "1 additional grids begun within a scan") != NULL, rows[i].two);
         unlink(rig_path("a.ptx"));
+        if (i == 0) continue; /* its padding is its own */
+        assert_int_equal(padding.n_shots, rows[i].shots + 2);
+        assert_int_equal(padding.n_places, rows[i].places + (rows[i].two ? 0 : rows[i].last_line - 1));
     }
-    assert_int_equal(padding.n_shots, 2);
-    assert_int_equal(padding.n_places, 1 << 24);
+}
+
+/* FILE.grid is what a repair needs of a grid that is not in FILE.part yet. It goes where there is no such grid, or no
+ * FILE.part. */
+static void test_grid_stays_for_a_repair(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 4; i++) {
+        const int is_empty = i & 1, has_part = i >> 1;
+        struct sh_err err = {0};
+        struct ptx_grid grid;
+        struct station_pose pose = {0};
+        char path[128], part[140], spool[140];
+        snprintf(path, sizeof path, "%s", rig_path("b.ptx"));
+        snprintf(part, sizeof part, "%s.part", path);
+        snprintf(spool, sizeof spool, "%s.grid", path);
+        assert_int_equal(ptx_grid_open(&grid, path, &err), SH_OK);
+        if (!is_empty) assert_int_equal(ptx_grid_begin(&grid, 0, &pose, 0, &err), SH_OK);
+        if (has_part) fclose(fopen(part, "w"));
+        ptx_grid_close(&grid);
+        assert_int_equal(access(spool, F_OK) == 0, !is_empty && has_part);
+        unlink(part);
+        unlink(spool);
+    }
 }
 
 /* Each shot of a line comes to its own place, also in a line that the recorder writes in several pieces. */
@@ -326,9 +381,17 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_grid),           cmocka_unit_test(test_scans),     cmocka_unit_test(test_polar),
-        cmocka_unit_test(test_poses),          cmocka_unit_test(test_far),       cmocka_unit_test(test_stop),
-        cmocka_unit_test(test_shared_padding), cmocka_unit_test(test_disk_full), cmocka_unit_test(test_long_line),
+        cmocka_unit_test(test_begins_with_later_echoes),
+        cmocka_unit_test(test_grid),
+        cmocka_unit_test(test_scans),
+        cmocka_unit_test(test_polar),
+        cmocka_unit_test(test_poses),
+        cmocka_unit_test(test_far),
+        cmocka_unit_test(test_stop),
+        cmocka_unit_test(test_shared_padding),
+        cmocka_unit_test(test_grid_stays_for_a_repair),
+        cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_long_line),
         cmocka_unit_test(test_huge),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);

@@ -316,6 +316,36 @@ static void reset_and_reboot(void **state)
     scip_ask("GD0000108001\nTM1\n", "GD0000108001\n10Q\n\nTM1\n00P\nm2@0?\n\n");
 }
 
+/* After a reboot without a head all that a session had is as at power-up: time mode, sleep, bit rate, a scan that was
+ * asked for, a malfunction. The reboot is over, too. */
+static void a_reboot_begins_anew(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply recorded[] = {{"HEAD:REBOOT", "ERR", -221}, {NULL, NULL, 0}};
+    static const char *const states[] = {"SS500000\n",       "TM0\n", "%SL\n", "DB02\n", "BM\nGD0000108001\n",
+                                         "MD0000108000000\n"};
+    for (size_t i = 0; i < sizeof states / sizeof *states; i++) {
+        scip_open("mine");
+        rig.replies = recorded;
+        scip_ask("%ST\n", "%ST\n00P\n000@\n\n");
+        protocol_rig_input(&rig, states[i]);
+        protocol_rig_input(&rig, "RB\nRB\n");
+        protocol_rig_input(&rig, states[i]);
+        assert_true(rig.ops->owes(rig.protocol));
+        rig.ops->time(rig.protocol, 1000000000);
+        assert_true(rig.hung_up);
+        assert_false(rig.ops->owes(rig.protocol));
+        protocol_rig_clear(&rig);
+        scip_ask("%ST\n", "%ST\n00P\n000@\n\n");
+        EXPECT_IN("II\n", "\nLASR:OFF;7\n", "\nMESM:000 Idle;", "\nSBPS:115200[bps];", "\nSTAT:Stable 000 no error.;");
+        const uint32_t n_lines = rig.n_lines;
+        rig.ops->time(rig.protocol, 2000000000);
+        for (uint32_t k = n_lines; k < rig.n_lines; k++)
+            assert_string_not_equal(rig.line[k], "HEAD:REBOOT");
+        scip_ask("RB\nDB10\n", "RB\n01Q\n\nDB10\n03S\n\n");
+    }
+}
+
 /* A head that is not planar, or has more steps than a unit has room for, gives no scans. */
 static void heads_that_dont_fit(void **state)
 {
@@ -353,6 +383,7 @@ int main(void)
         cmocka_unit_test(motor_speed),
         cmocka_unit_test(speed_is_reset),
         cmocka_unit_test(reset_and_reboot),
+        cmocka_unit_test(a_reboot_begins_anew),
         cmocka_unit_test(heads_that_dont_fit),
     };
     return cmocka_run_group_tests(tests, NULL, scip_teardown);

@@ -244,6 +244,57 @@ static void test_frame(void **state)
     assert_int_equal(rig_record(path, options, 1, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "points have no frame scalar"));
     unlink(path);
+    free(rig_record_bytes("a.poses.csv", options, NULL)); /* a file without colours needs none */
+}
+
+/* If a head moves, each point has its own frame scalar and place, also where more than a batch of points waits for
+ * colours. The scalar rises by 1 a millisecond, and the head by 1 m; points are 0.05 ms apart, at 1 m along y. */
+static void test_frames_of_points(void **state)
+{
+    (void)state;
+    enum { N = 300 };
+    static uint32_t range[N], zero[N], dt[N];
+    static int16_t refl[N], amplitude[N];
+    static uint16_t label[N], width[N];
+    static uint8_t echo[N], rgb[N][3];
+    const struct native_pose pose[2] = {
+        {.quat = {1, 0, 0, 0}, .frame = 100},
+        {.t_ns = 1000000000, .position_m = {0, 0, 1000}, .quat = {1, 0, 0, 0}, .frame = 1100}};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    a.moving = NATIVE_MOVING;
+    for (uint32_t i = 0; i < N; i++) {
+        range[i] = 1000;
+        echo[i] = 0x11;
+        dt[i] = 50000 * i;
+    }
+    for (unsigned content = 0; content <= (COLOURS | ATTRIBUTES); content++) {
+        const struct line_block block = {.n_pulses = N,
+                                         .n_points = N,
+                                         .dt_ns = dt,
+                                         .a = range,
+                                         .b = zero,
+                                         .c = zero,
+                                         .refl_cdb = refl,
+                                         .echo = echo,
+                                         .label = label,
+                                         .amplitude_cdb = content & ATTRIBUTES ? amplitude : NULL,
+                                         .width_cns = content & ATTRIBUTES ? width : NULL,
+                                         .rgb = content & COLOURS ? rgb : NULL};
+        rig_begin();
+        put_head(1, content, &a);
+        put(native_encode_poses(out, sizeof out, pose, 2, 0, 0), 0);
+        put(native_encode_points(out, sizeof out, &block, 0), 0);
+        const struct recorder_options options = {.ascii = 1, .columns = PLY_XYZ | PLY_FRAME};
+        char *text = rig_record_bytes("a.ply", options, NULL), *at = body_of(text);
+        for (int k = 0; k < N; k++) {
+            double x, y, z, frame;
+            assert_int_equal(sscanf(at, "%lf %lf %lf %lf", &x, &y, &z, &frame), 4);
+            assert_true(fabs(frame - (100 + 0.05 * k)) < 1e-9);
+            assert_true(fabs(x) < 1e-6 && fabs(y - 1) < 1e-6 && fabs(z - 0.05 * k) < 1e-6);
+            at = strchr(at, '\n') + 1;
+        }
+        free(text);
+    }
 }
 
 /* A file holds one kind, unless its colours are computed here. */
@@ -308,9 +359,11 @@ static void test_library(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_as_sent), cmocka_unit_test(test_another_choice), cmocka_unit_test(test_formats),
-        cmocka_unit_test(test_range),   cmocka_unit_test(test_height),         cmocka_unit_test(test_frame),
-        cmocka_unit_test(test_kinds),   cmocka_unit_test(test_library),
+        cmocka_unit_test(test_as_sent),          cmocka_unit_test(test_another_choice),
+        cmocka_unit_test(test_formats),          cmocka_unit_test(test_range),
+        cmocka_unit_test(test_height),           cmocka_unit_test(test_frame),
+        cmocka_unit_test(test_frames_of_points), cmocka_unit_test(test_kinds),
+        cmocka_unit_test(test_library),
     };
     return cmocka_run_group_tests_name("track_colours", tests, rig_set_up, rig_tear_down);
 }

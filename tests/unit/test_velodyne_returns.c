@@ -9,6 +9,7 @@
 
 #include "core/bytes.h"
 #include "core/rng.h"
+#include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/velodyne.h"
 #include "tests/unit/velodyne_head.h"
 
@@ -353,6 +354,37 @@ static void test_any_frames(void **state)
     assert_int_equal(range_units(0, 11, 31), 5000);
 }
 
+/* A frame of points that says more of them than it has is left out (LOSSES.md). */
+static void test_too_few_points(void **state)
+{
+    (void)state;
+    enum { N = 384 };
+    static uint8_t frame[28 + 40 + 20 * N];
+    for (uint32_t more = 2; more-- > 0;) {
+        static uint32_t zero[N], dt[N];
+        static int16_t refl[N];
+        static uint16_t label[N];
+        static uint8_t echo[N];
+        const struct line_block block = {.n_pulses = N + more,
+                                         .n_points = N,
+                                         .dt_ns = dt,
+                                         .a = zero,
+                                         .b = zero,
+                                         .c = zero,
+                                         .refl_cdb = refl,
+                                         .echo = echo,
+                                         .label = label};
+        rig.descriptor.scan++;
+        protocol_rig_describe(&rig, 0);
+        protocol_rig_clear(&rig);
+        assert_int_equal(native_encode_points(frame, sizeof frame, &block, 0), sizeof frame);
+        le_put32(frame + 28 + 36, N + more);
+        rig.ops->frame(rig.protocol, frame, sizeof frame);
+        assert_int_equal(rig.n_units, more ? 0 : 1);
+    }
+    assert_int_equal(lost(), 0);
+}
+
 /* A UDP link has no input; elsewhere it is counted. */
 static void test_input_is_counted(void **state)
 {
@@ -367,10 +399,10 @@ static void test_input_is_counted(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_dual_returns), TEST(test_range_units), TEST(test_reflectivities),   TEST(test_lost_pulses),
-        TEST(test_gap),          TEST(test_end_of_scan), TEST(test_joined_late),      TEST(test_mode_changes),
-        TEST(test_rpm_changes),  TEST(test_other_heads), TEST(test_line_head),        TEST(test_models),
-        TEST(test_no_room),      TEST(test_any_frames),  TEST(test_input_is_counted),
+        TEST(test_dual_returns), TEST(test_range_units), TEST(test_reflectivities), TEST(test_lost_pulses),
+        TEST(test_gap),          TEST(test_end_of_scan), TEST(test_joined_late),    TEST(test_mode_changes),
+        TEST(test_rpm_changes),  TEST(test_other_heads), TEST(test_line_head),      TEST(test_models),
+        TEST(test_no_room),      TEST(test_any_frames),  TEST(test_too_few_points), TEST(test_input_is_counted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
