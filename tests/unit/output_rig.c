@@ -23,7 +23,7 @@ void output_take(struct output *output, FILE *stream)
 
 char *output_give(struct output *output)
 {
-    enum { MOST = 65536 };
+    enum { MOST = 131072 };
     char *text = calloc(1, MOST);
     fflush(output->stream);
     assert_true(dup2(output->was, fileno(output->stream)) >= 0);
