@@ -140,8 +140,8 @@ static void an_output_has_heights(void **state)
     }
 }
 
-/* The zone's middle is at 500 km, where grid north is true north, and the grid is 0.9996 of true lengths: a range of
- * 1000 m reads 0.4 m less at height 0. Two metres up that is 0.3 ppm less again, a part in 6.4 million of a metre each. */
+/* At the zone's middle, 500 km, grid north is true north, and the grid has 0.9996 of true lengths. So a level range reads
+ * 400 ppm less than it is, and 0.3 ppm less again at a height of 2 m: that is 2 m of the Earth's radius. */
 static void anchors(void **state)
 {
     (void)state;
