@@ -243,6 +243,15 @@ static void test_names_of_groups(void **state)
         near("width", bar.width, 0.8 * 55.5 / 3.0 - 1.0, ROUNDED);
     }
     near("tallest", bar.height, (BOTTOM - 12.0) / 1.05, 2.0 * ROUNDED);
+    int n = 0;
+    for (const char *p = svg; (p = strstr(p, "text-anchor=\"end\">")) != NULL; n++, p++) { /* of 10 um in all */
+        const char *line = p;
+        while (strncmp(line, "y1=\"", 4) != 0)
+            line--;
+        near("scale", BOTTOM - atof(line + 4), atof(p + strlen("text-anchor=\"end\">")) * bar.height / 10.0,
+             2.0 * ROUNDED);
+    }
+    assert_true(n >= 3);
     assert_non_null(strstr(svg,
                            "<p class=\"key\"><span><i class=\"s0\"></i>mean</span> <span><i class=\"s2\"></i>x&lt;y"
                            "</span> <span><i class=\"line\"></i>expected</span> </p>\n"));

@@ -7,10 +7,12 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "firmware_sim/app/app.h"
@@ -156,6 +158,8 @@ static void points_in_a_mirror_are_left_out(void **state)
                          "scene: {meshes: [{file: m.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 2]}]\n"
                          "beam: {mode: single}\nsurfaces: [{object: floor, mirror: 0.9}]\n");
     does(&app_record, "m.yaml -o m.ply --quiet", 0);
+    const struct timespec written[2] = {{.tv_sec = 1767323045}, {.tv_sec = 1767323045}};
+    assert_int_equal(utimensat(AT_FDCWD, "m.ply", written, 0), 0);
     does(&app_report, "m.yaml m.ply --html m.html", 0);
     const char *at = strstr(on_out, "\nghosts ");
     assert_non_null(at);
@@ -166,6 +170,7 @@ static void points_in_a_mirror_are_left_out(void **state)
     char *page = contents("m.html");
     snprintf(card, sizeof card, "<div><span>Seen in mirrors, left out</span><b>%llu</b></div>\n", ghosts);
     has(page, card);
+    has(page, "<dt>Written</dt><dd>2026-01-02 03:04:05 UTC</dd>\n");
     has(page, "<div><span>Shots without echo in the file</span><b>0</b></div>\n");
     free(page);
     does(&app_report, "m.yaml m.ply --json", 0);
