@@ -6,6 +6,7 @@
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <netinet/in.h>
 
@@ -80,6 +81,17 @@ static void a_plain_scene(void **state)
     assert_int_equal(strncmp(text, first, strlen(first)), 0);
     has(text, "head      scanhead full sweep (full-sweep), 20000 Hz pulses, 100 lines/s, pan 240 deg/s");
     has(text, "scene     3 triangles, 2 surfaces, x -30.000..30.000  y -30.000..30.000  z 0.000..2.000 m");
+    double mb, each, peak_mb;
+    struct rusage usage;
+    const char *memory = strstr(text, "\nmemory ");
+    assert_non_null(memory);
+    assert_int_equal(sscanf(memory, " memory %lf MB for meshes and BVH, %lf bytes a triangle; %lf MB at the peak", &mb,
+                            &each, &peak_mb),
+                     3);
+    getrusage(RUSAGE_SELF, &usage);
+    /* Of the 3 triangles, with four digits. The peak was no higher then than now. */
+    assert_true(fabs(3.0 * each - 1e6 * mb) <= 1.5 + 1e3 * mb && peak_mb > 1.0);
+    assert_true(peak_mb <= 1024e-6 * (double)usage.ru_maxrss * 1.001);
     has(text, "anchor    none: each station has a place of its own, with the scene's y axis as its true north");
     has(text, "station 1 one, EPSG 0, anchor 0.000000 0.000000 2.000000");
     has(text, "  scene     0.0000 0.0000 2.0000 m; heading 0, pitch 0, roll 0 deg");

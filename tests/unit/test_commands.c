@@ -151,6 +151,7 @@ static void colours_have_limits_of_their_own(void **state)
     (void)state;
     double low = INFINITY, high = 0.0, range;
     int first[3] = {0}, last[3] = {0}, rgb[3], n = 0, used;
+    char said[256];
     does(&app_record, "c.yaml -o r.ply --ascii --colour range --ply-columns range,colour --quiet", 0);
     char *text = contents("r.ply"), *at = strstr(text, "end_header\n") + 11;
     for (; sscanf(at, "%*f %*f %*f %lf %d %d %d%n", &range, &rgb[0], &rgb[1], &rgb[2], &used) == 4; at += used, n++) {
@@ -163,6 +164,15 @@ static void colours_have_limits_of_their_own(void **state)
     assert_true(last[0] > 100 && last[2] < 50 && last[0] > last[1]);
     free(text);
     assert_int_not_equal(access("r.ply.frames", F_OK), 0);
+    does(&app_record, "c.yaml -o s.ply --colour reflectance --quiet", 0);
+    snprintf(
+        said, sizeof said,
+        "scanhead: warning: --colour reflectance: none of %d points has a reflectance, so all have the colour for a "
+        "missing one; it needs the head's signal.model: on\n",
+        SHOTS);
+    assert_string_equal(on_err, said);
+    does(&app_record, "c.yaml -o s.ply --colour reflectance --quiet --set signal.model=on", 0);
+    assert_null(strstr(on_err, "--colour reflectance"));
     does(&app_record, "c.yaml -o s.ply --ascii --colour solid --colour-rgb 1,2,3 --ply-columns colour --quiet", 0);
     text = contents("s.ply");
     n = 0;

@@ -87,6 +87,9 @@ static void test_axis_of_bins(void **state)
         while (strncmp(x, "<text", 5) != 0)
             x--;
         near("figure", atof(strstr(x, "x=\"") + 3), LEFT + (mm + 2.0) / 4.0 * (RIGHT - LEFT), ROUNDED);
+        near("below", atof(strstr(x, " y=\"") + 4), BOTTOM + 19.0, ROUNDED);
+        /* Steps are of 0.5 mm; every second figure is left out where the page is narrow. */
+        assert_int_equal(strncmp(x, "<text class=\"odd\"", 17) == 0, fmod(fabs(mm) / 0.5, 2.0) > 0.5);
         at++;
     }
     assert_true(n >= 5);
