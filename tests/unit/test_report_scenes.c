@@ -166,7 +166,9 @@ static void points_in_a_mirror_are_left_out(void **state)
     assert_int_equal(sscanf(on_out, "points %llu", &points), 1);
     assert_int_equal(sscanf(at, " ghosts %llu points seen in mirrors, left out", &ghosts), 1);
     assert_true(ghosts > 20 && points > 20);
-    has(on_out, "\nempty      0 shots without echo\n"); /* they are none */
+    has(on_out, "\nempty      0 shots without echo\n");                                              /* they are none */
+    has(on_out, "\nWithin the expected error: no point is farther from the scene than its bound, "); /* once */
+    assert_int_equal(times_in(on_out, "Within the expected error"), 1);
     char *page = contents("m.html");
     snprintf(card, sizeof card, "<div><span>Seen in mirrors, left out</span><b>%llu</b></div>\n", ghosts);
     has(page, card);
