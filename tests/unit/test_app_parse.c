@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* app_parse with a made-up table: each kind of option sets its value, and is refused beyond its limits; what the command
- * line says of files, keys and operands is kept in its order. */
+/* app_parse with a made-up table: each kind of option sets its value, and is refused beyond its limits; what the
+ * command line says of files, keys and operands is kept in its order. */
 #include "firmware_sim/app/app.h"
 
 #include <math.h>

@@ -135,7 +135,7 @@ static int keep(void *ctx, struct batch_entry *entry, struct sh_err *err)
 static unsigned points_in(const char *path)
 {
     char head[4096] = "";
-    unsigned n;
+    unsigned n = 0;
     FILE *in = fopen(path, "r");
     assert_non_null(in);
     assert_true(fread(head, 1, sizeof head - 1, in) > 100);
@@ -274,10 +274,10 @@ static void a_changed_file_is_made_again(void **state)
              was);
     batch(ALL "--shard 1/2", 0, "", said);
     assert_int_not_equal(access("d/manifest.json", F_OK), 0); /* it was that of the files before */
-    batch(
-        ALL "--shard 2/2 --quiet", 0, "",
-        "scanhead: warning: d/0002_station-2_noise.seed=1.ply: its contents have changed (sha256); job 2 is done again\n"
-        "scanhead: warning: d/0004_station-2_noise.seed=2.surfaces.csv: is missing; job 4 is done again\n");
+    batch(ALL "--shard 2/2 --quiet", 0, "",
+          "scanhead: warning: d/0002_station-2_noise.seed=1.ply: its contents have changed (sha256); job 2 is done "
+          "again\n"
+          "scanhead: warning: d/0004_station-2_noise.seed=2.surfaces.csv: is missing; job 4 is done again\n");
     batch(ALL "--merge --quiet", 0, "", "");
     read_entries();
     the_whole_manifest_is_right();

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The lines of `scanhead check`: scanners, target, anchors of all kinds, platform, output, links and time. Positions are
- * chosen so that their figures are known by hand. Run from the top of the source tree. */
+/* The lines of `scanhead check`: scanners, target, anchors of all kinds, platform, output, links and time. Positions
+ * are chosen so that their figures are known by hand. Run from the top of the source tree. */
 #include "firmware_sim/app/app.h"
 #include "tests/unit/output_rig.h"
 #include "tests/unit/site_rig.h"
@@ -152,8 +152,8 @@ static void an_output_has_heights(void **state)
     }
 }
 
-/* At the zone's middle, 500 km, grid north is true north, and the grid has 0.9996 of true lengths. So a level range reads
- * 400 ppm less than it is, and 0.3 ppm less again at a height of 2 m: that is 2 m of the Earth's radius. */
+/* At the zone's middle, 500 km, grid north is true north, and the grid has 0.9996 of true lengths. So a level range
+ * reads 400 ppm less than it is, and 0.3 ppm less again at a height of 2 m: that is 2 m of the Earth's radius. */
 static void anchors(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The objects of a scene as `check --scene` and --scene-csv have them. Areas and volumes are worked out by hand. Run from
- * the top of the source tree. */
+/* The objects of a scene as `check --scene` and --scene-csv have them. Areas and volumes are worked out by hand. Run
+ * from the top of the source tree. */
 #include "firmware_sim/app/app.h"
 #include "tests/unit/output_rig.h"
 #include "tests/unit/site_rig.h"

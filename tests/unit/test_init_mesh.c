@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The unit and the axis that points up, which `init` takes from a mesh or guesses: at the bounds of each guess, and what
- * is said of it. */
+/* The unit and the axis that points up, which `init` takes from a mesh or guesses: at the bounds of each guess, and
+ * what is said of it. */
 #include "firmware_sim/app/studio/init/mesh.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Pictures of map --perspective: points on a wall before the eye have the colours that their figures give, without shading
- * exactly so. */
+/* Pictures of map --perspective: points on a wall before the eye have the colours that their figures give, without
+ * shading exactly so. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -38,7 +38,7 @@ static void plan_it(const char *colour, const char *limits)
     if (map_view_read(&options, &plan, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* Draws a wall of 2 x 2 m in the plane y = 0, all of whose points have these figures. Returns the code, and the middle. */
+/* Draws a wall of 2 x 2 m in the plane y = 0, all of whose points have these figures. Returns the code. */
 static int draw(const struct picturing_figures *f, double top_m, uint8_t middle[3])
 {
     struct picturing *p;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page asks for previews: each word of a query is a figure of the request, with its default and its limits; and a
- * previewed head looks where it is asked to. */
+/* What a page asks for previews: each word of a query is a figure of the request, with its default and its limits; and
+ * a previewed head looks where it is asked to. */
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "tests/unit/preview_room.h"
 #include "tests/unit/site_rig.h"
@@ -133,8 +133,8 @@ static const char *xyz_of(const struct web_body *b)
     return b->bytes + 72 + 8 * (((size_t)le_get32(b->bytes + 12) + 63) / 64);
 }
 
-/* Half of the pan is on the side to which the head is turned: x from 0 on is east, and heading 180 makes it west. With a
- * pitch of 90 degrees the front is up. */
+/* Half of the pan is on the side to which the head is turned: x from 0 on is east, and heading 180 makes it west. With
+ * a pitch of 90 degrees the front is up. */
 static void the_head_looks_where_it_is_asked(void **state)
 {
     static const struct {

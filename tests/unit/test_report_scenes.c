@@ -90,8 +90,8 @@ static int times_in(const char *text, const char *what)
     return n;
 }
 
-/* A cloud of this many points in the middle of tile i of a row, one point more on each further tile. Tiles are 1 m wide.
- * Nothing is recorded: the points lie exactly on the floor. */
+/* A cloud of this many points in the middle of tile i of a row, one point more on each further tile. Tiles are 1 m
+ * wide. Nothing is recorded: the points lie exactly on the floor. */
 static void write_tiles(int n)
 {
     int points = 0, vertex = 1;

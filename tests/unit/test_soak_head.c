@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults in the head, by the states, times and PTP states that a client of a soak gets: each is noticed at its bound and
- * not beyond, hidden where no client can notice it, and missed otherwise. */
+/* Faults in the head, by the states, times and PTP states that a client of a soak gets: each is noticed at its bound
+ * and not beyond, hidden where no client can notice it, and missed otherwise. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -191,8 +191,8 @@ static void a_jump_of_the_clock(void **state)
     expect(FAULT_CLOCK_JUMP, 1, 1, NULL);
 }
 
-/* A clock that stopped falls behind by more than a millisecond; one that drifts is off by more than a microsecond, and by
- * less than a millisecond. */
+/* A clock that stopped falls behind by more than a millisecond; one that drifts is off by more than a microsecond, and
+ * by less than a millisecond. */
 static void a_clock_that_stops_or_drifts(void **state)
 {
     static const struct {

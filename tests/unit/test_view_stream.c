@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Points, stations, meshes and losses of a stream that is shown. The stream is written shot by shot, so that each figure
- * is known by hand. */
+/* Points, stations, meshes and losses of a stream that is shown. The stream is written shot by shot, so that each
+ * figure is known by hand. */
 #include "tests/unit/recorder_rig.h"
 
 #include "firmware_sim/app/studio/view/viewed.h"
@@ -153,8 +153,8 @@ static void stations_have_their_places(void **state)
     viewed_free(&shown);
 }
 
-/* A grid of 2 x 3 shots has a cell of 3 x 1 m and one of 1 x 1 m, with two triangles each. Before the filter of long edges
- * there are nine: 3 + 1 + 3 + 1 along the lines, three of 1 m across, and the diagonals root 10 and root 2. */
+/* A grid of 2 x 3 shots has a cell of 3 x 1 m and one of 1 x 1 m, with two triangles each. Before the filter of long
+ * edges there are nine: 3 + 1 + 3 + 1 along the lines, three of 1 m across, and the diagonals root 10 and root 2. */
 static void a_grid_is_a_mesh(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page is told of a head, from the watch's opening to its close: the head and its stations, the plan, the scene, and
- * which path leads where. Run from the top of the source tree. */
+/* What a page is told of a head, from the watch's opening to its close: the head and its stations, the plan, the scene,
+ * and which path leads where. Run from the top of the source tree. */
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "tests/unit/site_rig.h"
 
@@ -74,7 +74,8 @@ static void the_head_and_its_stations(void **state)
 {
     (void)state;
     static const char want[] =
-        "{\"maker\":\"scanhead\",\"model\":\"sphere\",\"profile\":\"sphere\",\"serial\":\"S7\",\"config\":\"test.yaml\","
+        "{\"maker\":\"scanhead\",\"model\":\"sphere\",\"profile\":\"sphere\",\"serial\":\"S7\","
+        "\"config\":\"test.yaml\","
         "\"pace\":\"realtime\",\"previews\":true,\"stations\":["
         "{\"number\":1,\"name\":\"one\",\"x_m\":0.5,\"y_m\":1,\"z_m\":2,\"heading_deg\":10,\"pitch_deg\":2,"
         "\"roll_deg\":3,\"tripod\":{\"leg_m\":2.5,\"foot_radius_m\":0,\"height_m\":1.8,\"head_above_m\":0.2,"

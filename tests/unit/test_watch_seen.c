@@ -11,7 +11,8 @@
 
 static struct watch w;
 
-/* A floor of 4 x 2 m, whose diagonal is y = x / 2, and two stations above it; a body of one triangle moves with 1 m/s. */
+/* A floor of 4 x 2 m, whose diagonal is y = x / 2, and two stations above it; a body of one triangle moves with 1 m/s.
+ */
 static void open_site(const char *more)
 {
     char text[1024];
@@ -102,8 +103,8 @@ static void each_station_has_its_cells(void **state)
     close_site();
 }
 
-/* There are about 20,000 cells at most: of 8 m2 that is a side of 0.02 m. Where they take too much memory, they are half as
- * large again, as often as it takes. */
+/* There are about 20,000 cells at most: of 8 m2 that is a side of 0.02 m. Where they take too much memory, they are
+ * half as large again, as often as it takes. */
 static void fine_cells_are_made_coarser(void **state)
 {
     (void)state;
