@@ -57,6 +57,21 @@ static int come_back(void **state)
     return chdir(back) != 0 || system(command) != 0;
 }
 
+/* The first job of a command is always named; which others are depends on the machine. */
+static void keep_first_job(char *text)
+{
+    static const char end[] = " here done";
+    char *first = strstr(text, end);
+    while (first != NULL) {
+        char *again = strstr(first + 1, end);
+        if (again == NULL) return;
+        char *begin = again, *rest = strchr(again, '\n') + 1;
+        while (begin[-1] != '\n')
+            begin--;
+        memmove(begin, rest, strlen(rest) + 1);
+    }
+}
+
 /* Runs `batch c.yaml WORDS`, and compares what is printed. said NULL: anything. */
 static void batch(const char *words, int want, const char *printed, const char *said)
 {
@@ -69,9 +84,10 @@ static void batch(const char *words, int want, const char *printed, const char *
     output_take(&out, stdout);
     output_take(&err, stderr);
     const int status = app_batch.run(argc, argv);
-    char *on_err = output_give(&err), *on_out = output_give(&out);
+    char *on_err = output_give_said(&err), *on_out = output_give(&out);
     if (status != want) fail_msg("batch %s: status %d: %s", words, status, on_err);
     assert_string_equal(on_out, printed);
+    keep_first_job(on_err);
     if (said != NULL) assert_string_equal(on_err, said);
     free(on_out);
     free(on_err);

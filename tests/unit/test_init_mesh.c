@@ -56,7 +56,7 @@ static struct scene *load(const char *up, double scale)
     free(said);
     output_take(&output, stderr);
     const int rc = init_load_mesh(&wish, "m.obj", &scene, &as, &err);
-    said = output_give(&output);
+    said = output_give_said(&output);
     if (rc != SH_OK) fail_msg("%s", err.text);
     return scene;
 }
