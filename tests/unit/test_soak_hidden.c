@@ -176,8 +176,23 @@ static void clients_are_turned_away(void **state)
     assert_true(row->noticed == 2 && link->n_refusals == 0);
     soak_saw_no_open(link); /* nobody was turned away, so far */
     assert_true(row->noticed == 2 && link->no_open_ns != 0);
+    link->no_open_ns = INT64_MAX; /* however slow the machine is, this was just now */
     soak_heard(soak, &note);
     assert_true(row->noticed == 3 && link->n_refusals == 0 && link->no_open_ns == 0);
+    link->no_open_ns = -INT64_C(1000000000); /* long ago: it has another reason */
+    soak_heard(soak, &note);
+    assert_true(row->noticed == 3 && link->n_refusals == 1);
+    soak_saw_no_open(link);
+    assert_true(row->noticed == 4 && link->n_refusals == 0);
+    link->odd_closings = 1; /* a session ended without a reason, just now, and another one long ago */
+    link->odd_ns = INT64_MAX;
+    soak_heard(soak, &note);
+    assert_true(row->noticed == 5 && link->n_refusals == 0 && link->odd_closings == 0);
+    link->odd_closings = 1;
+    link->odd_ns = link->no_open_ns = -INT64_C(1000000000);
+    soak_heard(soak, &note);
+    assert_true(row->noticed == 5 && link->n_refusals == 1 && link->odd_closings == 1);
+    soak_saw_no_open(link);
     for (int i = 0; i <= SOAK_MAX_ACTS; i++)
         soak_heard(soak, &note);
     assert_true(link->n_refusals == SOAK_MAX_ACTS && row->hidden == 1);
