@@ -227,6 +227,11 @@ static void maps(void **state)
         has(on_err, "scanhead: q.png: ");
         has(on_err, " left out by height\n");
     }
+    /* All points are in the picture, wherever the first and the last one are. */
+    write_text("far.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
+                          "property double z\nend_header\n-100 0 0\n0 0 1\n1 0 0\n0 300 0\n");
+    does(&app_map, "far.ply -o f.png --perspective --size 90x60", 0);
+    has(on_err, "scanhead: f.png: 4 points in the picture, 0 outside of it\n");
     does(&app_map, "c.yaml -o p.png --perspective --colour reflectance", 2);
     has(on_err, "--colour reflectance: no point has one; --set signal.model=on gives them one in a scan");
     does(&app_map, "c.yaml -o p.png --perspective --size 90x60 --colour reflectance --set signal.model=on", 0);
