@@ -164,6 +164,19 @@ static void colours_have_limits_of_their_own(void **state)
     assert_true(last[0] > 100 && last[2] < 50 && last[0] > last[1]);
     free(text);
     assert_int_not_equal(access("r.ply.frames", F_OK), 0);
+    /* Limits that are given count, in whatever order: up to 1000 m all that is in the room is blue. */
+    for (int order = 0; order < 2; order++) {
+        does(&app_record,
+             order ? "c.yaml -o s.ply --ascii --ply-columns colour --colour-limits 0,1000 --colour range --quiet"
+                   : "c.yaml -o s.ply --ascii --ply-columns colour --colour range --colour-limits 0,1000 --quiet",
+             0);
+        text = contents("s.ply");
+        at = strstr(text, "end_header\n") + 11;
+        for (n = 0; sscanf(at, "%*f %*f %*f %d %d %d%n", &rgb[0], &rgb[1], &rgb[2], &used) == 3; at += used, n++)
+            assert_true(rgb[2] > 100 && rgb[0] < 60);
+        assert_int_equal(n, SHOTS);
+        free(text);
+    }
     does(&app_record, "c.yaml -o s.ply --colour reflectance --quiet", 0);
     snprintf(
         said, sizeof said,
