@@ -262,6 +262,40 @@ static void test_names_of_groups(void **state)
     free(svg);
 }
 
+/* ---- figures as text */
+
+static void draw_figures(FILE *out)
+{
+    static const double lengths[] = {12345,      123.45, 12.345, 1.2345, 0.9995, 0.99949,  0.0123456,
+                                     0.00099951, 2e-6,   3e-9,   0.0,    NAN,    INFINITY, -0.25};
+    static const uint64_t counts[] = {0, 999, 1000, 1234567};
+    static const double numbers[] = {NAN, 0.12346, 999.9, 1000.4, 12345.6, 1e15};
+    for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++, fputc(';', out))
+        page_length(out, lengths[i]);
+    page_signed_length(out, 0.25);
+    fputc(';', out);
+    page_signed_length(out, -2e-6);
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
+        fputc(';', out), page_count(out, counts[i]);
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+        fputc(';', out), page_number(out, numbers[i]);
+}
+
+/* Four digits, with three decimals at most, in the largest unit of which there is one when it is rounded. */
+static void test_figures_as_text(void **state)
+{
+    (void)state;
+    char *text = drawn(draw_figures);
+    assert_string_equal(text, "12345&nbsp;m;123.5&nbsp;m;12.35&nbsp;m;1.235&nbsp;m;1.000&nbsp;m;999.5&nbsp;mm;"
+                              "12.35&nbsp;mm;1.000&nbsp;mm;2.000&nbsp;\xc2\xb5m;3.000&nbsp;nm;0&nbsp;mm;\xe2\x80\x93;"
+                              "\xe2\x88\x9e;-250.0&nbsp;mm;+250.0&nbsp;mm;-2.000&nbsp;\xc2\xb5m;0;999;1,000;1,234,567;"
+                              "\xe2\x80\x93;0.1235;999.9;1,000;12,346;1e+15");
+    free(text);
+    assert_int_equal(page_letters("a\xc2\xb5"
+                                  "b"),
+                     3);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -271,6 +305,7 @@ int main(void)
         cmocka_unit_test(test_ends_and_curve),
         cmocka_unit_test(test_without_values),
         cmocka_unit_test(test_names_of_groups),
+        cmocka_unit_test(test_figures_as_text),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
