@@ -266,7 +266,7 @@ static void test_names_of_groups(void **state)
 
 static void draw_figures(FILE *out)
 {
-    static const double lengths[] = {12345,      123.45, 12.345, 1.2345, 0.9995, 0.99949,  0.0123456,
+    static const double lengths[] = {12345,      123.46, 12.346, 1.2346, 0.9995, 0.99949,  0.0123457,
                                      0.00099951, 2e-6,   3e-9,   0.0,    NAN,    INFINITY, -0.25};
     static const uint64_t counts[] = {0, 999, 1000, 1234567};
     static const double numbers[] = {NAN, 0.12346, 999.9, 1000.4, 12345.6, 1e15};
