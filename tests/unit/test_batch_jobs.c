@@ -177,7 +177,7 @@ static void expect_files(const struct batch_entry *entry, const char *name, cons
     }
 }
 
-/* What the manifests of all shards have of the jobs. */
+/* Takes the entries of the jobs from the manifests of all shards, and compares them with the files. */
 static void read_entries(void)
 {
     struct sh_err err;

@@ -89,7 +89,7 @@ static void a_plain_scene(void **state)
                             &each, &peak_mb),
                      3);
     getrusage(RUSAGE_SELF, &usage);
-    /* Of the 3 triangles, with four digits. The peak was no higher then than now. */
+    /* The figures agree for 3 triangles, up to their four digits. The peak was no higher then than now. */
     assert_true(fabs(3.0 * each - 1e6 * mb) <= 1.5 + 1e3 * mb && peak_mb > 1.0);
     assert_true(peak_mb <= 1024e-6 * (double)usage.ru_maxrss * 1.001);
     has(text, "anchor    none: each station has a place of its own, with the scene's y axis as its true north");
@@ -152,7 +152,7 @@ static void an_output_has_heights(void **state)
     }
 }
 
-/* At the zone's middle, 500 km, grid north is true north, and the grid has 0.9996 of true lengths. So a level range
+/* At the zone's middle, 500 km, grid north is true north, and the grid has 0.9996 of true lengths. A level range
  * reads 400 ppm less than it is, and 0.3 ppm less again at a height of 2 m: that is 2 m of the Earth's radius. */
 static void anchors(void **state)
 {

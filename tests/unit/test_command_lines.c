@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead` says of a wrong command line, word for word: of the operands and options of all commands, of what "
-     "goes
- * together, and of the limits of each number. */
+/* Each wrong command line gives one line, which is compared word for word: operands and options of all commands,
+ * options that go together, and the limits of each number. */
 #include "tests/unit/lines_rig.h"
 
 #include <setjmp.h>

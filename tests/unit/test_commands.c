@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Whole commands in this process, on a closed room that a sphere of shots hits from two stations. So sanitizers see
- * what they leave behind, and all counts are known by hand. Run from the top of the source tree. */
+/* Whole commands in this process, on a closed room that a sphere of shots hits from two stations. Sanitizers see
+ * what the commands leave behind, and all counts are known by hand. Run from the top of the source tree. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -69,7 +69,7 @@ static int come_back(void **state)
     return chdir(back) != 0 || system(command) != 0;
 }
 
-/* Runs a command line. What it printed is in on_out and on_err. */
+/* Runs a command line, and keeps its output in on_out and on_err. */
 static void does(const struct app_command *command, const char *words, int want)
 {
     char text[512], *argv[40] = {0}, *at = text;

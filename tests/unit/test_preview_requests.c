@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page asks for previews: each word of a query is a figure of the request, with its default and its limits; and
- * a previewed head looks where it is asked to. */
+/* A page asks for previews by queries: each word is a figure of the request, with its default and its limits. A
+ * previewed head looks where it is asked to. */
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "tests/unit/preview_room.h"
 #include "tests/unit/site_rig.h"

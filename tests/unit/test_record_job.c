@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What `record` can't make of a configuration is refused before the scene is loaded, with the file and what is allowed;
- * all else is left as it is. */
+/* `record` refuses a configuration that it can't record before the scene is loaded, with the file and what is allowed.
+ * It leaves all else as it is. */
 #include "firmware_sim/app/studio/record/job.h"
 
 #include <setjmp.h>
@@ -104,7 +104,7 @@ static void a_crs_needs_points_in_it(void **state)
             "output.layout=geo");
 }
 
-/* Colours of the configuration without limits get those of the recording. Those of a texture come from the head. */
+/* Colours of the configuration without limits get those of the recording. Colours of a texture come from the head. */
 static void whose_colours(void **state)
 {
     struct colour_choice *c = &job->files.recorder.colour;

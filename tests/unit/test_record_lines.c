@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What `scanhead record` says of a wrong command line, word for word, also with --raw. */
+/* Each wrong command line of `record` gives one line, which is compared word for word, also with --raw. */
 #include "tests/unit/lines_rig.h"
 
 #include <setjmp.h>

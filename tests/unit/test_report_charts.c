@@ -209,7 +209,7 @@ static void test_without_values(void **state)
     free(svg);
 }
 
-/* Names of 20 letters take 7 units a letter and 8 more, 148 in all; a group has 55.5. So each third name is there, and
+/* Names of 20 letters take 7 units a letter and 8 more, 148 in all; a group has 55.5. Each third name is there, and
  * where the picture is narrow, only each second one of these. */
 static void draw_many(FILE *out)
 {

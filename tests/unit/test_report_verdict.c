@@ -131,7 +131,7 @@ static void test_texts(void **state)
         "must lie there.");
 }
 
-/* Of 1,000 points: 6 sqrt(2 / 1000) + 0.02 = 0.28833, and its roots from 1 on are 0.8436 and 1.1350. The mean has 6 /
+/* For 1,000 points: 6 sqrt(2 / 1000) + 0.02 = 0.28833, and its roots from 1 on are 0.8436 and 1.1350. The mean has 6 /
  * sqrt(1000) + 0.01 = 0.1997. Counts of a tenth of sigma add 0.1 to that, and three times their square to the upper
  * limit: sqrt(1.31833) = 1.1482. */
 static void test_text_of_noise(void **state)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Faults on the wire of a soak that no client can notice are hidden with a reason, and count neither as noticed nor as
- * missed. So do faults beside another one, and those after a session. */
+ * missed. Faults beside another one, and faults after a session, are hidden, too. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

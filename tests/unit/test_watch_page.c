@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a page is told of a head, from the watch's opening to its close: the head and its stations, the plan, the scene,
- * and which path leads where. Run from the top of the source tree. */
+/* A page is told of a head from the watch's opening to its close: the head and its stations, the plan, the scene, and
+ * which path leads where. Run from the top of the source tree. */
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "tests/unit/site_rig.h"
 
