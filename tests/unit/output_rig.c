@@ -23,7 +23,7 @@ void output_take(struct output *output, FILE *stream)
 
 char *output_give(struct output *output)
 {
-    enum { MOST = 65536 };
+    enum { MOST = 131072 };
     char *text = calloc(1, MOST);
     fflush(output->stream);
     assert_true(dup2(output->was, fileno(output->stream)) >= 0);
@@ -33,5 +33,28 @@ char *output_give(struct output *output)
     assert_true(fread(text, 1, MOST, f) < MOST);
     fclose(f);
     unlink(output->path);
+    return text;
+}
+
+static int is_progress(const char *line, size_t len)
+{
+    if (len >= 5 && memcmp(line + len - 5, " ...\n", 5) == 0) return 1;
+    for (size_t i = 2; i < len; i++)
+        if (line[i] == '%' && line[i - 1] == ' ' && line[i - 2] >= '0' && line[i - 2] <= '9') return 1;
+    return 0;
+}
+
+char *output_give_said(struct output *output)
+{
+    char *text = output_give(output), *to = text;
+    for (const char *line = text, *next; *line != '\0'; line = next) {
+        next = strchrnul(line, '\n');
+        next += *next == '\n';
+        const size_t len = (size_t)(next - line);
+        if (is_progress(line, len)) continue;
+        memmove(to, line, len);
+        to += len;
+    }
+    *to = '\0';
     return text;
 }

@@ -18,4 +18,7 @@ void output_take(struct output *output, FILE *stream);
 /* The stream is as before. Returns all that went to the file; free it. */
 char *output_give(struct output *output);
 
+/* The same without lines of progress ("what: 12 %, 3 s left", "what ..."), whose number depends on the machine. */
+char *output_give_said(struct output *output);
+
 #endif

@@ -240,6 +240,8 @@ static void test_beside(void **state)
     write_file("tex/lib.mtl", "w", "newmtl one\nmap_Kd d.png\nmap_d a.png\n");
     write_file("sub.obj", "w", "mtllib tex\\lib.mtl\nusemtl other.png\n");
     expect_beside("sub.obj", "/tex/lib.mtl;/tex/d.png;/a.png;/other.png;");
+    write_file("tex/other.png", "w", "x"); /* after the library the mesh's own folder comes first again */
+    expect_beside("sub.obj", "/tex/lib.mtl;/tex/d.png;/a.png;/other.png;");
     write_file("empty.obj", "w", "");
     expect_beside("empty.obj", "");
 }

@@ -46,6 +46,75 @@ static void test_values(void **state)
         assert_int_equal(values(*bad)[0], '!');
 }
 
+/* Each error is whole: the text as it was given, and what is allowed. */
+static void test_errors(void **state)
+{
+    static const char form[] = ": allowed KEY=A,B,... or KEY=FIRST:LAST:STEP, as in head.prr_hz=300000,600000";
+    static const struct {
+        const char *text, *says;
+    } rows[] = {{"a", NULL},
+                {"=1", NULL},
+                {"a=", NULL},
+                {"a=1,,2", "--sweep a=1,,2: an empty value; allowed as in a=A,B"},
+                {"a=1,", "--sweep a=1,: an empty value; allowed as in a=A,B"},
+                {"a=[1,2", "--sweep a=[1,2: a bracket or a quote is not closed"},
+                {"a=1]", "--sweep a=1]: a bracket or a quote is not closed"},
+                {"a='x", "--sweep a='x: a bracket or a quote is not closed"},
+                {"a=1,2,1", "--sweep a: the value 1 is given twice"},
+                {"a=1:2:0", "--sweep a=1:2:0: no value from FIRST to LAST; allowed FIRST:LAST:STEP as in 0:10:2"},
+                {"a=2:1:1", "--sweep a=2:1:1: no value from FIRST to LAST; allowed FIRST:LAST:STEP as in 0:10:2"},
+                {"a=0:10000:1", "--sweep a=0:10000:1: 10001 values; allowed at most 10000"}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char want[256];
+        snprintf(want, sizeof want, rows[i].says != NULL ? "!%s" : "!--sweep %s%s",
+                 rows[i].says != NULL ? rows[i].says : rows[i].text, form);
+        assert_string_equal(values(rows[i].text), want);
+    }
+}
+
+static void test_errors_between_sweeps(void **state)
+{
+    static const struct {
+        const char *first, *second, *says;
+    } rows[] = {
+        {"a[0].b=1", "a.0.b=2", "--sweep a.0.b: the key is given twice; allowed once, with all its values"},
+        {"a.b=1", "a={}", "--sweep a: it would replace the values of --sweep a.b; allowed is the other order"},
+        {"a[0]=1", "a=[]", "--sweep a: it would replace the values of --sweep a[0]; allowed is the other order"},
+        {"a={}", "a.b=1", NULL},
+        {"ab=1", "a=1", NULL}};
+    struct batch_sweeps sweeps = {.n = 0};
+    struct sh_err err;
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        assert_int_equal(batch_sweeps_add(&sweeps, rows[i].first, &err), SH_OK);
+        const int rc = batch_sweeps_add(&sweeps, rows[i].second, &err);
+        assert_int_equal(rc, rows[i].says == NULL ? SH_OK : SH_EINPUT);
+        if (rows[i].says != NULL) assert_string_equal(err.text, rows[i].says);
+        batch_sweeps_free(&sweeps);
+    }
+    for (int i = 0; i < 16; i++) {
+        char text[16];
+        snprintf(text, sizeof text, "k%d=1", i);
+        assert_int_equal(batch_sweeps_add(&sweeps, text, &err), SH_OK);
+    }
+    assert_int_equal(batch_sweeps_add(&sweeps, "more=1", &err), SH_EINPUT);
+    assert_string_equal(err.text, "--sweep: at most 16 keys");
+    batch_sweeps_free(&sweeps);
+    assert_int_equal(sweeps.n, 0);
+}
+
+/* Either spelling of an element is the same key. */
+static void test_keys(void **state)
+{
+    (void)state;
+    assert_string_equal(batch_after_key("a[0].b=5", "a.0.b"), "=5");
+    assert_string_equal(batch_after_key("a.0.b=5", "a[0]"), ".b=5");
+    assert_string_equal(batch_after_key("a", "a"), "");
+    assert_null(batch_after_key("a", "ab"));
+    assert_null(batch_after_key("b", "a"));
+}
+
 static void test_ranges(void **state)
 {
     (void)state;
@@ -157,14 +226,22 @@ static void test_names(void **state)
     value[sizeof value - 2] = 'y';
     batch_name(1, 4, 1, set, 1, other);
     assert_true(strlen(name) < BATCH_NAME_LEN - 1);
+    assert_int_equal(strlen(name), 96 + 1 + 8); /* what is kept, and the hash of all */
     assert_memory_equal(name, other, 90);
     assert_string_not_equal(name, other);
+    for (int longer = 0; longer < 2; longer++) { /* "0001_station-1_" has 15 characters */
+        value[96 - 15 + longer] = '\0';
+        batch_name(1, 4, 1, set, 1, name);
+        assert_int_equal(strlen(name), longer ? 105 : 96);
+        value[96 - 15 + longer] = 'x';
+    }
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_values),   cmocka_unit_test(test_ranges), cmocka_unit_test(test_order),
+        cmocka_unit_test(test_values),   cmocka_unit_test(test_errors), cmocka_unit_test(test_errors_between_sweeps),
+        cmocka_unit_test(test_keys),     cmocka_unit_test(test_ranges), cmocka_unit_test(test_order),
         cmocka_unit_test(test_stations), cmocka_unit_test(test_shards), cmocka_unit_test(test_names),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

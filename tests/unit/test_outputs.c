@@ -128,6 +128,10 @@ static void files_of_a_mesh(void **state)
     assert_string_equal(
         err.text, "--output ./m.png: is also read as m.png, named in the operand m.obj, and would be overwritten; "
                   "name another file");
+    struct app_input turned = {0}; /* in whatever order */
+    add(&turned, "output", "./m.png", APP_WRITES);
+    add(&turned, NULL, "m.obj", APP_READS);
+    assert_int_equal(app_check_files(&turned, NULL, &err), SH_EINPUT);
     unlink("m.png");
     assert_int_equal(app_check_files(&in, NULL, &err), SH_OK); /* it isn't there */
     unlink("m.obj");

@@ -89,6 +89,9 @@ static void test_cells(void **state)
     const char *of = cells.bytes + 48 + 4 * (size_t)n, *corner = of + 4 * (size_t)pieces;
     double area_m2 = 0.0;
     uint32_t dark = 0, lit = 0;
+    assert_memory_equal(cells.bytes, "SHCE", 4);
+    assert_int_equal(le_get32(cells.bytes + 4), 1); /* versions */
+    assert_int_equal(le_get32(leg.bytes + 4), 1);
     assert_int_equal(n, coverage_cells(r.coverage));
     assert_int_equal(points_of(&leg), 0);
     for (uint32_t i = 0; i < n; i++)

@@ -20,6 +20,24 @@ static void test_left(void **state)
     assert_true(progress_left_s(&pace, "comparing", -1, 15 * S) < 0);
 }
 
+/* Work is told apart by its name up to a colon; only so much of it is kept. */
+static void test_names(void **state)
+{
+    (void)state;
+    struct progress_pace pace = {0};
+    char name[300];
+    progress_left_s(&pace, "comparing points", 0.1, S);
+    assert_true(progress_left_s(&pace, "comparing", 0.2, 2 * S) < 0); /* a shorter name is another work ... */
+    assert_true(fabs(progress_left_s(&pace, "comparing: 1", 0.4, 3 * S) - 3) < 1e-9);
+    assert_true(fabs(progress_left_s(&pace, "comparing", 0.6, 4 * S) - 2) < 1e-9); /* ... and stays so */
+    memset(name, 'x', sizeof name);
+    name[sizeof name - 1] = '\0';
+    assert_true(progress_left_s(&pace, name, 0.5, 5 * S) < 0);
+    assert_true(fabs(progress_left_s(&pace, name, 0.75, 6 * S) - 1) < 1e-9);
+    assert_true(fabs(progress_left_s(&pace, name, 1.5, 7 * S)) < 1e-9); /* more than all is all */
+    assert_true(progress_left_s(&pace, name, 1.75, 5 * S) < 0);         /* no time has passed */
+}
+
 static double scan_s(const struct native_descriptor *d)
 {
     static uint8_t out[1024];
@@ -48,6 +66,7 @@ static void test_scan(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_left), cmocka_unit_test(test_scan)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_left), cmocka_unit_test(test_names),
+                                       cmocka_unit_test(test_scan)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -23,6 +23,7 @@
 enum deed {
     END,
     PULSES,    /* some of a scan */
+    LINES,     /* two ends of lines, with counts */
     LOSES,     /* frames do not reach the recorder, the scan's end among them */
     TELLS,     /* that it is idle, and what the scan had */
     ENDS,      /* the scan, with the same counts */
@@ -90,6 +91,16 @@ static void send_pulse(void)
     send_frame(frame, native_encode_points(frame, sizeof frame, &block, 0));
 }
 
+/* Two lines that left out 1 and 10 echoes for the lack of room, 2 and 20 faint ones, 3 and 30 that do not fit. */
+static void send_lines(void)
+{
+    uint8_t frame[256];
+    for (uint32_t times = 1; times <= 10; times += 9) {
+        const struct line_end end = {.n_crowded = times, .n_faint = 2 * times, .n_unfit = 3 * times};
+        send_frame(frame, native_encode_line_end(frame, sizeof frame, &end, 0));
+    }
+}
+
 static void send_far(void)
 {
     uint8_t frame[256];
@@ -117,6 +128,7 @@ static void *play(void *arg)
     head.fd = accept(head.listener, NULL, NULL);
     for (const enum deed *deed = head.script; *deed != END && head.wrong == NULL; deed++) {
         if (*deed == PULSES) send_pulse();
+        if (*deed == LINES) send_lines();
         if (*deed == IDLE) answer("HEAD:STAT?", "idle\r\n");
         if (*deed == SCANNING) answer("HEAD:STAT?", "scanning\r\n");
         if (*deed == SLOWS) answer("HEAD:STAT?", "spin-down\r\n");
@@ -225,6 +237,17 @@ static void test_unplugged_within_a_scan(void **state)
     assert_int_equal(result.replugs, 2);
     assert_int_equal(result.broken_scans, 1); /* one scan, however often */
     assert_int_equal(result.counts.pulses, 2);
+}
+
+static void test_lines_add_up(void **state)
+{
+    (void)state;
+    static const enum deed script[] = {PULSES, LINES, PULSES, PULSES, ENDS, END};
+    struct recording_result result;
+    record(script, &result);
+    assert_true(result.crowded == 11 && result.faint == 22 && result.unfit == 33);
+    assert_true(result.points == 3 && result.empty == 0 && result.lost_samples == 0);
+    check_counts(&result.counts, 3);
 }
 
 /* The scan was over, though its end was lost, so nothing was left to break. */
@@ -341,6 +364,7 @@ static void test_order_is_said(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_lines_add_up),
         cmocka_unit_test(test_unplugged_within_a_scan),
         cmocka_unit_test(test_unplugged_after_a_lost_end),
         cmocka_unit_test(test_unplugged_between_scans),

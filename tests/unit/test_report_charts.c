@@ -87,6 +87,9 @@ static void test_axis_of_bins(void **state)
         while (strncmp(x, "<text", 5) != 0)
             x--;
         near("figure", atof(strstr(x, "x=\"") + 3), LEFT + (mm + 2.0) / 4.0 * (RIGHT - LEFT), ROUNDED);
+        near("below", atof(strstr(x, " y=\"") + 4), BOTTOM + 19.0, ROUNDED);
+        /* Steps are of 0.5 mm; every second figure is left out where the page is narrow. */
+        assert_int_equal(strncmp(x, "<text class=\"odd\"", 17) == 0, fmod(fabs(mm) / 0.5, 2.0) > 0.5);
         at++;
     }
     assert_true(n >= 5);
@@ -135,12 +138,174 @@ static void test_groups(void **state)
     free(svg);
 }
 
+/* ---- edges: the first and the last bin, the curve, the scale */
+
+static const struct figures_histogram ENDS = {.from = 0.0, .width = 0.5, .bins = 5, .count = {14, 0, 0, 0, 7}};
+
+/* Expects 20 points in the second bin alone, more than any bin has. */
+static double expected(const void *ctx, double from, double to)
+{
+    assert_ptr_equal(ctx, &ENDS);
+    assert_true(fabs(to - from - 0.5) < 1e-12);
+    return fabs(from - 0.5) < 1e-9 ? 20.0 : 0.0;
+}
+
+static void draw_ends(FILE *out)
+{
+    page_histogram(out, "a & b", &ENDS, expected, &ENDS);
+}
+
+/* The tallest figure takes 1 / 1.05 of the height, from 12 to 245. Bars, curve and scale share their unit. */
+static void test_ends_and_curve(void **state)
+{
+    (void)state;
+    char *svg = drawn(draw_ends);
+    const char *at = svg;
+    struct rect first, last, none;
+    assert_true(next_bar(&at, "s0", &first) && next_bar(&at, "s0", &last));
+    assert_false(next_bar(&at, "s0", &none));
+    const double unit = first.height / 14.0, wide = (RIGHT - LEFT) / 5.0;
+    near("first", first.x, LEFT, ROUNDED);
+    near("last", last.x, LEFT + 4.0 * wide, ROUNDED);
+    near("width", last.width, wide - 1.0, ROUNDED);
+    near("height", last.height, 7.0 * unit, ROUNDED);
+    double x, y;
+    int used;
+    const char *curve =
+        strstr(svg, "<polyline class=\"mark\" points=\"") + strlen("<polyline class=\"mark\" points=\"");
+    for (int k = 0; k < 5; k++, curve += used) {
+        assert_int_equal(sscanf(curve, "%lf,%lf %n", &x, &y, &used), 2);
+        near("curve", x, LEFT + (k + 0.5) * wide, ROUNDED);
+        near("curve", BOTTOM - y, k == 1 ? 20.0 * unit : 0.0, 2.0 * ROUNDED);
+    }
+    assert_int_equal(*curve, '"');
+    int n = 0;
+    double most = 0.0;
+    for (const char *p = svg; (p = strstr(p, "text-anchor=\"end\">")) != NULL; n++, p++) {
+        const double v = atof(p + strlen("text-anchor=\"end\">"));
+        const char *line = p;
+        while (strncmp(line, "y1=\"", 4) != 0)
+            line--;
+        near("scale", BOTTOM - atof(line + 4), v * unit, 2.0 * ROUNDED);
+        most = fmax(most, v);
+    }
+    assert_true(n >= 3 && most <= 21.0 && most > 14.0);
+    assert_non_null(strstr(svg, "a &amp; b"));
+    assert_non_null(strstr(svg, "Up: points; to the right: m. A bar is 0.5 m wide."));
+    free(svg);
+}
+
+static void draw_nothing(FILE *out)
+{
+    page_histogram(out, "t", &(struct figures_histogram){.bins = 0}, NULL, NULL);
+    page_bars(out, &(struct page_bars){.title = "t", .axis = "a", .series = {"s"}});
+}
+
+static void test_without_values(void **state)
+{
+    (void)state;
+    char *svg = drawn(draw_nothing);
+    assert_string_equal(svg, "<p class=\"soft\">No value.</p>\n<p class=\"soft\">No value.</p>\n");
+    free(svg);
+}
+
+/* Names of 20 letters take 7 units a letter and 8 more, 148 in all; a group has 55.5. Each third name is there, and
+ * where the picture is narrow, only each second one of these. */
+static void draw_many(FILE *out)
+{
+    static char group[10][32];
+    static double value_m[10][PAGE_SERIES];
+    for (int g = 0; g < 10; g++) {
+        snprintf(group[g], sizeof group[g], "group-number-%07d", g);
+        value_m[g][0] = 1e-6 * (g + 1);
+        value_m[g][1] = value_m[g][2] = value_m[g][3] = (double)NAN;
+    }
+    const struct page_bars bars = {.title = "t",
+                                   .axis = "a",
+                                   .series = {"mean", NULL, "x<y", "expected"},
+                                   .n_groups = 10,
+                                   .group = (const char(*)[32])group,
+                                   .value_m = (const double(*)[PAGE_SERIES])value_m};
+    page_bars(out, &bars);
+}
+
+static void test_names_of_groups(void **state)
+{
+    (void)state;
+    char *svg = drawn(draw_many), text[128];
+    for (int g = 0; g < 10; g++) {
+        snprintf(text, sizeof text, "<text%s x=\"%.1f\" y=\"262\" text-anchor=\"middle\">group-number-%07d</text>\n",
+                 g / 3 % 2 == 1 ? " class=\"odd\"" : "", LEFT + (g + 0.5) * (RIGHT - LEFT) / 10.0, g);
+        assert_int_equal(strstr(svg, text) != NULL, g % 3 == 0);
+    }
+    const char *at = svg;
+    struct rect bar;
+    for (int g = 0; g < 10; g++) { /* a third of 0.8 of the group, less a gap of 1 */
+        assert_true(next_bar(&at, "s0", &bar));
+        near("left", bar.x, LEFT + (g + 0.1) * 55.5, ROUNDED);
+        near("width", bar.width, 0.8 * 55.5 / 3.0 - 1.0, ROUNDED);
+    }
+    near("tallest", bar.height, (BOTTOM - 12.0) / 1.05, 2.0 * ROUNDED);
+    int n = 0;
+    for (const char *p = svg; (p = strstr(p, "text-anchor=\"end\">")) != NULL; n++, p++) { /* of 10 um in all */
+        const char *line = p;
+        while (strncmp(line, "y1=\"", 4) != 0)
+            line--;
+        near("scale", BOTTOM - atof(line + 4), atof(p + strlen("text-anchor=\"end\">")) * bar.height / 10.0,
+             2.0 * ROUNDED);
+    }
+    assert_true(n >= 3);
+    assert_non_null(strstr(svg,
+                           "<p class=\"key\"><span><i class=\"s0\"></i>mean</span> <span><i class=\"s2\"></i>x&lt;y"
+                           "</span> <span><i class=\"line\"></i>expected</span> </p>\n"));
+    assert_non_null(strstr(svg, "Up: \xc2\xb5m; to the right: a."));
+    free(svg);
+}
+
+/* ---- figures as text */
+
+static void draw_figures(FILE *out)
+{
+    static const double lengths[] = {12345,      123.46, 12.346, 1.2346, 0.9995, 0.99949,  0.0123457,
+                                     0.00099951, 2e-6,   3e-9,   0.0,    NAN,    INFINITY, -0.25};
+    static const uint64_t counts[] = {0, 999, 1000, 1234567};
+    static const double numbers[] = {NAN, 0.12346, 999.9, 1000.4, 12345.6, 1e15};
+    for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++, fputc(';', out))
+        page_length(out, lengths[i]);
+    page_signed_length(out, 0.25);
+    fputc(';', out);
+    page_signed_length(out, -2e-6);
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
+        fputc(';', out), page_count(out, counts[i]);
+    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
+        fputc(';', out), page_number(out, numbers[i]);
+}
+
+/* Four digits, with three decimals at most, in the largest unit of which there is one when it is rounded. */
+static void test_figures_as_text(void **state)
+{
+    (void)state;
+    char *text = drawn(draw_figures);
+    assert_string_equal(text, "12345&nbsp;m;123.5&nbsp;m;12.35&nbsp;m;1.235&nbsp;m;1.000&nbsp;m;999.5&nbsp;mm;"
+                              "12.35&nbsp;mm;1.000&nbsp;mm;2.000&nbsp;\xc2\xb5m;3.000&nbsp;nm;0&nbsp;mm;\xe2\x80\x93;"
+                              "\xe2\x88\x9e;-250.0&nbsp;mm;+250.0&nbsp;mm;-2.000&nbsp;\xc2\xb5m;0;999;1,000;1,234,567;"
+                              "\xe2\x80\x93;0.1235;999.9;1,000;12,346;1e+15");
+    free(text);
+    assert_int_equal(page_letters("a\xc2\xb5"
+                                  "b"),
+                     3);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bars_stand_on_the_axis),
         cmocka_unit_test(test_axis_of_bins),
         cmocka_unit_test(test_groups),
+        cmocka_unit_test(test_ends_and_curve),
+        cmocka_unit_test(test_without_values),
+        cmocka_unit_test(test_names_of_groups),
+        cmocka_unit_test(test_figures_as_text),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -128,6 +128,7 @@ int raw_record(int argc, char **argv)
     static struct raw raw;
     struct raw *r = &raw;
     struct sh_err err = {0};
+    memset(r, 0, sizeof *r);
     int status = app_parse(&command, argc, argv, &r->in, r);
     if (status == APP_GO_ON && r->path == NULL) status = app_usage(&command, "-o FILE.pcapng is needed");
     if (status == APP_GO_ON) status = read_source(r);

@@ -61,7 +61,6 @@ static void add_moment(struct soak_link *link, const struct fault_note *note)
     struct soak_row *row = &link->row[note->kind];
     const char *why = why_hidden(link->soak, note->kind);
     row->injected++;
-    link->ask.others++;
     if (note->kind == FAULT_POWER_CYCLE)
         soak_usb_forget(&link->plugs, link->row, "power went before a client opened it");
     if (link->datagrams != NULL) why = "the clean packets come from the same head, so they have this fault, too";

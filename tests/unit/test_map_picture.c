@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: MIT */
+/* Pictures of map --perspective: points on a wall before the eye have the colours that their figures give, without
+ * shading exactly so. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <math.h>
+#include <png.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "core/colour.h"
+#include "core/studio/cloud.h"
+#include "core/studio/view.h"
+#include "firmware_sim/app/studio/map/view_inside.h"
+
+enum { SIDE_PX = 200 };
+
+static struct map_view_options options;
+static struct map_view_plan plan;
+static struct sh_err err;
+static char path[] = "/tmp/scanhead-picture-XXXXXX";
+
+static void plan_it(const char *colour, const char *limits)
+{
+    options = map_view_default;
+    options.eye = "0,-10,0";
+    options.look_at = "0,0,0";
+    options.size = "200x200";
+    options.colour = colour;
+    options.limits = limits;
+    options.point_px = 8;
+    options.shade = 0;
+    if (map_view_read(&options, &plan, &err) != SH_OK) fail_msg("%s", err.text);
+}
+
+/* Draws a wall of 2 x 2 m in the plane y = 0, all of whose points have these figures. Returns the code. */
+static int draw(const struct picturing_figures *f, double top_m, uint8_t middle[3])
+{
+    struct picturing *p;
+    struct picturing_bounds b = {{-1, 0, -1}, {1, 0, top_m}};
+    uint8_t *rgb = malloc(3 * SIDE_PX * SIDE_PX);
+    assert_non_null(rgb);
+    int rc = picturing_begin(&plan, path, 1, &p, &err);
+    assert_int_equal(rc, SH_OK);
+    rc = picturing_look(p, &b, &err);
+    for (int x = -40; x <= 40 && rc == SH_OK; x++)
+        for (int z = -40; z <= 40; z++)
+            picturing_add(p, (const double[3]){x / 40.0, 0, z / 40.0}, f);
+    if (rc == SH_OK) rc = picturing_finish(p, &err);
+    picturing_end(p);
+    if (rc == SH_OK) {
+        png_image image = {.version = PNG_IMAGE_VERSION};
+        assert_true(png_image_begin_read_from_file(&image, path));
+        image.format = PNG_FORMAT_RGB;
+        assert_true(image.width == SIDE_PX && image.height == SIDE_PX);
+        assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+        memcpy(middle, rgb + 3 * (SIDE_PX / 2 * SIDE_PX + SIDE_PX / 2), 3);
+    }
+    free(rgb);
+    return rc;
+}
+
+static void expect(const struct picturing_figures *f, const uint8_t want[3])
+{
+    uint8_t got[3];
+    if (draw(f, 1, got) != SH_OK) fail_msg("%s", err.text);
+    for (int k = 0; k < 3; k++)
+        if (abs(got[k] - want[k]) > 1)
+            fail_msg("%d %d %d, not %d %d %d", got[0], got[1], got[2], want[0], want[1], want[2]);
+}
+
+/* A quarter of the way to white, so that shading shows on dark colours, too. */
+static void paler(uint8_t rgb[3])
+{
+    for (int k = 0; k < 3; k++)
+        rgb[k] = (uint8_t)(rgb[k] + (255 - rgb[k]) / 4);
+}
+
+static void figures_are_colours(void **state)
+{
+    static const uint8_t own[3] = {200, 100, 50};
+    const struct picturing_figures f = {.range_m = 2.5, .refl_db = -12, .label = 3, .station = 2, .rgb = own};
+    struct picturing_figures bare = f;
+    uint8_t want[3];
+    (void)state;
+    plan_it("rgb", NULL);
+    expect(&f, own);
+    plan_it("label", NULL);
+    colour_number(3, want);
+    paler(want);
+    expect(&f, want);
+    bare.label = CLOUD_LABEL_NONE;
+    memcpy(want, colour_grey, 3);
+    paler(want);
+    expect(&bare, want);
+    plan_it("station", NULL);
+    colour_number(2, want);
+    paler(want);
+    expect(&f, want);
+    plan_it("reflectance", NULL);
+    colour_reflectance(-12, want);
+    expect(&f, want);
+    plan_it("range", "0,10");
+    colour_ramp(0.25, want);
+    expect(&f, want);
+    plan_it("range", NULL); /* all have one value: it is the middle */
+    colour_ramp(0.5, want);
+    expect(&f, want);
+    plan_it("height", "-5,15");
+    view_ramp(0.25, want);
+    expect(&f, want);
+}
+
+static void what_is_not_known_is_an_error(void **state)
+{
+    const struct picturing_figures none = {.range_m = NAN, .refl_db = NAN};
+    uint8_t middle[3];
+    char want[256];
+    (void)state;
+    plan_it("range", NULL);
+    assert_int_equal(draw(&none, 1, middle), SH_EINPUT);
+    assert_string_equal(err.text, "--colour range: no point has a range, as with a head that moves");
+    plan_it("reflectance", NULL);
+    assert_int_equal(draw(&none, 1, middle), SH_EINPUT);
+    assert_string_equal(err.text,
+                        "--colour reflectance: no point has one; --set signal.model=on gives them one in a scan");
+    plan_it("height", NULL);
+    options.above_m = 3; /* above all points */
+    assert_int_equal(draw(&none, 5, middle), SH_EINPUT);
+    snprintf(
+        want, sizeof want,
+        "%s: no point is in the picture: 0 are outside of it or behind the eye, --below and --above leave out 6561, "
+        "and 0 shots have no echo",
+        path);
+    assert_string_equal(err.text, want);
+    plan_it("height", NULL);
+    options.above_m = 0; /* half of them, and the row at 0 is kept */
+    struct picturing *p;
+    assert_int_equal(picturing_begin(&plan, path, 1, &p, &err), SH_OK);
+    assert_int_equal(picturing_look(p, &(struct picturing_bounds){{-1, 0, -1}, {1, 0, 1}}, &err), SH_OK);
+    picturing_add(p, (const double[3]){0, 0, 0}, &none);
+    picturing_add(p, (const double[3]){0, 0, -1e-9}, &none);
+    assert_int_equal(p->cut, 1);
+    picturing_end(p);
+}
+
+static int make_path(void **state)
+{
+    (void)state;
+    const int fd = mkstemp(path);
+    if (fd < 0) return -1;
+    close(fd);
+    return unlink(path);
+}
+
+static int remove_path(void **state)
+{
+    (void)state;
+    unlink(path);
+    return 0;
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(figures_are_colours),
+                                       cmocka_unit_test(what_is_not_known_is_an_error)};
+    return cmocka_run_group_tests_name("map picture", tests, make_path, remove_path);
+}

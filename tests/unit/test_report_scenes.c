@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: MIT */
+/* Reports of scenes with many surfaces, with a mirror, and of clouds that are far or empty: which lines there are, and
+ * what is left out. Run from the top of the source tree. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "firmware_sim/app/app.h"
+#include "tests/unit/output_rig.h"
+
+static char folder[64], back[512], *on_out, *on_err;
+
+static void write_text(const char *name, const char *text)
+{
+    FILE *out = fopen(name, "w");
+    assert_non_null(out);
+    fputs(text, out);
+    assert_int_equal(fclose(out), 0);
+}
+
+static int go_there(void **state)
+{
+    (void)state;
+    if (getcwd(back, sizeof back) == NULL) return -1;
+    strcpy(folder, "/tmp/scanhead-scenes-XXXXXX");
+    if (mkdtemp(folder) == NULL || chdir(folder) != 0) return -1;
+    char heads[600];
+    snprintf(heads, sizeof heads, "%s/config/heads", back);
+    return setenv("SCANHEAD_HEADS", heads, 1);
+}
+
+static int come_back(void **state)
+{
+    (void)state;
+    char command[80];
+    free(on_out);
+    free(on_err);
+    snprintf(command, sizeof command, "rm -r '%s'", folder);
+    return chdir(back) != 0 || system(command) != 0;
+}
+
+static void does(const struct app_command *command, const char *words, int want)
+{
+    char text[512], *argv[32] = {0}, *at = text;
+    struct output out, err;
+    int argc = 0;
+    snprintf(text, sizeof text, "%s %s", command->name, words);
+    for (char *word; (word = strsep(&at, " ")) != NULL;)
+        argv[argc++] = word;
+    free(on_out);
+    free(on_err);
+    output_take(&out, stdout);
+    output_take(&err, stderr);
+    const int status = command->run(argc, argv);
+    on_err = output_give_said(&err);
+    on_out = output_give(&out);
+    if (status != want) fail_msg("%s %s: status %d: %s", command->name, words, status, on_err);
+}
+
+static void has(const char *text, const char *what)
+{
+    if (strstr(text, what) == NULL) fail_msg("no %s in %s", what, text);
+}
+
+static char *contents(const char *name)
+{
+    char *text = calloc(1, 1 << 19);
+    FILE *in = fopen(name, "r");
+    assert_true(in != NULL && text != NULL);
+    assert_true(fread(text, 1, (1 << 19) - 1, in) > 0);
+    fclose(in);
+    return text;
+}
+
+static int times_in(const char *text, const char *what)
+{
+    int n = 0;
+    for (; (text = strstr(text, what)) != NULL; text++)
+        n++;
+    return n;
+}
+
+/* A cloud of this many points in the middle of tile i of a row, one point more on each further tile. Tiles are 1 m
+ * wide. Nothing is recorded: the points lie exactly on the floor. */
+static void write_tiles(int n)
+{
+    int points = 0, vertex = 1;
+    FILE *mesh = fopen("tiles.obj", "w"), *cloud = fopen("tiles.ply", "w");
+    assert_true(mesh != NULL && cloud != NULL);
+    for (int i = 0; i < n; i++, vertex += 4) {
+        fprintf(mesh, "o tile%d\nv %d 0 0\nv %d 0 0\nv %d 1 0\nv %d 1 0\nf %d %d %d %d\n", i, i, i + 1, i + 1, i,
+                vertex, vertex + 1, vertex + 2, vertex + 3);
+        points += i + 1;
+    }
+    fprintf(cloud,
+            "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\n"
+            "property ushort label\nend_header\n",
+            points);
+    for (int i = 0; i < n; i++)
+        for (int k = 0; k <= i; k++)
+            fprintf(cloud, "%g %g 0 %d\n", i + 0.25 + 0.01 * (k % 50), 0.3 + 0.01 * (k / 50), i);
+    assert_int_equal(fclose(mesh) | fclose(cloud), 0);
+    write_text("tiles.yaml",
+               "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: polar}\n"
+               "scene: {meshes: [{file: tiles.obj, up: z, scale: 1}]}\nstations: [{position_m: [1, 0.5, 2]}]\n");
+}
+
+/* The text has the 20 surfaces with the most points, the page 200, and JSON all of them. */
+static void so_many_surfaces_are_shown(void **state)
+{
+    static const int counts[] = {20, 21, 203};
+    (void)state;
+    for (int c = 0; c < 3; c++) {
+        const int n = counts[c], shown = n < 20 ? n : 20, on_page = n < 200 ? n : 200;
+        char line[160];
+        write_tiles(n);
+        does(&app_report, "tiles.yaml tiles.ply --html tiles.html", 0);
+        const char *at = strstr(on_out, "\nby surface");
+        assert_non_null(at);
+        assert_int_equal(times_in(at, "\nlabel "), shown);
+        for (int i = 0; i < shown; i++) { /* in this order */
+            snprintf(line, sizeof line, "\nlabel %-28d %10d ", n - 1 - i, n - i);
+            at = strstr(at, line);
+            if (at == NULL) fail_msg("no %s", line);
+        }
+        snprintf(line, sizeof line, "\nnot shown: %d more with points; --json has all of them\n", n - shown);
+        assert_int_equal(strstr(on_out, line) != NULL, n > shown);
+        assert_int_equal(times_in(on_out, "\nnot shown: "), n > shown);
+        char *page = contents("tiles.html");
+        assert_int_equal(times_in(page, "<tr><td>tile"), on_page);
+        snprintf(line, sizeof line, "<p class=\"soft\">%d more surfaces have points; ", n - on_page);
+        assert_int_equal(times_in(page, line), n > on_page);
+        free(page);
+        does(&app_report, "tiles.yaml tiles.ply --json", 0);
+        assert_int_equal(times_in(on_out, "\"object\": \"tile"), n + 1); /* and that of the worst point */
+    }
+}
+
+/* A floor that mirrors, under a ceiling: the ceiling is seen once more below the floor. These points are left out. */
+static void points_in_a_mirror_are_left_out(void **state)
+{
+    (void)state;
+    unsigned long long points, ghosts;
+    char card[128];
+    write_text("m.obj", "o floor\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3 4\n"
+                        "o roof\nv -9 -9 3\nv 9 -9 3\nv 9 9 3\nv -9 9 3\nf 8 7 6 5\n");
+    write_text("m.yaml", "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: geo}\n"
+                         "scene: {meshes: [{file: m.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 2]}]\n"
+                         "beam: {mode: single}\nsurfaces: [{object: floor, mirror: 0.9}]\n");
+    does(&app_record, "m.yaml -o m.ply --quiet", 0);
+    const struct timespec written[2] = {{.tv_sec = 1767323045}, {.tv_sec = 1767323045}};
+    assert_int_equal(utimensat(AT_FDCWD, "m.ply", written, 0), 0);
+    does(&app_report, "m.yaml m.ply --html m.html", 0);
+    const char *at = strstr(on_out, "\nghosts ");
+    assert_non_null(at);
+    assert_int_equal(sscanf(on_out, "points %llu", &points), 1);
+    assert_int_equal(sscanf(at, " ghosts %llu points seen in mirrors, left out", &ghosts), 1);
+    assert_true(ghosts > 20 && points > 20);
+    has(on_out, "\nempty      0 shots without echo\n");                                              /* they are none */
+    has(on_out, "\nWithin the expected error: no point is farther from the scene than its bound, "); /* once */
+    assert_int_equal(times_in(on_out, "Within the expected error"), 1);
+    char *page = contents("m.html");
+    snprintf(card, sizeof card, "<div><span>Seen in mirrors, left out</span><b>%llu</b></div>\n", ghosts);
+    has(page, card);
+    has(page, "<dt>Written</dt><dd>2026-01-02 03:04:05 UTC</dd>\n");
+    has(page, "<div><span>Shots without echo in the file</span><b>0</b></div>\n");
+    free(page);
+    does(&app_report, "m.yaml m.ply --json", 0);
+    snprintf(card, sizeof card, "\"empty\": 0,\n  \"ghosts\": %llu,\n", ghosts);
+    has(on_out, card);
+    /* Without the mirror in the configuration their labels are those of no surface. */
+    does(&app_report, "m.yaml m.ply --set surfaces=[]", 2);
+    has(on_err, "; the scene has 2 surfaces, from 0\n");
+}
+
+/* A coordinate of 10^12 m and more is not written with decimals. A cloud without points is refused. */
+static void clouds_that_are_far_or_empty(void **state)
+{
+    static const char head[] = "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\n"
+                               "property double z\nend_header\n%s";
+    char text[400];
+    (void)state;
+    write_tiles(3);
+    snprintf(text, sizeof text, head, 2, "2e12 0.5 0\n0.5 0.5 0\n");
+    write_text("far.ply", text);
+    does(&app_report, "tiles.yaml far.ply", 1);
+    has(on_out, "\nworst      point 1 at 2e+12 0.500000 0.000000\n");
+    has(on_out, "\nfar        1 farther than 10 m from everything\n");
+    has(on_err, "far.ply: 1 of 2 points are farther than 0.001 m from the scene\n");
+    snprintf(text, sizeof text, head, 1, "2e12 0.5 0\n");
+    write_text("far.ply", text);
+    does(&app_report, "tiles.yaml far.ply", 1);
+    has(on_out, "\nmean       -\nRMS        -\n50 %       -\n95 %       -\n99.9 %     -\nmax        -\n");
+    snprintf(text, sizeof text, head, 2, "nan nan nan\nnan nan nan\n");
+    write_text("none.ply", text);
+    does(&app_report, "tiles.yaml none.ply", 2);
+    assert_string_equal(on_err, "scanhead: none.ply: it has no points (2 shots without echo)\n");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(so_many_surfaces_are_shown),
+        cmocka_unit_test(points_in_a_mirror_are_left_out),
+        cmocka_unit_test(clouds_that_are_far_or_empty),
+    };
+    return cmocka_run_group_tests_name("report scenes", tests, go_there, come_back);
+}
