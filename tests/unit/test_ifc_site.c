@@ -137,6 +137,51 @@ static void units(void **state)
     assert_near(site.origin_m[1], -2000.0 * 0.3048);
 }
 
+/* The prefixes are those of ISO 1000, as IFC names them. */
+static void prefixes(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *prefix;
+        double m;
+    } row[] = {{".MILLI.", 1e-3}, {".CENTI.", 1e-2}, {".DECI.", 0.1},   {".MICRO.", 1e-6},
+               {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        assert_loads(load_edited(".MILLI.", row[i].prefix));
+        assert_near(site.elevation_m, 34500.0 * row[i].m);
+        assert_near(site.origin_m[2], 500.0 * row[i].m);
+    }
+}
+
+static void wrong_units_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *foot, *measure, *part;
+    } bad[] = {
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.),#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(-1.),#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(x),#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "0.3048,#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.3048)", "#31: attributes are missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.3048),#4", "not a unit of length"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.3048),#12", "#31: a reference to IFCSIUNIT is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#32", "IFCLENGTHMEASURE(0.3048),#32",
+         "#3: a reference to IFCMEASUREWITHUNIT is missing"},
+        {"$,.LENGTHUNIT.,'FOOT'", "IFCLENGTHMEASURE(0.3048),#32", "no unit of length"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        char with[256];
+        snprintf(with, sizeof with,
+                 "#3= IFCCONVERSIONBASEDUNIT(%s);\n#31= IFCMEASUREWITHUNIT(%s);\n"
+                 "#32= IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);",
+                 bad[i].foot, bad[i].measure);
+        const int code = load_edited("#3= IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.);", with);
+        if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
+            fail_msg("case %zu: %d \"%s\" without \"%s\"", i, code, err.text, bad[i].part);
+    }
+}
+
 /* The model is in millimetres. */
 static int load_map(const char *map, const char *crs)
 {
@@ -311,6 +356,8 @@ int main(void)
         cmocka_unit_test(byte_order_mark),
         cmocka_unit_test(angles),
         cmocka_unit_test(units),
+        cmocka_unit_test(prefixes),
+        cmocka_unit_test(wrong_units_are_refused),
         cmocka_unit_test(a_map_conversion),
         cmocka_unit_test(wrong_map_conversions_are_refused),
         cmocka_unit_test(what_is_wrong_is_refused),
