@@ -301,6 +301,46 @@ static void what_is_wrong_is_refused(void **state)
     assert_int_equal(ifc_site_read("/nonexistent.ifc", &site, &err), SH_EINPUT);
 }
 
+/* Diagnostics of the whole file name no line. */
+static void what_is_wrong_of_the_whole_file(void **state)
+{
+    (void)state;
+#define ADVICE "; use scene.anchor.source: explicit, which needs none of this"
+    static const struct {
+        const char *old, *with, *says;
+    } bad[] = {
+        {"#1= IFCPROJECT(", "#1= IFCWALL(", ": 0 IFCPROJECT records; allowed one" ADVICE},
+        {"#9= ", "#20= IFCPROJECT('p',$,$,$,$,$,$,(#5),#2);\n#9= ", ": 2 IFCPROJECT records; allowed one" ADVICE},
+        {"END-ISO-10303-21;", "END", ": cut off: it doesn't end with END-ISO-10303-21;"},
+        {"#9= IFCDIRECTION", "#7= IFCDIRECTION", ", line 14: a second record #7; allowed one"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        assert_int_equal(load_edited(bad[i].old, bad[i].with), SH_EINPUT);
+        assert_memory_equal(err.text, path, strlen(path));
+        assert_string_equal(err.text + strlen(path), bad[i].says);
+    }
+}
+
+/* The end is looked for in the last 1024 bytes, or in the whole file where it is shorter. */
+static void the_end_is_near(void **state)
+{
+    (void)state;
+    static const char end[] = "END-ISO-10303-21;";
+    char text[4096];
+    const char *data = strstr(base, "#1= ");
+    for (int size = 1023; size <= 1025; size++) { /* a comment fills it up */
+        const int fill = size - (int)strlen(base);
+        assert_true(fill > 4);
+        snprintf(text, sizeof text, "%.*s/*%*s*/%s", (int)(data - base), base, fill - 4, "", data);
+        assert_int_equal(strlen(text), size);
+        assert_loads(load_text(text));
+    }
+    for (int after = 1024 - (int)strlen(end); after <= 1025 - (int)strlen(end); after++) {
+        snprintf(text, sizeof text, "%s%*s", base, after - 1, ""); /* base has a line's end after it */
+        assert_int_equal(load_text(text), after <= 1024 - (int)strlen(end) ? SH_OK : SH_EINPUT);
+    }
+}
+
 /* Any cut and any changed byte gives a site or one line. */
 static void damaged_files_never_crash(void **state)
 {
@@ -361,6 +401,8 @@ int main(void)
         cmocka_unit_test(a_map_conversion),
         cmocka_unit_test(wrong_map_conversions_are_refused),
         cmocka_unit_test(what_is_wrong_is_refused),
+        cmocka_unit_test(what_is_wrong_of_the_whole_file),
+        cmocka_unit_test(the_end_is_near),
         cmocka_unit_test(damaged_files_never_crash),
         cmocka_unit_test(the_house),
     };
