@@ -268,6 +268,22 @@ static void what_is_refused(void **state)
     mesh.texture = "a.png";
     mesh.uv = NULL;
     write_refused("a.glb", &mesh, "it has a texture but no texture coordinates");
+    mesh = sheet();
+    mesh.n_parts = MESH_MAX_PARTS + 1;
+    write_refused("a.obj", &mesh, "parts; allowed are up to ");
+    mesh = sheet();
+    mesh.n_vertices = MESH_MAX_VERTICES + 1U;
+    write_refused("a.ply", &mesh, "vertices; allowed are up to ");
+    for (int i = 0; i < 5; i++) { /* the last vertex's */
+        float up[N_VERTICES][3] = {{0}}, at[N_VERTICES][2] = {{0}};
+        *(i < 3 ? &up[N_VERTICES - 1][i] : &at[N_VERTICES - 1][i - 3]) = i % 2 ? (float)INFINITY : (float)NAN;
+        mesh = sheet();
+        mesh.normal = (const float(*)[3])up;
+        mesh.uv = (const float(*)[2])at;
+        write_refused("a.obj", &mesh,
+                      i < 3 ? "the normal of vertex 7 is not finite"
+                            : "the texture coordinate of vertex 7 is not finite");
+    }
 }
 
 /* Half a step of float at 5.4e6 m is 0.25 m: 5.4e6 lies between 2^22 and 2^23, where floats are 2^-1 apart. The bound
