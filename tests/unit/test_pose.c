@@ -314,6 +314,31 @@ static void test_slow_knots(void **state)
     }
 }
 
+/* The head brakes or speeds up, so that its acceleration is larger at one end of an interval. The path between knots
+ * stays within the error that is given, which is within the tolerance of 0.1 mm. */
+static void test_knots_where_the_acceleration_changes(void **state)
+{
+    (void)state;
+    static const double t_s[4] = {0, 1, 2, 3}, x_m[2][4] = {{0, 10, 10.5, 10.6}, {10.6, 10.5, 10, 0}};
+    const struct pose mount = {.quat = {1, 0, 0, 0}};
+    for (int way = 0; way < 2; way++) {
+        struct trajectory *tr = along_x(t_s, x_m[way], 4);
+        struct pose_path path;
+        struct sh_err err;
+        double worst_m = 0, frame;
+        assert_int_equal(find_path(tr, 0, 1e9, &mount, &path, &err), SH_OK);
+        for (size_t i = 0; i + 1 < path.n; i++) {
+            struct pose at;
+            const struct pose_knot *a = &path.knot[i], *b = &path.knot[i + 1];
+            trajectory_at(tr, 0.5e-9 * (double)(a->t_ns + b->t_ns), &at, &frame);
+            worst_m = fmax(worst_m, fabs(at.position_m[0] - 0.5 * (a->pose.position_m[0] + b->pose.position_m[0])));
+        }
+        assert_true(path.error_m <= 1e-4 && worst_m <= path.error_m * 1.0001);
+        free(path.knot);
+        trajectory_free(tr);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -328,6 +353,7 @@ int main(void)
         cmocka_unit_test(test_ends),
         cmocka_unit_test(test_samples_too_near),
         cmocka_unit_test(test_samples_that_are_no_pose),
+        cmocka_unit_test(test_knots_where_the_acceleration_changes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
