@@ -24,6 +24,8 @@ static void contradictions_are_named(void **state)
          "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":2,\"mode\":7}]}]," MORE_ACCESSORS,
          "meshes[0].primitives[0].mode is 7; allowed are 0 to 6"},
         {"\"nodes\":[{\"mesh\":-1}]," MESH MORE_ACCESSORS, ": nodes[0].mesh is not a whole number from 0 on"},
+        {"\"nodes\":[{\"mesh\":0,\"children\":1}]," MESH MORE_ACCESSORS, ": nodes[0].children is not a list"},
+        {"\"nodes\":{}," MESH MORE_ACCESSORS, ": nodes is not a list"},
         {"\"scene\":0.5," NODE MESH MORE_ACCESSORS, ": scene is not a whole number from 0 on"},
         {"\"nodes\":[{\"mesh\":4294967295}]," MESH MORE_ACCESSORS,
          "nodes[0].mesh is 4294967295; allowed are indices below 4294967295"},
