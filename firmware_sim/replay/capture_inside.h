@@ -11,6 +11,7 @@ struct capture_segment {
     int64_t t_ns;
     const uint8_t *data; /* in the file's bytes */
     uint32_t len, seq;
+    uint32_t missing;    /* TCP: bytes that were cut off its end */
     uint8_t flags, side; /* side: of the flow, 0 or 1 */
 };
 

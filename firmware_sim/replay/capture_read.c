@@ -116,12 +116,14 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
         f->has_begin = 1;
     }
     if (p->is_tcp && (p->flags & (TCP_FIN | TCP_RST)) != 0) f->is_closed = 1;
-    c->counts.missing_bytes += p->missing;
-    if (p->len == 0 && (p->flags & TCP_SYN) == 0) return SH_OK;
+    /* Bytes that TCP lacks are counted when a stream is put together, since they may come again. */
+    const uint32_t missing = p->is_tcp ? p->missing : 0;
+    c->counts.missing_bytes += p->missing - missing;
+    if (p->len + missing == 0 && (p->flags & TCP_SYN) == 0) return SH_OK;
     f->n_sent[side] += p->len != 0;
     f->bytes_sent[side] += p->len;
     if (!grow(&f->segment, &f->room, f->n + 1, sizeof *f->segment)) return sh_fail(err, SH_ENOMEM, "no memory");
-    f->segment[f->n++] = (struct capture_segment){t_ns, p->data, p->len, p->seq, (uint8_t)p->flags, side};
+    f->segment[f->n++] = (struct capture_segment){t_ns, p->data, p->len, p->seq, missing, (uint8_t)p->flags, side};
     return SH_OK;
 }
 

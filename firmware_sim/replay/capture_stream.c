@@ -20,6 +20,7 @@ struct parts {
     struct part *part;
     size_t n, room;
     int has_begin; /* the side's SYN is there: place 0 is its first byte */
+    int64_t end;   /* the place after the last byte that was sent, also if that byte was cut off */
 };
 
 static int by_place(const void *a, const void *b)
@@ -45,8 +46,10 @@ static int collect(const struct capture_flow *f, uint32_t side, struct parts *pa
             parts->has_begin = is_syn || !f->is_tcp;
         }
         is_known = 1;
-        if (s->len == 0) continue;
         const int64_t from = f->is_tcp ? last + (int32_t)(seq - base - (uint32_t)last) : last;
+        const int64_t end = from + s->len + s->missing;
+        if (end > parts->end) parts->end = end;
+        if (s->len == 0) continue;
         last = f->is_tcp ? from : last + s->len;
         if (!grow(&parts->part, &parts->room, parts->n + 1, sizeof *parts->part)) return SH_ENOMEM;
         parts->part[parts->n++] = (struct part){s->data, s->len, from, s->t_ns, i};
@@ -76,6 +79,7 @@ static void trim(struct replay_capture *c, struct parts *parts)
         number = p.number;
         parts->part[n++] = p;
     }
+    if (parts->end > place) c->counts.missing_bytes += (uint64_t)(parts->end - place);
     parts->n = n;
 }
 

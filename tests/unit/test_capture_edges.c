@@ -247,6 +247,47 @@ static void test_swapped_beginning(void **state)
     client_close(&c);
 }
 
+/* Packets were cut off as they were captured, the first and the last one of the answer, one down to its headers, after
+ * one that was lost. One of them came again as a whole. Each byte that is missing counts once. */
+static void test_cut_packets(void **state)
+{
+    (void)state;
+    uint8_t frame[ETHERNET_MAX_FRAME], whole[ETHERNET_MAX_FRAME];
+    struct capture_counts counts;
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 0, 0, "a\n");
+    made_add(&m, 1, frame, tcp_put_data(&m.talk, 1, "one, two\n", 9, frame) - 4); /* "two\n" is missing */
+    made_say(&m, 2, 1, "three\n");
+    const size_t len = tcp_put_data(&m.talk, 1, "four\n", 5, whole);
+    made_add(&m, 3, whole, len - 3);
+    made_add(&m, 3, whole, len);
+    tcp_put_data(&m.talk, 1, "lost...", 7, frame);
+    made_add(&m, 4, frame, tcp_put_data(&m.talk, 1, "five\n", 5, frame) - 5);
+    made_say(&m, 5, 1, "six\n");
+    made_add(&m, 6, frame, tcp_put_data(&m.talk, 1, "seven\n", 6, frame) - 1);
+    client_open(&c, &m, 0, NULL);
+    capture_get_counts(c.capture, &counts);
+    assert_int_equal(counts.missing_bytes, 4 + 7 + 5 + 1);
+    client_close(&c);
+}
+
+/* Datagrams have no numbers: what was cut off them counts. */
+static void test_cut_datagrams(void **state)
+{
+    (void)state;
+    uint8_t frame[ETHERNET_MAX_FRAME];
+    struct capture_counts counts;
+    made_begin(&m);
+    made_add(&m, 0, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "one", 3) - 2);
+    made_add(&m, 1, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "two", 3));
+    made_add(&m, 2, frame, ethernet_put_udp(frame, &DEVICE, &DRIVER, "three", 5) - 5);
+    client_open(&c, &m, 0, NULL);
+    capture_get_counts(c.capture, &counts);
+    assert_int_equal(counts.missing_bytes, 2 + 5);
+    client_close(&c);
+}
+
 /* LMCstopmeas ends scans, and no other event; LMCstartmeas begins them again. mSCreboot ends all. */
 static void test_scans_stop(void **state)
 {
@@ -371,6 +412,8 @@ int main(void)
         cmocka_unit_test(test_clock_steps),
         cmocka_unit_test(test_without_times),
         cmocka_unit_test(test_time_offsets),
+        cmocka_unit_test(test_cut_packets),
+        cmocka_unit_test(test_cut_datagrams),
         cmocka_unit_test(test_swapped_beginning),
         cmocka_unit_test(test_scans_stop),
         cmocka_unit_test(test_pipelined_turns),

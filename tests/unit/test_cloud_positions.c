@@ -315,6 +315,85 @@ static void test_pcd_counts(void **state)
     expect_error(NO_COUNT, sizeof NO_COUNT - 1, "no line POINTS");
 }
 
+/* POINTS counts, whatever the sides of the grid are. */
+static void test_pcd_points_count_first(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *counts, *error;
+    } row[] = {{"POINTS 2\n", NULL},
+               {"WIDTH 5\nHEIGHT 7\nPOINTS 2\n", NULL},
+               {"POINTS 2\nWIDTH 1\nHEIGHT 1\n", NULL},
+               {"WIDTH 2\nHEIGHT 1\n", NULL},
+               {"WIDTH 0\nHEIGHT 2\n", "no WIDTH and HEIGHT"},
+               {"WIDTH 2\nHEIGHT 0\n", "no WIDTH and HEIGHT"},
+               {"WIDTH 2\n", "no WIDTH and HEIGHT"},
+               {"WIDTH 6000000000\nHEIGHT 6000000000\n", "cut off"},
+               {"WIDTH 4294967296\nHEIGHT 4294967296\n", "cut off"}, /* 2^64 */
+               {"POINTS -1\n", "POINTS, WIDTH or HEIGHT is not a whole number"},
+               {"WIDTH two\n", "POINTS, WIDTH or HEIGHT is not a whole number"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        char text[512];
+        const int len =
+            snprintf(text, sizeof text, "VERSION .7\n%s%sDATA ascii\n1.5 -2.25 3.125\n-0.5 8 0\n", XYZ, row[i].counts);
+        if (row[i].error != NULL)
+            expect_error(text, (size_t)len, row[i].error);
+        else
+            expect(text, (size_t)len, 2, TWO, 1);
+        assert_string_equal(warnings, "");
+    }
+}
+
+/* Writes a header with n fields, of which the last three are x, y and z, and the first one has this count. */
+static size_t put_fields(char *to, int n, int count)
+{
+    static const char *const key[] = {"FIELDS", "SIZE", "TYPE", "COUNT"};
+    char *p = to + sprintf(to, "VERSION .7\n");
+    for (int line = 0; line < 4; line++) {
+        p += sprintf(p, "%s", key[line]);
+        for (int i = 0; i < n; i++) {
+            const int axis = i - (n - 3);
+            if (line == 0)
+                p += sprintf(p, " %s", axis == 0 ? "x" : axis == 1 ? "y" : axis == 2 ? "z" : "c");
+            else if (line == 2)
+                p += sprintf(p, " %c", axis >= 0 ? 'F' : 'U');
+            else
+                p += sprintf(p, " %d", line == 3 ? (i == 0 ? count : 1) : axis >= 0 ? 4 : 1);
+        }
+        *p++ = '\n';
+    }
+    return (size_t)(p - to) + (size_t)sprintf(p, "POINTS 1\nDATA binary\n");
+}
+
+/* There are up to 64 fields, with up to 4096 values. */
+static void test_pcd_limits(void **state)
+{
+    (void)state;
+    static const struct {
+        int fields, count;
+        const char *error;
+    } row[] = {{64, 1, NULL},
+               {65, 1, "more than 64 fields"},
+               {4, 4096, NULL},
+               {4, 4097, "a size or count is not a number from 1 to 4096"},
+               {4, 0, "a size or count is not a number from 1 to 4096"},
+               {3, 2, "x, y and z are not TYPE F of SIZE 4 or 8 and COUNT 1"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        static char text[8192];
+        size_t len = put_fields(text, row[i].fields, row[i].count);
+        const size_t others = row[i].fields == 3 ? 4 : (size_t)(row[i].fields - 4 + row[i].count);
+        memset(text + len, 7, others);
+        len += others;
+        for (int k = 0; k < 3; k++, len += 4)
+            memcpy(text + len, &(float){(float)TWO[0][k]}, 4);
+        if (row[i].error != NULL)
+            expect_error(text, len, row[i].error);
+        else
+            expect(text, len, 1, TWO, 0);
+        assert_string_equal(warnings, "");
+    }
+}
+
 static void test_pcd_that_is_wrong(void **state)
 {
     (void)state;
@@ -349,6 +428,8 @@ int main(void)
         cmocka_unit_test(test_pcd_that_is_no_position),
         cmocka_unit_test(test_pcd_precision),
         cmocka_unit_test(test_pcd_counts),
+        cmocka_unit_test(test_pcd_points_count_first),
+        cmocka_unit_test(test_pcd_limits),
         cmocka_unit_test(test_pcd_that_is_wrong),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "drivers/protocol/cola_way.h"
 #include "tests/unit/cola_rig.h"
 
 static struct cola_lmd lmd;
@@ -284,6 +285,48 @@ static void the_encoder_counts_the_way(void **state)
     assert_int_equal(lmd.speed, 2000);
 }
 
+static void add_way(struct cola_way *way, uint32_t scan, const struct native_pose *pose, uint32_t n)
+{
+    uint8_t frame[1024];
+    const size_t len = native_encode_poses(frame, sizeof frame, pose, n, 0, 0);
+    cola_way_add(way, scan, frame + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN);
+}
+
+static void expect_way(const struct cola_way *way, uint32_t scan, int64_t t_ns, int32_t path_mm, int16_t speed_mm_s)
+{
+    const struct cola_encoder at = cola_way_at(way, scan, t_ns);
+    if (at.path_mm != path_mm || at.speed_mm_s != speed_mm_s)
+        fail_msg("at %lld ns %d mm, %d mm/s", (long long)t_ns, at.path_mm, at.speed_mm_s);
+}
+
+/* A way is known from a frame's first pose to its last one. Before and after that the encoder stands at its ends. */
+static void a_way_ends_with_its_poses(void **state)
+{
+    (void)state;
+    static const int64_t S = 1000000000;
+    const struct native_pose pose[3] = {{0, {1, 1, 1}, {1, 0, 0, 0}, 0, 0, 0},
+                                        {S, {4, 5, 13}, {1, 0, 0, 0}, 0, 0, 0}, /* 13 m on: 3, 4 and 12 */
+                                        {2 * S, {4, 45, 13}, {1, 0, 0, 0}, 0, 0, 0}};
+    struct cola_way way = {0};
+    expect_way(&way, 0, S, 0, 0); /* a head that stands */
+    add_way(&way, 3, pose, 2);
+    static const struct {
+        double t_s;
+        int32_t path_mm;
+    } row[] = {{-1, 0}, {0, 0}, {0.25, 3250}, {1, 13000}, {1.25, 13000}, {1.75, 13000}, {9, 13000}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++)
+        expect_way(&way, 3, (int64_t)(row[i].t_s * 1e9), row[i].path_mm, 13000);
+    expect_way(&way, 2, S, 0, 0);  /* of another scan */
+    add_way(&way, 3, &pose[1], 2); /* 40 m in a second: faster than 16 bits can say */
+    expect_way(&way, 3, 3 * S / 2, 33000, INT16_MAX);
+    expect_way(&way, 3, 3 * S, 53000, INT16_MAX);
+    add_way(&way, 4, pose, 2); /* a new scan begins at 0 */
+    expect_way(&way, 4, S, 13000, 13000);
+    expect_way(&way, 3, S, 0, 0);
+    cola_way_add(&way, 4, (const uint8_t *)"", 0); /* no poses: nothing changes */
+    expect_way(&way, 4, S, 13000, 13000);
+}
+
 /* The longest telegram has all channels, 16 bits, hexadecimal, and everything in the tail. */
 static void the_longest_telegram_has_room(void **state)
 {
@@ -320,7 +363,8 @@ int main(void)
         CASE(rates_agree_as_sick_tim_asks),       CASE(a_mark_on_the_left_is_on_the_left),
         CASE(far_heads_count_in_two_millimetres), CASE(echoes_go_to_their_channels),
         CASE(signals_end_where_their_scale_ends), CASE(name_and_time_where_asked_for),
-        CASE(the_encoder_counts_the_way),         CASE(the_longest_telegram_has_room),
+        CASE(the_encoder_counts_the_way),         CASE(a_way_ends_with_its_poses),
+        CASE(the_longest_telegram_has_room),
     };
     return cmocka_run_group_tests_name("cola scan", tests, NULL, NULL);
 }

@@ -320,6 +320,18 @@ static void test_too_small(void **state)
         if (coverage_create(&spec, NULL, &coverage, &err) != 0) fail_msg("%g MiB: %s", memory_mib, err.text);
         coverage_free(coverage);
     }
+    /* Numbers of cells have 30 bits: 1e9 along a side, of which the longest is the scene's. */
+    const double span_m = fmax(fmax(HI[0] - LO[0], HI[1] - LO[1]), HI[2] - LO[2]);
+    char says[160];
+    struct coverage_spec fine = {bvh, NULL, 0.99e-9 * span_m, 1e9, 1};
+    assert_int_equal(coverage_create(&fine, NULL, &coverage, &err), SH_EINPUT);
+    snprintf(says, sizeof says, "cells of %g m in a scene of %.3g m; allowed is a cell of at least ", fine.cell_m,
+             span_m);
+    if (strncmp(err.text, says, strlen(says)) != 0) fail_msg("%s", err.text);
+    fine.cell_m = atof(err.text + strlen(says)); /* that is allowed, though memory then is another limit */
+    assert_true(fine.cell_m >= 1e-9 * span_m && fine.cell_m <= 1.1e-9 * span_m);
+    assert_int_equal(coverage_create(&fine, NULL, &coverage, &err), SH_EINPUT);
+    assert_null(strstr(err.text, "in a scene of"));
     bvh_free(bvh);
     scene_free(scene);
 }

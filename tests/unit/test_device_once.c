@@ -46,6 +46,33 @@ static void control_is_given_back_at_once(void **state)
     rig_close(rig);
 }
 
+static void expect_control(struct rig *rig, uint64_t session, const char *text)
+{
+    assert_true(rig_claim(rig));
+    const struct native_event *event = rig_event(rig, NATIVE_EV_CONTROL);
+    assert_non_null(event);
+    assert_true(event->a == session && event->b == 0 && event->c == 0);
+    assert_string_equal(event->text, text);
+}
+
+/* An event says which session has control now, with its client's name where that is known; 0: none has. */
+static void control_is_announced(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, 300);
+    device_session_opened(rig->device, 2, "tcp 127.0.0.1:9");
+    assert_int_equal(lasting(rig, 2, "SYST:CONT:REL"), 0); /* nobody had it */
+    assert_int_equal(count_control_events(rig), 0);
+    assert_int_equal(lasting(rig, 2, "HEAD:LINES 21"), 0);
+    expect_control(rig, 2, "tcp 127.0.0.1:9");
+    assert_int_equal(lasting(rig, 2, "SYST:CONT:REL"), 0);
+    expect_control(rig, 0, "released");
+    assert_int_equal(lasting(rig, 3, "HEAD:LINES 22"), 0);
+    expect_control(rig, 3, "taken");
+    rig_close(rig);
+}
+
 /* Asking for the head's description changes nothing that it will report. */
 static void to_describe_it_changes_nothing(void **state)
 {
@@ -118,9 +145,8 @@ static void fixes_lie_at_their_times_of_utc(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(control_is_given_back_at_once),
-        cmocka_unit_test(to_describe_it_changes_nothing),
-        cmocka_unit_test(no_time_no_fixes),
+        cmocka_unit_test(control_is_given_back_at_once),   cmocka_unit_test(control_is_announced),
+        cmocka_unit_test(to_describe_it_changes_nothing),  cmocka_unit_test(no_time_no_fixes),
         cmocka_unit_test(fixes_lie_at_their_times_of_utc),
     };
     return cmocka_run_group_tests_name("device, other protocols", tests, make_folder, remove_folder);

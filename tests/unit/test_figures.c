@@ -154,6 +154,26 @@ static void histograms_count_each_value_once(void **state)
 }
 
 /* The size of values counts without their sign. What is beyond the axis is counted on its side, however large it is. */
+/* A bin begins at its lower edge: a value at the upper edge of the last one is above all. */
+static void edges_belong_to_the_bin_above(void **state)
+{
+    (void)state;
+    double value[6] = {1, 1, 1, 1};
+    float both[6] = {1, 1, 1, 1};
+    struct figures_histogram h, again;
+    figures_histogram_of(value, 4, 0.5, &h);
+    value[4] = h.from + h.bins * h.width;
+    value[5] = h.from;
+    figures_histogram_of(value, 6, 0.5, &again);
+    assert_true(again.bins == h.bins && fabs(again.width - h.width) <= 0.0);
+    assert_true(again.above == 1 && again.below == 0 && again.count[0] == h.count[0] + 1);
+    figures_histogram_of_signed(both, 4, 0.5, &h);
+    both[4] = (float)(h.from + h.bins * h.width);
+    both[5] = nextafterf((float)h.from, -9);
+    figures_histogram_of_signed(both, 6, 0.5, &again);
+    assert_true(again.bins == h.bins && again.above == 1 && again.below == 1);
+}
+
 static void histograms_of_one_side(void **state)
 {
     (void)state;
@@ -298,6 +318,7 @@ int main(void)
         cmocka_unit_test(sigmas_and_angles_at_their_bounds),
         cmocka_unit_test(nice_numbers_are_1_2_5),
         cmocka_unit_test(histograms_count_each_value_once),
+        cmocka_unit_test(edges_belong_to_the_bin_above),
         cmocka_unit_test(histograms_of_one_side),
         cmocka_unit_test_setup_teardown(density_is_points_by_area, make_folder, remove_folder),
         cmocka_unit_test(times_go_by_station_and_scan),

@@ -277,6 +277,13 @@ static void what_is_nowhere_is_refused(void **state)
     ok(geoframe_set_grid(&frame, 0, 1, &err));
     assert_int_equal(geoframe_find(&frame, &berlin, p, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "UPS does not reach latitude 52"));
+    for (int k = 0; k < 4; k++) {
+        const double origin_m[3] = {k == 0 ? NAN : 1, k == 1 ? INFINITY : 2, k == 2 ? -INFINITY : 3};
+        assert_int_equal(geoframe_set_tangent(&frame, origin_m, &berlin, k == 3 ? NAN : 0, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, "origin or direction is not a finite number"));
+    }
+    assert_int_equal(geoframe_set_grid(&frame, -1, 1, &err), SH_EINPUT);
+    assert_string_equal(err.text, "UTM zone -1; allowed 1 to 60, or 0: UPS");
     /* A frame that is no rotation. */
     struct georef_spec spec = {.crs = GEOREF_ECEF, .rotation = {1, 0, 0, 0, 2, 0, 0, 0, 1}};
     struct georef *georef = NULL;

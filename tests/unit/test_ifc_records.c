@@ -52,6 +52,41 @@ static void texts_are_whole(void **state)
     decodes("'\\X2\\00'", "00"); /* cut off: bytes that are no character of it stay */
 }
 
+/* UTF-8 has one byte more from each of these codes on (RFC 3629). Surrogates alone and codes beyond U+10FFFF are no
+ * characters: U+FFFD stands for them. */
+static void texts_at_the_limits_of_codes(void **state)
+{
+    (void)state;
+    decodes("'\\X2\\007F0080\\X0\\'", "\x7f\xc2\x80");
+    decodes("'\\X2\\07FF0800\\X0\\'", "\xdf\xbf\xe0\xa0\x80");
+    decodes("'\\X2\\D7FFE000FFFF\\X0\\'", "\xed\x9f\xbf\xee\x80\x80\xef\xbf\xbf");
+    decodes("'\\X2\\D800DC00DBFFDFFF\\X0\\'", "\xf0\x90\x80\x80\xf4\x8f\xbf\xbf");
+    decodes("'\\X4\\00010000\\X0\\\\X4\\0010FFFF\\X0\\'", "\xf0\x90\x80\x80\xf4\x8f\xbf\xbf");
+    decodes("'\\X4\\0000D7FF\\X0\\\\X4\\0000E000\\X0\\'", "\xed\x9f\xbf\xee\x80\x80");
+    decodes("'\\X4\\0000D800\\X0\\\\X4\\0000DFFF\\X0\\\\X4\\00110000\\X0\\'", "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd");
+    decodes("'\\X2\\DC00D8000041\\X0\\'", "\357\277\275\357\277\275A");
+    decodes("'\\X\\7F\\X\\80\\X\\ff'", "\x7f\xc2\x80\xc3\xbf");
+}
+
+/* What begins as an escape and is none stays as it is. */
+static void texts_with_halves_of_escapes(void **state)
+{
+    (void)state;
+    static const char *const same[] = {"\\",    "\\X",  "\\X\\", "\\X\\F", "\\X\\FG",
+                                       "\\S\\", "\\S|", "\\PA",  "\\PAB",  "\\X3\\0041"};
+    for (size_t i = 0; i < sizeof same / sizeof same[0]; i++) {
+        char quoted[32];
+        snprintf(quoted, sizeof quoted, "'%s'", same[i]);
+        decodes(quoted, same[i]);
+    }
+    decodes("'\\PA\\x\\PI\\'", "x");
+    decodes("'\\\\'", "\\");
+    decodes("'\\X2\\0041'", "A");
+    decodes("'\\X2\\0041\\X0'", "A\\X0");
+    decodes("'a", "");
+    decodes("'", "");
+}
+
 /* The unit of length scales the records' values: 4 feet are 1.2192 m. */
 static void units_are_read(void **state)
 {
@@ -381,6 +416,8 @@ static void rules_choose(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(texts_at_the_limits_of_codes),
+        cmocka_unit_test(texts_with_halves_of_escapes),
         cmocka_unit_test(texts_are_whole),
         cmocka_unit_test(units_are_read),
         cmocka_unit_test(products_are_found),

@@ -137,6 +137,51 @@ static void units(void **state)
     assert_near(site.origin_m[1], -2000.0 * 0.3048);
 }
 
+/* The prefixes are those of ISO 1000, as IFC names them. */
+static void prefixes(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *prefix;
+        double m;
+    } row[] = {{".MILLI.", 1e-3}, {".CENTI.", 1e-2}, {".DECI.", 0.1},   {".MICRO.", 1e-6},
+               {".KILO.", 1e3},   {".DECA.", 10.0},  {".HECTO.", 100.0}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        assert_loads(load_edited(".MILLI.", row[i].prefix));
+        assert_near(site.elevation_m, 34500.0 * row[i].m);
+        assert_near(site.origin_m[2], 500.0 * row[i].m);
+    }
+}
+
+static void wrong_units_are_refused(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *foot, *measure, *part;
+    } bad[] = {
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.),#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(-1.),#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(x),#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "0.3048,#32", "#31: the factor of a length unit is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.3048)", "#31: attributes are missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.3048),#4", "not a unit of length"},
+        {"$,.LENGTHUNIT.,'FOOT',#31", "IFCLENGTHMEASURE(0.3048),#12", "#31: a reference to IFCSIUNIT is missing"},
+        {"$,.LENGTHUNIT.,'FOOT',#32", "IFCLENGTHMEASURE(0.3048),#32",
+         "#3: a reference to IFCMEASUREWITHUNIT is missing"},
+        {"$,.LENGTHUNIT.,'FOOT'", "IFCLENGTHMEASURE(0.3048),#32", "no unit of length"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        char with[256];
+        snprintf(with, sizeof with,
+                 "#3= IFCCONVERSIONBASEDUNIT(%s);\n#31= IFCMEASUREWITHUNIT(%s);\n"
+                 "#32= IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);",
+                 bad[i].foot, bad[i].measure);
+        const int code = load_edited("#3= IFCSIUNIT(*,.LENGTHUNIT.,.MILLI.,.METRE.);", with);
+        if (code != SH_EINPUT || strstr(err.text, bad[i].part) == NULL)
+            fail_msg("case %zu: %d \"%s\" without \"%s\"", i, code, err.text, bad[i].part);
+    }
+}
+
 /* The model is in millimetres. */
 static int load_map(const char *map, const char *crs)
 {
@@ -256,6 +301,46 @@ static void what_is_wrong_is_refused(void **state)
     assert_int_equal(ifc_site_read("/nonexistent.ifc", &site, &err), SH_EINPUT);
 }
 
+/* Diagnostics of the whole file name no line. */
+static void what_is_wrong_of_the_whole_file(void **state)
+{
+    (void)state;
+#define ADVICE "; use scene.anchor.source: explicit, which needs none of this"
+    static const struct {
+        const char *old, *with, *says;
+    } bad[] = {
+        {"#1= IFCPROJECT(", "#1= IFCWALL(", ": 0 IFCPROJECT records; allowed one" ADVICE},
+        {"#9= ", "#20= IFCPROJECT('p',$,$,$,$,$,$,(#5),#2);\n#9= ", ": 2 IFCPROJECT records; allowed one" ADVICE},
+        {"END-ISO-10303-21;", "END", ": cut off: it doesn't end with END-ISO-10303-21;"},
+        {"#9= IFCDIRECTION", "#7= IFCDIRECTION", ", line 14: a second record #7; allowed one"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+        assert_int_equal(load_edited(bad[i].old, bad[i].with), SH_EINPUT);
+        assert_memory_equal(err.text, path, strlen(path));
+        assert_string_equal(err.text + strlen(path), bad[i].says);
+    }
+}
+
+/* The end is looked for in the last 1024 bytes, or in the whole file where it is shorter. */
+static void the_end_is_near(void **state)
+{
+    (void)state;
+    static const char end[] = "END-ISO-10303-21;";
+    char text[4096];
+    const char *data = strstr(base, "#1= ");
+    for (int size = 1023; size <= 1025; size++) { /* a comment fills it up */
+        const int fill = size - (int)strlen(base);
+        assert_true(fill > 4);
+        snprintf(text, sizeof text, "%.*s/*%*s*/%s", (int)(data - base), base, fill - 4, "", data);
+        assert_int_equal(strlen(text), size);
+        assert_loads(load_text(text));
+    }
+    for (int after = 1024 - (int)strlen(end); after <= 1025 - (int)strlen(end); after++) {
+        snprintf(text, sizeof text, "%s%*s", base, after - 1, ""); /* base has a line's end after it */
+        assert_int_equal(load_text(text), after <= 1024 - (int)strlen(end) ? SH_OK : SH_EINPUT);
+    }
+}
+
 /* Any cut and any changed byte gives a site or one line. */
 static void damaged_files_never_crash(void **state)
 {
@@ -311,9 +396,13 @@ int main(void)
         cmocka_unit_test(byte_order_mark),
         cmocka_unit_test(angles),
         cmocka_unit_test(units),
+        cmocka_unit_test(prefixes),
+        cmocka_unit_test(wrong_units_are_refused),
         cmocka_unit_test(a_map_conversion),
         cmocka_unit_test(wrong_map_conversions_are_refused),
         cmocka_unit_test(what_is_wrong_is_refused),
+        cmocka_unit_test(what_is_wrong_of_the_whole_file),
+        cmocka_unit_test(the_end_is_near),
         cmocka_unit_test(damaged_files_never_crash),
         cmocka_unit_test(the_house),
     };

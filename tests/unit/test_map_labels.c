@@ -46,6 +46,42 @@ static uint32_t check_labels(const struct map_label *label, uint32_t n, const do
     return placed;
 }
 
+/* A thin line leads to each label that is more than 22.5 pixels away from its station. It begins 14 pixels from the
+ * station, beyond its mark, and ends where the label is nearest. */
+static void check_lines(const struct map *map, const struct map_label *label, uint32_t n, const double (*place_px)[2])
+{
+    struct sh_err err = {0, ""};
+    const char *file = path_in("lines.svg");
+    static char text[1 << 20];
+    uint32_t n_away = 0;
+    if (map_write_svg(map, file, &err) != SH_OK) fail_msg("%s", err.text);
+    FILE *in = fopen(file, "rb");
+    assert_non_null(in);
+    text[fread(text, 1, sizeof text - 1, in)] = '\0';
+    fclose(in);
+    unlink(file);
+    for (uint32_t i = 0; i < n; i++) {
+        const double *p = place_px[i];
+        const double to[2] = {fmin(label[i].right, fmax(label[i].left, p[0])),
+                              fmin(label[i].bottom, fmax(label[i].top, p[1]))};
+        const double away = hypot(to[0] - p[0], to[1] - p[1]);
+        if (!label[i].placed || away <= 22.5) continue;
+        int found = 0;
+        for (const char *at = text; !found && (at = strstr(at, "<line ")) != NULL; at++) {
+            double from[2], end[2], width;
+            if (sscanf(at, "<line x1=\"%lf\" y1=\"%lf\" x2=\"%lf\" y2=\"%lf\" stroke-width=\"%lf\"", &from[0], &from[1],
+                       &end[0], &end[1], &width) != 5)
+                continue;
+            found = width <= 1 && hypot(end[0] - to[0], end[1] - to[1]) < 0.02; /* hundredths of a pixel */
+            for (int k = 0; k < 2 && found; k++)
+                assert_true(fabs(from[k] - p[k] - 14 * (to[k] - p[k]) / away) < 0.02);
+        }
+        if (!found) fail_msg("no line leads to label %u, which is %g pixels away", i, away);
+        n_away++;
+    }
+    assert_true(n_away > 0);
+}
+
 /* 60 stations are at random places of 600 x 600 pixels. A label is about 110 x 35 pixels, so all of them would cover
  * two thirds of the map, and some find no room. All 12 on a grid of 150 pixels do. */
 static void test_labels(void **state)
@@ -82,6 +118,7 @@ static void test_labels(void **state)
     const uint32_t left_out = map_place_labels(map, label);
     assert_int_equal(check_labels(label, N, place_px), N - left_out);
     assert_true(left_out > 0 && left_out < N / 2);
+    check_lines(map, label, N, (const double(*)[2])place_px);
     map_free(map);
 }
 

@@ -268,6 +268,22 @@ static void what_is_refused(void **state)
     mesh.texture = "a.png";
     mesh.uv = NULL;
     write_refused("a.glb", &mesh, "it has a texture but no texture coordinates");
+    mesh = sheet();
+    mesh.n_parts = MESH_MAX_PARTS + 1;
+    write_refused("a.obj", &mesh, "parts; allowed are up to ");
+    mesh = sheet();
+    mesh.n_vertices = MESH_MAX_VERTICES + 1U;
+    write_refused("a.ply", &mesh, "vertices; allowed are up to ");
+    for (int i = 0; i < 5; i++) { /* the last vertex's */
+        float up[N_VERTICES][3] = {{0}}, at[N_VERTICES][2] = {{0}};
+        *(i < 3 ? &up[N_VERTICES - 1][i] : &at[N_VERTICES - 1][i - 3]) = i % 2 ? (float)INFINITY : (float)NAN;
+        mesh = sheet();
+        mesh.normal = (const float(*)[3])up;
+        mesh.uv = (const float(*)[2])at;
+        write_refused("a.obj", &mesh,
+                      i < 3 ? "the normal of vertex 7 is not finite"
+                            : "the texture coordinate of vertex 7 is not finite");
+    }
 }
 
 /* Half a step of float at 5.4e6 m is 0.25 m: 5.4e6 lies between 2^22 and 2^23, where floats are 2^-1 apart. The bound
@@ -327,6 +343,21 @@ static uint64_t get64(const char *p)
     return v;
 }
 
+/* After the last list come 16 bytes, 4 zeros, 1 to 16 zeros up to a multiple of 16, the version, 120 zeros, and the mark
+ * of the end. Readers know the mark; Blender's exporter has its bytes. */
+static void check_end(const char *fbx, size_t at, size_t end)
+{
+    static const char zero[120];
+    static const char mark[] = "\xf8\x5a\x8c\x6a\xde\xf5\xd9\x7e\xec\xe9\x0c\xe3\x75\x8f\x29\x0b";
+    const size_t version = (at + 16 + 4) / 16 * 16 + 16;
+    assert_int_equal(end, version + 4 + 120 + 16);
+    assert_memory_not_equal(fbx + at, zero, 16);
+    assert_memory_equal(fbx + at + 16, zero, version - at - 16);
+    assert_memory_equal(fbx + version, fbx + 23, 4); /* that of the file's head */
+    assert_memory_equal(fbx + version + 4, zero, 120);
+    assert_memory_equal(fbx + version + 124, mark, 16);
+}
+
 /* Counts the nodes from `from` to `end`; each list of nodes ends with 25 zeros. */
 static unsigned count_nodes(const char *fbx, size_t from, size_t end, int is_top)
 {
@@ -336,7 +367,10 @@ static unsigned count_nodes(const char *fbx, size_t from, size_t end, int is_top
         const uint64_t next = get64(fbx + p);
         if (next == 0) {
             assert_memory_equal(fbx + p, zero, 25);
-            if (!is_top) assert_int_equal(p + 25, end);
+            if (is_top)
+                check_end(fbx, p + 25, end);
+            else
+                assert_int_equal(p + 25, end);
             return n;
         }
         const size_t inside = p + 25 + (uint8_t)fbx[p + 24] + (size_t)get64(fbx + p + 16);

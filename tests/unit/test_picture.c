@@ -125,6 +125,145 @@ static void lines_have_their_width(void **state)
         }
 }
 
+/* The ink's columns and rows: the first and the last one of each. */
+struct extent {
+    long left, right, top, bottom;
+};
+
+static struct extent extent_of(const struct picture *p)
+{
+    struct extent e = {p->width, -1, p->height, -1};
+    for (uint32_t i = 0; i < p->width * p->height; i++) {
+        const long c = i % p->width, r = i / p->width;
+        if (ink(p, (uint32_t)c, (uint32_t)r) <= 0) continue;
+        e = (struct extent){c < e.left ? c : e.left, c > e.right ? c : e.right, r < e.top ? r : e.top,
+                            r > e.bottom ? r : e.bottom};
+    }
+    return e;
+}
+
+/* Capitals are 28 pixels high. Then strokes are 0.11 of it wide, 3.08, and their border is a pixel wide. So ink goes
+ * 1.54 + 0.5 pixels beyond a stroke's end. */
+static const struct picture_type TALL = {28, 0, 0};
+
+static struct extent draw_word(const char *text, enum picture_anchor anchor, const struct picture_type *type,
+                               double *sum)
+{
+    struct picture p = blank(240, 60);
+    picture_text(&p, (const double[2]){120, 44}, anchor, type, black, text);
+    const struct extent e = extent_of(&p);
+    if (sum != NULL) *sum = all_ink(&p);
+    picture_free(&p);
+    return e;
+}
+
+/* Whether the last pixel with ink is within its row's or column's reach of the end, 2.04; a round end may just miss the
+ * next pixel's centre. */
+static int ends_at(long pixel, double end, int sign)
+{
+    const double beyond = sign * ((double)pixel + 0.5 - end);
+    return beyond > 0.9 && beyond < 2.05;
+}
+
+static void assert_text_fills(const char *text)
+{
+    const double w = picture_text_width(&TALL, text);
+    for (int anchor = PICTURE_LEFT; anchor <= PICTURE_RIGHT; anchor++) {
+        const struct extent e = draw_word(text, (enum picture_anchor)anchor, &TALL, NULL);
+        const double at = 120 - (anchor == PICTURE_MIDDLE ? w / 2 : anchor == PICTURE_RIGHT ? w : 0);
+        if (!ends_at(e.left, at, -1) || !ends_at(e.right, at + w, 1))
+            fail_msg("%s: from %ld to %ld, not from %g to %g", text, e.left, e.right, at, at + w);
+        if (strspn(text, "ABCDEFGHIJKLMNOPRSTUVWXYZ") == strlen(text))
+            assert_true(ends_at(e.top, 44 - 28, -1) && ends_at(e.bottom, 44, 1));
+    }
+}
+
+/* A text reaches from its left end to its right end, where the anchor says, and capitals stand on its baseline. */
+static void texts_have_their_place(void **state)
+{
+    (void)state;
+    for (char c = '!'; c <= '~'; c++)
+        assert_text_fills((const char[]){c, '\0'});
+    static const char *const words[] = {
+        "AB",           "1.5 m",       "LEFT", "\xc2\xb0", "\xc2\xb1\xc2\xb2\xc2\xb7", "\xc3\x97\xc3\x9f",
+        "\xe2\x80\x93", "\xe4\xb8\xad"};
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
+        assert_text_fills(words[i]);
+    assert_true(picture_text_width(&TALL, "A A") > picture_text_width(&TALL, "AA") + 7);
+    assert_true(picture_text_width(&TALL, "") <= 0.0);
+}
+
+/* A letter with an accent is as wide as without it, and more is drawn: over a capital above its top. */
+static void accents_add_no_width(void **state)
+{
+    (void)state;
+    static const char bases[] =
+        "AAAAAA CEEEEIIII NOOOOO OUUUUY  aaaaaa ceeeeiiii nooooo ouuuuy y"; /* U+00C0 to U+00FF */
+    for (int i = 0; i < 64; i++) {
+        const char text[] = {(char)0xc3, (char)(0x80 + i), '\0'}, base[] = {bases[i], '\0'};
+        double sum, base_sum;
+        if (bases[i] == ' ') continue;
+        assert_true(fabs(picture_text_width(&TALL, text) - picture_text_width(&TALL, base)) < 1e-9);
+        const struct extent e = draw_word(text, PICTURE_LEFT, &TALL, &sum),
+                            plain = draw_word(base, PICTURE_LEFT, &TALL, &base_sum);
+        /* a cedilla is below, the stroke of O is within, and an i changes its dot */
+        if (strchr("Ccio", bases[i]) == NULL && bases[i] != 'O' && !(e.top < plain.top))
+            fail_msg("%d: no accent above", i);
+        if (strchr("Cc", bases[i]) != NULL) assert_true(e.bottom > plain.bottom && e.top == plain.top);
+        if (bases[i] != 'i' && !(sum > base_sum + 5)) fail_msg("%d: no accent", i);
+    }
+    /* Capitals' accents are above those of small letters. */
+    assert_true(draw_word("\303\211", PICTURE_LEFT, &TALL, NULL).top <
+                draw_word("\303\251", PICTURE_LEFT, &TALL, NULL).top);
+}
+
+/* A wrong byte is a character that no font has, and nothing is read behind the end. */
+static void wrong_bytes_are_boxes(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *same;
+    } row[] = {{"\377", "\344\270\255"}, {"\200", "\344\270\255"}, {"\360\237\230\200", "\344\270\255"},
+               {"\303", "\377"},         {"\344\270", "\377"},     {"\360\237\230", "\377"},
+               {"\303A", "\377A"},       {"\344\270A", "\377A"},   {"\360\237\230A", "\377A"},
+               {"\300\200", "\377\377"}, {"\301\277", "\377\377"}, {"\303\211\303", "\303\211\377"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        double sum, same;
+        draw_word(row[i].text, PICTURE_LEFT, &TALL, &sum);
+        draw_word(row[i].same, PICTURE_LEFT, &TALL, &same);
+        if (fabs(sum - same) > 0.01) fail_msg("%zu: %g, not %g", i, sum, same);
+    }
+}
+
+/* The strokes of I, of 28 units, have round ends. A small text's are 1.2 pixels wide; a bold text's are 0.16 of its
+ * height. */
+static void texts_have_their_strokes(void **state)
+{
+    (void)state;
+    static const struct {
+        struct picture_type type;
+        double width;
+    } row[] = {{{28, 0, 0}, 3.08}, {{28, 1, 0}, 4.48}, {{8, 0, 0}, 1.2}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        double sum;
+        const double width = row[i].width, want = row[i].type.size_px * width + M_PI * width * width / 4;
+        draw_word("I", PICTURE_LEFT, &row[i].type, &sum);
+        if (fabs(sum - want) > 0.06 * want) fail_msg("%g, not %g", sum, want);
+    }
+    struct picture p = blank(40, 60);
+    picture_text(&p, (const double[2]){10, 44}, PICTURE_LEFT, &TALL, black, "U");
+    for (uint32_t k = 0; k < 2; k++) /* its curve begins and ends at the top */
+        assert_true(ink(&p, 9 + k * 18, 16) >= 1 && ink(&p, 10 + k * 18, 16) >= 1);
+    for (uint32_t y = 14; y < 36; y++) /* and there is nothing between its sides */
+        assert_true(ink(&p, 19, y) <= 0);
+    picture_fill(&p, 0, 0, 40, 60, black);
+    picture_text(&p, (const double[2]){20, 44}, PICTURE_LEFT, &(struct picture_type){28, 0, 2}, black, "I");
+    /* black up to 1.04 and from 4.04 on, white from 2.04 to 3.04, on both sides */
+    for (uint32_t k = 0; k < 2; k++)
+        assert_true(ink(&p, k ? 19 : 20, 30) >= 1 && ink(&p, k ? 17 : 22, 30) <= 0 && ink(&p, k ? 15 : 24, 30) >= 1);
+    picture_free(&p);
+}
+
 static char *svg_text(void (*draw)(struct pen *pen))
 {
     struct svg *svg;
@@ -220,6 +359,10 @@ int main(void)
         cmocka_unit_test(fills_and_blends),
         cmocka_unit_test(triangles_have_their_area),
         cmocka_unit_test(lines_have_their_width),
+        cmocka_unit_test(texts_have_their_place),
+        cmocka_unit_test(accents_add_no_width),
+        cmocka_unit_test(wrong_bytes_are_boxes),
+        cmocka_unit_test(texts_have_their_strokes),
         cmocka_unit_test(elements_of_an_svg),
         cmocka_unit_test(texts_of_an_svg),
     };

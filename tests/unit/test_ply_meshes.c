@@ -129,12 +129,40 @@ static void names_of_texture_coordinates(void **state)
     unlink(path_in("a b.png"));
 }
 
+/* A header has up to 16 elements, 512 properties and 256 textures. One more is refused, with its line. */
+static void limits_of_a_header(void **state)
+{
+    (void)state;
+    static const struct {
+        int n; /* of them; the mesh itself has two elements and four properties */
+        const char *first, *line, *says;
+    } row[] = {{14, "", "element other 0\n", NULL},
+               {15, "", "element other 0\n", "line 23: more than 16 elements"},
+               {508, "element other 0\n", "property int a\n", NULL},
+               {509, "element other 0\n", "property int a\n", "line 518: more than 512 properties"},
+               {256, "", "comment TextureFile a.png\n", NULL},
+               {257, "", "comment TextureFile a.png\n", "line 265: more than 256 textures"},
+               {1, "", "element other 1\n", "element other has no properties"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        static char text[16384];
+        char *p = text + sprintf(text, VERTICES("3") "element face 1\nproperty list uchar int vertex_indices\n%s",
+                                 row[i].first);
+        for (int k = 0; k < row[i].n; k++)
+            p += sprintf(p, "%s", row[i].line);
+        p += sprintf(p, "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+        if (row[i].says != NULL)
+            refuse("a.ply", text, (size_t)(p - text), row[i].says);
+        else
+            scene_free(load_text("a.ply", text));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(strips_are_triangles),         cmocka_unit_test(vertices_that_are_not_finite),
         cmocka_unit_test(faces_of_few_corners),         cmocka_unit_test(indices_at_their_bounds),
-        cmocka_unit_test(names_of_texture_coordinates),
+        cmocka_unit_test(names_of_texture_coordinates), cmocka_unit_test(limits_of_a_header),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

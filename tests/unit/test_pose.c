@@ -50,6 +50,33 @@ static void test_samples_too_near(void **state)
     }
 }
 
+/* Each number of a sample must be finite, and its quaternion needs a direction. The error names the sample. */
+static void test_samples_that_are_no_pose(void **state)
+{
+    (void)state;
+    static const double none[] = {NAN, INFINITY, -INFINITY};
+    struct trajectory *tr;
+    struct sh_err err;
+    for (int which = 0; which < 9; which++)
+        for (size_t i = 0; i < sizeof none / sizeof none[0]; i++) {
+            struct pose_sample sample[2] = {{.t_s = 1, .frame = 1, .pose = {.quat = {0, 0, 0, -3}}},
+                                            {.t_s = 2, .frame = 2, .pose = {.quat = {1, 0, 0, 0}}}};
+            struct pose_sample *bad = &sample[i % 2];
+            *(which < 3   ? &bad->pose.position_m[which]
+              : which < 7 ? &bad->pose.quat[which - 3]
+              : which < 8 ? &bad->t_s
+                          : &bad->frame) = none[i];
+            assert_int_equal(trajectory_from_samples(sample, 2, &tr, &err), SH_EINPUT);
+            assert_string_equal(err.text, i % 2 ? "sample 1: not a finite number" : "sample 0: not a finite number");
+            assert_null(tr);
+        }
+    const struct pose_sample zero = {.t_s = 1};
+    assert_int_equal(trajectory_from_samples(&zero, 1, &tr, &err), SH_EINPUT);
+    assert_string_equal(err.text, "sample 0: a quaternion of length 0");
+    assert_int_equal(trajectory_from_samples(&zero, 0, &tr, &err), SH_EINPUT);
+    assert_string_equal(err.text, "the trajectory has no samples");
+}
+
 /* Velocities are those of a parabola through three samples, at the ends too. So a parabola stays one, with samples at
  * any distance. Rounding: 1e-15 of 30 m, some times. */
 static void test_parabola(void **state)
@@ -287,13 +314,46 @@ static void test_slow_knots(void **state)
     }
 }
 
+/* The head brakes or speeds up, so that its acceleration is larger at one end of an interval. The path between knots
+ * stays within the error that is given, which is within the tolerance of 0.1 mm. */
+static void test_knots_where_the_acceleration_changes(void **state)
+{
+    (void)state;
+    static const double t_s[4] = {0, 1, 2, 3}, x_m[2][4] = {{0, 10, 10.5, 10.6}, {10.6, 10.5, 10, 0}};
+    const struct pose mount = {.quat = {1, 0, 0, 0}};
+    for (int way = 0; way < 2; way++) {
+        struct trajectory *tr = along_x(t_s, x_m[way], 4);
+        struct pose_path path;
+        struct sh_err err;
+        double worst_m = 0, frame;
+        assert_int_equal(find_path(tr, 0, 1e9, &mount, &path, &err), SH_OK);
+        for (size_t i = 0; i + 1 < path.n; i++) {
+            struct pose at;
+            const struct pose_knot *a = &path.knot[i], *b = &path.knot[i + 1];
+            trajectory_at(tr, 0.5e-9 * (double)(a->t_ns + b->t_ns), &at, &frame);
+            worst_m = fmax(worst_m, fabs(at.position_m[0] - 0.5 * (a->pose.position_m[0] + b->pose.position_m[0])));
+        }
+        assert_true(path.error_m <= 1e-4 && worst_m <= path.error_m * 1.0001);
+        free(path.knot);
+        trajectory_free(tr);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_find_knot),        cmocka_unit_test(test_parabola),      cmocka_unit_test(test_pause),
-        cmocka_unit_test(test_straight_line),    cmocka_unit_test(test_constant_turn), cmocka_unit_test(test_knots),
-        cmocka_unit_test(test_knots_to_an_end),  cmocka_unit_test(test_slow_knots),    cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_find_knot),
+        cmocka_unit_test(test_parabola),
+        cmocka_unit_test(test_pause),
+        cmocka_unit_test(test_straight_line),
+        cmocka_unit_test(test_constant_turn),
+        cmocka_unit_test(test_knots),
+        cmocka_unit_test(test_knots_to_an_end),
+        cmocka_unit_test(test_slow_knots),
+        cmocka_unit_test(test_ends),
         cmocka_unit_test(test_samples_too_near),
+        cmocka_unit_test(test_samples_that_are_no_pose),
+        cmocka_unit_test(test_knots_where_the_acceleration_changes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -350,19 +350,96 @@ static void the_end_counts_what_is_left(void **state)
     expect_lost(2 + 5, 3 + 5 * PULSES);
 }
 
+/* ---- power goes with tick 15, and comes back with tick 18 */
+
+static int n_unplugs, n_plugs;
+
+static int take_fault(void *link, enum link_fault what, int session, uint32_t n, double for_ms)
+{
+    assert_ptr_equal(link, pump.link);
+    assert_true(session == 0 && n == 0 && for_ms <= 0.0);
+    n_unplugs += what == LINK_FAULT_UNPLUG;
+    n_plugs += what == LINK_FAULT_PLUG;
+    return SH_OK;
+}
+
+static const struct link_ops power_ops = {.fault = take_fault};
+
+static void let_power_go(void)
+{
+    pump.ops = &power_ops;
+    pump.can_unplug = 1;
+    pump.power_seen = 0;
+    n_unplugs = n_plugs = 0;
+    s->open = 1;
+}
+
+/* A session is cut off once it has taken all from before that tick. Where the pace waits for readers, all must be
+ * written, too; else a client that takes no more holds nobody up. */
+static void power_goes_once_a_session_has_its_ticks(void **state)
+{
+    (void)state;
+    static const struct {
+        int waits;
+        uint64_t cursor;
+        uint32_t unwritten, full;
+        int goes, again;
+    } row[] = {{1, 15, 0, 0, 1, 1}, {1, 16, 0, 0, 1, 1}, {1, 14, 0, 0, 0, 0}, {1, 15, 1, 0, 0, 0}, {1, 14, 0, 2, 0, 0},
+               {0, 15, 1, 0, 1, 1}, {0, 14, 0, 0, 0, 1}, {0, 14, 1, 2, 1, 1}, {0, 14, 1, 1, 0, 1}};
+    release_all(0, 0);
+    stream_power(&stream, 15);
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        let_power_go();
+        stream.waits = row[i].waits;
+        s->cursor = row[i].cursor;
+        s->out_pos = 3;
+        s->out_len = 3 + row[i].unwritten;
+        memcpy(out, "OK\nOK\n", 6);
+        if (pump_power(&pump, row[i].full) != row[i].again) fail_msg("row %zu", i);
+        assert_true(s->open == !row[i].goes && n_unplugs == row[i].goes && n_plugs == 0);
+        assert_int_equal(pump.power_seen, row[i].goes);
+        if (row[i].goes) assert_int_equal(pump.is_off, 1);
+        pump.is_off = 0;
+    }
+}
+
+/* Nothing happens before the tick is released, or on a link that sees nothing of faults. In the pace `step` the link is
+ * back at once. */
+static void power_goes_and_comes(void **state)
+{
+    (void)state;
+    release_all(0, 0);
+    for (int steps = 0; steps < 2; steps++) {
+        atomic_store(&stream.n_power, 0);
+        stream_power(&stream, 15);
+        stream.steps = steps;
+        let_power_go();
+        s->open = 0;
+        pump.is_clean = 1;
+        assert_int_equal(pump_power(&pump, 0), 0);
+        pump.is_clean = 0;
+        assert_true(n_unplugs == 0 && pump.power_seen == 0);
+        assert_int_equal(pump_power(&pump, 0), 1);
+        assert_true(n_unplugs == 1 && n_plugs == steps && pump.is_off == !steps);
+        stream_power(&stream, 18);
+        assert_int_equal(pump_power(&pump, 0), 1);
+        assert_true(n_unplugs == 1 && n_plugs == 1 && pump.is_off == 0 && pump.power_seen == 2);
+        stream_power(&stream, RELEASED); /* not released yet */
+        assert_int_equal(pump_power(&pump, 0), 0);
+        assert_true(n_unplugs == 1 && pump.power_seen == 2);
+    }
+}
+
 int main(void)
 {
+#define CASE(f) cmocka_unit_test_setup_teardown(f, open_stream, close_stream)
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(a_late_session_goes_on_where_it_can, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(a_tick_that_the_head_lost_shows_nothing, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(frames_that_were_overtaken_are_lost, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(numbers_come_from_the_first_tick_that_has_some, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(without_numbers_nothing_is_counted, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(what_was_not_written_is_not_received, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(a_session_learns_the_next_number, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(an_episode_ends_near_the_end, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(units_that_wait_at_the_end_are_lost, open_stream, close_stream),
-        cmocka_unit_test_setup_teardown(the_end_counts_what_is_left, open_stream, close_stream),
+        CASE(a_late_session_goes_on_where_it_can),     CASE(a_tick_that_the_head_lost_shows_nothing),
+        CASE(frames_that_were_overtaken_are_lost),     CASE(numbers_come_from_the_first_tick_that_has_some),
+        CASE(without_numbers_nothing_is_counted),      CASE(what_was_not_written_is_not_received),
+        CASE(a_session_learns_the_next_number),        CASE(an_episode_ends_near_the_end),
+        CASE(units_that_wait_at_the_end_are_lost),     CASE(the_end_counts_what_is_left),
+        CASE(power_goes_once_a_session_has_its_ticks), CASE(power_goes_and_comes),
     };
     return cmocka_run_group_tests_name("readers that are gone", tests, NULL, NULL);
 }

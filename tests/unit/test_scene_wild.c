@@ -319,6 +319,45 @@ static void ply_textures(void **state)
     scene_free(s);
 }
 
+/* Textures and coordinates that a file lacks are reported: once each, and how many. */
+static void ply_textures_that_do_not_fit(void **state)
+{
+    (void)state;
+#define TEXTURES(n) PLY_HEAD "comment TextureFile a.png\n" n XYZ(4)
+#define UV          "property float texture_u\nproperty float texture_v\n"
+#define CORNERS     "end_header\n0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n"
+#define SECOND      "comment TextureFile b.png\n"
+    static const struct {
+        const char *text, *says, *also;
+        int n_there; /* of a.png and b.png */
+    } row[] = {
+        {TEXTURES("") "element face 4\n" LIST "property list uchar float texcoord\nend_header\n" SQUARE
+                      "4 0 1 2 3 8 0 0 1 0 1 1 0 1\n3 0 1 2 4 0 0 1 0\n3 0 2 3 0\n3 0 1 3 8 0 0 1 0 1 1 0 1\n",
+         "a.ply: 2 faces have more or fewer texture coordinates than corners: these coordinates are left out\n", NULL,
+         2},
+        {TEXTURES(SECOND) UV "element face 1\n" LIST "property int texnumber\n" CORNERS "3 0 1 2 1\n",
+         "a.ply, line 3: the texture 'a.png' is missing; put it beside the mesh\n",
+         "a.ply: 2 of 2 textures are missing\n", 0},
+        {TEXTURES(SECOND) UV "element face 1\n" LIST CORNERS "3 0 1 2\n",
+         "a.ply: it names 2 textures, but its faces have no texnumber: the first texture is used\n", NULL, 2},
+        {TEXTURES("") "element face 1\n" LIST "end_header\n" SQUARE "3 0 1 2\n",
+         "a.ply: it names a texture, but has no texture coordinates: the texture is not used\n", NULL, 2},
+    };
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        if (row[i].n_there > 0) put("a.png", "x");
+        if (row[i].n_there > 1) put("b.png", "x");
+        struct scene *s = take("a.ply", row[i].text);
+        if (strstr(warnings, row[i].says) == NULL) fail_msg("%zu: %s", i, warnings);
+        if (row[i].also != NULL) assert_non_null(strstr(warnings, row[i].also));
+        assert_int_equal(n_warnings, row[i].also != NULL ? 2 : 1);
+        assert_int_equal(s->surface[0].texture, i < 3 ? i == 1 ? 2 : 1 : 0);
+        if (i == 0) /* triangles 0 and 1 are of the square */
+            assert_true(!isnan(s->uv[0][0][0]) && !isnan(s->uv[1][2][1]) && isnan(s->uv[2][0][0]) &&
+                        isnan(s->uv[4][1][0]));
+        scene_free(s);
+    }
+}
+
 /* ---- STL */
 
 static size_t binary_stl(char *out, const char *head, uint32_t says, uint32_t n)
@@ -393,6 +432,7 @@ int main(void)
         cmocka_unit_test(ply_in_any_order),
         cmocka_unit_test(ply_vertices_that_nothing_uses),
         cmocka_unit_test(ply_textures),
+        cmocka_unit_test(ply_textures_that_do_not_fit),
         cmocka_unit_test(stl_by_its_size),
         cmocka_unit_test(stl_as_text),
     };

@@ -108,6 +108,26 @@ static void within_a_slab(void **state)
     says("hit something nearer than range_min_m, 1.5 m: the station may be inside an object");
 }
 
+/* A planar head looks along its plane alone. Over a slab it sees nothing, where another head sees the slab. In a room
+ * whose walls are 30 m away all that it sees is beyond its 20 m. */
+static void a_planar_head_sees_only_its_plane(void **state)
+{
+    (void)state;
+    static const double ROOF_M[] = {0.0, 10.0};
+    for (int in_room = 0; in_room < 2; in_room++) {
+        write_box(-0.2, ROOF_M[in_room]);
+        load("0, 0, 1.7", 1, "", "");
+        says_nothing();
+        write_in("test.yaml", "head: {profile: sick-lms111}\nscene: {meshes: [{file: mesh.obj, up: z, scale: 1}]}\n"
+                              "stations: [{position_m: [0, 0, 1.7]}]\n");
+        load_file(config_path);
+        says(
+            in_room
+                ? "of 1024 directions 0 hit something from 0.5 to 20 m away, 0 something nearer, 1024 something farther"
+                : "of 1024 directions 0 hit something from 0.5 to 20 m away, 0 something nearer, 0 something farther");
+    }
+}
+
 /* The head is 300 m beside a slab of 20 cm, which it sees under 0.04 degrees. */
 static void a_scan_that_is_mostly_empty(void **state)
 {
@@ -202,6 +222,7 @@ int main(void)
         cmocka_unit_test(copies_out_of_reach),
         cmocka_unit_test(under_the_floor),
         cmocka_unit_test(within_a_slab),
+        cmocka_unit_test(a_planar_head_sees_only_its_plane),
         cmocka_unit_test(a_scan_that_is_mostly_empty),
         cmocka_unit_test(a_scale_that_is_a_thousand_times_off),
         cmocka_unit_test(a_window_between_two_pulses),

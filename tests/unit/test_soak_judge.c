@@ -196,6 +196,31 @@ static void test_connections(void **state)
     soak_rig_end(soak);
 }
 
+/* A fault strikes before the client's first frame, or while it has no session. */
+static void test_faults_without_a_session(void **state)
+{
+    (void)state;
+    for (int had_one = 0; had_one < 2; had_one++) {
+        struct soak *soak = make();
+        struct soak_link *link = &soak->link[0];
+        const struct fault_note note = note_of(FAULT_DROP, 0, 0, "");
+        send_clean(soak);
+        if (had_one) {
+            see_others(soak, FIRST, HIT);
+            link->act[link->n_acts++] = (struct soak_act){FAULT_DISCONNECT, 0}; /* its end was asked for */
+            link->row[FAULT_DISCONNECT].injected++;
+            soak_saw_end(link);
+        }
+        soak_heard(soak, &note);
+        if (had_one) soak_saw_open(link);
+        assert_int_equal(finish(soak), 0);
+        assert_true(link->row[FAULT_DROP].hidden == 1 && link->row[FAULT_DROP].missed == 0);
+        assert_string_equal(link->row[FAULT_DROP].why, "there was no session then");
+        assert_int_equal(link->away, 1);
+        end(soak);
+    }
+}
+
 /* A boot that no client saw is a miss in real time only: else it may be over before a client is there. */
 static void test_boots(void **state)
 {
@@ -239,6 +264,7 @@ int main(void)
         cmocka_unit_test(test_bytes),
         cmocka_unit_test(test_cut_bytes),
         cmocka_unit_test(test_connections),
+        cmocka_unit_test(test_faults_without_a_session),
         cmocka_unit_test(test_boots),
         cmocka_unit_test(test_numbers_wrap),
     };

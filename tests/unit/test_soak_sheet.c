@@ -282,6 +282,17 @@ static void each_reason_is_enough(void **state)
             if (soak.n_failures != 1) fail_msg("%u reasons instead of: %s", soak.n_failures, BAD[i].reason);
             assert_string_equal(soak.failures[0], BAD[i].reason);
         }
+    /* Several reasons stand once each, in the order of the links, also where both links have them. */
+    make_good();
+    differ(&soak.link[0]);
+    differ(&soak.link[1]);
+    give_up(&soak.link[1]);
+    lose_pulses(NULL);
+    soak_conclude(&soak);
+    assert_int_equal(soak.n_failures, 3);
+    assert_string_equal(soak.failures[0], "a frame that was accepted differs from the clean one, without a fault");
+    assert_string_equal(soak.failures[1], "a client gave up");
+    assert_string_equal(soak.failures[2], "the head lost pulses");
     /* A clean reader that lost frames has another hash, which says nothing of the head. */
     make_good();
     strcpy(soak.clean.sha256, "1");

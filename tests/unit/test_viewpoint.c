@@ -80,16 +80,21 @@ static void add_land(double size_m, double height_m)
         }
 }
 
-static void find(void)
+static void find_in(const struct viewpoint_view *view)
 {
     struct sh_err err;
     struct scene *scene = NULL;
     const struct scene_arrays arrays = {
         (const double(*)[3])vertex_m, n_vertices, (const uint32_t(*)[3])triangle, n_triangles, NULL, NULL, 0};
     int rc = scene_from_arrays(&arrays, &scene, &err);
-    if (rc == SH_OK) rc = viewpoint_find(scene, &VIEW, NULL, &at, &err);
+    if (rc == SH_OK) rc = viewpoint_find(scene, view, NULL, &at, &err);
     if (rc != SH_OK) fail_msg("%s", err.text);
     scene_free(scene);
+}
+
+static void find(void)
+{
+    find_in(&VIEW);
 }
 
 static void assert_near(double got, double want, double tolerance)
@@ -254,6 +259,46 @@ static void a_plate_is_looked_at_from_its_side(void **state)
     assert_true(at.seen > 0.5);
 }
 
+/* Which side of a plate is its front decides, though it is as large from behind. */
+static void a_plate_is_looked_at_from_its_front(void **state)
+{
+    (void)state;
+    static const double corner[4][3] = {{0, 0, 0}, {2, 0, 0}, {2, 0, 2}, {0, 0, 2}};
+    for (int turned = 0; turned < 2; turned++) {
+        clear();
+        memcpy(vertex_m, corner, sizeof corner);
+        n_vertices = 4;
+        add_triangle(0, 1, 2, turned); /* counter-clockwise from -y */
+        add_triangle(0, 2, 3, turned);
+        find();
+        assert_int_equal(at.kind, VIEWPOINT_OUTSIDE);
+        assert_true(turned ? at.position_m[1] > 2 : at.position_m[1] < -2);
+    }
+}
+
+/* Little bodies lie a kilometre apart. The one with the most surface is looked at; among equals the one in the
+ * middle. */
+static void a_part_of_a_sparse_scene_is_looked_at(void **state)
+{
+    (void)state;
+    static const struct viewpoint_view near = {0.5, 40, -40 * M_PI / 180, 60 * M_PI / 180};
+    static const struct {
+        double x_m, y_m, side_m[2];
+    } row[] = {{0, 0, {0.1, 0.1}}, {510, 480, {0.1, 0.1}}, {700, 200, {0.1, 0.2}}, {1000, 1000, {0.1, 0.1}}};
+    for (int larger = 0; larger < 2; larger++) {
+        const int want = larger ? 2 : 1;
+        clear();
+        for (int i = 0; i < 4; i++) {
+            const double x = row[i].x_m, y = row[i].y_m, side = row[i].side_m[larger];
+            add_box((const double[3]){x, y, 0}, (const double[3]){x + side, y + side, side}, 0);
+        }
+        find_in(&near);
+        assert_int_equal(at.kind, VIEWPOINT_OUTSIDE);
+        assert_true(hypot(at.position_m[0] - row[want].x_m, at.position_m[1] - row[want].y_m) < 2);
+        assert_true(at.seen > 0.1);
+    }
+}
+
 /* The land has 2 km of hills. The head is a two-hundredth of that above the ground, 10 m. */
 static void land_is_stood_on(void **state)
 {
@@ -338,6 +383,8 @@ int main(void)
         cmocka_unit_test(the_step_that_a_large_grid_is_told_to_use_is_enough),
         cmocka_unit_test(an_object_is_looked_at_from_the_front),
         cmocka_unit_test(a_plate_is_looked_at_from_its_side),
+        cmocka_unit_test(a_plate_is_looked_at_from_its_front),
+        cmocka_unit_test(a_part_of_a_sparse_scene_is_looked_at),
         cmocka_unit_test(land_is_stood_on),
         cmocka_unit_test(between_houses),
         cmocka_unit_test(the_search_can_be_stopped),

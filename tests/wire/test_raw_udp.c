@@ -67,7 +67,10 @@ static void test_datagrams(void **state)
     }
     clock_gettime(CLOCK_REALTIME, &ended);
     close(fd);
-    raw_recorder_end(&recorder, SIGINT, 0, "300 packets");
+    char said[256];
+    snprintf(said, sizeof said, "scanhead: 300 packets, %.3f MB in %s\n", 1e-6 * (double)bytes,
+             wire_path(wire, "cap.pcapng"));
+    raw_recorder_end(&recorder, SIGINT, 0, said);
     captured_read(wire, &captured);
     captured_check_order(&captured);
     assert_int_equal(captured.n, MANY);

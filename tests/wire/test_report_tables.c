@@ -290,6 +290,22 @@ static void has_page_rows(const char *page, const struct made *all)
     has_page_row(page, "surface not known", &unknown, NULL);
 }
 
+/* The page's top says which files it is of, and when the recording was written. */
+static void has_files(const struct wire *wire, const char *page)
+{
+    char text[512], day[64];
+    struct stat file;
+    assert_int_equal(stat(wire_path(wire, "made.ply"), &file), 0);
+    assert_true(strftime(day, sizeof day, "%F %T UTC", gmtime(&file.st_mtime)) > 0);
+    has_once(page, "<h1>Scan report: made.ply</h1>\n");
+    snprintf(text, sizeof text, "<dt>Recording</dt><dd>%s</dd>\n<dt>Written</dt><dd>%s</dd>\n",
+             wire_path(wire, "made.ply"), day);
+    has_once(page, text);
+    snprintf(text, sizeof text, "<dt>Configuration</dt><dd>%s</dd>\n<dt>Scene</dt><dd>%s</dd>\n",
+             wire_path(wire, "made.yaml"), wire_path(wire, "room.obj"));
+    has_once(page, text);
+}
+
 static void each_row_of_the_page_is_right(void **state)
 {
     struct wire *wire = *state;
@@ -309,6 +325,7 @@ static void each_row_of_the_page_is_right(void **state)
                                                 "<tr><td>north |", "<tr><td>surface not known<"});
     has_once(page, "<p>The first point farther than 10 m from everything is number 62 of the file, at 900.000000 "
                    "0.000000 0.100000, on east | paint-east.</p>\n");
+    has_files(wire, page);
     has_once(page, "<span>of 12 have points</span>");
     has_once(page, "<dt>Scanner</dt><dd>scanhead full sweep, range noise on, angle noise off, ball noise off</dd>\n");
     has_once(page, "<dt>Coordinates</dt><dd>the scene's own frame</dd>\n");

@@ -227,11 +227,19 @@ static void scans_have_the_servers_time(void **state)
     scanner_end();
 }
 
+/* Takes errors up to this report of the server. On a busy machine there are more, of answers that came late. */
+static void expect_report(struct scanhead *sh, const char *text)
+{
+    struct scanhead_frame frame;
+    do
+        client_until_soon(sh, SCANHEAD_EV_ERROR, &frame);
+    while (strstr(frame.event_text, text) == NULL);
+}
+
 /* A wrong, a silent and a refusing server set nothing; a time zone adds hours. Refused answers leave the clock as it
  * is. */
 static void wrong_servers(void **state)
 {
-    struct scanhead_frame frame;
     int64_t start_us, date_us;
     scanner_start(state, "");
     struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
@@ -242,7 +250,7 @@ static void wrong_servers(void **state)
     server_answer(SERVER_S + SECONDS_1900, 0, 1, "TEST");
     server.request[47] ^= 1;
     serve(sh, 0.0, (struct reply){SERVER_S, 0, 3, 1, "TEST"}, "UNSYNCHRONISED");
-    client_until_soon(sh, SCANHEAD_EV_ERROR, &frame);
+    expect_report(sh, "127.0.0.1: is not synchronised");
     assert_true(llabs(read_shift_us()) <= 1); /* still 1970 */
     serve(sh, ask_again(), at(SERVER_S), "SET");
     read_times(&start_us, &date_us);
@@ -253,6 +261,7 @@ static void wrong_servers(void **state)
     assert_true(fabs(t1_s - SECONDS_1900 - SERVER_S) < 1e-3 * SOON_MS);
     serve(sh, t1_s, after_t1(18001.0), "OFFSET");
     serve(sh, ask_again(), (struct reply){3.0, 1, 0, 0, "DENY"}, "KISS");
+    expect_report(sh, "127.0.0.1: kiss-o'-death DENY, it is asked no more");
     assert_true(llabs(read_shift_us() - shift_us) <= 2);
 
     serve(sh, ask_again(), after_t1(17999.0), "SET"); /* a step within the limit is taken */
@@ -273,6 +282,7 @@ static void wrong_servers(void **state)
     assert_true(none >= 1);                                                        /* more where answers came late */
     cola_client_expect(&scanner, "sWN TSCTCSrvAddr C0 0 2 1", "sWA TSCTCSrvAddr"); /* 192.0.2.1: not this machine */
     until_state(sh, "REFUSED");
+    expect_report(sh, "192.0.2.1: is not asked, since it is not on this machine; see ntp.anywhere");
     cola_client_reboot(&scanner, &head);
     cola_client_expect(&scanner, "sRN TSCRole", "sRA TSCRole 0");
     cola_client_expect(&scanner, "sRN TSCTCdelay", "sRA TSCTCdelay 00000000");

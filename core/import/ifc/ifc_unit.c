@@ -42,7 +42,7 @@ static int read_converted(const struct ifc_index *x, const struct step_record *u
     if (!step_list((struct text_span){arg[0].p + skip, arg[0].n - skip}, &list) ||
         !step_real(&x->text, list, &factor) || factor <= 0.0)
         return ifc_index_fail(x, measure, err, "the factor of a length unit is missing");
-    int rc = read_si(x, si, m, err);
+    int rc = ifc_unit_of(x, si, m, err); /* a factor of radians, for example, gives no length */
     *m *= factor;
     return rc;
 }

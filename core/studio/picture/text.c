@@ -54,7 +54,7 @@ static void add_stroke(struct strokes *s, char kind, double p[][2], int n)
         }
         return;
     }
-    for (int i = 1; i < n && (kind != '~' || n < 3); i++)
+    for (int i = 1; i < n && kind != '~'; i++)
         add_segment(s, p[i - 1], p[i]);
     for (int i = 1; i < n - 1 && kind == '~'; i++) {
         middle(p[i - 1], p[i], from);
