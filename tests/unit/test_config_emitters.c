@@ -280,8 +280,10 @@ static void a_planar_head_has_its_geometries(void **state)
     static const char lms[] = "sick-lms111", list[] = "50 Hz at 0.5 deg, 25 Hz at 0.25 deg, 25 Hz at 0.5 deg";
     static const struct wrong wrong[] = {
         {lms, "lines_hz: 50,", "lines_hz: 51,", "geometries[0].lines_hz", "allowed 25 to 50 Hz"},
-        {lms, "steps_per_turn: 720,", "steps_per_turn: 700,", "geometries[0].steps_per_turn", "700; steps_per_turn, "},
-        {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn", "steps_per_turn, "},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 700,", "geometries[0].steps_per_turn",
+         "700; the head's steps_per_turn (1440) divided"},
+        {lms, "steps_per_turn: 720,", "steps_per_turn: 2880,", "geometries[0].steps_per_turn",
+         "2880; the head's steps_per_turn (1440) divided"},
         {lms, "front_step: { value: 540,", "front_step: { value: 541,", "geometries[0].steps_per_turn", "front_step"},
         {lms, "lines_hz: 50,", "lines_hz: 25,", "geometries[2].lines_hz", "is given twice"},
         {lms, "emitter: planar", "emitter: flat", "emitter", "allowed line, "},

@@ -270,7 +270,7 @@ static const struct {
     {vlp, "  ambiguity: folded\n", "", 3, "head.ambiguity",
      "the pulses of head profile velodyne-vlp16 are not evenly spaced in time; allowed none"},
     {vlp, "  lines_hz: 9.5\n  phase_lock: on\n", "", 4, "head.phase_lock",
-     "on, but head.lines_hz is 9.5, which is at another azimuth each second; allowed with whole turns per second"},
+     "on, but with head.lines_hz 9.5 the rotor is at another azimuth each second; allowed with whole turns per second"},
     {lms, "  phase_deg: 1\n", "", 3, "head.phase_deg", "head profile sick-lms111 has emitter: planar; allowed only with emitter: beams"},
     {"hokuyo-urg-04lx", "  prr_hz: 10000\n", "", 3, "head.prr_hz",
      "10000, but a line of head profile hokuyo-urg-04lx has 1024 pulses; allowed 10240, or none: it follows from head.lines_hz"},

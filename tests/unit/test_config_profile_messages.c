@@ -6,7 +6,7 @@
 /* clang-format off */
 #define FARTHEST "{ value: 130, from: quoted, source: \"a reseller's page\" }"
 #define FIGURE "allowed { value: V, from: data sheet }, or from: quoted, from: assumed"
-#define ONE_STEP "; steps_per_turn, 1440, divided by it must be a whole number that also divides first_step, last_step and front_step"
+#define ONE_STEP "; the head's steps_per_turn (1440) divided by this number must be a whole number that also divides first_step, last_step and front_step"
 static const struct {
     const char *head, *old, *with, *key, *text;
 } profiles[] = {

@@ -54,7 +54,7 @@ static void a_head_with_all_on(void **state)
                                           .instrument = 1};
     static const struct want want[] = {
         {"movers", "cast separately", "meshes that move", 1},
-        {"signal", "range equation", "targets vanish by chance; the farthest of the profile's reaches is 1234 m", 1},
+        {"signal", "range equation", "targets vanish by chance; the largest reach in the head profile is 1234 m", 1},
         {"noise", "gauss, by signal", "sigma 0.005 m at 100 m, elsewhere it depends on the signal, and 20 ppm", 1},
         {"ball", "uniform in a ball", "points move by up to 0.25 m", 1},
         {"zones", "resolved", "echoes that return after the next pulse", 1},
@@ -192,14 +192,16 @@ static void the_cheapest_polynomial_that_holds(void **state)
     assert_true(row.cost_ns < left_out(&row, GEOREF_ORDER3)->cost_ns);
     assert_true(left_out(&row, GEOREF_EXACT)->cost_ns > 100.0); /* core/georef.h: 0.2 us or more for each point */
     char want[sizeof row.why];
-    snprintf(want, sizeof want, "the cheapest that meets the tolerance: %.3g m within 200 m, 50 m up or down",
+    snprintf(want, sizeof want,
+             "the cheapest that meets the tolerance: %.3g m for points up to 200 m away, 50 m up or down",
              need.tolerance_m);
     assert_string_equal(row.why, want);
     need.tolerance_m = 1e-7;
     need.radius_m = 103000.0;
     need.height_m = 1000.0;
     assert_int_equal(planned(georef, &need, &row), GEOREF_EXACT);
-    assert_non_null(strstr(row.why, "no polynomial meets the tolerance: 1e-07 m within 1.03e+05 m, 1000 m up or down"));
+    assert_non_null(strstr(
+        row.why, "no polynomial meets the tolerance: 1e-07 m for points up to 1.03e+05 m away, 1000 m up or down"));
     need.tolerance_m = 1e-9; /* GeographicLib itself has 5 nm */
     assert_int_equal(planned(georef, &need, &row), GEOREF_EXACT);
     assert_non_null(strstr(row.why, "no method meets the tolerance"));
@@ -217,7 +219,7 @@ static void a_method_that_is_asked_for(void **state)
     enum georef_method method;
     struct sh_err err;
     assert_int_equal(planned(utm, &need, &row), GEOREF_ORDER3);
-    assert_non_null(strstr(row.why, "asked for by output.georef: 0.001 m within 200 m"));
+    assert_non_null(strstr(row.why, "asked for by output.georef: 0.001 m for points up to 200 m away"));
     assert_string_equal(left_out(&row, GEOREF_ORDER2)->why_not, "not asked for");
     assert_string_equal(left_out(&row, GEOREF_EXACT)->why_not, "not asked for");
     need.forced = GEOREF_EXACT;

@@ -133,22 +133,22 @@ static void georeferences_have_an_extent(void **state)
     static const struct {
         const char *head, *rest, *extent;
     } rows[] = {
-        {"profile: any-rate, range_max_m: 100", STATION, " within 42.893 m, 2.05 m up or down"},
+        {"profile: any-rate, range_max_m: 100", STATION, " for points up to 42.893 m away, 2.05 m up or down"},
         {"profile: any-rate, range_max_m: 100", "stations: [{position_m: [-10, 5, 1]}]\n",
-         " within 53.725 m, 1.04 m up or down"},
+         " for points up to 53.725 m away, 1.04 m up or down"},
         {"profile: any-rate, range_max_m: 100", STATION "noise: {range: on, sigma_m: 0.05}\n",
-         " within 43.558 m, 2.52 m up or down"},
-        {"profile: any-rate, range_max_m: 1.6", STATION, " within 1.616 m, 1.616 m up or down"},
+         " for points up to 43.558 m away, 2.52 m up or down"},
+        {"profile: any-rate, range_max_m: 1.6", STATION, " for points up to 1.616 m away, 1.616 m up or down"},
         {"profile: any-rate, range_max_m: 10", STATION "platform: {kind: live, reach_m: 5}\n",
-         " within 15.15 m, 2.05 m up or down"},
+         " for points up to 15.15 m away, 2.05 m up or down"},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         plan_with(rows[i].head, rows[i].rest, sets, 2);
-        const char *why = row_of("georef")->why, *extent = strstr(why, " within ");
+        const char *why = row_of("georef")->why, *extent = strstr(why, " for points up to ");
         if (extent == NULL || strcmp(extent, rows[i].extent) != 0) fail_msg("%zu: %s", i, why);
     }
     plan_with("profile: any-rate, range_max_m: 20", STATION, sets, 3);
-    assert_non_null(strstr(row_of("georef")->why, " within 20.2 m, 20.2 m up or down"));
+    assert_non_null(strstr(row_of("georef")->why, " for points up to 20.2 m away, 20.2 m up or down"));
 }
 
 static void a_tripod_has_a_row(void **state)
