@@ -201,7 +201,7 @@ static void test_faults_without_a_session(void **state)
 {
     (void)state;
     for (int had_one = 0; had_one < 2; had_one++) {
-        struct soak *soak = make();
+        struct soak *soak = soak_rig_make();
         struct soak_link *link = &soak->link[0];
         const struct fault_note note = note_of(FAULT_DROP, 0, 0, "");
         send_clean(soak);
@@ -217,7 +217,7 @@ static void test_faults_without_a_session(void **state)
         assert_true(link->row[FAULT_DROP].hidden == 1 && link->row[FAULT_DROP].missed == 0);
         assert_string_equal(link->row[FAULT_DROP].why, "there was no session then");
         assert_int_equal(link->away, 1);
-        end(soak);
+        soak_rig_end(soak);
     }
 }
 
