@@ -1,12 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A campaign of four jobs from its list to manifest.json, in this process: which jobs there are, what is said of them,
- * what a manifest has of their files, and what follows where a file is not as it was. Run from the top of the source
- * tree. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
+ * what a manifest has of their files, and what follows where a file is not as it was. */
+#include "tests/unit/commands_rig.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,47 +9,22 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/batch/manifest.h"
-#include "tests/unit/output_rig.h"
-
-static char folder[64], back[512];
 
 /* The jobs of noise.seed=1,2 at two stations: all stations of the first value, then all of the second. */
 static const char *const NAMES[] = {"0001_station-1_noise.seed=1", "0002_station-2_noise.seed=1",
                                     "0003_station-1_noise.seed=2", "0004_station-2_noise.seed=2"};
 enum { N_JOBS = 4 };
 
-static void write_text(const char *name, const char *text)
-{
-    FILE *out = fopen(name, "w");
-    assert_non_null(out);
-    fputs(text, out);
-    assert_int_equal(fclose(out), 0);
-}
-
 static int go_there(void **state)
 {
     (void)state;
-    char heads[600];
-    if (getcwd(back, sizeof back) == NULL) return -1;
-    snprintf(heads, sizeof heads, "%s/config/heads", back);
-    setenv("SCANHEAD_HEADS", heads, 1);
-    strcpy(folder, "/tmp/scanhead-jobs-XXXXXX");
-    if (mkdtemp(folder) == NULL || chdir(folder) != 0) return -1;
+    if (commands_begin() != 0) return -1;
     write_text("floor.obj", "v -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\nf 1 2 3 4\n");
     write_text("c.yaml",
                "head: {profile: sphere, step_deg: 10}\nscene: {meshes: [{file: floor.obj, up: z, scale: 1}]}\n"
                "stations: [{position_m: [0, 0, 2]}, {position_m: [4, 0, 2]}]\noutput: {crs: local}\n");
     return 0;
-}
-
-static int come_back(void **state)
-{
-    (void)state;
-    char command[80];
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return chdir(back) != 0 || system(command) != 0;
 }
 
 /* The first job of a command is always named; which others are depends on the machine. */
@@ -75,22 +45,12 @@ static void keep_first_job(char *text)
 /* Runs `batch c.yaml WORDS`, and compares what is printed. said NULL: anything. */
 static void batch(const char *words, int want, const char *printed, const char *said)
 {
-    char text[512], *argv[32] = {0}, *at = text;
-    struct output out, err;
-    int argc = 0;
-    snprintf(text, sizeof text, "batch c.yaml %s", words);
-    for (char *word; (word = strsep(&at, " ")) != NULL;)
-        if (*word != '\0') argv[argc++] = word;
-    output_take(&out, stdout);
-    output_take(&err, stderr);
-    const int status = app_batch.run(argc, argv);
-    char *on_err = output_give_said(&err), *on_out = output_give(&out);
-    if (status != want) fail_msg("batch %s: status %d: %s", words, status, on_err);
+    char text[512];
+    snprintf(text, sizeof text, "c.yaml %s", words);
+    does(&app_batch, text, want);
     assert_string_equal(on_out, printed);
     keep_first_job(on_err);
     if (said != NULL) assert_string_equal(on_err, said);
-    free(on_out);
-    free(on_err);
 }
 
 #define SEEDS "--sweep noise.seed=1,2 "
@@ -354,5 +314,5 @@ int main(void)
         cmocka_unit_test(another_campaign_is_refused),
         cmocka_unit_test(what_is_wrong_is_said_before_the_first_job),
     };
-    return cmocka_run_group_tests_name("batch", tests, go_there, come_back);
+    return cmocka_run_group_tests_name("batch", tests, go_there, commands_end);
 }

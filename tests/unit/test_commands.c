@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Whole commands in this process, on a closed room that a sphere of shots hits from two stations. Sanitizers see
- * what the commands leave behind, and all counts are known by hand. Run from the top of the source tree. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
+/* Whole commands in this process, on a closed room that a sphere of shots hits from two stations. All
+ * counts are known by hand. */
+#include "tests/unit/commands_rig.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,23 +9,11 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "firmware_sim/app/app.h"
 #include "firmware_sim/app/run/page.h"
 #include "firmware_sim/app/studio/watch/watch.h"
-#include "tests/unit/output_rig.h"
 
 /* Steps of 10 degrees: 17 rings of 36 shots, and a shot at each pole, where 35 more are fired and not cast. */
 enum { SHOTS = 17 * 36 + 2, FIRED = 19 * 36 };
-
-static char folder[64], back[512], *on_out, *on_err;
-
-static void write_text(const char *name, const char *text)
-{
-    FILE *out = fopen(name, "w");
-    assert_non_null(out);
-    fputs(text, out);
-    assert_int_equal(fclose(out), 0);
-}
 
 /* A box of 10 x 10 x 4 m, whose lower corner has this x. */
 static void write_box(const char *name, double x)
@@ -46,12 +30,7 @@ static void write_box(const char *name, double x)
 static int go_there(void **state)
 {
     (void)state;
-    char heads[600];
-    if (getcwd(back, sizeof back) == NULL) return -1;
-    snprintf(heads, sizeof heads, "%s/config/heads", back);
-    setenv("SCANHEAD_HEADS", heads, 1);
-    strcpy(folder, "/tmp/scanhead-commands-XXXXXX");
-    if (mkdtemp(folder) == NULL || chdir(folder) != 0) return -1;
+    if (commands_begin() != 0) return -1;
     write_box("room.obj", -5);
     write_text("c.yaml", "head: {profile: sphere, step_deg: 10}\nscene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
                          "stations: [{position_m: [0, 0, 2]}, {position_m: [4, 0, 2], heading_deg: 90}]\n"
@@ -59,55 +38,11 @@ static int go_there(void **state)
     return 0;
 }
 
-static int come_back(void **state)
-{
-    (void)state;
-    char command[80];
-    free(on_out);
-    free(on_err);
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return chdir(back) != 0 || system(command) != 0;
-}
-
-/* Runs a command line, and keeps its output in on_out and on_err. */
-static void does(const struct app_command *command, const char *words, int want)
-{
-    char text[512], *argv[40] = {0}, *at = text;
-    struct output out, err;
-    int argc = 0;
-    snprintf(text, sizeof text, "%s %s", command->name, words);
-    for (char *word; (word = strsep(&at, " ")) != NULL;)
-        argv[argc++] = word;
-    free(on_out);
-    free(on_err);
-    output_take(&out, stdout);
-    output_take(&err, stderr);
-    const int status = command->run(argc, argv);
-    on_err = output_give_said(&err);
-    on_out = output_give(&out);
-    if (status != want) fail_msg("%s %s: status %d: %s", command->name, words, status, on_err);
-}
-
-static void has(const char *text, const char *what)
-{
-    if (strstr(text, what) == NULL) fail_msg("no %s in %s", what, text);
-}
-
 static void count_is(const char *key, unsigned long long want)
 {
     char line[96];
     snprintf(line, sizeof line, "\"%s\": %llu,\n", key, want);
     has(on_out, line);
-}
-
-static char *contents(const char *name)
-{
-    char *text = calloc(1, 1 << 21);
-    FILE *in = fopen(name, "r");
-    assert_true(in != NULL && text != NULL);
-    assert_true(fread(text, 1, (1 << 21) - 1, in) > 0);
-    fclose(in);
-    return text;
 }
 
 static void all_formats_are_recorded_at_once(void **state)
@@ -327,5 +262,5 @@ int main(void)
         cmocka_unit_test(a_first_configuration),
         cmocka_unit_test(a_head_with_a_page),
     };
-    return cmocka_run_group_tests_name("commands", tests, go_there, come_back);
+    return cmocka_run_group_tests_name("commands", tests, go_there, commands_end);
 }

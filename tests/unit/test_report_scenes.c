@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Reports of scenes with many surfaces, with a mirror, and of clouds that are far or empty: which lines there are, and
- * what is left out. Run from the top of the source tree. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <cmocka.h>
+ * what is left out. */
+#include "tests/unit/commands_rig.h"
 
 #include <fcntl.h>
 #include <math.h>
@@ -15,71 +11,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "firmware_sim/app/app.h"
-#include "tests/unit/output_rig.h"
-
-static char folder[64], back[512], *on_out, *on_err;
-
-static void write_text(const char *name, const char *text)
-{
-    FILE *out = fopen(name, "w");
-    assert_non_null(out);
-    fputs(text, out);
-    assert_int_equal(fclose(out), 0);
-}
-
 static int go_there(void **state)
 {
     (void)state;
-    if (getcwd(back, sizeof back) == NULL) return -1;
-    strcpy(folder, "/tmp/scanhead-scenes-XXXXXX");
-    if (mkdtemp(folder) == NULL || chdir(folder) != 0) return -1;
-    char heads[600];
-    snprintf(heads, sizeof heads, "%s/config/heads", back);
-    return setenv("SCANHEAD_HEADS", heads, 1);
-}
-
-static int come_back(void **state)
-{
-    (void)state;
-    char command[80];
-    free(on_out);
-    free(on_err);
-    snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return chdir(back) != 0 || system(command) != 0;
-}
-
-static void does(const struct app_command *command, const char *words, int want)
-{
-    char text[512], *argv[32] = {0}, *at = text;
-    struct output out, err;
-    int argc = 0;
-    snprintf(text, sizeof text, "%s %s", command->name, words);
-    for (char *word; (word = strsep(&at, " ")) != NULL;)
-        argv[argc++] = word;
-    free(on_out);
-    free(on_err);
-    output_take(&out, stdout);
-    output_take(&err, stderr);
-    const int status = command->run(argc, argv);
-    on_err = output_give_said(&err);
-    on_out = output_give(&out);
-    if (status != want) fail_msg("%s %s: status %d: %s", command->name, words, status, on_err);
-}
-
-static void has(const char *text, const char *what)
-{
-    if (strstr(text, what) == NULL) fail_msg("no %s in %s", what, text);
-}
-
-static char *contents(const char *name)
-{
-    char *text = calloc(1, 1 << 19);
-    FILE *in = fopen(name, "r");
-    assert_true(in != NULL && text != NULL);
-    assert_true(fread(text, 1, (1 << 19) - 1, in) > 0);
-    fclose(in);
-    return text;
+    return commands_begin();
 }
 
 static int times_in(const char *text, const char *what)
@@ -214,5 +149,5 @@ int main(void)
         cmocka_unit_test(points_in_a_mirror_are_left_out),
         cmocka_unit_test(clouds_that_are_far_or_empty),
     };
-    return cmocka_run_group_tests_name("report scenes", tests, go_there, come_back);
+    return cmocka_run_group_tests_name("report scenes", tests, go_there, commands_end);
 }
