@@ -12,6 +12,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/device/head_clock.h"
+#include "firmware_sim/device/settings_file.h"
 #include "firmware_sim/loop/loop.h"
 #include "firmware_sim/site/waves.h"
 
@@ -237,6 +238,8 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     int rc = sites_load(cfg, SITE_FOR_SCANS, &report, &sites, err);
     const double all_mb = peak_mb(); /* of the scene, without the head's queues */
     if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);
+    if (rc == SH_OK && cfg->head.settings_file[0] != '\0')
+        rc = settings_file_check(cfg->head.settings_file, cfg->profile.name, err);
     if (rc == SH_OK) rc = print_summary(cfg, &sites, all_mb, out, err);
     if (rc == SH_OK && (run->scene || run->csv != NULL))
         rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? out : NULL, err);

@@ -11,6 +11,7 @@
 #include <strings.h>
 #include <unistd.h>
 
+#include "core/infile.h"
 #include "core/newfile.h"
 #include "drivers/protocol/protocol.h"
 
@@ -248,6 +249,18 @@ static int read_from(struct settings_file *file, struct sh_err *err)
     const int rc = read_image(file, in, err);
     fclose(in);
     return rc;
+}
+
+int settings_file_check(const char *path, const char *profile, struct sh_err *err)
+{
+    struct settings_file file = {.path = path, .image = {.profile = profile}};
+    struct sh_err why = {0};
+    const char *reason;
+    if (access(path, F_OK) != 0 && errno == ENOENT) return SH_OK;
+    FILE *in = infile_open(path, &reason);
+    const int rc = in != NULL ? read_image(&file, in, &why) : sh_fail(&why, SH_EINPUT, "%s: %s", path, reason);
+    if (in != NULL) fclose(in);
+    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "head.settings_file: %s", why.text);
 }
 
 int settings_file_open(const char *path, const char *profile, const struct sh_report *report,

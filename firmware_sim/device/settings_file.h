@@ -25,6 +25,10 @@ struct settings_file;
 int settings_file_open(const char *path, const char *profile, const struct sh_report *report,
                        struct settings_file **out, struct sh_err *err);
 
+/* Reads the file as settings_file_open does, but neither makes nor locks it: a head may have it. A file that is missing is
+ * right. */
+int settings_file_check(const char *path, const char *profile, struct sh_err *err);
+
 /* Replaces what is stored under a name: whole lines with their '\n'; empty: nothing is stored there any more.
  * SH_EINPUT: a character is not printable ASCII, an empty line, a missing end, or too long for the file; nothing
  * changes. Any thread; never waits for the file. */

@@ -62,6 +62,7 @@ void does(const struct app_command *command, const char *words, int want)
     output_take(&out, stdout);
     output_take(&err, stderr);
     const int status = command->run(argc, argv);
+    app_end_messages(); /* as main does */
     on_err = output_give_said(&err);
     on_out = output_give(&out);
     if (status != want) fail_msg("%s %s: status %d: %s", command->name, words, status, on_err);

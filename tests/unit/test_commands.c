@@ -250,6 +250,17 @@ static void a_head_with_a_page(void **state)
     run_take_page(NULL);
 }
 
+/* What run would refuse, check says. */
+static void stored_settings_are_looked_at(void **state)
+{
+    (void)state;
+    write_text("s.txt", "scanhead settings 1\nprofile sphere\nend\n");
+    does(&app_check, "c.yaml --set head.settings_file=s.txt", 0);
+    write_text("s.txt", "scanhead settings 1\nprofile puck\nend\n");
+    does(&app_check, "c.yaml --set head.settings_file=s.txt", 2);
+    has(on_err, "s.txt: has the settings of a head of profile puck, this is sphere; name another file");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -261,6 +272,7 @@ int main(void)
         cmocka_unit_test(how_much_is_seen),
         cmocka_unit_test(a_first_configuration),
         cmocka_unit_test(a_head_with_a_page),
+        cmocka_unit_test(stored_settings_are_looked_at),
     };
     return cmocka_run_group_tests_name("commands", tests, go_there, commands_end);
 }

@@ -142,6 +142,9 @@ static void expect_refused(const char *text, const char *const says[2])
     if (rc != SH_EINPUT || strstr(err.text, path) == NULL || strstr(err.text, says[0]) == NULL ||
         strstr(err.text, says[1]) == NULL)
         fail_msg("%s%d, %s", text, rc, rc == SH_OK ? "" : err.text);
+    struct sh_err said = err;
+    assert_int_equal(settings_file_check(path, "puck", &err), SH_EINPUT);
+    assert_string_equal(err.text, said.text);
     expect_text(text);
 }
 
@@ -154,6 +157,28 @@ static void a_broken_or_foreign_file_is_refused_and_stays(void **state)
         expect_refused(bad[i].text, bad[i].says);
     snprintf(text, sizeof text, "scanhead settings 1\nprofile puck\nhead %0479d\nend\n", 0);
     expect_refused(text, (const char *const[]){":3: too long a setting; allowed are 478", ""});
+}
+
+/* A check of the configuration looks at the file while a head may have it. What is missing, a head makes. */
+static void a_check_neither_makes_nor_locks_it(void **state)
+{
+    (void)state;
+    char want[200];
+    begin();
+    assert_int_equal(settings_file_check(path, "puck", &err), SH_OK);
+    assert_int_equal(access(path, F_OK), -1);
+    struct settings_file *file = open_file();
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 15\n"), SH_OK);
+    assert_int_equal(settings_file_check(path, "puck", &err), SH_OK);
+    close_file(file);
+    assert_int_equal(settings_file_check(path, "puck", &err), SH_OK);
+    close_file(open_file()); /* nobody has it */
+    begin();
+    assert_int_equal(mkfifo(path, 0600), 0);
+    assert_int_equal(settings_file_check(path, "puck", &err), SH_EINPUT);
+    snprintf(want, sizeof want, "head.settings_file: %s: a FIFO, not a file", path);
+    assert_string_equal(err.text, want);
+    begin();
 }
 
 /* Room for so many names, so much under each, and so long a setting; one more is too much. */
@@ -356,6 +381,7 @@ int main(void)
         cmocka_unit_test(nothing_new_is_not_written),
         cmocka_unit_test(wrong_text_is_refused),
         cmocka_unit_test(a_broken_or_foreign_file_is_refused_and_stays),
+        cmocka_unit_test(a_check_neither_makes_nor_locks_it),
         cmocka_unit_test(a_file_has_its_limits),
         cmocka_unit_test(two_heads_have_no_file_in_common),
         cmocka_unit_test(a_file_of_another_is_not_replaced),
