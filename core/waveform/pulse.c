@@ -176,7 +176,7 @@ int waveform_pulse_make(const struct waveform_spec *spec, struct waveform_pulse 
 {
     const struct outgoing o = outgoing_of(spec);
     const double sigma_s = receiver_sigma_s(spec->bandwidth_hz), end_s = GAUSSIAN_END * sigma_s;
-    /* Of the 2 samples more, one has room for the EDGE_STEPS before the pulse, and one comes after it. */
+    /* There are 2 samples more: one has room for the EDGE_STEPS before the pulse, and one comes after it. */
     const double length = ceil((o.to_s - o.from_s + 2.0 * end_s) / spec->sample_s) + 2.0;
     if (length > WAVEFORM_MAX_SAMPLES)
         return sh_fail(err, SH_EINPUT, "the pulse is %.0f samples of %.4g ns long; at most %d are allowed", length,

@@ -12,7 +12,7 @@
 
 #include "firmware_sim/app/app.h"
 
-/* What the last command printed to standard output and standard error, without lines of progress. */
+/* These hold what the last command printed: on_out its standard output, on_err its standard error without progress. */
 extern char *on_out, *on_err;
 
 /* Makes the folder, and goes there. Returns 0, or -1. */

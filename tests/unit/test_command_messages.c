@@ -125,7 +125,7 @@ static void lines_are_refused_word_by_word(void **state)
     expect_refused(&dev, 1, owners, N_OF(owners));
 }
 
-/* What a device lacks, or does at the moment, comes before what a line asks for. */
+/* The device answers first that it lacks something or is busy, and then that a line asks for something wrong. */
 static void devices_refuse_word_by_word(void **state)
 {
     (void)state;

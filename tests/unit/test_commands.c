@@ -250,7 +250,7 @@ static void a_head_with_a_page(void **state)
     run_take_page(NULL);
 }
 
-/* What run would refuse, check says. */
+/* `check` refuses a file of stored settings that `run` would refuse. */
 static void stored_settings_are_looked_at(void **state)
 {
     (void)state;

@@ -277,7 +277,7 @@ static void settings_become_lengths(void **state)
     }
 }
 
-/* What a configuration says of ranges, noise and step are the settings of power-up. */
+/* The ranges, noise and step of a configuration are the settings of power-up. */
 static void keys_become_settings(void **state)
 {
     (void)state;

@@ -99,7 +99,7 @@ static void other_heads_have_what_they_can(void **state)
     }
 }
 
-/* What was chosen by trying it on the scene holds only within the ranges of power-up. */
+/* A choice that was tried on the scene holds only within the ranges of power-up. */
 static void ranges_stay_where_methods_were_tried(void **state)
 {
     (void)state;

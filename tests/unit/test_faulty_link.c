@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A link with injected faults around a link of the test's own: which calls reach the inner one, how long it may wait, and
- * what the person who runs the head is told. Waits are of an hour, so that no machine is too slow for them. */
+/* A link with injected faults around a link of the test's own: which calls reach the inner one, how long it may wait,
+ * and what the person who runs the head is told. Waits are of an hour, so that no machine is too slow for them. */
 #include "firmware_sim/fault/faulty_inside.h"
 #include "tests/unit/wire_rig.h"
 
@@ -183,7 +183,7 @@ static void without_faults_calls_pass_through(void **state)
     close_it(f);
 }
 
-/* What a fault holds back does not wait for the inner link, and an inner link that takes nothing is not asked at once. */
+/* Bytes that a fault holds back do not wait for the inner link. If it takes nothing, it is not asked again at once. */
 static void a_stall_ends_the_wait(void **state)
 {
     (void)state;
@@ -214,7 +214,7 @@ static void a_stall_ends_the_wait(void **state)
     close_it(f);
 }
 
-/* Whoever writes to a session that the fault has ended learns of it. The endpoint may be taken meanwhile. */
+/* A writer to a session that the fault has ended learns of it. The endpoint may be taken meanwhile. */
 static void an_unplugged_link_comes_back(void **state)
 {
     (void)state;
