@@ -9,4 +9,7 @@
 /* Returns the pulse as the detectors of a waveform know it. */
 const struct finder *finder_rig_of(const struct waveform *waveform);
 
+/* Returns a Gaussian pulse of 4 samples, limited at 10 thresholds, with noise in thresholds. */
+struct waveform *finder_rig_open(double noise);
+
 #endif

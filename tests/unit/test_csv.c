@@ -6,35 +6,22 @@
 #include <unistd.h>
 
 #include "core/csv.h"
+#include "tests/unit/file_rig.h"
 #include "tests/common/cases.h"
 
 #define DIGITS_63 "123456789012345678901234567890123456789012345678901234567890123"
 
 static const char *const known[] = {"t", "x", "y", NULL};
-static char path[] = "/tmp/scanhead-csv-XXXXXX";
 static struct csv csv;
 static struct sh_err err;
 
-static int make_file(void **state)
-{
-    (void)state;
-    const int fd = mkstemp(path);
-    return fd < 0 ? -1 : close(fd);
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
-
 static int open_text(const char *text)
 {
-    FILE *f = fopen(path, "w");
+    FILE *f = fopen(file_path, "w");
     assert_non_null(f);
     fputs(text, f);
     assert_int_equal(fclose(f), 0);
-    return csv_open(&csv, path, known, NULL, &err);
+    return csv_open(&csv, file_path, known, NULL, &err);
 }
 
 /* A value goes to its column's name. A column that the file lacks reads 0. Lines count from 1, with those that hold
@@ -87,7 +74,7 @@ static void diagnostics_have_lines(void **state)
         char want[256];
         int code = open_text(bad[i].text);
         if (code == SH_OK) code = csv_next(&csv, &err);
-        snprintf(want, sizeof want, "%s%s: %s", path, bad[i].line, bad[i].why);
+        snprintf(want, sizeof want, "%s%s: %s", file_path, bad[i].line, bad[i].why);
         assert_int_equal(code, SH_EINPUT);
         assert_string_equal(err.text, want);
         csv_close(&csv);

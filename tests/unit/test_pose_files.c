@@ -4,26 +4,12 @@
 
 #include "core/geoframe.h"
 #include "core/vec3.h"
+#include "tests/unit/file_rig.h"
 #include "tests/unit/pose_rig.h"
-
-static char path[] = "/tmp/scanhead-pose-XXXXXX";
-
-static int make_file(void **state)
-{
-    (void)state;
-    int fd = mkstemp(path);
-    return fd < 0 ? -1 : close(fd);
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
 
 static void write_file(const char *text)
 {
-    FILE *f = fopen(path, "w");
+    FILE *f = fopen(file_path, "w");
     assert_non_null(f);
     fputs(text, f);
     assert_int_equal(fclose(f), 0);
@@ -38,7 +24,7 @@ static void test_csv(void **state)
     double frame, first, last;
     write_file("\xef\xbb\xbf# a comment behind a byte order mark\n\nt_s, x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\r\n"
                "0,1,2,3,5,-6,370\r\n# another\n2.5,3,2,3,0,0,90\n");
-    if (trajectory_read_csv(path, NULL, &angles, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_csv(file_path, NULL, &angles, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_span(angles, &first, &last);
     assert_true(first == 0.0 && last == 2.5);
     trajectory_at(angles, 0.0, &a, &frame);
@@ -49,7 +35,7 @@ static void test_csv(void **state)
              "frame,qw,qx,qy,qz,z_m,y_m,x_m,t_s\n7,%.17g,%.17g,%.17g,%.17g,3,2,1,0\n8,1,0,0,0,3,2,3,2\n", b.quat[0],
              b.quat[1], b.quat[2], b.quat[3]);
     write_file(text);
-    if (trajectory_read_csv(path, NULL, &quats, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_csv(file_path, NULL, &quats, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_at(quats, 0.0, &b, &frame);
     assert_true(pose_angle_between(a.quat, b.quat) < 1e-14 && frame == 7.0 && b.position_m[0] == 1.0);
     trajectory_free(angles);
@@ -65,7 +51,7 @@ static void test_csv_upright(void **state)
     struct pose p;
     double frame, quat[4];
     write_file("t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n0,0,0,0,30,90,10\n1,0,0,0,30,-90,10\n");
-    if (trajectory_read_csv(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_csv(file_path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     for (int i = 0; i < 2; i++) {
         trajectory_at(tr, i, &p, &frame);
         pose_from_angles(30 * DEG, i == 0 ? 90 * DEG : -90 * DEG, 10 * DEG, quat);
@@ -81,7 +67,7 @@ static void test_csv_lengths(void **state)
     struct sh_err err;
     struct trajectory *tr;
     write_file("t_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,0.9995,0,0,0\n1,0,0,0,1.0005,0,0,0\n");
-    if (trajectory_read_csv(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_csv(file_path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_free(tr);
 }
 
@@ -120,9 +106,9 @@ static void test_csv_errors(void **state)
         struct trajectory *tr;
         struct sh_err err = {0};
         write_file(wrong[i].text);
-        assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
+        assert_int_equal(trajectory_read_csv(file_path, NULL, &tr, &err), SH_EINPUT);
         assert_null(tr);
-        if (strstr(err.text, path) == NULL || strstr(err.text, wrong[i].where) == NULL ||
+        if (strstr(err.text, file_path) == NULL || strstr(err.text, wrong[i].where) == NULL ||
             strstr(err.text, wrong[i].what) == NULL)
             fail_msg("%zu: %s", i, err.text);
     }
@@ -130,16 +116,16 @@ static void test_csv_errors(void **state)
     struct sh_err err;
     /* Steps of the least length: doubles near 1.7e9 are 0.24 us apart. */
     write_file(NAMES "1700000000,1,2,3,4\n1700000000.0001,1,2,3,4\n1700000000.0002,1,2,3,4\n");
-    assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_OK);
+    assert_int_equal(trajectory_read_csv(file_path, NULL, &tr, &err), SH_OK);
     trajectory_free(tr);
     assert_int_equal(trajectory_read_csv("/nonexistent/x.csv", NULL, &tr, &err), SH_EINPUT);
     /* A number does not end at a byte 0. */
     static const char zero[] = NAMES "0,1\0002,2,3,4\n";
-    FILE *file = fopen(path, "wb");
+    FILE *file = fopen(file_path, "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(zero, 1, sizeof zero - 1, file), sizeof zero - 1);
     assert_int_equal(fclose(file), 0);
-    assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
+    assert_int_equal(trajectory_read_csv(file_path, NULL, &tr, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "x_m is not a finite decimal number: \"1?2\""));
 }
 
@@ -152,7 +138,7 @@ static void test_waypoints(void **state)
     double frame, h, pitch, roll, first, last;
     /* The way goes north at 5 m/s for 20 m, stands for 2 s, and goes on for 10 m at 2 m/s. */
     write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,1,5,0\n0,10,1,5,0\n0,20,1,2,2\n0,30,1,2,0\n");
-    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_span(tr, &first, &last);
     assert_true(first == 0.0 && fabs(last - 11.0) < 1e-12);
     trajectory_at(tr, 1.0, &p, &frame);
@@ -175,7 +161,7 @@ static void test_waypoints(void **state)
     trajectory_free(tr);
     /* A pause in a bend: the car stands as it came and leaves as it stands, without a jerk of its nose. */
     write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,5,0\n0,20,0,5,1\n20,20,0,5,0\n");
-    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     struct pose before;
     trajectory_at(tr, 0.0, &before, &frame);
     for (double t = 0.01; t <= 9.0; t += 0.01) {
@@ -187,7 +173,7 @@ static void test_waypoints(void **state)
     trajectory_free(tr);
     /* A corner: the heading turns from north to east, in the end along the last leg. */
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,10\n0,50,0,10\n50,50,0,10\n100,50,0,10\n");
-    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_at(tr, 5.0, &p, &frame);
     pose_to_angles(p.quat, &h, &pitch, &roll);
     assert_true(fabs(h - 45 * DEG) < 1e-3); /* equal times before and after: the parabola halves the angle */
@@ -200,8 +186,8 @@ static void test_waypoints(void **state)
         "x_m,y_m,z_m,speed_m_s\n0,0,0,1\n0,0,0,1\n", "x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,1,-1\n1,0,0,1,0\n"};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         write_file(wrong[i]);
-        assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
-        assert_non_null(strstr(err.text, path));
+        assert_int_equal(trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, file_path));
     }
 }
 
@@ -222,12 +208,12 @@ static void test_columns_and_frames(void **state)
                 if (k != without) p += sprintf(p, "%s%s", p == text ? "" : ",", (form ? quats : angles)[k]);
             strcpy(p, "\n");
             write_file(text);
-            assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
+            assert_int_equal(trajectory_read_csv(file_path, NULL, &tr, &err), SH_EINPUT);
             assert_int_equal(strstr(err.text, "columns must be") != NULL, without < n);
         }
     }
     write_file("t_s,x_m,y_m,z_m,heading_deg\n0,0,0,0,0\n1,1,0,0,0\n2,3,0,0,0\n4,5,0,0,0\n");
-    if (trajectory_read_csv(path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_csv(file_path, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     static const double t_s[4] = {0, 1, 2, 4};
     for (int i = 0; i < 4; i++) {
         struct pose pose;
@@ -262,7 +248,7 @@ static void test_speeds_and_pauses(void **state)
         snprintf(text, sizeof text, "x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,%s,%s\n10,0,0,1,0\n", row[i].speed,
                  row[i].pause);
         write_file(text);
-        const int rc = trajectory_read_waypoints(path, NULL, NULL, &tr, &err);
+        const int rc = trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err);
         assert_int_equal(rc, isnan(row[i].last_s) ? SH_EINPUT : SH_OK);
         if (rc != SH_OK) {
             if (strstr(err.text, row[i].says) == NULL) fail_msg("%s", err.text);
@@ -288,7 +274,7 @@ static void test_slow_waypoints(void **state)
     struct pose p;
     double frame, h, pitch, roll;
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,0.001\n0,5,0,0.001\n5,5,0,0.001\n");
-    if (trajectory_read_waypoints(path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+    if (trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     const struct pose mount = {.quat = {1, 0, 0, 0}};
     struct pose_path got;
     assert_int_equal(find_path(tr, 0, 1e9, &mount, &got, &err), SH_OK);
@@ -302,16 +288,16 @@ static void test_slow_waypoints(void **state)
     for (int i = 0; i < 120; i++) /* each 999 m at 1 mm/s: 99,900 samples */
         snprintf(text + strlen(text), sizeof text - strlen(text), "%d,0,0,0.001\n", 999 * i);
     write_file(text);
-    assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
-    assert_non_null(strstr(err.text, path));
+    assert_int_equal(trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, file_path));
     assert_non_null(strstr(err.text, "allowed are 10000000"));
-    FILE *f = fopen(path, "w");
+    FILE *f = fopen(file_path, "w");
     assert_non_null(f);
     fputs("x_m,y_m,z_m,speed_m_s,pause_s\n", f);
     for (int i = 0; i < 50000; i++) /* a day each: 4e9 s are over with the 46,297th */
         fprintf(f, "0,%d,0,1000,86400\n", i);
     assert_int_equal(fclose(f), 0);
-    assert_int_equal(trajectory_read_waypoints(path, NULL, NULL, &tr, &err), SH_EINPUT);
+    assert_int_equal(trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err), SH_EINPUT);
     /* 46,297 pauses, and 46.296 s on the way */
     assert_non_null(strstr(err.text, "line 46298: 4.00006085e+09 s from the first way-point on; "));
     assert_non_null(strstr(err.text, "allowed 4e+09"));
@@ -337,7 +323,7 @@ static void test_level_waypoints(void **state)
             snprintf(text + strlen(text), sizeof text - strlen(text), "%.9f,%.9f,%.9f,%g\n", at_m[0] + 10 * k * east[0],
                      at_m[1] + 10 * k * east[1], at_m[2] + 10 * k * east[2], i == 1 ? 0.001 : 5.0);
         write_file(text);
-        if (trajectory_read_waypoints(path, &ecef, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
+        if (trajectory_read_waypoints(file_path, &ecef, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
         trajectory_at(tr, i == 1 ? 1e4 : 2.0, &p, &frame);
         quat_matrix(p.quat, r);
         for (int k = 0; k < 3; k++) {
@@ -363,7 +349,7 @@ static void test_messages_are_lines(void **state)
     char warning[64];
     const struct sh_report report = {.ctx = warning, .warn = keep_warning};
     write_file("t_s,\x1b[2J\x7f\a\n0,1\n");
-    assert_int_equal(trajectory_read_csv(path, NULL, &tr, &err), SH_EINPUT);
+    assert_int_equal(trajectory_read_csv(file_path, NULL, &tr, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "column \"?[2J??\" is unknown"));
     sh_warn(&report, "%s", "a name\r\n\x1b[0m\x7f \xc3\xa4");
     assert_string_equal(warning, "a name???[0m? \xc3\xa4");

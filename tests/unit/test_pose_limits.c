@@ -3,22 +3,8 @@
  * line and its limits (core/pose.h). */
 #include <unistd.h>
 
+#include "tests/unit/file_rig.h"
 #include "tests/unit/pose_rig.h"
-
-static char path[] = "/tmp/scanhead-limits-XXXXXX";
-
-static int make_file(void **state)
-{
-    (void)state;
-    const int fd = mkstemp(path);
-    return fd < 0 ? -1 : close(fd);
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
 
 /* Writes the columns and up to two lines. `says` is what follows the file's name in the message; NULL: the file is
  * right. */
@@ -26,19 +12,20 @@ static void expect_file(int of_waypoints, const char *columns, const char *lines
 {
     struct trajectory *tr;
     struct sh_err err;
-    FILE *file = fopen(path, "w");
+    FILE *file = fopen(file_path, "w");
     assert_non_null(file);
     fprintf(file, "%s\n%s", columns, lines);
     assert_int_equal(fclose(file), 0);
-    const int rc = of_waypoints ? trajectory_read_waypoints(path, NULL, NULL, &tr, &err)
-                                : trajectory_read_csv(path, NULL, &tr, &err);
+    const int rc = of_waypoints ? trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err)
+                                : trajectory_read_csv(file_path, NULL, &tr, &err);
     if (rc != (says == NULL ? SH_OK : SH_EINPUT)) fail_msg("%s: %d, %s", lines, rc, rc != SH_OK ? err.text : "");
     if (says == NULL) {
         trajectory_free(tr);
         return;
     }
     assert_null(tr);
-    if (strncmp(err.text, path, strlen(path)) != 0 || strstr(err.text, says) == NULL) fail_msg("%s", err.text);
+    if (strncmp(err.text, file_path, strlen(file_path)) != 0 || strstr(err.text, says) == NULL)
+        fail_msg("%s", err.text);
 }
 
 static void samples(void **state)

@@ -12,6 +12,7 @@
 
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
+#include "tests/unit/file_rig.h"
 #include "tests/unit/event_recording.h"
 
 static void expect_next_error(struct replay *r, const char *start, const char *text)
@@ -83,22 +84,6 @@ static void a_single_command_keeps_no_control(void **state)
     free(cfg);
 }
 
-static char path[] = "/tmp/scanhead-clients-XXXXXX";
-
-static int make_file(void **state)
-{
-    (void)state;
-    const int fd = mkstemp(path);
-    if (fd >= 0) close(fd);
-    return fd < 0;
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
-
 /* Returns how many events the tick has. */
 static int events_of(struct replay *r, uint64_t number)
 {
@@ -130,12 +115,12 @@ static void it_waits_for_its_clients(void **state)
     struct ring_tick tick;
     struct sh_err err;
     assert_non_null(cfg);
-    event_recording_write(path, 3);
+    event_recording_write(file_path, 3);
     cfg->loop.tick_hz = 1000;
     cfg->n_links = N_OWN;
     for (uint32_t i = 0; i < N_OWN; i++)
         cfg->link[i].type = own[i];
-    const struct replay_options options = {.path = path, .speed = 1, .start = 1, .clients = 2};
+    const struct replay_options options = {.path = file_path, .speed = 1, .start = 1, .clients = 2};
     if (replay_open(cfg, &options, &r, &err) != SH_OK) fail_msg("%s", err.text);
     for (uint32_t i = 0; i < N_OWN; i++)
         replay_source.session_opened(r, 10 + i, "the link's own");

@@ -13,13 +13,13 @@
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
+#include "tests/unit/file_rig.h"
 #include "tests/unit/event_recording.h"
 
 /* ---- times of frames */
 
 enum { PERIOD_NS = 1000 };
 
-static char path[] = "/tmp/scanhead-replay-XXXXXX";
 static uint32_t next_seq;
 
 static void put(FILE *f, uint8_t *frame, size_t len)
@@ -83,7 +83,7 @@ static int64_t time_of_points(struct recording *r)
 
 static FILE *begin_file(void)
 {
-    FILE *f = fopen(path, "wb");
+    FILE *f = fopen(file_path, "wb");
     assert_non_null(f);
     next_seq = 0;
     return f;
@@ -106,7 +106,7 @@ static void points_go_out_with_what_follows(void **state)
         put_event(f, NATIVE_EV_CONTROL, rows[i].event_ns);
         assert_int_equal(fclose(f), 0);
         memset(&r, 0, sizeof r);
-        if (recording_open(&r, path, &err) != SH_OK) fail_msg("%s", err.text);
+        if (recording_open(&r, file_path, &err) != SH_OK) fail_msg("%s", err.text);
         assert_int_equal(time_of_points(&r), rows[i].want_ns);
         recording_close(&r);
     }
@@ -124,7 +124,7 @@ static void it_begins_anew_as_it_began(void **state)
     put_descriptor(f);
     assert_int_equal(fclose(f), 0);
     memset(&r, 0, sizeof r);
-    if (recording_open(&r, path, &err) != SH_OK) fail_msg("%s", err.text);
+    if (recording_open(&r, file_path, &err) != SH_OK) fail_msg("%s", err.text);
     for (int times = 0; times < 3; times++) {
         struct recording_frame frame;
         int n = 1;
@@ -159,7 +159,7 @@ static int play(const struct replay_options *given, uint64_t first_tick, int mos
 {
     struct config *cfg = config_new();
     struct replay_options options = *given;
-    options.path = path;
+    options.path = file_path;
     options.start = 1;
     struct replay *r;
     struct ring_tick tick;
@@ -237,7 +237,7 @@ static void each_time_has_its_numbers(void **state)
 static void a_part_begins_with_the_head(void **state)
 {
     (void)state;
-    event_recording_write(path, 20);
+    event_recording_write(file_path, 20);
     const int n = play(&(struct replay_options){.speed = 1, .from_s = 0.005, .to_s = 0.012}, 3, MOST);
     assert_int_equal(n, 1 + 8);
     assert_int_equal(played[0].header.type, NATIVE_DESCRIPTOR);
@@ -302,8 +302,8 @@ static void a_command_seeks_paces_and_loops(void **state)
                 {9, "SCAN:REPL ,1", "0 "}, /* anew, by the loop */
                 {10, "SCAN:REPL ,,OFF", "1 "}};
     struct config *cfg = config_new();
-    event_recording_write(path, 20);
-    const struct replay_options options = {.path = path, .speed = 1, .start = 1};
+    event_recording_write(file_path, 20);
+    const struct replay_options options = {.path = file_path, .speed = 1, .start = 1};
     struct replay *r = open_replay(cfg, &options);
     assert_string_equal(said(r, "SCAN:REPL?"), "PLAYING,0.000000,0.019000,1,OFF");
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -326,8 +326,8 @@ static void a_seek_to_the_end_of_a_part_is_its_end(void **state)
 {
     (void)state;
     struct config *cfg = config_new();
-    event_recording_write(path, 20);
-    const struct replay_options options = {.path = path, .speed = 1, .to_s = 0.0125};
+    event_recording_write(file_path, 20);
+    const struct replay_options options = {.path = file_path, .speed = 1, .to_s = 0.0125};
     struct replay *r = open_replay(cfg, &options);
     assert_string_equal(said(r, "SCAN:REPL 0.0124,1,ON"), "OK");
     assert_string_equal(tick_of_replay(r, 0), "");
@@ -345,7 +345,7 @@ static void its_name_is_a_line(void **state)
     put_head(f, "Maker,Mo\r\ndel,\xd5,1");
     put_event(f, NATIVE_EV_CONTROL, 0);
     assert_int_equal(fclose(f), 0);
-    const struct replay_options options = {.path = path, .speed = 1};
+    const struct replay_options options = {.path = file_path, .speed = 1};
     struct replay *r = open_replay(cfg, &options);
     assert_string_equal(said(r, "*IDN?"), "Maker,Mo~~del,~,1");
     assert_string_equal(cfg->profile.model, "Mo~~del");
@@ -371,8 +371,8 @@ static void what_a_replay_refuses(void **state)
                 {"SCAN:REPL 0,1,ON,1", "ERR -108", "takes a time"},
                 {"SCAN:REPL? 1", "ERR -108", ""}};
     struct config *cfg = config_new();
-    event_recording_write(path, 3);
-    struct replay_options options = {.path = path, .speed = 1};
+    event_recording_write(file_path, 3);
+    struct replay_options options = {.path = file_path, .speed = 1};
     struct replay *r = open_replay(cfg, &options);
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         const char *reply = said(r, rows[i].line);
@@ -422,19 +422,6 @@ static void a_state_holds_from_its_tick_on(void **state)
     pthread_mutex_destroy(&r->lock);
     free(cfg);
     free(r);
-}
-
-static int make_file(void **state)
-{
-    (void)state;
-    const int fd = mkstemp(path);
-    return fd < 0 ? -1 : close(fd);
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    return unlink(path);
 }
 
 int main(void)

@@ -7,28 +7,15 @@
 
 #include "core/infile.h"
 #include "core/text.h"
+#include "tests/unit/file_rig.h"
 #include "tests/common/cases.h"
 
-static char path[] = "/tmp/scanhead-text-XXXXXX";
 static struct text t;
 static struct sh_err err;
 
-static int make_file(void **state)
-{
-    (void)state;
-    const int fd = mkstemp(path);
-    return fd < 0 ? -1 : close(fd);
-}
-
-static int remove_file(void **state)
-{
-    (void)state;
-    return unlink(path);
-}
-
 static void write_file(const char *bytes, size_t n)
 {
-    FILE *file = fopen(path, "wb");
+    FILE *file = fopen(file_path, "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, n, file), n);
     assert_int_equal(fclose(file), 0);
@@ -37,7 +24,7 @@ static void write_file(const char *bytes, size_t n)
 static void open_text(const char *text)
 {
     write_file(text, strlen(text));
-    assert_int_equal(text_open(&t, path, NULL, NULL, &err), SH_OK);
+    assert_int_equal(text_open(&t, file_path, NULL, NULL, &err), SH_OK);
 }
 
 static void expect_word(const char *want)
@@ -278,7 +265,7 @@ static void characters_of_utf8(void **state)
     }
 }
 
-/* Of a long path the last 120 bytes stand in the message. */
+/* The message has the last 120 bytes of a long path. */
 static void messages_name_a_place(void **state)
 {
     (void)state;
@@ -312,27 +299,27 @@ static void large_files(void **state)
     (void)state;
     enum { SIZE = 17 << 20 };
     int left = 10;
-    assert_int_equal(truncate(path, SIZE), 0);
-    assert_int_equal(text_open(&t, path, count_parts, &left, &err), SH_OK);
+    assert_int_equal(truncate(file_path, SIZE), 0);
+    assert_int_equal(text_open(&t, file_path, count_parts, &left, &err), SH_OK);
     assert_int_equal(left, 8);
     assert_true(t.size == SIZE && t.end == t.data + SIZE && *t.end == '\0');
     text_close(&t);
     left = 1;
-    assert_int_equal(text_open(&t, path, count_parts, &left, &err), SH_ESTOPPED);
+    assert_int_equal(text_open(&t, file_path, count_parts, &left, &err), SH_ESTOPPED);
     assert_string_equal(err.text, "enough");
     text_close(&t);
-    assert_int_equal(truncate(path, 0), 0);
+    assert_int_equal(truncate(file_path, 0), 0);
 }
 
 static void what_files_begin_with(void **state)
 {
     (void)state;
     write_file("PK\3\4rest", 8);
-    assert_int_equal(infile_begins(path, "PK\3\4"), 1);
-    assert_int_equal(infile_begins(path, "PK\3\5"), 0);
-    assert_int_equal(infile_begins(path, "PK\3\4rest"), 1);
+    assert_int_equal(infile_begins(file_path, "PK\3\4"), 1);
+    assert_int_equal(infile_begins(file_path, "PK\3\5"), 0);
+    assert_int_equal(infile_begins(file_path, "PK\3\4rest"), 1);
     write_file("PK", 2);
-    assert_int_equal(infile_begins(path, "PK\3\4"), 0); /* too short */
+    assert_int_equal(infile_begins(file_path, "PK\3\4"), 0); /* too short */
     assert_int_equal(infile_begins("/nonexistent/file", "P"), -1);
     assert_int_equal(text_open(&t, "/nonexistent/file", NULL, NULL, &err), SH_EINPUT);
     assert_string_equal(err.text, "/nonexistent/file: No such file or directory");

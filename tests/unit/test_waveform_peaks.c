@@ -14,10 +14,7 @@ static double y[N];
 static int open_pulse(void **state)
 {
     (void)state;
-    struct waveform_spec spec = waveform_rig_spec();
-    spec.noise = 0.02;
-    spec.full_scale = 10.0;
-    w = waveform_rig_open(&spec);
+    w = finder_rig_open(0.02);
     return 0;
 }
 
