@@ -160,11 +160,6 @@ uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_n
     return before - kept;
 }
 
-uint32_t fault_board_remove(struct fault_board *board, uint32_t number)
-{
-    return fault_board_end(board, number, INT64_MIN);
-}
-
 void fault_board_note(struct fault_board *board, const struct fault_note *note)
 {
     if (!note->ended) {

@@ -50,10 +50,8 @@ const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t numb
 int fault_board_add(struct fault_board *board, const struct fault *fault, int64_t t_ns, uint32_t *number,
                     struct sh_err *err);
 /* Takes out the fault of that number; 0: all. Frames from before device time t_ns are still hit, since they are on
- * their way. Returns how many faults were taken out. */
+ * their way; INT64_MIN: none is hit any more. Returns how many faults were taken out. */
 uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_ns);
-/* The same, at once. */
-uint32_t fault_board_remove(struct fault_board *board, uint32_t number);
 
 /* Notes an injection: counts it, writes it to the truth, and passes it to the listeners. */
 void fault_board_note(struct fault_board *board, const struct fault_note *note);

@@ -233,7 +233,7 @@ static void move_anchor(struct worker *worker, const struct device_work *work, s
     struct native_anchor anchor;
     if (stretch == worker->anchored) return;
     worker->anchored = stretch;
-    if (work->site->station[work->station].leg == NULL) return;
+    if (work->site->station[work->station].on_stretch == NULL) return;
     device_fill_anchor(work->site, work->station, stretch, &anchor);
     add_anchor(worker, &anchor, work->t_ns, 0);
 }

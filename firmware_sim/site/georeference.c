@@ -46,17 +46,18 @@ static int plan_one(const struct site *site, struct georef *georef, const double
     return georef_set_method(georef, method, err);
 }
 
-/* Gives each stretch of the path a leg: a georeference of its own about the stretch's middle. So counts and polynomials
+/* Gives each stretch of the path a georeference of its own about the stretch's middle. So counts and polynomials
  * need not reach further than a stretch, however long the path is. */
-static int plan_legs(const struct site *site, struct site_station *s, struct sh_err *err)
+static int plan_stretches(const struct site *site, struct site_station *s, struct sh_err *err)
 {
     struct plan_row row;
-    s->leg = calloc(site->n_stretches, sizeof *s->leg);
-    if (s->leg == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
+    s->on_stretch = calloc(site->n_stretches, sizeof *s->on_stretch);
+    if (s->on_stretch == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
     for (size_t i = 0; i < site->n_stretches; i++) {
         const struct site_stretch *stretch = &site->stretch[i];
-        int rc = georef_recentre(s->georef, stretch->centre_m, &s->leg[i].georef, err);
-        if (rc == SH_OK) rc = plan_one(site, s->leg[i].georef, stretch->centre_m, reach_m(site, stretch), &row, err);
+        int rc = georef_recentre(s->georef, stretch->centre_m, &s->on_stretch[i].georef, err);
+        if (rc == SH_OK)
+            rc = plan_one(site, s->on_stretch[i].georef, stretch->centre_m, reach_m(site, stretch), &row, err);
         if (rc != SH_OK) return rc;
         if (i == 0 || row.cost_ns > s->plan.cost_ns ||
             (row.cost_ns == s->plan.cost_ns && row.error_m > s->plan.error_m))
@@ -73,9 +74,9 @@ static int plan_station(const struct site *site, struct site_station *s, const s
                         struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    int has_legs = site->n_knots != 0 && cfg->output.layout == LINE_GEO;
-    int rc = has_legs ? plan_legs(site, s, err)
-                      : plan_one(site, s->georef, s->at.position_m, reach_m(site, NULL), &s->plan, err);
+    int by_stretch = site->n_knots != 0 && cfg->output.layout == LINE_GEO;
+    int rc = by_stretch ? plan_stretches(site, s, err)
+                        : plan_one(site, s->georef, s->at.position_m, reach_m(site, NULL), &s->plan, err);
     if (rc == SH_OK && s->plan.error_m > cfg->output.tolerance_m && cfg->output.layout == LINE_GEO)
         sh_warn(
             report,
@@ -110,9 +111,10 @@ static int scale_station(const struct site *site, struct site_station *s, double
 {
     int rc = SH_OK;
     const double most_m = longest_m(site);
-    if (s->leg == NULL) return georef_scale(s->georef, scale_m, most_m + site->live_reach_m, s->scale, err);
+    if (s->on_stretch == NULL) return georef_scale(s->georef, scale_m, most_m + site->live_reach_m, s->scale, err);
     for (size_t i = 0; i < site->n_stretches && rc == SH_OK; i++)
-        rc = georef_scale(s->leg[i].georef, scale_m, most_m + site->stretch[i].reach_m, s->leg[i].scale, err);
+        rc = georef_scale(s->on_stretch[i].georef, scale_m, most_m + site->stretch[i].reach_m, s->on_stretch[i].scale,
+                          err);
     return rc;
 }
 
@@ -180,9 +182,10 @@ static void warn_of_coarse_counts(const struct site *site, const struct sh_repor
 static double count_m(const struct site *site, const struct site_station *s)
 {
     double most_m = 0.0;
-    if (s->leg == NULL) return georef_count_m(s->georef, reach_m(site, NULL), s->scale);
+    if (s->on_stretch == NULL) return georef_count_m(s->georef, reach_m(site, NULL), s->scale);
     for (size_t i = 0; i < site->n_stretches; i++)
-        most_m = fmax(most_m, georef_count_m(s->leg[i].georef, reach_m(site, &site->stretch[i]), s->leg[i].scale));
+        most_m = fmax(
+            most_m, georef_count_m(s->on_stretch[i].georef, reach_m(site, &site->stretch[i]), s->on_stretch[i].scale));
     return most_m;
 }
 
@@ -239,8 +242,8 @@ int site_georeference_one(struct site *site, uint32_t station, struct sh_err *er
 void site_free_georeference(struct site *site, uint32_t station)
 {
     struct site_station *s = &site->station[station];
-    for (size_t k = 0; s->leg != NULL && k < site->n_stretches; k++)
-        georef_free(s->leg[k].georef);
-    free(s->leg);
+    for (size_t k = 0; s->on_stretch != NULL && k < site->n_stretches; k++)
+        georef_free(s->on_stretch[k].georef);
+    free(s->on_stretch);
     georef_free(s->georef);
 }

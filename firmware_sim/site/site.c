@@ -149,10 +149,10 @@ const struct georef *site_georef(const struct site *site, uint32_t station, size
                                  const double **scale)
 {
     const struct site_station *s = &site->station[station];
-    const struct site_leg *leg = s->leg != NULL ? &s->leg[stretch] : NULL;
-    *centre_m = leg != NULL ? site->stretch[stretch].centre_m : s->at.position_m;
-    *scale = leg != NULL ? leg->scale : s->scale;
-    return leg != NULL ? leg->georef : s->georef;
+    const struct site_on_stretch *on = s->on_stretch != NULL ? &s->on_stretch[stretch] : NULL;
+    *centre_m = on != NULL ? site->stretch[stretch].centre_m : s->at.position_m;
+    *scale = on != NULL ? on->scale : s->scale;
+    return on != NULL ? on->georef : s->georef;
 }
 
 static double counts_or_ideal(double counts)

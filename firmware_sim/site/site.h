@@ -24,7 +24,7 @@ struct site_waves;
 
 /* Georeference and scale of the points of one stretch of a head's path, geo layout. Points are relative to the
  * stretch's centre. */
-struct site_leg {
+struct site_on_stretch {
     struct georef *georef;
     double scale[3]; /* as below */
 };
@@ -48,12 +48,12 @@ struct site_station {
     struct georef *georef;
     struct placement at;
     struct site_tripod tripod;
-    struct cast_beam *beam;         /* NULL: one ray per pulse */
-    struct beam_outlines *outlines; /* of an adaptive beam */
-    double scale[3];                /* of geo points on the wire, units of the CRS per count */
-    struct site_leg *leg;           /* one for each stretch of a trajectory, in the geo layout; else NULL */
-    struct plan_row plan;           /* how the georef's method was chosen; of the worst leg */
-    struct cast_colour colour;      /* of its points; where output.colour is not none */
+    struct cast_beam *beam;             /* NULL: one ray per pulse */
+    struct beam_outlines *outlines;     /* of an adaptive beam */
+    double scale[3];                    /* of geo points on the wire, units of the CRS per count */
+    struct site_on_stretch *on_stretch; /* [n_stretches] of a trajectory, in the geo layout; else NULL */
+    struct plan_row plan;               /* how the georef's method was chosen; of the worst stretch */
+    struct cast_colour colour;          /* of its points; where output.colour is not none */
     double t_s, frame; /* of a stop: its time after the trajectory's first sample; the trajectory's frame scalar */
 };
 

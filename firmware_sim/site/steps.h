@@ -91,8 +91,8 @@ int site_set_up_colours(struct site *site, const struct sh_report *report, struc
 int site_check_plausibility(const struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- georeference.c: heights, CRS, method, and how many metres a count is on the wire */
-/* After stations are placed and the path of a moving head is known. Fills the stations' georef, plan, scale and leg,
- * and site->scale_m. Warns where a tolerance is not met. */
+/* Stations are placed before, and the path of a moving head is known. This fills the stations' georef, on_stretch, plan
+ * and scale, and site->scale_m. It warns where a tolerance is not met. */
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err);
 /* The same for one station without a georeference, and for the scale, which depends on all stations. No warnings. */
 int site_georeference_one(struct site *site, uint32_t station, struct sh_err *err);

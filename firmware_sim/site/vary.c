@@ -9,7 +9,7 @@
 struct site_vary {
     struct site site; /* the first member: site_vary_free gets its address */
     struct config cfg;
-    uint32_t station; /* this site has a georeference and legs of its own for this station alone */
+    uint32_t station; /* this site has georeferences of its own for this station alone */
 };
 
 int site_varies(const struct head_settings *a, const struct head_settings *b)
@@ -42,9 +42,9 @@ static int plan_again(struct site_vary *v, const struct site *from, struct sh_er
     if (site->station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu stations", n);
     memcpy(site->station, from->station, n * sizeof *site->station);
     site->station[v->station].georef = NULL;
-    /* Scales are written into the legs of a path. The legs that were copied belong to `from`, so they are not kept. */
+    /* Scales are written to each stretch of a path. Those that were copied belong to `from`, so they are not kept. */
     for (size_t i = 0; i < n; i++)
-        site->station[i].leg = NULL;
+        site->station[i].on_stretch = NULL;
     int rc = site_vary_detect(site, err);
     return rc == SH_OK ? site_georeference_one(site, v->station, err) : rc;
 }

@@ -142,12 +142,12 @@ static void the_list_changes_and_counts_stay(void **state)
     }
     assert_int_equal(fault_board_add(board, &list.fault[0], 77, &number, &err), SH_EINPUT);
     assert_string_equal(err.text, "there are 32 faults already; allowed 32");
-    assert_int_equal(fault_board_remove(board, 2), 1);
+    assert_int_equal(fault_board_end(board, 2, INT64_MIN), 1);
     assert_true(fault_board_version(board) != version);
     for (uint32_t i = 0; i < 3000; i++) { /* numbers go on, however many there were */
         assert_int_equal(fault_board_add(board, &list.fault[0], 78, &number, &err), SH_OK);
         fault_board_note(board, &(struct fault_note){.fault = number, .byte = -1});
-        assert_int_equal(fault_board_remove(board, number), 1);
+        assert_int_equal(fault_board_end(board, number, INT64_MIN), 1);
     }
     assert_int_equal(fault_board_last(board), 3032);
     assert_int_equal(fault_board_injected(board, 1500), 1);
@@ -161,8 +161,8 @@ static void the_list_changes_and_counts_stay(void **state)
     assert_int_equal(n, FAULT_MAX - 1);
     assert_true(entry[0].from_start && entry[0].number == 1 && entry[0].since_ns == 0);
     assert_true(!entry[1].from_start && entry[1].number == 3 && entry[1].since_ns == 77);
-    assert_int_equal(fault_board_remove(board, 0), FAULT_MAX - 1);
-    assert_int_equal(fault_board_remove(board, 0), 0);
+    assert_int_equal(fault_board_end(board, 0, INT64_MIN), FAULT_MAX - 1);
+    assert_int_equal(fault_board_end(board, 0, INT64_MIN), 0);
     fault_board_free(board);
     fault_board_free(NULL);
     list.n = 0;
@@ -323,7 +323,7 @@ static void a_run_has_a_bounded_number_of_faults(void **state)
     assert_int_equal(fault_board_create(&list, NULL, NULL, &board, &err), SH_OK);
     for (uint32_t i = 0; i < FAULT_MOST_OF_A_RUN && rc == SH_OK; i++) {
         rc = fault_board_add(board, &list.fault[0], 0, &number, &err);
-        if (rc == SH_OK) fault_board_remove(board, number);
+        if (rc == SH_OK) fault_board_end(board, number, INT64_MIN);
     }
     assert_int_equal(rc, SH_EINPUT);
     assert_string_equal(err.text, "there were 1000000 faults in this run; allowed 1000000; a new run counts anew");

@@ -112,7 +112,7 @@ static void a_fault_counts_from_when_it_was_added(void **state)
     assert_true(rig.n_notes == 6 && rig.note[3].number == 11 && rig.note[3].fault == 1);
     assert_true(rig.note[4].number == 3 && rig.note[5].number == 4 && rig.note[4].fault == 2);
     assert_int_equal(fault_board_end(rig.board, 0, 1040 * MS), 1);
-    assert_int_equal(fault_board_remove(rig.board, 2), 0);
+    assert_int_equal(fault_board_end(rig.board, 2, INT64_MIN), 0);
     rig_frame_at(RIG_STREAM, 40, 2000 * MS, 0);
     assert_int_equal(rig.n_notes, 6);
     assert_int_equal(fault_board_injected(rig.board, 1), 4); /* removed faults keep their count */
@@ -128,7 +128,7 @@ static void what_is_held_when_its_fault_goes_still_comes(void **state)
     f.n = 1;
     rig_open(&f, 1, 1);
     rig_frame(RIG_STREAM);
-    fault_board_remove(rig.board, 0);
+    fault_board_end(rig.board, 0, INT64_MIN);
     rig_frame(RIG_STREAM);
     rig_frame(RIG_STREAM);
     assert_int_equal(rig_take(0), 3);

@@ -124,7 +124,7 @@ static void follows_the_board(void **state)
     assert_int_equal(fault_board_add(rig.board, &pan, 4 * TICK_NS, &number, &err), SH_OK);
     step(&rig, HEAD_FAULTS_BEAM, 4, -1);
     assert_int_equal(rig.n, 1);
-    assert_int_equal(fault_board_remove(rig.board, 1), 1);
+    assert_int_equal(fault_board_end(rig.board, 1, INT64_MIN), 1);
     assert_int_equal(step(&rig, HEAD_FAULTS_BEAM, 5, -1), 1);
     assert_int_equal(rig.n, 2);
     assert_true(rig.note[1].fault == 1 && rig.note[1].ended && rig.note[1].t_ns == 5 * TICK_NS);
