@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* These are tests of the choice of the client that makes room at a web link. */
+/* These are tests of the choice of the client that makes room at a web link, and of the types of the page's files. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <string.h>
@@ -8,6 +8,7 @@
 #include <cmocka.h>
 #include <netinet/in.h>
 
+#include "drivers/link/web_pages.h"
 #include "drivers/link/web_places.h"
 
 static struct web_place place[WEB_PLACES];
@@ -83,12 +84,30 @@ static void test_addresses(void **state)
     assert_memory_not_equal(a, b, 8);
 }
 
+/* Browsers run no script and take no style of another type, since the head sends `nosniff`. */
+static void test_types(void **state)
+{
+    (void)state;
+    static const char *const types[][2] = {{"/", "text/html; charset=utf-8"},
+                                           {"/index.html", "text/html; charset=utf-8"},
+                                           {"/view.js", "text/javascript; charset=utf-8"},
+                                           {"/style.css", "text/css; charset=utf-8"},
+                                           {"/icon.svg", "image/svg+xml"}};
+    struct web_page page;
+    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
+        assert_true(web_page_at(types[i][0], &page));
+        assert_string_equal(page.type, types[i][1]);
+    }
+    assert_false(web_page_at("/view", &page));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_who_goes),
         cmocka_unit_test(test_answers),
         cmocka_unit_test(test_addresses),
+        cmocka_unit_test(test_types),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
