@@ -239,6 +239,28 @@ static void test_messages(void **state)
     free(text);
 }
 
+/* Each unknown request is said once. After 63 different ones the head says that it says no more: it remembers 64. */
+static void test_unknown_requests(void **state)
+{
+    enum { SAID = 63, ASKED = 70 };
+    struct wire *wire = *state;
+    uint8_t got[2];
+    char request[16];
+    struct head head = head_start(wire, make_capture(wire, 1), (const char *const[]){"--link", "type: tcp", NULL});
+    const int fd = raw_connect(head_endpoint(&head, "tcp"));
+    for (int i = 0; i < 2 * ASKED; i++)
+        raw_send(fd, request, (size_t)snprintf(request, sizeof request, "x%d\n", i / 2));
+    raw_send(fd, "a\n", 2);
+    read_all(fd, got, 2); /* all are answered */
+    close(fd);
+    head_end(&head, SIGTERM);
+    assert_int_equal(stats_link_uint(wire, "wrong_requests"), 2 * ASKED);
+    char *text = wire_read(wire_path(wire, "head.err"), NULL);
+    assert_int_equal(lines_with(text, "the capture has no such request: x"), SAID);
+    assert_int_equal(lines_with(text, "further messages of its protocol are not shown"), 1);
+    free(text);
+}
+
 static void test_refused(void **state)
 {
     struct wire *wire = *state;
@@ -266,6 +288,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_udp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_loop_has_no_end, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_messages, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_unknown_requests, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
