@@ -8,7 +8,7 @@
  * hits which triangle, and without any rounding where double is not enough. Ranges are those of the triangles' planes
  * in double. The proof is in core/bvh/bvh_inside.h.
  *
- * A BVH depends on the scene alone. It is constant after it is made, and may be used from any thread; each thread has
+ * A BVH depends on the scene alone, is constant after it is made, and may be used from any thread; each thread has
  * working memory of its own. */
 #ifndef CORE_BVH_H
 #define CORE_BVH_H
@@ -146,8 +146,8 @@ double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3
  * holes. */
 
 /* All rays with the numbers `from` to `to` - 1 hit `triangle`, or nothing if it is BVH_NO_TRIANGLE. Sets their ranges,
- * labels and steepness, bit by bit as bvh_hits does. It may overwrite up to seven rays after these, so set later ones
- * afterwards. */
+ * labels and steepness, bit by bit as bvh_hits does. The function may overwrite up to seven rays after `to` - 1, so set
+ * later rays afterwards. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
 /* The same where ray `from` hits triangle[0], the next one triangle[1], and so on. A ray stays as it
  * is where its entry of `triangle` is neither a triangle of the scene nor BVH_NO_TRIANGLE. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Writing past the system's cache (O_DIRECT). It saves copying, which is most of the cost of a long file, but each
- * write then waits for the disk. It takes whole blocks of aligned memory, at whole blocks of the file. */
+ * write then waits for the disk. Each write takes whole blocks of aligned memory, at whole blocks of the file. */
 #ifndef CORE_DIRECT_H
 #define CORE_DIRECT_H
 

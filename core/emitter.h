@@ -28,8 +28,8 @@ enum emitter_kind { EMITTER_LINE, EMITTER_PLANAR, EMITTER_BEAMS, EMITTER_SPHERE,
 extern const char *const emitter_names[]; /* by kind; NULL at the end */
 enum { EMITTER_MAX_BEAMS = 128, EMITTER_MAX_STEPS = 1000000 };
 
-/* A beam fires offset_ns after the sequence's first one. Its azimuth counts from that of the turning head at that
- * time. */
+/* A beam fires offset_ns after the sequence's first beam. The beam's azimuth counts from that of the turning head at
+ * that time. */
 struct emitter_beam {
     int64_t elevation_udeg, azimuth_udeg;
     uint32_t offset_ns;
@@ -102,7 +102,7 @@ static inline uint32_t emitter_line_pulses(const struct emitter *emitter)
 }
 /* Returns the pulse rate of a head of beams in micro-hertz, rounded. */
 int64_t emitter_rate_uhz(const struct emitter *emitter);
-/* Returns the line angle of a planar head's step, rounded. It counts from the front, in the direction of the steps. */
+/* Returns the line angle of a planar head's step, rounded. The angle counts from the front, along the steps. */
 int64_t emitter_step_udeg(const struct emitter *emitter, int64_t step);
 
 #endif

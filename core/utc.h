@@ -7,7 +7,7 @@
  * from 1980-01-06T00:00:00Z in weeks of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); a table is not needed for
  * it. POSIX time has no leap seconds: 23:59:60 has the number of the second after it (POSIX.1, 4.16).
  *
- * The table is IERS Bulletin C's. It has an end: leap seconds after expires_s are not known yet.
+ * The table is IERS Bulletin C's. The table has an end: leap seconds after expires_s are not known yet.
  * Pure; any thread. */
 #ifndef CORE_UTC_H
 #define CORE_UTC_H

@@ -48,7 +48,7 @@ struct mesh_part {
     const char *name; /* without control characters */
     uint32_t n_vertices, n_faces;
     const char *texture; /* as mesh.texture */
-    /* That image itself: it is written beside the file under that name, or into a .glb. NULL: it is the caller's. */
+    /* The image itself, written beside the file under that name, or into a .glb. NULL: the caller writes it. */
     const struct picture *image;
 };
 

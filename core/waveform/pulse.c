@@ -16,9 +16,9 @@
 
 enum { MIN_PHASES = 4, STEPS_PER_SCALE = 16, EDGE_STEPS = 4, FINEST = 64 };
 
-/* The outgoing pulse, which lasts from from_s to to_s, in seconds after its peak (a table: after its first value). It
- * consists of pieces of equal length. Sums over it take the same number of steps in each piece, and a step is at most
- * fine_s long. */
+/* The outgoing pulse, which lasts from from_s to to_s, in seconds after its peak (a table: after its first value). The
+ * pulse consists of pieces of equal length. Sums over it take the same number of steps in each piece, and a step is at
+ * most fine_s long. */
 struct outgoing {
     const struct waveform_spec *spec;
     double from_s, to_s, fine_s, pieces;
@@ -71,8 +71,8 @@ static double parts_of(const struct outgoing *o, double fine_s)
 }
 
 /* Returns sigma of the receiver's impulse response. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to
- * which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays nothing here
- * (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
+ * which chains of many stages tend. The response is centred on the time that Elmore calls the delay, so the receiver
+ * delays nothing here (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
 static double receiver_sigma_s(double bandwidth_hz)
 {
     return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;
