@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Checks the files that a command names: it writes none twice, and none that it reads, so that none is destroyed.
- * It also checks that a file that an option or a link writes has a folder. */
+ * This file also checks that a file that an option or a link writes has a folder. */
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>

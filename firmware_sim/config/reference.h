@@ -30,7 +30,7 @@ void config_print_reference(FILE *out);
 int config_print_section(const char *section, FILE *out, struct sh_err *err);
 
 /* Prints a configuration that loads and has all keys, each with its help. Keys that need a value have one; the others
- * are commented out with their defaults. It names a profile and a mesh that come with the program. */
+ * are commented out with their defaults. The example names a profile and a mesh that come with the program. */
 int config_print_example(FILE *out, struct sh_err *err);
 
 /* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. With dir NULL it

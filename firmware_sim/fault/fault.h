@@ -100,8 +100,8 @@ struct fault {
     uint64_t from, until; /* numbers; until 0: no end */
     uint64_t every;       /* from `from` on */
     double probability;
-    /* It strikes at most so often; 0: no limit. This counts in each session. For acts of the link (fault_is_act), and
-     * for faults at connections, it counts on the link. */
+    /* The fault strikes at most so often; 0: no limit. The limit is for each session. For acts of the link
+     * (fault_is_act), and for faults at connections, it is for the link. */
     uint64_t count;
     uint64_t from_pulse, until_pulse; /* of a scan, from 0; until UINT64_MAX: no end. Other frames have no pulses */
     double from_s, until_s;           /* until 0: no end */

@@ -188,8 +188,8 @@ void loop_put_links(const struct loop *loop, struct json *json)
     json_close_array(json);
 }
 
-/* Locks the memory that is allocated now, so that nothing the pacing thread touches is paged out or in. It is called
- * before the threads start, since else their whole stacks would be locked. */
+/* Locks the memory that is allocated now, so that nothing the pacing thread touches is paged out or in. The function is
+ * called before the threads start, since else their whole stacks would be locked. */
 static void lock_memory(const struct loop *loop)
 {
     if (loop->stream.waits || mlockall(MCL_CURRENT) == 0) return;

@@ -10,7 +10,7 @@
  * takes them in.
  *
  * A line is not used when it is malformed, out of reach, not later than the one before, or more than
- * DEVICE_POSE_AHEAD_S ahead of device time. It is counted (bad_poses), and reported once per second at
+ * DEVICE_POSE_AHEAD_S ahead of device time. Such a line is counted (bad_poses), and reported once per second at
  * most. */
 #ifndef FIRMWARE_SIM_LOOP_POSE_FEED_H
 #define FIRMWARE_SIM_LOOP_POSE_FEED_H

@@ -103,7 +103,7 @@ void pump_say(void *pump, const char *text);
 /* session.c */
 void session_open(struct pump *pump, struct session *s, const char *peer);
 void session_close(struct pump *pump, struct session *s);
-/* Its client sends nothing more. It still gets answers to what it sent, and the stream. */
+/* The session's client sends nothing more. The client still gets answers to what it sent, and the stream. */
 void session_shut(struct pump *pump, struct session *s);
 /* As session_close, but when power goes. Neither the protocol is told that the client went, nor does the session give
  * back its control: the device does that itself. */
@@ -115,8 +115,8 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes released ticks and replies, and writes until the link is full (1) or nothing is left (0). index: of the session
  * on its link. */
 int session_write(struct pump *pump, struct session *s, int index);
-/* Whether a session whose bytes are all written is over. It is when its protocol ends it, or when its client sends
- * nothing more and nothing is due to it. */
+/* Whether a session whose bytes are all written is over. A session is over when its protocol ends it, or when its
+ * client sends nothing more and nothing is due to it. */
 int session_is_done(const struct pump *pump, const struct session *s);
 
 /* Lets the link know that all before the session's cursor was written, so that it passes on what is due. is_last:
@@ -124,8 +124,8 @@ int session_is_done(const struct pump *pump, const struct session *s);
 int session_pass(struct pump *pump, struct session *s, int is_last);
 /* Whether bytes that were written wait in the link. */
 int session_waits(const struct pump *pump, const struct session *s);
-/* In the paces that wait, sessions take no frames while the file of the truth is behind. Their clients still get their
- * replies. */
+/* In the paces that wait, sessions take no frames while the file of the truth is behind. The sessions' clients still
+ * get their replies. */
 int session_waits_for_files(const struct pump *pump);
 /* Returns the number of the session on its link. */
 static inline int session_index(const struct pump *pump, const struct session *s)
@@ -142,12 +142,12 @@ int pump_power(struct pump *pump, uint32_t full);
  * if it is that of the session's first frames. */
 void session_know_next(struct pump *pump, struct session *s);
 /* Moves the cursor on, since the ring no longer has its tick. The cursor goes to the oldest tick of the queue if no
- * frame is lost before that, else to the middle of the queue, so that the reader has time to recover. It does not go
- * beyond off_tick. */
+ * frame is lost before that, else to the middle of the queue, so that the reader has time to recover. The cursor does
+ * not go beyond off_tick. */
 void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick);
 /* Compares the number of a tick's first frame with the expected one, and counts a gap. A native reader gets an event
- * frame before the tick's frames. These lie at the end of its buffer, with REPLY_ROOM / 8 bytes free after them.
- * `released`: ticks released when the tick was read. Returns how many frames are missing. */
+ * frame before the tick's frames. The tick's frames lie at the end of the session's buffer, with REPLY_ROOM / 8 bytes
+ * free after them. `released`: ticks released when the tick was read. Returns how many frames are missing. */
 uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
 /* Counts n units of a protocol. */
 void session_count_units(struct pump *pump, struct session *s, uint64_t n);
@@ -173,7 +173,8 @@ void pump_read(struct pump *pump, struct session *s, int index);
 /* The same; then carries out its lines. */
 void pump_read_commands(struct pump *pump, struct session *s, int index);
 
-/* pump_protocol.c: a session of a protocol that is not native. It has everything before the tick at its cursor. */
+/* pump_protocol.c: a session of a protocol that is not native. The session has everything before the tick at its
+ * cursor. */
 /* Returns 0 or a negative SH_E. */
 int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err);
 void session_close_protocol(struct pump *pump, struct session *s);

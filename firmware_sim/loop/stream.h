@@ -5,7 +5,7 @@
  * reader at its own speed. Readers are the sessions of links (pump.h) and the hash of the stream (hash.c).
  *
  * The stream holds the ring, how far each reader is, the number of the next frame, the counts that are made at
- * release, the time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links
+ * release, the time that a peer granted (pace step), and all wake-ups. The stream knows nothing of casting, of links
  * or of commands.
  *
  * Wake-ups. In real time a link is woken at each tick that it wants, or once in `every` ticks. Casters are woken once a

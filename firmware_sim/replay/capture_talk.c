@@ -11,7 +11,7 @@
 enum { MAX_REQUESTS = 20000, MAX_STREAMS = 16, MOST_PENDING = 16, MOST_BACK = 4096, KIND_BYTES = 1024 };
 enum { OF_CONNECTION = -1 };
 
-/* A request of a client. One that came several times has an entry for each time. */
+/* A request of a client. A request that came several times has an entry for each time. */
 struct asked {
     uint32_t request; /* of the store */
     size_t at;

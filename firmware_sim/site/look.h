@@ -19,8 +19,8 @@ struct site_look {
     uint32_t n;
 };
 
-/* Opens a look from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that the site has now. It must not
- * be moved or copied: its places point into it. */
+/* Opens a look from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that the site has now. The look
+ * must not be moved or copied: its places point into it. */
 void site_look_open(struct site_look *look, const struct site *site);
 
 #endif

@@ -188,7 +188,8 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
 }
 
 /* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no
- * telemetry: where the end of its scan was lost, nothing else says that it is over. Its descriptor may be lost, too. */
+ * telemetry: where the end of its scan was lost, nothing else says that it is over. The scan's descriptor may be lost,
+ * too. */
 static void rest(struct watch *w)
 {
     uint32_t station;
