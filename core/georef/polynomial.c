@@ -78,8 +78,9 @@ static void next_power(int power[3])
     }
 }
 
-/* On entry value[1] and value[2] hold n and u of the nodes in the meridian's plane. The map's values at these nodes
- * then replace n and u. Beyond the pole, latitude counts on beyond 90 degrees, so that it stays smooth. */
+/* On entry value[1] and value[2] hold n and u of the nodes in the meridian's plane. On return value[0] and value[2]
+ * hold the map's latitude and height there; value[1], the longitude, is 0. Beyond the pole, latitude counts on beyond
+ * 90 degrees, so that it stays smooth. */
 static void sample_meridian(const struct shim_map *map, const struct polynomial *p, double value[3][CUBE])
 {
     double place[3], pole;
