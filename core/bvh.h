@@ -132,11 +132,11 @@ const struct bvh_counters *bvh_work_counters(const struct bvh_work *work);
 struct bvh_profile *bvh_work_profile(const struct bvh_work *work);
 /* Directions of the last chunk, as Embree gets them. */
 struct vec3_floats bvh_work_directions(const struct bvh_work *work);
-/* Sets them, for n <= BVH_CHUNK rays that are decided without bvh_hits. */
+/* Sets the directions of the last chunk, for n <= BVH_CHUNK rays that are decided without bvh_hits. */
 void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, uint32_t n);
 
-/* Exact hits. Hits within half a micrometre of a ray's origin don't count, so that it does not hit the surface that it
- * begins on. tests/accuracy measures the error of ranges. Allocates nothing. */
+/* Exact hits. Hits within half a micrometre of a ray's origin don't count, so that the ray does not hit the surface
+ * that it begins on. tests/accuracy measures the error of ranges. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* The range of one ray's first hit; NaN: none. */

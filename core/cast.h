@@ -74,7 +74,7 @@ struct cast_detect {
 
 /* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes are weighted
  * by the power that comes back. Each is detected, and has noise, by itself. Where any part of an adaptive
- * beam's footprint lies on glass or a mirror, it is cast as rings: the outlines of what is seen there are
+ * beam's footprint lies on glass or a mirror, the footprint is cast as rings: the outlines of what is seen there are
  * not known. */
 struct cast_beam {
     struct beam beam;

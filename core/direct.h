@@ -13,8 +13,8 @@ enum {
     DIRECT_FROM = 8 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
 };
 
-/* Switches it on or off for the writes that follow. *is_on is 0 at first; it becomes -1 where the file system or an
- * older kernel can't do it, and then stays so. */
+/* Switches O_DIRECT on or off for the writes that follow. *is_on is 0 at first; it becomes -1 where the file system or
+ * an older kernel can't do it, and then stays so. */
 static inline void direct_set(int fd, int *is_on, int on)
 {
     if (*is_on < 0 || *is_on == on) return;

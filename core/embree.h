@@ -28,7 +28,7 @@ uint32_t embree_packet(RTCDevice device);
 
 /* Embree sorts a packet's directions by their signs, but treats components smaller than 1e-18 as positive
  * when it divides by them. With a component of -1e-22, all rays of the packet with the same signs would be
- * lost. So this makes no such components. */
+ * lost. So embree_direction makes no such components. */
 VEC_INLINE float embree_direction(double d)
 {
     float f = (float)d;

@@ -78,7 +78,7 @@ static inline uint32_t emitter_sphere_steps(int64_t step_udeg)
 /* Whether a sphere's step divides a turn and half a turn, so that nothing was rounded. */
 int emitter_sphere_is_exact(const struct emitter *emitter);
 /* Limits a sphere to the rings from start to stop, elevations of -90 to 90 deg, start <= stop. A ring within
- * a micro-degree of a limit counts as inside. Where both limits are the same, it is a circle: one ring, at
+ * a micro-degree of a limit counts as inside. Where both limits are the same, the sphere is a circle: one ring, at
  * exactly that elevation. SH_EINPUT: no ring lies there; the text names the nearest ones. */
 int emitter_set_rings(struct emitter *emitter, int64_t start_udeg, int64_t stop_udeg, struct sh_err *err);
 /* Returns the elevation of ring i (0 .. rings - 1) of a sphere, in turns. */

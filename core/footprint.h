@@ -99,7 +99,7 @@ double beam_echo_width(double pulse_m, double variance_m2);
 /* Gives the part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
  * times the distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
-/* Gives its second moments, along n and along the line. */
+/* Gives the second moments of that part, along n and along the line. */
 void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
@@ -111,9 +111,9 @@ struct beam_pattern {
 /* Makes a pattern of 0 (the centre alone) to BEAM_MAX_RINGS rings. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
-/* Where a plane ends within a footprint, the sub-rays that hit it stand for the part of the footprint on it. Returns
- * a bound b: the error of their centre is less than b w, and that of the echo's range less than b w(R) tan i. b is 0.12
- * with 4 rings and 0.05 with 12. The RMS over all cuts is about b / 4. No fit through the same sub-rays does
+/* Where a plane ends within a footprint, the sub-rays that hit the plane stand for the part of the footprint on it.
+ * Returns a bound b: the error of their centre is less than b w, and that of the echo's range less than b w(R) tan i. b
+ * is 0.12 with 4 rings and 0.05 with 12. The RMS over all cuts is about b / 4. No fit through the same sub-rays does
  * better, since each has 1/n of the energy or nothing. Outlines (below) cut exactly. */
 double beam_end_error(uint32_t rings);
 

@@ -5,9 +5,9 @@
  *
  * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner
  * system (2007), and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on
- * geometric error model (2015). In this module they are exact geometry, not its first-order expansion. For line angle m
- * (elevation) and pan p, both true angles of the axes, the beam is, in the frame that turns with the pan (x right,
- * along the mirror's axis; y ahead; z up):
+ * geometric error model (2015). In this module the terms are exact geometry, not its first-order expansion. For line
+ * angle m (elevation) and pan p, both true angles of the axes, the beam is, in the frame that turns with the pan (x
+ * right, along the mirror's axis; y ahead; z up):
  *
  *     direction = Ry(trunnion) (sin c, cos c cos m, cos c sin m)      c: collimation
  *     origin    = (mirror_offset, transit_offset, 0)

@@ -35,7 +35,7 @@ struct pose {
     double quat[4];       /* body -> prcs */
 };
 
-/* A pose at its time, as casting takes them and as they go out on the wire. */
+/* A pose and its time, as casting takes both and as both go out on the wire. */
 struct pose_knot {
     int64_t t_ns; /* since the scan's start */
     struct pose pose;
@@ -98,7 +98,7 @@ int trajectory_read_csv(const char *path, const struct sh_report *report, struct
 
 /* Reads way-points from a CSV file: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
  * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
- * the last point needs a speed, which is not used. At a point with pause_s it comes to rest smoothly, stands
+ * the last point needs a speed, which is not used. At a point with pause_s the platform comes to rest smoothly, stands
  * for that time and starts smoothly. The platform heads along the path, with pitch and roll 0, about the axes that a
  * station has there: geoframe_level of frame, or the scene's own where frame is NULL. SH_EINPUT, too, where
  * the way needs more than POSE_MAX_KNOTS samples: one every 0.02 s, or every 0.01 m where that is longer. */
@@ -113,7 +113,7 @@ void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose 
 struct pose_knot_rules {
     double start_s, end_s; /* on the trajectory */
     double tolerance_m;    /* between two knots pose_between may differ from the trajectory by this */
-    /* Where the head moves further than longest_m between two knots, or turns by over 0.01 rad, they are at most
+    /* Where the head moves further than longest_m between two knots, or turns by over 0.01 rad, the knots are at most
      * longest_ns apart. */
     int64_t longest_ns;
     double longest_m;

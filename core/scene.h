@@ -141,7 +141,7 @@ struct scene_copied {
     uint32_t first; /* triangle of the first copy; those of the others follow, copy by copy */
 };
 
-/* Triangles are numbered: the scene's own first, then those of the copies. The arrays hold its own triangles
+/* Triangles are numbered: the scene's own first, then those of the copies. The arrays hold the scene's own triangles
  * alone. */
 struct scene {
     uint32_t n_vertices, n_triangles, n_surfaces;
@@ -241,7 +241,7 @@ void scene_find_part(const struct scene *scene, uint32_t triangle, struct scene_
 uint32_t scene_label(const struct scene *scene, uint32_t triangle);
 /* Corners of any triangle, prcs. */
 void scene_corners(const struct scene *scene, uint32_t triangle, double corner[3][3]);
-/* Triangles that are kept in memory: its own, and those of each mesh that has copies. */
+/* Triangles that are kept in memory: the scene's own, and those of each mesh that has copies. */
 uint64_t scene_n_kept(const struct scene *scene);
 
 /* Turns a direction from the mesh's frame into the scene's. out may be v. */

@@ -20,7 +20,7 @@
 
 struct sight;
 
-/* The map leaves a group of triangles to the BVH where it gets fewer rays than this for each of its triangles.
+/* The map leaves a group of triangles to the BVH where the group gets fewer rays than this for each of its triangles.
  * Examining a triangle costs as much as it saves for this many rays. */
 #define SIGHT_GROUP_RAYS 64.0
 

@@ -85,7 +85,7 @@ static inline uint32_t surface_of_label(uint32_t label)
     return label & 0xffff;
 }
 
-/* Colours by label, for clouds that show them: the texel at a hit, as the image has it. Without a texel it is the
+/* Colours by label, for clouds that show them: the texel at a hit, as the image has it. Without a texel the hit has the
  * colour between the vertices, else the mesh's diffuse colour, else grey. Packed: red << 16 | green << 8 | blue. */
 struct surface_image;
 struct surface_colours {

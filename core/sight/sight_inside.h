@@ -19,22 +19,23 @@
  * misses by less than double precision tells, and on where it meets their planes. So it is enough to show
  * that all other triangles of the scene leave the hit as it is. A triangle is left out of a square only in
  * one of three ways:
- * - Beside it (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the square,
- *   pad included. The side is linear, so it is below that everywhere in the square: all rays miss the triangle, by more
- *   than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side of the
- *   region's pyramid, which is wider than the region by some pads.
+ * - Beside the square (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the
+ *   square, pad included. The side is linear, so it is below that everywhere in the square: all rays miss the triangle,
+ *   by more than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side
+ *   of the region's pyramid, which is wider than the region by some pads.
  * - Behind (region.c): another one covers the square (all sides above their doubts at all corners, so every ray
- *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes
- *   to it first, in whatever way its ranges are rounded. An edge that is nearly hit lies in its triangle's plane,
- *   so it comes later as well.
+ *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes to
+ *   the covering triangle first, in whatever way the ray's ranges are rounded. An edge that is nearly hit lies in its
+ *   triangle's plane, so it comes later as well.
  * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
  *   the square, the triangle's nearest point is further away than all of the triangle that covers the square.
- * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: it lies outside of the box
- * that holds them, with the margin of regions. Behind as a whole: by the box's nearest point. Where a group is not left
- * out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that covers the square
- * (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A few are decided ray by ray with the same doubts (candidate_list.c).
- * Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover nor hide. Over a
- * square each doubt counts twice, since there d has a largest component of 1 and is up to sqrt(3) long. */
+ * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: the square lies outside of
+ * the box that holds the group, with the margin of regions. Behind as a whole: by the box's nearest point. Where a
+ * group is not left out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that
+ * covers the square (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A few are decided ray by ray with the same doubts
+ * (candidate_list.c). Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover
+ * nor hide. Over a square each doubt counts twice, since there d has a largest component of 1 and is up to sqrt(3)
+ * long. */
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 

@@ -67,7 +67,7 @@ struct picture_part {
  * with `what` and name the path. */
 int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err);
 
-/* Writes its PNG to a stream, which is flushed. Errors give only the reason. */
+/* Writes the picture's PNG to a stream, which is flushed. Errors give only the reason. */
 int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err);
 
 /* These two functions are for pages that hold pictures. picture_put_uri writes the image as a data URI of a PNG, with

@@ -33,9 +33,9 @@ int config_print_section(const char *section, FILE *out, struct sh_err *err);
  * are commented out with their defaults. The example names a profile and a mesh that come with the program. */
 int config_print_example(FILE *out, struct sh_err *err);
 
-/* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. With dir NULL it
- * takes the first directory that exists, in the order in which config_load_profile looks for a profile (profile.h).
- * heads/ beside a configuration is not among them. */
+/* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. With dir NULL
+ * the function takes the first directory that exists, in the order in which config_load_profile looks for a profile
+ * (profile.h). heads/ beside a configuration is not among these directories. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
 #endif

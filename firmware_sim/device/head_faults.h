@@ -7,9 +7,9 @@
  * threads.
  *
  * A fault begins with the first tick that starts at from_s or later, and ends with the first that starts at until_s or
- * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse it is
- * active in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is off
- * for for_ms, rounded up to a whole tick. A fault that is taken out of the list while it is active ends.
+ * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse a fault
+ * is active in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is
+ * off for for_ms, rounded up to a whole tick. A fault that is taken out of the list while it is active ends.
  *
  * Faults that change what is measured are not handled here: they are exact to the pulse (beam_faults.c).
  *

@@ -78,7 +78,7 @@ struct ptp {
     int64_t sample_ns, sample_offset_ns; /* the first sample */
 };
 
-/* All that it points to must outlive it. seed: noise.seed. */
+/* All that *ptp points to must outlive *ptp. seed: noise.seed. */
 void ptp_init(struct ptp *ptp, const struct config_ptp *cfg, uint64_t seed);
 /* A tick, [t_ns, end_ns) of device time, after the faults of the tick have begun and ended. is_up: the head has power
  * and has booted. */

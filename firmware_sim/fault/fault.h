@@ -131,7 +131,7 @@ struct fault_spot {
 
 extern const char *const fault_names[]; /* by kind, NULL at the end */
 enum fault_place fault_place_of(enum fault_kind kind);
-/* Whether it is an act of the link, at a frame: disconnect to short_packets. */
+/* Whether the kind is an act of the link, at a frame: disconnect to short_packets. */
 int fault_is_act(enum fault_kind kind);
 /* The kind by which a link carries out an act. acts: those that it can do; bit 0 is FAULT_DISCONNECT, and so on. For a
  * link that can't fall silent, a pulled cable is an unplugging. */
@@ -139,7 +139,7 @@ enum fault_kind fault_act_of(enum fault_kind kind, uint32_t acts);
 /* Returns n; if that is 0, the default of the kind. */
 uint32_t fault_n(const struct fault *fault);
 
-/* Whether it strikes there, without regard to its count. index: in the list; link: the spot's. */
+/* Whether the fault strikes there, without regard to its count. index: in the list; link: the spot's. */
 int fault_strikes(const struct fault *fault, uint32_t index, uint32_t link, const struct fault_spot *spot);
 /* Returns a random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
 uint64_t fault_random(const struct fault *fault, uint32_t index, uint32_t link, uint64_t number, uint32_t draw);

@@ -110,7 +110,8 @@ void session_shut(struct pump *pump, struct session *s);
 void session_cut(struct pump *pump, struct session *s);
 /* Returns the first tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
 uint64_t session_off_tick(const struct pump *pump, const struct session *s);
-/* Begins a session anew when power goes with a tick. For sessions that outlast it, such as that of a file. */
+/* Begins a session anew when power goes with a tick. For sessions that outlast the loss of power, such as that of a
+ * file. */
 void session_restart(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes released ticks and replies, and writes until the link is full (1) or nothing is left (0). index: of the session
  * on its link. */
@@ -166,7 +167,7 @@ void pump_end_move(struct pump *pump, struct session *s);
  * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
 /* A client that floods the link with wrong lines would cost a processor. So a link rests when one of its sessions had
- * WRONG_AT_ONCE of them, or when its input has no room. 1: it did, and more lines may wait. */
+ * WRONG_AT_ONCE of them, or when its input has no room. 1: the link rested, and more lines may wait. */
 int pump_rest(struct pump *pump);
 /* Reads what the client sent. */
 void pump_read(struct pump *pump, struct session *s, int index);
@@ -178,7 +179,7 @@ void pump_read_commands(struct pump *pump, struct session *s, int index);
 /* Returns 0 or a negative SH_E. */
 int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err);
 void session_close_protocol(struct pump *pump, struct session *s);
-/* Closes it and opens it again at the cursor. */
+/* Closes the session and opens it again at the cursor. */
 int session_restart_protocol(struct pump *pump, struct session *s);
 /* As session_write. */
 int session_write_protocol(struct pump *pump, struct session *s, int index);

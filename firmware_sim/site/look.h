@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A look is the stations that pulses are fired from, with setups like the run's. core/plan takes random samples of
- * these pulses to compare methods. The cost of methods is measured with them, too (rate.c). */
+ * these pulses to compare methods. The cost of methods is measured with these pulses, too (rate.c). */
 #ifndef FIRMWARE_SIM_SITE_LOOK_H
 #define FIRMWARE_SIM_SITE_LOOK_H
 

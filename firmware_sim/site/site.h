@@ -94,7 +94,7 @@ struct site_plan {
 };
 
 /* The world: the meshes and their BVHs, which the sites of one scene share (world.c). The last of these
- * sites frees it. One thread loads and frees them; others may cast meanwhile. */
+ * sites frees it. One thread loads and frees sites; others may cast meanwhile. */
 struct site_world {
     uint32_t n_users;
     int written_out; /* copies are triangles of the scene */

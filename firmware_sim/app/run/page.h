@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A head that runs gives a page more than its stream, by these functions. Behind them is a watch: an observer that
- * reads the stream. `run` only opens, starts and closes it. The program scanhead has a watch
+ * reads the stream. `run` only opens, starts and closes the watch. The program scanhead has a watch
  * (firmware_sim/app/studio/watch); scanheadd has none, and its page shows the stream alone.
  *
  *     open(cfg, site, &options, &watch, err)            before the loop is made

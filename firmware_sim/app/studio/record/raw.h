@@ -3,7 +3,7 @@
  *
  * In: the command line. Out: Ethernet frames (drivers/protocol/ethernet.h) with the kernel's times of receiving. A
  * source is UDP, on sockets of its own, or TCP. TCP is a connection of its own or, with --relay, the connections of
- * other programs, which reach the device through it. */
+ * other programs, which reach the device through `record --raw`. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
 
