@@ -124,7 +124,7 @@ static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
 }
 
 /* Locks the file as long as fd is open, for writing (LOCK_EX) or against writers (LOCK_SH). Returns 0 where another
- * process has the lock. On a file system without locks it does nothing. */
+ * process has the lock. On a file system without locks the function does nothing. */
 static int has_locked(int fd, int kind)
 {
     return flock(fd, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK;

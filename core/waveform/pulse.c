@@ -26,7 +26,7 @@ struct outgoing {
 
 /* Returns the log-normal pulse with its peak of 1 at 0: exp(-ln 2 (ln(1 + a t) / ln s)^2), a = (s - 1/s) / width.
  * Half of the peak is reached at ln(1 + a t) = -ln s and ln s, so the time from the peak to the half on the falling
- * side is s times that on the rising side, and both together are the width. With s -> 1 it is the Gaussian. */
+ * side is s times that on the rising side, and both together are the width. With s -> 1 the pulse is the Gaussian. */
 static double log_normal(double t_s, double width_s, double skew)
 {
     const double s = fmax(skew, 1.0 + 1e-6), x = (s - 1.0 / s) / width_s * t_s;

@@ -139,7 +139,7 @@ static double extent_of(const struct waveform *w, const struct waveform_return *
 }
 
 /* The ranges on a plane rise as 1 / (1 - b x) across the disc, b = extent / range where the beam has spread far beyond
- * its exit. Returns b, limited to 0.5 as in core/footprint.h; it weighs the second term of the series. */
+ * its exit. Returns b, limited to 0.5 as in core/footprint.h; b weighs the second term of the series. */
 static double bend_of(const struct waveform_return *part)
 {
     if (part->spread != WAVEFORM_DISC) return 0.0;

@@ -52,7 +52,7 @@ int app_is_name_of_scan(const char *file, size_t n_ending, const char *name)
     return digits > 0 && strcmp(name + stem + 1 + digits, file + stem) == 0;
 }
 
-/* Whether both are one name in one folder: then they would be one file, also where it is not there yet. */
+/* Whether both are one name in one folder: then they would be one file, also where that file is not there yet. */
 static int is_same_name(const struct named *a, const struct named *b)
 {
     struct stat folder[2];

@@ -197,8 +197,8 @@ static void lock_memory(const struct loop *loop)
             strerror(errno));
 }
 
-/* Only a SICK scanner in real time asks a time server. While a journal is replayed, it does not: the journal has the
- * effects of the server's answers. */
+/* Only a SICK scanner in real time asks a time server. While a journal is replayed, the scanner does not: the journal
+ * has the effects of the server's answers. */
 static int asks_time(const struct loop *loop)
 {
     const int asks = config_speaks(loop->cfg, PROTOCOL_COLA);

@@ -272,7 +272,7 @@ static int build_place(struct replay_capture *c, const struct capture_flow *firs
     return rc;
 }
 
-/* Whether it is the first flow of its place: those before it are of other places. */
+/* Whether a flow is the first of its place: flows before it are of other places. */
 static int is_first(const struct replay_capture *c, const struct capture_flow *f)
 {
     for (const struct capture_flow *before = c->flow; before < f; before++)
