@@ -122,7 +122,7 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
 }
 
 /* Returns whether all lines are so far from the centre that the centre's side of each line is certain. Ends of outlines
- * are floats relative to the station, so a line very near to the centre may in truth pass on the centre's other side.
+ * are floats relative to the station, so a line very near to the centre may pass on the centre's other side.
  * Then the centre's hit says nothing about the part around the centre. The floats have an error of 2^-24 of the range.
  * This error is 1e-3 of the footprint's radius for a divergence of 0.12 mrad, and less for wider beams. The limit is
  * twice this error. */

@@ -186,9 +186,8 @@ static double series_bound_m(const struct polynomial *p, int order, double radiu
     return bound_m + 10.0 * whole_m[POLYNOMIAL_DEGREE] * ratio * reach_m / p->half_m;
 }
 
-/* Where the z axis of prcs is not vertical at the centre, a point may be as high above the centre as the point is far
- * from the centre. Turning a point into the meridian moves it by s - a (polynomial.h), which is at most radius^2 /
- * 2a. */
+/* Where the z axis of prcs is not vertical at the centre, a point's height above the centre may equal its distance from
+ * the centre. Turning a point into the meridian moves it by s - a (polynomial.h), which is at most radius^2 / 2a. */
 static double meridian_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                                const double weight[3])
 {

@@ -6,7 +6,7 @@
  * Along the beam: the line from the station through the point is followed to the scene. The deviation is the measured
  * minus the exact range, so it is positive where the point lies beyond the surface. The exact range is that of the
  * BVH's first hit. Where the point belongs to another surface (a later echo, a point beyond glass), the exact range is
- * that of the nearest triangle, if the line crosses that triangle.
+ * that of the nearest triangle, if the line crosses it.
  *
  * A point is on a smooth face where its distance from the nearest triangle equals the deviation times the cosine of
  * the incidence, to 1 % and 2 um. Then the surface that the beam hits is also the nearest one, and no edge or corner is

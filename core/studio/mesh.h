@@ -80,7 +80,7 @@ int mesh_takes_points(const char *path);
 /* Returns 1 where the ending is that of a format whose coordinates are float. */
 int mesh_is_float(const char *path);
 
-/* SH_EINPUT where the ending is of a format of floats and floats can't hold coordinates between low and high, with the
+/* SH_EINPUT where the ending is of a format of floats that can't hold coordinates between low and high, with the
  * figures and what to do. For an early refusal; mesh_write checks the same. */
 int mesh_check_box(const char *path, const double low[3], const double high[3], struct sh_err *err);
 
