@@ -6,7 +6,7 @@ set -eu
 scanhead=$1
 out=$2
 mkdir -p "$out"
-# Assimp reads the house where node or the readers of IFC are missing. It names the products that it may get wrong.
+# Assimp reads the house where node or the readers of IFC are missing. Assimp names the products that it may get wrong.
 reader=auto
 if ! command -v node >/dev/null || [ ! -e "$(dirname "$scanhead")/ifc/installed" ]; then
     reader=assimp

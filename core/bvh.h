@@ -8,7 +8,7 @@
  * hits which triangle, and without any rounding where double is not enough. Ranges are those of the triangles' planes
  * in double. The proof is in core/bvh/bvh_inside.h.
  *
- * A BVH depends on the scene alone. It is constant after it is made, and may be used from any thread; each thread has
+ * A BVH depends on the scene alone, is constant after it is made, and may be used from any thread; each thread has
  * working memory of its own. */
 #ifndef CORE_BVH_H
 #define CORE_BVH_H
@@ -132,11 +132,11 @@ const struct bvh_counters *bvh_work_counters(const struct bvh_work *work);
 struct bvh_profile *bvh_work_profile(const struct bvh_work *work);
 /* Directions of the last chunk, as Embree gets them. */
 struct vec3_floats bvh_work_directions(const struct bvh_work *work);
-/* Sets them, for n <= BVH_CHUNK rays that are decided without bvh_hits. */
+/* Sets the directions of the last chunk, for n <= BVH_CHUNK rays that are decided without bvh_hits. */
 void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, uint32_t n);
 
-/* Exact hits. Hits within half a micrometre of a ray's origin don't count, so that it does not hit the surface that it
- * begins on. tests/accuracy measures the error of ranges. Allocates nothing. */
+/* Exact hits. Hits within half a micrometre of a ray's origin don't count, so that the ray does not hit the surface
+ * that it begins on. tests/accuracy measures the error of ranges. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* The range of one ray's first hit; NaN: none. */
@@ -146,8 +146,8 @@ double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3
  * holes. */
 
 /* All rays with the numbers `from` to `to` - 1 hit `triangle`, or nothing if it is BVH_NO_TRIANGLE. Sets their ranges,
- * labels and steepness, bit by bit as bvh_hits does. It may overwrite up to seven rays after these, so set later ones
- * afterwards. */
+ * labels and steepness, bit by bit as bvh_hits does. The function may overwrite up to seven rays after `to` - 1, so set
+ * later rays afterwards. */
 void bvh_ranges_of(const struct bvh *bvh, uint32_t triangle, const struct bvh_rays *rays, uint32_t from, uint32_t to);
 /* The same where ray `from` hits triangle[0], the next one triangle[1], and so on. A ray stays as it
  * is where its entry of `triangle` is neither a triangle of the scene nor BVH_NO_TRIANGLE. */

@@ -74,7 +74,7 @@ struct cast_detect {
 
 /* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes are weighted
  * by the power that comes back. Each is detected, and has noise, by itself. Where any part of an adaptive
- * beam's footprint lies on glass or a mirror, it is cast as rings: the outlines of what is seen there are
+ * beam's footprint lies on glass or a mirror, the footprint is cast as rings: the outlines of what is seen there are
  * not known. */
 struct cast_beam {
     struct beam beam;
@@ -99,9 +99,10 @@ struct cast_disturbance {
     int dark;         /* the laser does not fire: shots are empty, except for echoes that noise makes in waveforms */
     double slip_turn; /* the beam's pan is this much more than the encoder reads */
     /* The optical power that a soiled window lets through, both ways together, as a share of that of a clean one. With
-     * a signal model each return is weaker by this factor, and detect.h has the rest. Without one the fixed part of the
-     * range noise is divided by it. That is the jitter of detect.h: rise time over the ratio of signal and noise as
-     * voltages (Skolnik). The voltage is proportional to the optical power, and thermal noise does not depend on it. */
+     * a signal model each return is weaker by this factor, and detect.h has the rest. Without a signal model the fixed
+     * part of the range noise is divided by this share. So the fixed part counts as the jitter of detect.h: rise time
+     * over the ratio of signal and noise as voltages (Skolnik). The voltage is proportional to the optical power, and
+     * thermal noise does not depend on it. */
     double share;
     uint32_t n_wobbles; /* each adds turn * sin(2 pi hz (t - begin)) to the axes, t since the scan's start */
     struct cast_wobble {
@@ -111,12 +112,12 @@ struct cast_disturbance {
 };
 
 /* Waveforms: the samples of a pulse go into blocks that have room for them. A single ray counts as a footprint that
- * lies on the plane it hits. This needs cast_detect with a signal. */
+ * lies on the plane it hits. Waveforms need cast_detect with a signal. */
 struct cast_waves {
     const struct waveform *waveform;
     const struct beam *beam; /* the head's, also of single rays */
-    /* The echoes of a pulse are those that the detector finds in its samples, in place of merged returns. Their noise
-     * is that of the samples: cast_setup's range noise is not added. */
+    /* The echoes of a pulse are those that the detector finds in its samples, in place of merged returns. The echoes'
+     * noise is that of the samples: cast_setup's range noise is not added. */
     int finds;
     enum waveform_detector detector;
 };
@@ -127,9 +128,10 @@ void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, doubl
 /* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
 struct cast_setup {
     const struct bvh *bvh;
-    /* The station's visibility map; NULL: none. It is made for `bvh` and `station_m`. Rays that begin at the station
-     * are looked up in it, with the same hits. All other rays are cast into the BVH: beams that begin beside the
-     * station, sub-rays, rays beyond glass and mirrors, and rays to moving bodies. A head that moves has no sight. */
+    /* The station's visibility map; NULL: none. The map is made for `bvh` and `station_m`. Rays that begin at the
+     * station are looked up in it, with the same hits. All other rays are cast into the BVH: beams that begin beside
+     * the station, sub-rays, rays beyond glass and mirrors, and rays to moving bodies. A head that moves has no
+     * sight. */
     const struct sight *sight;
     const struct georef *georef; /* geo layout */
     double station_m[3];         /* the head's origin, prcs */
@@ -207,10 +209,11 @@ struct cast_hit {
     uint8_t front;          /* the triangle's corners go counter-clockwise as seen from the head */
 };
 
-/* Casts a run's pulses as single rays without noise, and fills `hit` with the hits that the head can report. They lie
- * within its ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit, and so is
- * the surface beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit has room
- * for (1 + depth) run->n. Returns the number of hits. They are in order of chunks only. Allocates nothing. */
+/* Casts a run's pulses as single rays without noise, and fills `hit` with the hits that the head can report. These hits
+ * lie within the head's ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit,
+ * and so is the surface beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit
+ * has room for (1 + depth) run->n. Returns the number of hits. The hits are in order of chunks only. Allocates
+ * nothing. */
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 

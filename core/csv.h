@@ -19,8 +19,8 @@ struct csv {
     const struct sh_report *report;
 };
 
-/* Reads the header; csv_close is due in any case. Unknown or doubled names are errors. This and
- * csv_next return SH_ESTOPPED where report asks to stop. */
+/* Reads the header; csv_close is due in any case. Unknown or doubled names are errors. csv_open and csv_next return
+ * SH_ESTOPPED where report asks to stop. */
 int csv_open(struct csv *csv, const char *path, const char *const *known, const struct sh_report *report,
              struct sh_err *err);
 void csv_close(struct csv *csv);

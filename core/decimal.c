@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A double is m 2^-s with a whole number m below 2^53. Its product with a power of ten is exact in 128 bits, unless s
- * or the power is too large, which is rare. The product is rounded once, as printf rounds: ties to even. Then the
- * digits of a whole number remain to be written. printf writes all other doubles. */
+/* A double is m 2^-s with a whole number m below 2^53. The double's product with a power of ten is exact in 128 bits,
+ * unless s or the power is too large, which is rare. The product is rounded once, as printf rounds: ties to even. Then
+ * the digits of a whole number remain to be written. printf writes all other doubles. */
 #include "core/decimal.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Writing past the system's cache (O_DIRECT). It saves copying, which is most of the cost of a long file, but each
- * write then waits for the disk. It takes whole blocks of aligned memory, at whole blocks of the file. */
+ * write then waits for the disk. Each write takes whole blocks of aligned memory, at whole blocks of the file. */
 #ifndef CORE_DIRECT_H
 #define CORE_DIRECT_H
 
@@ -13,8 +13,8 @@ enum {
     DIRECT_FROM = 8 << 20, /* a shorter file stays in the system's cache, as it is often read again soon */
 };
 
-/* Switches it on or off for the writes that follow. *is_on is 0 at first; it becomes -1 where the file system or an
- * older kernel can't do it, and then stays so. */
+/* Switches O_DIRECT on or off for the writes that follow. *is_on is 0 at first; it becomes -1 where the file system or
+ * an older kernel can't do it, and then stays so. */
 static inline void direct_set(int fd, int *is_on, int on)
 {
     if (*is_on < 0 || *is_on == on) return;

@@ -5,8 +5,8 @@
  *
  * The query runs in the BVH's float frame. Every radius is widened by that frame's rounding, so no triangle that could
  * be nearest is missed. The distance from point to triangle is computed in double, edges and face separately, since
- * barycentric regions (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles. Its error is at most 16
- * half-units in the last place of the distance to the triangle's farthest corner, at any coordinates. */
+ * barycentric regions (Ericson, Real-Time Collision Detection, 5.1.5) lose digits on needles. The distance's error is
+ * at most 16 half-units in the last place of the distance to the triangle's farthest corner, at any coordinates. */
 #ifndef CORE_DISTANCE_H
 #define CORE_DISTANCE_H
 

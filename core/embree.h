@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Embree 3 or 4. No other file includes it. This header also turns its errors into ours. The Makefile chooses the
- * version (SH_EMBREE) with the library that it links. Point queries are the same in both. */
+/* Embree 3 or 4. No other file includes Embree. This header also turns Embree's errors into ours. The Makefile chooses
+ * the version (SH_EMBREE) with the library that it links. Point queries are the same in both. */
 #ifndef CORE_EMBREE_H
 #define CORE_EMBREE_H
 
@@ -20,7 +20,7 @@
 /* Turns an error of Embree into ours. */
 int embree_fail(enum RTCError code, struct sh_err *err);
 
-/* Whether Embree takes packets of that many rays (4, 8 or 16) as they are. It divides packets of other sizes, and a
+/* Whether Embree takes packets of that many rays (4, 8 or 16) as they are. Embree divides packets of other sizes, and a
  * leaf may then get rays of several packets at once. */
 int embree_has_packet(RTCDevice device, uint32_t rays);
 /* Rays a packet at which Embree is best on this machine: 16, 8, 4 or 1. */
@@ -28,7 +28,7 @@ uint32_t embree_packet(RTCDevice device);
 
 /* Embree sorts a packet's directions by their signs, but treats components smaller than 1e-18 as positive
  * when it divides by them. With a component of -1e-22, all rays of the packet with the same signs would be
- * lost. So this makes no such components. */
+ * lost. So embree_direction makes no such components. */
 VEC_INLINE float embree_direction(double d)
 {
     float f = (float)d;

@@ -28,8 +28,8 @@ enum emitter_kind { EMITTER_LINE, EMITTER_PLANAR, EMITTER_BEAMS, EMITTER_SPHERE,
 extern const char *const emitter_names[]; /* by kind; NULL at the end */
 enum { EMITTER_MAX_BEAMS = 128, EMITTER_MAX_STEPS = 1000000 };
 
-/* A beam fires offset_ns after the sequence's first one. Its azimuth counts from that of the turning head at that
- * time. */
+/* A beam fires offset_ns after the sequence's first beam. The beam's azimuth counts from that of the turning head at
+ * that time. */
 struct emitter_beam {
     int64_t elevation_udeg, azimuth_udeg;
     uint32_t offset_ns;
@@ -78,7 +78,7 @@ static inline uint32_t emitter_sphere_steps(int64_t step_udeg)
 /* Whether a sphere's step divides a turn and half a turn, so that nothing was rounded. */
 int emitter_sphere_is_exact(const struct emitter *emitter);
 /* Limits a sphere to the rings from start to stop, elevations of -90 to 90 deg, start <= stop. A ring within
- * a micro-degree of a limit counts as inside. Where both limits are the same, it is a circle: one ring, at
+ * a micro-degree of a limit counts as inside. Where both limits are the same, the sphere is a circle: one ring, at
  * exactly that elevation. SH_EINPUT: no ring lies there; the text names the nearest ones. */
 int emitter_set_rings(struct emitter *emitter, int64_t start_udeg, int64_t stop_udeg, struct sh_err *err);
 /* Returns the elevation of ring i (0 .. rings - 1) of a sphere, in turns. */
@@ -102,7 +102,7 @@ static inline uint32_t emitter_line_pulses(const struct emitter *emitter)
 }
 /* Returns the pulse rate of a head of beams in micro-hertz, rounded. */
 int64_t emitter_rate_uhz(const struct emitter *emitter);
-/* Returns the line angle of a planar head's step, rounded. It counts from the front, in the direction of the steps. */
+/* Returns the line angle of a planar head's step, rounded. The angle counts from the front, along the steps. */
 int64_t emitter_step_udeg(const struct emitter *emitter, int64_t step);
 
 #endif

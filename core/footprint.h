@@ -7,7 +7,7 @@
  * With exit diameter D and divergence theta, and the waist in the exit plane, w(R)^2 = (D/2)^2 + (R
  * theta/2)^2: the hyperbola of ISO 11146-1, which holds for beams that are not diffraction-limited as well.
  *
- * Footprint. The circle of radius w(R). Its energy counts as 1; the 13.5 % outside of it is not modelled.
+ * Footprint. The circle of radius w(R). The energy within it counts as 1; the 13.5 % outside of it is not modelled.
  *
  * Sub-rays. The hyperboloid is a ruled surface: the straight line from rho D/2 (cos phi, sin phi) in the exit
  * plane, with slope rho theta/2 (-sin phi, cos phi), is rho w(R) from the axis at every R. So a sub-ray is a
@@ -99,7 +99,7 @@ double beam_echo_width(double pulse_m, double variance_m2);
 /* Gives the part of the unit disc beyond the line n . u = h, n a unit vector, |h| <= 1: its energy, and the energy
  * times the distance of its centre of energy along n. */
 void beam_half(const struct beam *beam, double h, double *energy, double *moment);
-/* Gives its second moments, along n and along the line. */
+/* Gives the second moments of that part, along n and along the line. */
 void beam_half_squares(const struct beam *beam, double h, double *along, double *across);
 
 /* Places of sub-rays in the unit disc, each with 1/n of the energy. */
@@ -111,9 +111,9 @@ struct beam_pattern {
 /* Makes a pattern of 0 (the centre alone) to BEAM_MAX_RINGS rings. */
 void beam_rings(uint32_t rings, struct beam_pattern *pattern);
 
-/* Where a plane ends within a footprint, the sub-rays that hit it stand for the part of the footprint on it. Returns
- * a bound b: the error of their centre is less than b w, and that of the echo's range less than b w(R) tan i. b is 0.12
- * with 4 rings and 0.05 with 12. The RMS over all cuts is about b / 4. No fit through the same sub-rays does
+/* Where a plane ends within a footprint, the sub-rays that hit the plane stand for the part of the footprint on it.
+ * Returns a bound b: the error of their centre is less than b w, and that of the echo's range less than b w(R) tan i. b
+ * is 0.12 with 4 rings and 0.05 with 12. The RMS over all cuts is about b / 4. No fit through the same sub-rays does
  * better, since each has 1/n of the energy or nothing. Outlines (below) cut exactly. */
 double beam_end_error(uint32_t rings);
 
@@ -178,7 +178,7 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
 /* The outlines of a scene as seen from one place: edges with the surface on one side only. A footprint
  * without an outline lies on the surface that its centre hits: one ray is enough. An edge with a triangle on
  * each side is no outline, however sharp: ranges are continuous there. All edges are examined once, here.
- * For a pulse, the cell of its direction is looked up. It lists the edges that footprints within it may
+ * For a pulse, the cell of its direction is looked up. The cell lists the edges that footprints within it may
  * reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
@@ -227,7 +227,8 @@ struct beam_line {
 };
 /* Finds the outlines that cross the footprint of a pulse nearer than limit_m, as lines in the axes of `sight`. Returns
  * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. From the range near->next_m on further
- * outlines may cross the footprint. It is INFINITY where there are none, or where no outline crosses up to limit_m. */
+ * outlines may cross the footprint. next_m is INFINITY where there are none, or where no outline crosses up to
+ * limit_m. */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,
                          const struct beam_sight *sight, double limit_m, struct beam_line *line);
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* How the scene's frame (prcs) lies on the Earth. It turns points of the scene into places on the Earth (degrees,
- * metres) and back, and gives rotations between the frames. It is set up once for a scene, so that all
+/* How the scene's frame (prcs) lies on the Earth. This module turns points of the scene into places on the Earth
+ * (degrees, metres) and back, and gives rotations between the frames. The frame is set up once for a scene, so that all
  * stations agree.
  *   tangent  metric. One point of the scene, origin_m, is at a place on the Earth. z is the plumb line (the
  *            ellipsoid's normal) there, and true north there lies north_deg clockwise from the scene's y
- *            axis. Elsewhere z differs from the local plumb line by the angle between the two at the Earth's
+ *            axis. Elsewhere z differs from the local plumb line by the angle between the two places at the Earth's
  *            centre, about 0.009 deg per km.
  *   grid     prcs is easting, northing (with false origin) and ellipsoidal height of one UTM or UPS grid, as
  *            a mesh in such coordinates is. y is grid north, z the plumb line everywhere. Lengths are grid
@@ -40,7 +40,7 @@ int geoframe_locate(const struct geoframe *frame, const double p_prcs[3], struct
 int geoframe_find(const struct geoframe *frame, const struct georef_place *at, double p_prcs[3], struct sh_err *err);
 
 /* The rotation from the axes of a levelled head with heading 0 at p_prcs to prcs, row by row: the unit
- * matrix except for ecef. Its third column is up. */
+ * matrix except for ecef. The rotation's third column is up. */
 int geoframe_level(const struct geoframe *frame, const double p_prcs[3], double rotation[9], struct sh_err *err);
 
 /* The rotation from prcs to east, north, up at p_prcs; for a grid without its scale. */

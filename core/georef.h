@@ -17,7 +17,7 @@
  *             -180..180
  *
  * Methods. Exact calls GeographicLib for each point (about 0.2 us for geodetic, 0.9 us for utm; `make
- * chart`). Order 1, 2, 3 evaluate its Taylor polynomial about the centre in a few ns, within georef_bound_m.
+ * chart`). Order 1, 2, 3 evaluate the map's Taylor polynomial about the centre in a few ns, within georef_bound_m.
  * Order 5 exists where heights stay the same: from a grid to another grid, or from a UTM grid to geodetic. In
  * geodetic output longitude has a closed form (georef/polynomial.h). So the orders may be used near a pole, too,
  * down to a distance of a few radii of the scene.

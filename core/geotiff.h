@@ -3,8 +3,8 @@
  * from cells to a projected system, units, and which value means that a cell has no height.
  *
  * Sources: TIFF 6.0 and BigTIFF; OGC GeoTIFF 1.1 (19-008r4), clauses 7 and B.6; GDAL's tags 42112 (scale, offset and
- * unit of the heights) and 42113 (no data). It reads the first directory by itself, without a library: an anchor needs
- * it in the process of the head, where a broken file must do no harm. Any thread. */
+ * unit of the heights) and 42113 (no data). The module reads the first directory by itself, without a library: an
+ * anchor needs that directory in the process of the head, where a broken file must do no harm. Any thread. */
 #ifndef CORE_GEOTIFF_H
 #define CORE_GEOTIFF_H
 

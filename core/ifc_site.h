@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Where an IFC building model stands: its IFCMAPCONVERSION and IFCSITE records, which mesh readers leave out.
  *
- * It reads these from the STEP file (ISO 10303-21): IfcSite.RefLatitude, RefLongitude, RefElevation; the site's
- * ObjectPlacement, whose origin is the point that they locate; TrueNorth of the model's
+ * The module reads the following from the STEP file (ISO 10303-21): IfcSite.RefLatitude, RefLongitude, RefElevation;
+ * the site's ObjectPlacement, whose origin is the point that these three locate; TrueNorth of the model's
  * IfcGeometricRepresentationContext; and IfcMapConversion, which gives the model's origin coordinates in an
  * IfcProjectedCRS. A record that is there, but not as IFC2x3/IFC4 define it, is an error. Nothing is guessed.
  *

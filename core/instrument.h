@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Instrument errors: the geometry of a scanner that is not quite as designed. Its mechanics determine the
- * true direction of the beam, its encoders the direction that the head reports. In: scheduled angles in
- * turns, errors. Out: directions and origins of beams (socs, metres), and what the encoders read (turns).
+/* Instrument errors: the geometry of a scanner that is not quite as designed. The scanner's mechanics determine the
+ * true direction of the beam, its encoders the direction that the head reports. In: scheduled angles in turns, errors.
+ * Out: directions and origins of beams (socs, metres), and what the encoders read (turns).
  *
  * Terms as in D. Lichti, Error modelling, calibration and analysis of an AM-CW terrestrial laser scanner
  * system (2007), and B. Muralikrishnan et al., Volumetric performance evaluation of a laser scanner based on
- * geometric error model (2015). Here they are exact geometry, not its first-order expansion. For line angle m
- * (elevation) and pan p, both true angles of the axes, the beam is, in the frame that turns with the pan (x right,
- * along the mirror's axis; y ahead; z up):
+ * geometric error model (2015). In this module the terms are exact geometry, not its first-order expansion. For line
+ * angle m (elevation) and pan p, both true angles of the axes, the beam is, in the frame that turns with the pan (x
+ * right, along the mirror's axis; y ahead; z up):
  *
  *     direction = Ry(trunnion) (sin c, cos c cos m, cos c sin m)      c: collimation
  *     origin    = (mirror_offset, transit_offset, 0)

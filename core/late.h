@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Libraries that few runs need, loaded at their first use. They and their dependencies take twice as long to load as
- * everything that every run needs.
+/* Libraries that few runs need, loaded at their first use. These libraries and their dependencies take twice as long to
+ * load as everything that every run needs.
  *
  *   #define PROJ_CALLS(CALL) CALL(proj_create) CALL(proj_destroy)      the calls that the project uses
  *   LATE_LIBRARY(proj, PROJ_CALLS)

@@ -2,7 +2,7 @@
 /* A block is the result of casting: a part of one scan line, as arrays. The points of a scan leave core in no other
  * form.
  *
- * A line is one mirror sweep. It leaves in blocks, so that packets are not late where the mirror is slow;
+ * A line is one mirror sweep. A line leaves in blocks, so that packets are not late where the mirror is slow;
  * each block is a run of consecutive cast pulses of one line, with one entry per echo, and one entry for a
  * shot without echo. Entries are in order of pulse, then of range. Times and pulse numbers count from the
  * scan's start.
@@ -47,7 +47,7 @@ struct line_waves {
     struct line_wave *wave;
     uint16_t *sample;
     uint32_t n_left_out; /* samples that found no room */
-    /* The digitiser. It is set when the block is made, and is the same for all blocks of a scan. */
+    /* The digitiser: its figures are set when the block is made, and are the same for all blocks of a scan. */
     uint32_t sample_ps;   /* time between samples */
     uint16_t baseline_16; /* the count without light, in 1/16 counts */
     uint8_t bits;         /* of a sample */
@@ -100,8 +100,8 @@ enum {
 };
 
 int line_block_alloc(struct line_block *block, uint32_t capacity, struct sh_err *err);
-/* These four add optional arrays to a block that line_block_alloc has made. After an error line_block_free releases the
- * block as usual. */
+/* These four functions add optional arrays to a block that line_block_alloc has made. After an error line_block_free
+ * releases the block as usual. */
 int line_block_alloc_attributes(struct line_block *block, struct sh_err *err);
 int line_block_alloc_colours(struct line_block *block, struct sh_err *err);
 int line_block_alloc_deviations(struct line_block *block, struct sh_err *err);

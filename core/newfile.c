@@ -124,7 +124,7 @@ static int fail_locked(const char *path, int fd, int code, struct sh_err *err)
 }
 
 /* Locks the file as long as fd is open, for writing (LOCK_EX) or against writers (LOCK_SH). Returns 0 where another
- * process has the lock. On a file system without locks it does nothing. */
+ * process has the lock. On a file system without locks the function does nothing. */
 static int has_locked(int fd, int kind)
 {
     return flock(fd, kind | LOCK_NB) == 0 || errno != EWOULDBLOCK;
@@ -138,7 +138,8 @@ static int is_named(const char *name, int fd)
            open_st.st_ino == named.st_ino;
 }
 
-/* Locks a file that is written in place. It must still have its name, since bytes in a file without a name are lost. */
+/* Locks a file that is written in place. The file must still have its name, since bytes in a file without a name are
+ * lost. */
 static int lock_named(const char *path, int fd, int code, struct sh_err *err)
 {
     if (!has_locked(fd, LOCK_EX)) return fail_locked(path, fd, code, err);
@@ -356,7 +357,8 @@ int newfile_settle(const char *path, const char *part, int fd, struct sh_err *er
     return rc == SH_OK ? close_renamed(path, fd) : rc;
 }
 
-/* Some file systems can't rename without replacing. There link() gives the new name, since it never replaces a file. */
+/* Some file systems can't rename without replacing. On such file systems link() gives the new name, since it never
+ * replaces a file. */
 static int rename_free(const char *path, const char *part)
 {
     if (renameat2(AT_FDCWD, part, AT_FDCWD, path, RENAME_NOREPLACE) == 0) return 0;

@@ -23,7 +23,7 @@
 int newfile_open(const char *path, int *fd, struct sh_err *err);
 
 /* Opens a file that grows line by line, for reading and appending: it is made, or stays as it is. It is locked as long
- * as *fd is open; SH_ESTATE where another process has it. On a file system without locks it is not locked. */
+ * as *fd is open; SH_ESTATE where another process has it. On a file system without locks the file is not locked. */
 int newfile_append(const char *path, int *fd, struct sh_err *err);
 
 /* A file that appears at `path` whole or not at all. It is written as `part` in the same folder, and renamed
@@ -38,7 +38,7 @@ int newfile_write(const char *path, newfile_put *put, const void *source, struct
 /* The same for a file that newfile_append has opened as *fd. The new file is locked, too, and *fd becomes its
  * descriptor. SH_ESTATE: path no longer names the file of *fd. */
 int newfile_replace(const char *path, int *fd, newfile_put *put, const void *source, struct sh_err *err);
-/* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. It leaves no
+/* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. The check leaves no
  * file behind. */
 int newfile_check(const char *path, struct sh_err *err);
 /* Opens the `part` that a killed writer has left: an existing regular file, for reading and writing, locked as

@@ -92,18 +92,18 @@ struct plan_places {
 
 struct plan_sample;
 
-/* Draws equally many pulses of all places. 61 sub-rays show which footprints lie on one smooth surface. These are
- * many and alike: only some of them are cast with the reference. The places must outlive the sample.
- * Where report asks to stop, sampling ends at once, and its figures mean nothing. */
+/* Draws equally many pulses of all places. 61 sub-rays show which footprints lie on one smooth surface. Such footprints
+ * are many and alike: only some of them are cast with the reference. The places must outlive the sample. Where report
+ * asks to stop, sampling ends at once, and its figures mean nothing. */
 int plan_sample_create(const struct plan_places *places, const struct sh_report *report, struct plan_sample **out,
                        struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
 /* Finds the error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
- * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures are upper
- * limits: error_m is three standard errors above the mean square. For footprints that do not lie on one smooth
- * surface, echo_share has the 95 % limit of Poisson's distribution. For the others it has the share that was found,
- * without a margin. The first call casts the reference. */
+ * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures have margins: error_m
+ * is three standard errors above the mean square. For footprints that do not lie on one smooth surface, echo_share has
+ * the 95 % limit of Poisson's distribution. For the other footprints it has the share that was found, without a margin.
+ * The first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* Finds the error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
@@ -132,12 +132,12 @@ struct plan_sight_found {
     double examined;  /* triangles of the scene that making the map examines one by one (sight_examined) */
 };
 
-/* Sets *map to 1 where a map is worth its cost, and fills row. It casts some pulses of the places to find out, unless
- * there are too few pulses for any map. */
+/* Sets *map to 1 where a map is worth its cost, and fills row. plan_sight casts some pulses of the places to find out,
+ * unless there are too few pulses for any map. */
 int plan_sight(const struct plan_sight_need *need, const struct plan_places *places, const struct sh_report *report,
                int *map, struct plan_row *row, struct sh_err *err);
 
-/* The steps of plan_sight. This returns 0 where so few pulses don't pay for a map, whatever they hit. */
+/* The steps of plan_sight. plan_sight_may_pay returns 0 where so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
 /* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as in struct sight_spec. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
@@ -154,7 +154,7 @@ struct plan_methods {
     int sight;           /* first hits are looked up in the station's map */
 };
 
-/* Sets a beam's name, and its cost where that does not depend on the scene. Its error is not known yet. */
+/* Sets a beam's name, and its cost where that does not depend on the scene. The beam's error is not known yet. */
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* Fills the row of the mesh: the error of its vertices, see struct scene. */

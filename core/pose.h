@@ -13,8 +13,8 @@
  * one fixed axis at constant rate (slerp, Shoemake 1985): pose_between. The head moves like this between the
  * poses it sends.
  *
- * A trajectory has samples further apart. There the position is a cubic Hermite curve. Its velocity at a
- * sample is the derivative of the parabola through the sample and its two neighbours, or zero where the
+ * A trajectory has samples further apart. Between two samples the position is a cubic Hermite curve. The curve's
+ * velocity at a sample is the derivative of the parabola through the sample and its two neighbours, or zero where the
  * platform stands before or after it. The attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz
  * the error of the position is 0.16 mm; straight lines have 12.5 mm (tests/unit/test_pose.c). Before the
  * first and after the last sample the platform stands.
@@ -35,7 +35,7 @@ struct pose {
     double quat[4];       /* body -> prcs */
 };
 
-/* A pose at its time, as casting takes them and as they go out on the wire. */
+/* A pose and its time, as casting takes both and as both go out on the wire. */
 struct pose_knot {
     int64_t t_ns; /* since the scan's start */
     struct pose pose;
@@ -98,8 +98,8 @@ int trajectory_read_csv(const char *path, const struct sh_report *report, struct
 
 /* Reads way-points from a CSV file: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
  * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
- * the last point needs a speed, which is not used. At a point with pause_s it comes to rest smoothly, stands
- * for that time and starts smoothly. It heads along the path, with pitch and roll 0, about the axes that a
+ * the last point needs a speed, which is not used. At a point with pause_s the platform comes to rest smoothly, stands
+ * for that time and starts smoothly. The platform heads along the path, with pitch and roll 0, about the axes that a
  * station has there: geoframe_level of frame, or the scene's own where frame is NULL. SH_EINPUT, too, where
  * the way needs more than POSE_MAX_KNOTS samples: one every 0.02 s, or every 0.01 m where that is longer. */
 int trajectory_read_waypoints(const char *path, const struct geoframe *frame, const struct sh_report *report,
@@ -113,7 +113,7 @@ void trajectory_at(const struct trajectory *trajectory, double t_s, struct pose 
 struct pose_knot_rules {
     double start_s, end_s; /* on the trajectory */
     double tolerance_m;    /* between two knots pose_between may differ from the trajectory by this */
-    /* Where the head moves further than longest_m between two knots, or turns by over 0.01 rad, they are at most
+    /* Where the head moves further than longest_m between two knots, or turns by over 0.01 rad, the knots are at most
      * longest_ns apart. */
     int64_t longest_ns;
     double longest_m;

@@ -47,15 +47,15 @@ static inline uint64_t rng_place(uint64_t hash, const double p[3])
     return hash;
 }
 
-/* The key of a purpose's random numbers. It is computed once per scan, not per pulse. */
+/* The key of a purpose's random numbers. The key is computed once per scan, not per pulse. */
 VEC_INLINE uint64_t rng_key(uint64_t seed, enum rng_purpose purpose)
 {
     return rng_mix(rng_mix(seed + 0x9e3779b97f4a7c15ULL) + (uint64_t)purpose * 0xd1b54a32d192ed03ULL);
 }
 
-/* Returns a number that is XORed into keys, so that each scan draws other numbers. It depends on the station and the
- * number of its scan, both counted from 1. It is 0 for the first scan at the first station. It is computed once per
- * scan. */
+/* Returns a number that is XORed into keys, so that each scan draws other numbers. The result depends on the station
+ * and the number of its scan, both counted from 1. The result is 0 for the first scan at the first station, and is
+ * computed once per scan. */
 VEC_INLINE uint64_t rng_scan(uint32_t station, uint32_t scan)
 {
     return rng_mix((uint64_t)(station - 1) << 32 | (scan - 1));

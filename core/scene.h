@@ -26,8 +26,8 @@
 enum scene_up { SCENE_UP_Z, SCENE_UP_Y };
 
 enum {
-    /* The room of an object's or a material's name, with its NUL. A longer name is cut and counted. It then ends in a
-     * hash of the whole name, so that two names never become one. */
+    /* The room of an object's or a material's name, with its NUL. A longer name is cut and counted. The cut name then
+     * ends in a hash of the whole name, so that two names never become one. */
     SCENE_NAME_LEN = 256,
     SCENE_TYPE_LEN = 64,        /* of a product's type, with its NUL */
     SCENE_GUID_LEN = 24,        /* of its GlobalId, likewise */
@@ -133,7 +133,7 @@ struct scene_copy {
     uint32_t label0;           /* added to the mesh's labels */
 };
 
-/* A mesh that is kept once and stands in the scene any number of times. Its frame: metres, z up, as it was loaded. */
+/* A mesh that is kept once and stands in the scene any number of times. The mesh's frame: metres, z up, as loaded. */
 struct scene_copied {
     struct scene *mesh;      /* owned; its surfaces and textures are the scene's */
     struct scene_copy *copy; /* [n] owned */
@@ -141,7 +141,7 @@ struct scene_copied {
     uint32_t first; /* triangle of the first copy; those of the others follow, copy by copy */
 };
 
-/* Triangles are numbered: the scene's own first, then those of the copies. The arrays hold its own triangles
+/* Triangles are numbered: the scene's own first, then those of the copies. The arrays hold the scene's own triangles
  * alone. */
 struct scene {
     uint32_t n_vertices, n_triangles, n_surfaces;
@@ -174,8 +174,8 @@ struct scene {
 
 /* Loads all meshes into one scene.
  * tolerance_m: the largest error of a vertex that is allowed. All files but .obj, .ply, .stl and .tif are read in
- *   single precision. Their error is 6e-8 of their coordinates, and of the numbers that place them. A file whose error
- *   is larger than tolerance_m is refused. The message names the error.
+ *   single precision. The error of those files is 6e-8 of their coordinates, and of the numbers that place them. A file
+ *   whose error is larger than tolerance_m is refused. The message names the error.
  *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates, and of a binary .stl.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
  *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
@@ -218,9 +218,9 @@ int scene_find_same(const struct scene *scene, const struct sh_report *report, u
 
 void scene_free(struct scene *scene);
 
-/* Finds a file that a mesh or its library names. It is searched by its name in n <= 4 folders, then by its last part
- * there; then both without regard to case. Folders are paths up to their last slash, and may be empty. To be freed;
- * NULL: it is nowhere. */
+/* Finds a file that a mesh or its library names. The file is searched by its name in n <= 4 folders, then by the name's
+ * last part there; then both without regard to case. Folders are paths up to their last slash, and may be empty. To be
+ * freed; NULL: it is nowhere. */
 char *scene_find_file(const char *const *folder, size_t n, const char *name);
 
 /* Reads the image of a texture, as texture_read does. */
@@ -241,7 +241,7 @@ void scene_find_part(const struct scene *scene, uint32_t triangle, struct scene_
 uint32_t scene_label(const struct scene *scene, uint32_t triangle);
 /* Corners of any triangle, prcs. */
 void scene_corners(const struct scene *scene, uint32_t triangle, double corner[3][3]);
-/* Triangles that are kept in memory: its own, and those of each mesh that has copies. */
+/* Triangles that are kept in memory: the scene's own, and those of each mesh that has copies. */
 uint64_t scene_n_kept(const struct scene *scene);
 
 /* Turns a direction from the mesh's frame into the scene's. out may be v. */

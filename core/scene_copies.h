@@ -5,9 +5,9 @@
 
 #include "core/scene.h"
 
-/* Turns copies into triangles of the scene. These keep their numbers, labels, texture coordinates and holes. To be
- * called before anyone uses the scene. SH_EINPUT where there would be more than `most`. After an error the scene is to
- * be freed. */
+/* Turns copies into triangles of the scene. The triangles keep their numbers, labels, texture coordinates and holes. To
+ * be called before anyone uses the scene. SH_EINPUT where there would be more than `most`. After an error the scene is
+ * to be freed. */
 int scene_write_out_copies(struct scene *scene, uint64_t most, const struct sh_report *report, struct sh_err *err);
 
 #endif

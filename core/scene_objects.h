@@ -36,8 +36,8 @@ struct scene_open_edges {
     int (*take)(void *ctx, const double a[3], const double b[3], struct sh_err *err);
 };
 
-/* Corners at the same place, bit for bit, are one. It takes up to 150 bytes a triangle of the largest object while it
- * works. edges NULL: they are only counted. Fails with SH_ENOMEM, SH_ESTOPPED, or the error of edges->take.
+/* Corners at the same place, bit for bit, are one. The search takes up to 150 bytes a triangle of the largest object
+ * while it works. edges NULL: they are only counted. Fails with SH_ENOMEM, SH_ESTOPPED, or the error of edges->take.
  * scene_objects_free is due in any case. */
 int scene_objects_find(const struct scene *scene, const struct scene_open_edges *edges, const struct sh_report *report,
                        struct scene_objects *objects, struct sh_err *err);

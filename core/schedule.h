@@ -4,8 +4,8 @@
  * ratios; nothing accumulates. core/cast/aim.c makes directions from the turns.
  *
  * A scan is a list of segments; each change of a setting opens one. Within a segment, pulse i (from its
- * first pulse) fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns. Its place in the mirror
- * sweep is the ratio r(i)/den with r(i) = r0 + i*num - n*den. Here n is the lines passed, and num/den is
+ * first pulse) fires at t(i) = t0_ns + floor((t0_acc + i * 1e15) / prr_uhz) ns. The pulse's place in the mirror
+ * sweep is the ratio r(i)/den with r(i) = r0 + i*num - n*den. n is the number of lines passed, and num/den is
  * lines_uhz/prr_uhz reduced. The pan turns with time: pan_udeg_s * i / prr from the frame's first pulse. The
  * products are formed in 128 bits: exact for pulse numbers to 2^50 (15 years at 2.2 MHz).
  *
@@ -68,8 +68,8 @@ struct schedule_run {
     int64_t ns_quot;
     /* The table of beams or directions, else NULL. Pulse j uses row i = (firing_at + j) mod n_firings:
      * mirror = firing[i].mirror_turn, pan = (r + d*num) * pan_turn_per_r + firing[i].pan_turn.
-     * In a head of beams, pulse j fires d(j) ticks after the run's first pulse. There d(j) replaces j in dt above:
-     * d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick.
+     * In a head of beams, pulse j fires d(j) ticks after the run's first pulse. In such a head d(j) replaces j in dt
+     * above: d(j) = (firing_at + j) div n_firings * sequence_ticks + firing[i].tick - firing[firing_at].tick.
      * A list of directions has a pulse each tick: its sequence_ticks is 0, and dt holds as it stands. */
     const struct emitter_firing *firing;
     uint32_t n_firings, firing_at;
@@ -125,8 +125,8 @@ void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, st
 /* Returns the number of pulses that fire within max_ns, at least one. */
 uint64_t schedule_longest_run(const struct schedule_segment *seg, int64_t max_ns);
 
-/* These return pan angle and mirror angle of any pulse, in turns, for the encoders. The pan's is not reduced to one
- * turn. */
+/* These two functions return pan angle and mirror angle of any pulse, in turns, for the encoders. The pan angle is not
+ * reduced to one turn. */
 double schedule_pan_turn(const struct schedule_segment *seg, uint64_t k);
 double schedule_mirror_turn(const struct schedule_segment *seg, uint64_t k);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Sight: a visibility map. It holds what a standing station sees in each direction, before rays are cast.
+/* Sight: a visibility map. The map holds what a standing station sees in each direction, before rays are cast.
  *
  * In: a BVH (core/bvh.h), the one point where all rays begin, and which directions matter. Out: a map of
  * directions. For a ray the map says which triangle it meets, or that it meets nothing, without a walk through
@@ -20,7 +20,7 @@
 
 struct sight;
 
-/* The map leaves a group of triangles to the BVH where it gets fewer rays than this for each of its triangles.
+/* The map leaves a group of triangles to the BVH where the group gets fewer rays than this for each of its triangles.
  * Examining a triangle costs as much as it saves for this many rays. */
 #define SIGHT_GROUP_RAYS 64.0
 
@@ -50,7 +50,7 @@ int sight_possible(const struct scene *scene);
 /* Cells along an edge of the cube's faces, for rays and memory_bytes as of struct sight_spec. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes);
 /* Returns about how many triangles a sight would examine one by one: those that are not in a group for the BVH.
- * It looks at a few thousand of them. */
+ * The function looks at a few thousand triangles. */
 double sight_examined(const struct sight_spec *spec);
 /* Made by `threads` threads (0: all). SH_ESTOPPED where report asks to stop, SH_ENOMEM. */
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,

@@ -8,18 +8,18 @@
  *     rho(i) = reflectance cos i + specular (m + 2)/2 cos^m(2i) cos i + retro
  *
  * - reflectance: Lambertian, radiance the same in all directions; cos i is the area the beam is spread over.
- * - specular: a lobe of cos^m about the mirror direction, which lies 2i from the way back. It is normalised so
- *   that all of it adds up to `specular` (E. P. Lafortune, Y. D. Willems, Using the modified Phong reflectance
- *   model, 1994); m is `gloss`.
+ * - specular: a lobe of cos^m about the mirror direction, which lies 2i from the way back. The lobe is normalised so
+ *   that all of it adds up to `specular` (E. P. Lafortune, Y. D. Willems, Using the modified Phong reflectance model,
+ *   1994); m is `gloss`.
  * - retro: sent back into a narrow cone around where it came from, at any incidence: a foil has 100 to 1000.
  *
  * Glass passes a share of the power on, at each of its surfaces, in the same direction (panes are thin: no
  * refraction). A mirror sends a share on by the law of reflection.
  *
  * Where the mesh has a colour, the reflectance is its luminance in linear sRGB (ITU-R BT.709: 0.2126 R +
- * 0.7152 G + 0.0722 B). That is an assumption: a surface bright to the eye need not be bright at the
- * laser's wavelength. Where it has a diffuse texture, the colour is multiplied by the texel at the hit,
- * channel by channel. Where it has no texture but colours of its vertices, the colour interpolated at the
+ * 0.7152 G + 0.0722 B). This use of the colour is an assumption: a surface bright to the eye need not be bright at the
+ * laser's wavelength. Where the mesh has a diffuse texture, the colour is multiplied by the texel at the hit,
+ * channel by channel. Where the mesh has no texture but colours of its vertices, the colour interpolated at the
  * hit counts. */
 #ifndef CORE_SURFACE_H
 #define CORE_SURFACE_H
@@ -85,7 +85,7 @@ static inline uint32_t surface_of_label(uint32_t label)
     return label & 0xffff;
 }
 
-/* Colours by label, for clouds that show them: the texel at a hit, as the image has it. Without a texel it is the
+/* Colours by label, for clouds that show them: the texel at a hit, as the image has it. Without a texel the hit has the
  * colour between the vertices, else the mesh's diffuse colour, else grey. Packed: red << 16 | green << 8 | blue. */
 struct surface_image;
 struct surface_colours {
@@ -95,9 +95,9 @@ struct surface_colours {
     uint8_t *by_vertex;           /* [n] 1: some of its triangles have colours at their corners */
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
-/* Leaves no entries. It may be called again, and after an alloc that failed. */
+/* Leaves no entries. The function may be called again, and after an alloc that failed. */
 void surface_colours_free(struct surface_colours *colours);
-/* Sets an entry. This comes before its image. */
+/* Sets an entry. The entry comes before its image. */
 void surface_colours_set(struct surface_colours *colours, uint32_t label, const struct scene_surface *named);
 /* Entry `label` gets an image. SH_EINPUT, naming the file: can't be read; the entry stays as it is. */
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,

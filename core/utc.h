@@ -4,10 +4,10 @@
  * Inside the program there is one continuous scale: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, as CLOCK_TAI
  * counts. Dates from 1972 to 2199 are allowed, well within int64. UTC is TAI less a whole number of seconds
  * that a table gives; during a leap second the time of day reads 23:59:60. GPS time is TAI less 19 s, counted
- * from 1980-01-06T00:00:00Z in weeks of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); a table is not needed for
- * it. POSIX time has no leap seconds: 23:59:60 has the number of the second after it (POSIX.1, 4.16).
+ * from 1980-01-06T00:00:00Z in weeks of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); GPS time needs no table. POSIX time
+ * has no leap seconds: 23:59:60 has the number of the second after it (POSIX.1, 4.16).
  *
- * The table is IERS Bulletin C's. It has an end: leap seconds after expires_s are not known yet.
+ * The table is IERS Bulletin C's. The table has an end: leap seconds after expires_s are not known yet.
  * Pure; any thread. */
 #ifndef CORE_UTC_H
 #define CORE_UTC_H

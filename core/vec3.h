@@ -69,7 +69,8 @@ static inline void vec3_bound(double min[3], double max[3], const double a[3])
 }
 
 /* Whether one of a triangle's corners is the origin. A ray that begins at a corner hits the triangle nowhere else. For
- * any direction it lies on the lines of two edges: their side tests give 0, and the plane's range is only rounding. */
+ * any direction the ray touches the lines of two edges: their side tests give 0, and the plane's range is only
+ * rounding. */
 static inline int vec3_is_any_zero(double corner[3][3])
 {
     for (int i = 0; i < 3; i++)

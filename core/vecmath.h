@@ -9,7 +9,7 @@
 
 /* Builds a function in several versions; the best one for the CPU at hand is chosen once at start. With VEC_ONE, for
  * measuring, there is only the version of the compiler's options. Sanitizers can't follow the resolver. Clang before
- * version 18 gives it a name that other files don't find (llvm-project pull request 71706). */
+ * version 18 gives the resolver a name that other files don't find (llvm-project pull request 71706). */
 #if defined(VEC_ONE) || (defined(__clang__) && __clang_major__ < 18)
 #define VEC_CLONES
 #elif defined(__x86_64__) && !defined(SH_SANITIZE) && defined(__clang__)

@@ -121,8 +121,8 @@ int waveform_check_detection(const struct waveform *waveform, struct sh_err *err
 double waveform_pulse_peak(const struct waveform *waveform);
 
 /* Finds at most `most` echoes of an amplitude of 1 or more, in the order of range. Returns how many, and adds to
- * *n_crowded those that found no room: the weakest are left out. It finds none where waveform_check_detection fails.
- * Pure. */
+ * *n_crowded those that found no room: the weakest are left out. The function finds none where waveform_check_detection
+ * fails. Pure. */
 uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector,
                          const struct waveform_record *record, struct waveform_echo *echoes, uint32_t most,
                          uint32_t *n_crowded);

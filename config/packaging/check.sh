@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 # This tries the packages in a new root of Debian 12: apt installs, removes and purges them, and nothing may be left.
 # Where systemd-nspawn is installed, the root is then booted, and the service runs in it. The script is run by make
-# deb-check. It prints TAP, the service's output in the booted root, lintian's output, and systemd's rating of the
-# service.
+# deb-check. The script prints TAP, the service's output in the booted root, lintian's output, and systemd's rating of
+# the service.
 #
 #   check.sh DEB_DIR VERSION      DEB_DIR: where the packages are; the root is made in it
 #
@@ -218,8 +218,8 @@ END
     timeout 180 systemd-nspawn --register=no --keep-unit --private-network -D "$root" -b >"$work/boot" 2>&1
     [ -s "$root/service.out" ]
 }
-# The service must run without root and capabilities, and behind a filter of system calls. It must be ready once its
-# link is open, end without an error, and leave no user.
+# The service must run without root and capabilities, and behind a filter of system calls. The service must be ready
+# once its link is open, end without an error, and leave no user.
 service_is_sound() {
     for line in started ActiveState=active 'StatusText=links open: tcp:127.0.0.1:5025' DynamicUser=yes 'CapEff:.0*' 'CapBnd:.0*' \
         'NoNewPrivs:.1' 'Seccomp:.2' 'Uid:.6[0-9]*.*' scanned stopped ActiveState=inactive Result=success; do

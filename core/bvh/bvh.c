@@ -73,8 +73,8 @@ static int build(struct bvh *bvh, unsigned threads, const struct sh_report *repo
 }
 
 /* Returns the largest number of leaves that Embree may put at one node of its tree, where it finds that cheaper. With
- * four of them the tree takes a seventh less memory, and rays are as fast where surfaces are connected. In foliage a
- * ray would try 1.5 times as many leaves. */
+ * four leaves at a node the tree takes a seventh less memory, and rays are as fast where surfaces are connected. In
+ * foliage a ray would try 1.5 times as many leaves. */
 static unsigned most_together(const struct scene *scene)
 {
     const int is_large = scene->n_triangles >= 500000, hangs_together = scene->n_vertices <= 0.6 * scene->n_triangles;
@@ -93,7 +93,7 @@ int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, co
     *out = NULL;
     struct bvh *bvh = calloc(1, sizeof *bvh);
     if (bvh == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
-    /* Embree sets 128 MB aside for subdivision surfaces. Scenes have none of these, so it gets the least: 1 MB. */
+    /* Embree sets 128 MB aside for subdivision surfaces. Scenes have none of these, so Embree gets the least: 1 MB. */
     char config[96];
     snprintf(config, sizeof config, "tessellation_cache_size=1,object_accel_max_leaf_size=%u,threads=%u",
              most_together(scene), threads);

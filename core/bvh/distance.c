@@ -4,7 +4,7 @@
  * Rounding. Embree sees q' = float(q - c), c being the BVH's origin. With g the largest |q - c| over the axes, that
  * moves the query by at most sqrt(3) 2^-24 g. The boxes of leaves are rounded outward (leaves.c). So a triangle within
  * r of q is in a box within r + sqrt(3) 2^-24 g of q'. Embree's test of a box works on squares with a few roundings,
- * below 8 * 2^-24 of the distance. Both go onto every radius. */
+ * below 8 * 2^-24 of the distance. Both bounds go onto every radius. */
 #include "core/distance.h"
 
 #include <float.h>
@@ -26,8 +26,8 @@ struct search {
 /* Points and edges from here on are relative to the query point, which is the origin: nothing of the large
  * coordinates is left in the products. */
 
-/* Finds the point nearest to the origin on the edge from a along ab. It is measured from the end that is nearer to it,
- * so that less is rounded. */
+/* Finds the point nearest to the origin on the edge from a along ab. The point is measured from the end that is nearer
+ * to it, so that less is rounded. */
 static void nearest_on_edge(const double a[3], const double b[3], const double ab[3], double out[3])
 {
     double along_a = -vec3_dot(a, ab), along_b = vec3_dot(b, ab), length2 = along_a + along_b;

@@ -16,8 +16,8 @@
  * certain, these corners decide whether a ray hits (meet.c). The second line has the planes in double, for rays that
  * hit. The scene has the corners in double. */
 struct bvh_leaf {
-    /* Corners count from this point, which counts from the BVH's origin. The lowest bits of its numbers hold other
-     * figures (bvh_leaf_rest). They stay in the numbers when corners are computed. */
+    /* Corners count from this point, which counts from the BVH's origin. The lowest bits of the point's numbers hold
+     * other figures (bvh_leaf_rest). These bits stay in the numbers when corners are computed. */
     float base_m[3];
     float corner_m[3][4]; /* x, y, z of the corners, from base_m */
     uint32_t triangle;    /* number of triangle 0 */

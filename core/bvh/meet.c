@@ -24,8 +24,8 @@ static int any(const struct lanes *lanes, uint8_t bits)
     return (all & UINT64_C(0x0101010101010101) * bits) != 0;
 }
 
-/* Judges a ray by a, b and c, which say on which side of each of the triangle's edges it passes. It is inside where all
- * three certainly have the same sign, and outside where two certainly have different ones. */
+/* Judges a ray by a, b and c, which say on which side of each of the triangle's edges it passes. The ray is inside
+ * where all three certainly have the same sign, and outside where two certainly have different ones. */
 VEC_INLINE int32_t judge(float a, float b, float c, float doubt)
 {
     const float ab_lo = a < b ? a : b, ab_hi = a < b ? b : a, lo = ab_lo < c ? ab_lo : c, hi = ab_hi < c ? c : ab_hi;

@@ -44,10 +44,10 @@ void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t 
  *
  * Rays of a packet may begin at different points o. Then p and q are relative to c, the origin of one of them, and the
  * side is (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with A = |o - c| in place
- * of F. It is computed for three edges. For the other two it is a sum or difference of those, since the edges of a
- * triangle add up to zero. Its error is therefore at most 2 * 15 + 1 units of A L. Adding it to the first term rounds
- * by 1 unit of A L and 1 of F L. So F has 2 A in it. The doubt of double precision (edges.h) is far less than the rest
- * of the bound. */
+ * of F. The second term is computed for three edges. For the other two edges it is a sum or difference of these three
+ * terms, since the edges of a triangle add up to zero. The second term's error is therefore at most 2 * 15 + 1 units of
+ * A L. Adding it to the first term rounds by 1 unit of A L and 1 of F L. So F has 2 A in it. The doubt of double
+ * precision (edges.h) is far less than the rest of the bound. */
 #define BVH_SIDE_DOUBT (24.0F * 0x1p-24F)
 
 /* The figures of a leaf by which rays are judged: edges e, and their moments m = p x (q - p). All rays from one point

@@ -38,8 +38,8 @@ static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t tri
 }
 
 /* Takes a hit at range_m. first_m is the nearest range of the hits that count as equal to this one: for a triangle
- * range_m itself, for a copy of a mesh the nearest range in the copy or so far. It is no further than the nearest range
- * so far, or counts as equal to that. */
+ * range_m itself, for a copy of a mesh the nearest range in the copy or so far. first_m is no further than the nearest
+ * range so far, or counts as equal to that range. */
 VEC_INLINE void bvh_take_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m,
                              double first_m)
 {

@@ -66,8 +66,8 @@ static void begin_packet(struct packet *packet, const struct bvh_batch *batch, u
         org[i] = (float)batch->local.at_m[i / width];
 }
 
-/* Sets the rays from `first` to first + n - 1. A lane without a ray gets the origin and direction of lane 0. It is not
- * valid, so it gets no hit. */
+/* Sets the rays from `first` to first + n - 1. A lane without a ray gets the origin and direction of lane 0. Such a
+ * lane is not valid, so it gets no hit. */
 VEC_INLINE void set_floats(struct packet *packet, const struct bvh_batch *batch, uint32_t first, uint32_t n,
                            uint32_t width)
 {

@@ -10,8 +10,8 @@
 #include "core/embree.h"
 #include "core/vecmath.h"
 
-/* A surface no further than this from a ray's origin is no hit: the ray begins on it, and goes on. This is half of the
- * finest step of ranges and coordinates in the stream (1 um), and far more than the rounding error of a range of 0. */
+/* A surface no further than this from a ray's origin is no hit: the ray begins on it, and goes on. This limit is half
+ * of the finest step of ranges and coordinates in the stream (1 um), and far more than the rounding of a range of 0. */
 #define BVH_AT_ORIGIN_M 5e-7
 /* Ranges that differ by no more than this share of them are the same. */
 #define BVH_SAME 1e-12

@@ -47,8 +47,8 @@ VEC_INLINE struct aim_reading aim_reading(const struct kernel_reading *reading)
                                 aim_matrix(reading->rotation)};
 }
 
-/* Sine and cosine of an angle become those of what the encoder reads, whole counts. Its error d is at most half
- * a count: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves d^3/6, which is 1e-12 for 2^14 counts per turn,
+/* Sine and cosine of an angle become those of what the encoder reads, whole counts. The encoder's error d is at most
+ * half a count: sin(a + d) = sin a + d cos a - d^2/2 sin a leaves d^3/6, which is 1e-12 for 2^14 counts per turn,
  * 5e-18 for 2^20. */
 VEC_INLINE void aim_read(struct aim_encoder e, double turn, double *sine, double *cosine)
 {

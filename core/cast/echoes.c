@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Turns the hits of a chunk's pulses into the echoes that the head reports. It decides which are detected, how they
- * merge, their noise, and which a pulse sends. There is one list for single rays, footprints, and hits in glass and
- * mirrors. */
+/* Turns the hits of a chunk's pulses into the echoes that the head reports. This file decides which echoes are
+ * detected, how they merge, their noise, and which a pulse sends. There is one list for single rays, footprints, and
+ * hits in glass and mirrors. */
 #include "core/cast/echoes.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast: this stage turns hits into the echoes that the head reports. It keeps them in a list. */
+/* Private to core/cast: this stage turns hits into a list of the echoes that the head reports. */
 #ifndef CORE_CAST_ECHOES_H
 #define CORE_CAST_ECHOES_H
 

@@ -17,7 +17,8 @@ struct kernel_turns {
     uint32_t n;
     const double *mirror, *pan;
 };
-/* The directions as the encoders read them, in whole counts. They are turned by `rotation`, and written to e. */
+/* The directions as the encoders read them, in whole counts. The directions are turned by `rotation`, and written to
+ * e. */
 struct kernel_reading {
     const struct cast_setup *setup; /* has the counts */
     const double *rotation;         /* takes socs to the CRS or to prcs, or leaves it (aim.c) */

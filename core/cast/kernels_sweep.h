@@ -7,8 +7,8 @@
 #include "core/cast/kernels_aim.h"
 
 enum { KERNEL_BLOCK = 64 };
-/* A step is the angle that an axis turns from one pulse to the next. This is a table of the sine, and of the cosine
- * minus 1, of -32 to 31 steps, for the mirror (sm, cm) and the pan (sp, cp). */
+/* A step is the angle that an axis turns from one pulse to the next. The struct is a table of the sine, and of the
+ * cosine minus 1, of -32 to 31 steps, for the mirror (sm, cm) and the pan (sp, cp). */
 struct kernel_steps {
     int ready;
     double mirror_turn, pan_turn; /* a step */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Finds the hits of pulses, with their triangles, by the first stages of a pulse (caster.c). From the later stages it
- * takes only one decision: whether a hit makes an echo. */
+/* Finds the hits of pulses, with their triangles, by the first stages of a pulse (caster.c). From the later stages this
+ * file takes only one decision: whether a hit makes an echo. */
 #include <math.h>
 
 #include "core/cast/aim.h"

@@ -41,7 +41,7 @@ int caster_goes_on(const struct cast_setup *s, uint32_t label);
 void caster_normal(const struct cast_setup *s, uint8_t body, uint32_t triangle, double n[3]);
 /* Returns 1 for a bare pane or mirror, which sends nothing back: it has no echo, with or without a signal model. */
 int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho);
-/* Follows up to CHUNK rays through glass and off mirrors. Their hits are chains in p. */
+/* Follows up to CHUNK rays through glass and off mirrors. The rays' hits are chains in p. */
 void caster_follow(struct nearest *w, const struct cast_setup *s, const struct ray_hits *first, struct path_rays *p);
 
 #endif

@@ -20,8 +20,8 @@ VEC_INLINE struct sub_ray sub_ray(const struct beam *beam, const struct beam_sig
 {
     const double exit_m = beam->exit_radius_m, slope = beam->slope;
     const double *dir = sight->dir, *e1 = sight->e1, *e2 = sight->e2;
-    /* 1 / sqrt(1 + t) as a series, which is faster than root and division. Its error is below t^4 / 3, where t is at
-     * most 1e-4: a divergence of 0.02 rad. That is less than rounding. */
+    /* 1 / sqrt(1 + t) as a series, which is faster than root and division. The error of the series is below t^4 / 3,
+     * where t is at most 1e-4: a divergence of 0.02 rad. This error is less than rounding. */
     const double t = slope * slope * (x * x + y * y), over = 1.0 - t * (0.5 - t * (0.375 - 0.3125 * t));
     return (struct sub_ray){{from_m[0] + exit_m * (x * e1[0] + y * e2[0]), from_m[1] + exit_m * (x * e1[1] + y * e2[1]),
                              from_m[2] + exit_m * (x * e1[2] + y * e2[2])},
@@ -122,9 +122,10 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
 }
 
 /* Returns whether all lines are so far from the centre that the centre's side of each line is certain. Ends of outlines
- * are floats relative to the station, so a line very near to the centre may in truth pass on its other side. Then the
- * centre's hit says nothing about the part around the centre. The floats have an error of 2^-24 of the range. That is
- * 1e-3 of the footprint's radius for a divergence of 0.12 mrad, and less for wider beams. The limit is twice that. */
+ * are floats relative to the station, so a line very near to the centre may pass on the centre's other side.
+ * Then the centre's hit says nothing about the part around the centre. The floats have an error of 2^-24 of the range.
+ * This error is 1e-3 of the footprint's radius for a divergence of 0.12 mrad, and less for wider beams. The limit is
+ * twice this error. */
 static int is_centre_clear(const struct beam_line *line, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++)

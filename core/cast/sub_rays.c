@@ -185,8 +185,9 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     w->n_echoes += n;
 }
 
-/* Returns whether beam_merge_alike can merge the returns of whole footprints. It knows only ranges, labels and the
- * energy that comes back: no waveforms, colours, sigma of ranges, silent surfaces, or hits beyond the first ones. */
+/* Returns whether beam_merge_alike can merge the returns of whole footprints. beam_merge_alike knows only ranges,
+ * labels and the energy that comes back: no waveforms, colours, sigma of ranges, silent surfaces, or hits beyond the
+ * first ones. */
 static int are_alike(const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
@@ -285,9 +286,9 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
     if (w->n_jobs > 0) run_jobs(c, k);
 }
 
-/* Returns the range up to which outlines may cut a footprint. Its centre hits a surface at range_m; steep is the
- * incidence as 1 / cos^2. The limit lies 4 radii of the footprint beyond the hit, and 3 more times 1 / cos, since the
- * surface may bend away: a footprint on a plane reaches tan(incidence) radii beyond. */
+/* Returns the range up to which outlines may cut a footprint. The footprint's centre hits a surface at range_m; steep
+ * is the incidence as 1 / cos^2. The limit lies 4 radii of the footprint beyond the hit, and 3 more times 1 / cos,
+ * since the surface may bend away: a footprint on a plane reaches tan(incidence) radii beyond. */
 static double limit_m(const struct beam *beam, double range_m, float steep)
 {
     double s = steep < 1e6f ? (double)steep : 1e6;

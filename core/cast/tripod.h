@@ -15,8 +15,8 @@ static inline int caster_is_hidden(const struct cast_tripod *t, const struct vec
 }
 
 /* d: directions of n_pulses <= CHUNK, prcs. Returns how many of them are hidden. The caster hides single
- * rays before optics, which then follows no hidden ray. It hides footprints once caster_sub_rays has put their hits
- * into l. */
+ * rays before optics, which then follows no hidden ray. The caster hides footprints once caster_sub_rays has put their
+ * hits into l. */
 uint32_t caster_hide(const struct cast_tripod *t, const struct vec3_in *d, uint32_t n_pulses, struct echo_list *l);
 
 #endif

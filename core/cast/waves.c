@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* This stage samples the light that comes back of each pulse, over time. It takes a pulse's returns before merging:
+/* This stage samples the light that comes back of each pulse, over time. The returns are taken before merging:
  *
  *     one ray for the whole footprint    a disc on the plane that it hits: the closed form
  *     parts of a footprint that is cut   a bell (Gaussian) each, as wide as the part is deep
@@ -53,7 +53,7 @@ static void parts_end(struct wave_work *w, uint32_t pulse, uint32_t n)
     w->n_parts += n;
 }
 
-/* Returns one part for returns that lie close together. It keeps their power, mean and variance. */
+/* Returns one part for returns that lie close together. The part keeps their power, mean and variance. */
 static struct wave_part join_returns(const struct beam_return *r, uint32_t n)
 {
     double back = 0.0, first = 0.0, second = 0.0;
@@ -92,7 +92,7 @@ static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apar
 enum { FEW = 16 };
 
 /* Two returns d apart that are joined into one lose a third moment of at most 0.096 d^3. Here d, as a time, is a
- * sixteenth of the pulse's integral over time (in s). This is about a fifteenth of the pulse's width. So the signal
+ * sixteenth of the pulse's integral over time (in s). So d is about a fifteenth of the pulse's width. The signal
  * changes by 1e-4 of its peak: less than half a count of 12 bits. */
 static double least_apart_m(const struct cast_waves *waves)
 {
@@ -290,8 +290,8 @@ static void clear_list(struct caster *c, const struct chunk *k)
     l->n_secondary = 0;
 }
 
-/* Returns the part from which an echo comes. It is the part with the most light at most half the echo's width away.
- * Without one it is the nearest part at most two widths away. NULL: the echo is noise. */
+/* Returns the part from which an echo comes: the part with the most light at most half the echo's width away.
+ * Without such a part it is the nearest part at most two widths away. NULL: the echo is noise. */
 static const struct wave_part *part_of(const struct caster *c, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {
@@ -349,7 +349,7 @@ static void find_echoes(struct caster *c, const struct chunk *k, const struct wa
     const uint32_t rest = n > 1 ? echoes_secondary(l, i, n - 1) : 0, all = n + crowded;
     c->counters.crowded += crowded;
     const uint32_t missed = c->waves->merged[i] > all ? c->waves->merged[i] - all : 0, outside = found - n;
-    /* An echo out of range is among the missed, too. It counts once. */
+    /* An echo out of range is among the missed, too. Such an echo counts once. */
     c->counters.faint += missed > outside ? missed : outside;
     if (n == 0) l->range_m[i] = (double)NAN;
     for (uint32_t j = 0; j < n; j++) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* This stage samples the light that comes back of pulses (core/waveform.h). Where a head is set so, it finds the
- * echoes in these samples. Only chunks with waveforms have it. The header is private to core/cast. */
+/* This stage samples the light that comes back of pulses (core/waveform.h). Where a head is set so, the stage finds the
+ * echoes in these samples. Only chunks with waveforms have this stage. The header is private to core/cast. */
 #ifndef CORE_CAST_WAVES_H
 #define CORE_CAST_WAVES_H
 

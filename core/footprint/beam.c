@@ -9,8 +9,8 @@
 #include "core/vec3.h"
 #include "core/vecmath.h"
 
-/* t = rho^2 over the footprint has a density proportional to exp(-2 t) on 0 .. 1. Its means, and those of t^2 and t^3,
- * follow by integration by parts. */
+/* t = rho^2 over the footprint has a density proportional to exp(-2 t) on 0 .. 1. The means of t, t^2 and t^3 follow by
+ * integration by parts. */
 static double mean_t(void)
 {
     return 0.5 - exp(-2.0) / (1.0 - exp(-2.0));
@@ -116,8 +116,9 @@ static void plane_means(const double *restrict term, float most, const float *re
 }
 
 /* The mean range of the sub-rays at one rho is longer than the range at the centre by a share of
- * sqrt((1 + t s^2) / (1 - t b^2)) - 1, where b = s tan i (core/footprint.h). This function takes its series to third
- * order in t. With x = 1 / cos^2 i, s^2 + b^2 is s^2 x. Terms below a kept one by a factor of s^2 are left out. */
+ * sqrt((1 + t s^2) / (1 - t b^2)) - 1, where b = s tan i (core/footprint.h). This function takes the share's series to
+ * third order in t. With x = 1 / cos^2 i, s^2 + b^2 is s^2 x. Terms below a kept one by a factor of s^2 are left
+ * out. */
 void beam_plane_means(const struct beam *beam, const float *steep, uint32_t n, double *range_m)
 {
     double s2 = beam->slope * beam->slope;
@@ -211,7 +212,7 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
     }
 }
 
-/* With 1 to 18 rings this is an upper bound of the errors of all cuts that leave 1 % of the energy (test_beam.c).
+/* With 1 to 18 rings the result is an upper bound of the errors of all cuts that leave 1 % of the energy (test_beam.c).
  * Without rings the centre is the only sub-ray. It may stand for a sliver at the rim, one radius away. */
 double beam_end_error(uint32_t rings)
 {

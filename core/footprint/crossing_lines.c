@@ -20,8 +20,8 @@ static void turn_in(const float p[3], const struct beam_sight *sight, double out
     out[2] = vec3_dot(at, sight->dir);
 }
 
-/* Cuts an edge to where it lies within w(z) of the beam's axis. That is a quadratic inequality, since w^2 is quadratic
- * in z. Returns 0 where it never does. */
+/* Cuts an edge to where it lies within w(z) of the beam's axis. The condition is a quadratic inequality, since w^2 is
+ * quadratic in z. Returns 0 where the edge never does. */
 static int clip_to_beam(const struct beam *beam, struct local_edge *e)
 {
     double d[3] = {e->b[0] - e->a[0], e->b[1] - e->a[1], e->b[2] - e->a[2]}, s2 = beam->slope * beam->slope;

@@ -3,7 +3,7 @@
  *
  * An edge and the station span a plane. With triangles on both sides of it, the surface goes on beyond the
  * edge, without a step in range; with triangles on one side only, it ends there. Where triangles on both
- * sides are of different kinds, one kind of surface ends there. This needs neither normals nor an order of
+ * sides are of different kinds, one kind of surface ends there. The rule needs neither normals nor an order of
  * corners. Corners at the same place, bit by bit, are one. */
 #include <stdlib.h>
 #include <string.h>

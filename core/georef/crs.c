@@ -89,8 +89,8 @@ static PJ_COORD transformed(const struct grid *grid, double easting_m, double no
     return grid->lib.proj_trans(grid->to, PJ_FWD, in);
 }
 
-/* Measures convergence and scale by differences over 100 m each way. Their error is of the third order, below 1e-9 in
- * any survey grid. */
+/* Measures convergence and scale by differences over 100 m each way. The error of these differences is of the third
+ * order, below 1e-9 in any survey grid. */
 static void measure_grid(const struct grid *grid, double easting_m, double northing_m, const PJ_COORD *at,
                          struct crs_place *place)
 {

@@ -269,8 +269,8 @@ int georef_set_method(struct georef *georef, enum georef_method method, struct s
     return SH_OK;
 }
 
-/* These bound the rounding of positions of 6.4e6 to 1e7 m and, for maps, the error of GeographicLib, which states 5 nm
- * for transverse Mercator. */
+/* These two limits bound the rounding of positions of 6.4e6 to 1e7 m and, for maps, the error of GeographicLib, which
+ * states 5 nm for transverse Mercator. */
 #define EXACT_LINEAR_M 5e-9
 #define EXACT_MAP_M    2e-8
 

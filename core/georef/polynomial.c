@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The map as a polynomial: fit and bound.
  *
- * Fit. GeographicLib computes the map at 7 x 7 x 7 Chebyshev nodes of a cube about the centre. It is
- * interpolated by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are
- * kilometres apart. So a coefficient of degree k has the nanometres of rounding in GeographicLib's figures,
- * divided by (20 km)^k. Its term has (scene / 20 km)^k of these nanometres. Derivatives by small differences
- * would amplify the rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. For the form `meridian` all
- * nodes lie in the meridian's plane.
+ * Fit. GeographicLib computes the map at 7 x 7 x 7 Chebyshev nodes of a cube about the centre. The map is interpolated
+ * by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are kilometres apart. So a
+ * coefficient of degree k has the nanometres of rounding in GeographicLib's figures, divided by (20 km)^k. The
+ * coefficient's term has (scene / 20 km)^k of these nanometres. Derivatives by small differences would amplify the
+ * rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. For the form `meridian` all nodes lie in the
+ * meridian's plane.
  *
  * Bound. Points lie in a cylinder about the centre: up to radius_m from its axis, and up to height_m above and
  * below. The error of an order, at every point of the cylinder, is at most the sum of four parts: the absolute
@@ -25,7 +25,7 @@
 
 enum { NODES = POLYNOMIAL_DEGREE + 1, CUBE = NODES * NODES * NODES };
 
-/* Twice GeographicLib's error for transverse Mercator, 5 nm. Its error for geocentric coordinates is 1 nm. */
+/* Twice GeographicLib's error for transverse Mercator, 5 nm; the one for geocentric coordinates is 1 nm. */
 static const double FLOOR_M = 1e-8;
 
 /* lagrange[i][a]: coefficient of t^a in the polynomial that is 1 at node i of -1..1 and 0 at the others. */
@@ -78,8 +78,9 @@ static void next_power(int power[3])
     }
 }
 
-/* On entry value[1] and value[2] hold n and u of the nodes in the meridian's plane. They are replaced by the map's
- * values at these nodes. Beyond the pole, latitude counts on beyond 90 degrees, so that it stays smooth. */
+/* On entry value[1] and value[2] hold n and u of the nodes in the meridian's plane. On return value[0] and value[2]
+ * hold the map's latitude and height there; value[1], the longitude, is 0. Beyond the pole, latitude counts on beyond
+ * 90 degrees, so that it stays smooth. */
 static void sample_meridian(const struct shim_map *map, const struct polynomial *p, double value[3][CUBE])
 {
     double place[3], pole;
@@ -185,8 +186,8 @@ static double series_bound_m(const struct polynomial *p, int order, double radiu
     return bound_m + 10.0 * whole_m[POLYNOMIAL_DEGREE] * ratio * reach_m / p->half_m;
 }
 
-/* Where the z axis of prcs is not vertical at the centre, a point may be as high above the centre as it is far from it.
- * Turning a point into the meridian moves it by s - a (polynomial.h), which is at most radius^2 / 2a. */
+/* Where the z axis of prcs is not vertical at the centre, a point's height above the centre may equal its distance from
+ * the centre. Turning a point into the meridian moves it by s - a (polynomial.h), which is at most radius^2 / 2a. */
 static double meridian_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                                const double weight[3])
 {

@@ -5,10 +5,10 @@
  *   space     three polynomials of x, y, z: a metric frame to a grid, a grid to ECEF
  *   flat      two of x, y; heights stay what they are: a grid to another grid, a UTM grid to geodetic
  *   meridian  geodetic from a metric frame or a UPS grid. Let e, n, u be the point's east, north, up from the
- *             centre. Its distance from the Earth's axis is
+ *             centre. The point's distance from the Earth's axis is
  *                 s = hypot(a, e),  a = s0 + u cos lat - n sin lat,
  *             and its longitude differs from the centre's by 2 atan(e / (s + a)). Turned back into the
- *             centre's meridian, the point moves by s - a away from the axis. There latitude and height are
+ *             centre's meridian, the point moves by s - a away from the axis. In that meridian latitude and height are
  *             polynomials of n and u alone, which are smooth at the pole. A polynomial for longitude would
  *             have an error of (scene / s0)^4 s0. A UPS grid has the pole in its plane: the same holds with
  *             a = s0 -+ n. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Import in a process of its own. On some broken files Assimp and the readers of IFC crash, never end, or
  * take all memory. The readers of glTF and GeoTIFF call decoders of others. So each of them reads in a process of its
- * own, with limits. Its result is checked before it is used.
+ * own, with limits. Each result is checked before it is used.
  *
  *   import_apart.c     this process: starts the other ones, watches them, reports how they ended
  *   import_child.c     the other process: its limits, its messages, its work, or the program that does it

@@ -250,8 +250,8 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
     return in;
 }
 
-/* The tree's root. An FBX file has no root itself. Assimp adds one, and from 5.4 on turns the file's axes to y up
- * there. This is undone: the file's axes stay, as with older versions. */
+/* The tree's root. An FBX file has no root itself. Assimp adds one, and from 5.4 on turns the file's axes to y up in
+ * that root. This turn is undone: the file's axes stay, as with older versions. */
 static struct aiNode root_of(const struct aiScene *in, const char *file)
 {
     struct aiNode root = *in->mRootNode;

@@ -2,8 +2,8 @@
 /* The process that reads sets its limits, does the work, and writes the scene into the file of the task.
  *
  * For all but IFC it is a fork without exec. The parent may have threads; the fork has only a copy of the thread that
- * called fork. glibc lets such a process use malloc and stdio; libraries are loaded before the fork. It ends by _exit,
- * which runs no destructors. */
+ * called fork. glibc lets such a process use malloc and stdio; libraries are loaded before the fork. The fork ends by
+ * _exit, which runs no destructors. */
 #include "core/import/import_child.h"
 
 #include <errno.h>
@@ -53,7 +53,7 @@ static void send_progress(void *ctx, const char *what, double fraction)
     send_text(IMPORT_PROGRESS, 0, fraction, what);
 }
 
-/* Resets signals as in a new program. Those in the list are ignored: Ctrl-C reaches both processes, and the parent
+/* Resets signals as in a new program. Signals in the list are ignored: Ctrl-C reaches both processes, and the parent
  * decides what it means; a write that fails returns an error. */
 static void set_signals(void)
 {
@@ -71,7 +71,7 @@ static void set_signals(void)
  * when the parent closes them. Output is discarded. */
 static int set_descriptors(const struct import_task *task)
 {
-    /* Both move beyond their places first, since either may stand in the other's. */
+    /* Both descriptors move beyond their places first, since either may stand in the other's. */
     int result = fcntl(task->result_fd, F_DUPFD, FIRST_FREE_FD), note = fcntl(task->note_fd, F_DUPFD, FIRST_FREE_FD);
     int nothing = open("/dev/null", O_RDWR);
     if (result < 0 || note < 0 || nothing < 0) return 0;

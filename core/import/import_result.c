@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A scene as a file in memory, between two processes: head, textures, surfaces, vertices, triangles, labels,
- * texture coordinates, colours, one array after the other. It is read by pread, not mapped: each value is checked in
- * its final place, and a file that has become shorter is an error of read. */
+ * texture coordinates, colours, one array after the other. The file is read by pread, not mapped: each value is checked
+ * in its final place, and a file that has become shorter is an error of read. */
 #include "core/import/import_result.h"
 
 #include <errno.h>
@@ -301,8 +301,8 @@ static int take_triangles(struct result *r, struct triangles *t)
     return rc;
 }
 
-/* The least size of a file with these counts: its textures have neither names nor bytes. It is checked before anything
- * is allocated. */
+/* The least size of a file with these counts: its textures have neither names nor bytes. This size is checked before
+ * anything is allocated. */
 static uint64_t least_size(const struct result_head *head)
 {
     const struct scene *s = NULL;

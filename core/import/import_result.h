@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The process that reads a mesh writes its scene into a file. Its parent reads that file, and checks it. */
+/* The process that reads a mesh writes its scene into a file. The parent process reads that file, and checks it. */
 #ifndef CORE_IMPORT_IMPORT_RESULT_H
 #define CORE_IMPORT_IMPORT_RESULT_H
 
@@ -7,7 +7,7 @@
 
 struct scene_build;
 
-/* Writes the scene to an empty file. Its arrays are released on the way. */
+/* Writes the scene to an empty file. The scene's arrays are released on the way. */
 int import_result_write(struct scene *s, int fd, struct sh_err *err);
 
 /* Adds the scene in the file to b, after b's other files. Nothing in it is trusted: SH_EINPUT says what is

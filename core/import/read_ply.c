@@ -35,8 +35,8 @@ static int compare_lost(const void *number, const void *lost)
     return (a > b) - (a < b);
 }
 
-/* A vertex that is not finite is an error only where a face uses it. It keeps its number, so that the others keep
- * theirs. */
+/* A vertex that is not finite is an error only where a face uses it. Such a vertex keeps its number, so that the others
+ * keep theirs. */
 static int lose_vertex(struct ply *y, const double v[3], struct sh_err *err)
 {
     static const double nowhere[3] = {0.0, 0.0, 0.0};

@@ -54,7 +54,7 @@ struct plan_sample {
     struct look *look; /* of the beam */
     uint32_t n_looks;
     uint64_t drawn, plain, mixed_looks, plain_looks;
-    /* The sample of the optics. Its references follow light through up to CAST_MAX_DEPTH surfaces. */
+    /* The sample of the optics, whose references follow light through up to CAST_MAX_DEPTH surfaces. */
     struct look *way;
     uint32_t n_ways;
 };

@@ -226,8 +226,8 @@ struct walk {
     double heading_rad; /* of the last sample */
 };
 
-/* Adds a sample at time t_s. Its place is that of the curve at curve_s, its heading is that of the way from curve_s - d
- * to curve_s + d. */
+/* Adds a sample at time t_s. The sample's place is that of the curve at curve_s, its heading is that of the way from
+ * curve_s - d to curve_s + d. */
 static int put_sample(struct walk *w, double curve_s, double t_s, double d, struct sh_err *err)
 {
     struct pose_sample *s = add_sample(&w->out);

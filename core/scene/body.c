@@ -14,7 +14,7 @@
 
 #include "core/vec3.h"
 
-/* Directions w, wave vectors k in periods over the body's size, and phases. They were drawn at random. */
+/* Directions w, wave vectors k in periods over the body's size, and phases. All these figures were drawn at random. */
 static const double field[BODY_FIELDS][7] = {
     {0.62, -0.31, 0.72, 1.37, -0.58, 0.91, 0.4},  {-0.45, 0.83, 0.33, -0.76, 1.12, 1.21, 2.9},
     {0.11, 0.54, -0.83, 0.93, 1.49, -0.37, 1.7},  {0.79, 0.42, 0.44, -1.26, 0.69, 1.03, 5.3},

@@ -43,7 +43,7 @@ struct scene_build {
 /* Makes room for that many more, so that a reader that knows its counts allocates once. */
 int build_reserve(struct scene_build *b, uint64_t vertices, uint64_t triangles, struct sh_err *err);
 
-/* Adds a vertex. v: in the file's units and axes. Its index in the scene is scene->n_vertices before the call. */
+/* Adds a vertex, whose index is scene->n_vertices before the call. v: in the file's units and axes. */
 int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
 
 /* Makes room for n corners in corner, corner_uv and corner_rgb; their contents stay. */
@@ -70,7 +70,7 @@ static inline bool build_wants_colours(const struct scene_build *b)
     return b->spec->textures;
 }
 
-/* Returns the file's name without folders and ending. It is the object's name where the file names no object. */
+/* Returns the file's name without folders and ending. This name is the object's where the file names no object. */
 struct text_span build_base_name(const struct scene_build *b);
 
 /* Limits of a reader in a process of its own: the file's, or the defaults. */

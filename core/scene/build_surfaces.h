@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A builder gives the surfaces of its scene their labels, by name, and their textures. It stores the colours of
- * vertices. */
+/* A builder gives the surfaces of its scene their labels, by name, and their textures. The builder also stores the
+ * colours of vertices. */
 #ifndef CORE_SCENE_BUILD_SURFACES_H
 #define CORE_SCENE_BUILD_SURFACES_H
 

@@ -7,7 +7,7 @@
 #include "core/text.h"
 
 struct text_span build_folder_of(const char *path);
-/* Returns the path, with / for \\. It is to be freed; NULL: there is no memory. */
+/* Returns the path, with / for \\. The path is to be freed; NULL: there is no memory. */
 char *build_join(struct text_span folder, struct text_span name);
 /* Finds the file of that name in one of the folders; else by the name's last part there; else both without regard to
  * case. The path is to be freed; NULL: the file is nowhere. */

@@ -7,7 +7,8 @@
 #include "core/scene/copies.h"
 #include "core/vec3.h"
 
-/* Keeps the triangles of surfaces that are kept, with the new labels. Their vertices get numbers in the old order. */
+/* Keeps the triangles of surfaces that are kept, with the new labels. The triangles' vertices get numbers in the old
+ * order. */
 static void keep_triangles(struct scene *s, const uint8_t *keep, const uint16_t *label, uint32_t *vertex)
 {
     uint32_t n = 0;

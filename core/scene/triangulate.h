@@ -3,7 +3,7 @@
  *
  * The polygon is projected along the largest axis of its Newell normal. Points that lie on an edge keep their
  * place (no triangle skips them, so neighbours still meet), and holes may be joined by a keyhole edge.
- * The result is always n - 2 triangles. Those of a polygon that crosses itself overlap; `simple` is false
+ * The result is always n - 2 triangles. The triangles of a polygon that crosses itself overlap; `simple` is false
  * where this was noticed. Cost: n for convex polygons, n times the number of reflex corners otherwise. */
 #ifndef CORE_SCENE_TRIANGULATE_H
 #define CORE_SCENE_TRIANGULATE_H

@@ -7,7 +7,8 @@
  *
  * Triangles that follow each other in the scene's list make a group. Where a group's triangles are so small that too
  * few rays meet each, the group is a candidate as a whole: the box around it says where it may be seen, and how near it
- * begins. It hides nothing, and rays that may meet it ask the BVH. So most triangles of a large scene cost little. */
+ * begins. A group hides nothing; rays that may meet it ask the BVH. So most triangles of a large scene cost
+ * little. */
 #ifndef CORE_SIGHT_BUILD_INSIDE_H
 #define CORE_SIGHT_BUILD_INSIDE_H
 
@@ -37,8 +38,8 @@ struct build_group {
     uint8_t beside; /* a bit for each face that shows nothing of it */
 };
 
-/* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. They have the
- * meaning and the scale of those in struct sight_record. */
+/* A triangle in a region: functions linear in u and v, as constant and slopes f[0] + f[1] u + f[2] v. The functions
+ * have the meaning and the scale of those in struct sight_record. */
 struct build_candidate {
     union {
         double edge[3][3];

@@ -15,10 +15,10 @@ struct looks {
     quad_mask open;  /* the records can't decide */
 };
 
-/* Finds for each record on which side of its edges the rays pass, and where they hit its plane. Then it finds the
- * nearest of the triangles that are certainly hit. If a ray hits or may hit another triangle, and the plane of that is
- * not certainly behind, the ray is left to the BVH. Rays at planes that coincide are left to it, too: to compare their
- * ranges here takes longer. */
+/* Finds for each record on which side of its edges the rays pass, and where they hit its plane. Then the function finds
+ * the nearest of the triangles that are certainly hit. If a ray hits or may hit another triangle, and that triangle's
+ * plane is not certainly behind, the ray is left to the BVH. Rays at planes that coincide are left to the BVH, too: to
+ * compare their ranges here takes longer. */
 VEC_INLINE void look_at(const struct sight *s, const uint32_t *list, struct looks *w)
 {
     const quad x = w->x, y = w->y, z = w->z;

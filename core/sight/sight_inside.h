@@ -2,7 +2,7 @@
 /* Private to core/sight: the map of directions, and its lists of triangles, one of which a ray may hit.
  *
  * A direction d belongs to the face of the cube that its largest component points through: face
- * 2 * axis + (d[axis] < 0). There it has the coordinates u = d[axis + 1] / |d[axis]| and
+ * 2 * axis + (d[axis] < 0). On that face it has the coordinates u = d[axis + 1] / |d[axis]| and
  * v = d[axis + 2] / |d[axis]| (axes count modulo 3), both in -1..1. With the face's sign s,
  * d / |d[axis]| = s e_axis + u e_axis+1 + v e_axis+2: any function that is linear in d is linear in u and v,
  * and takes its extremes over a square at the corners.
@@ -19,22 +19,23 @@
  * misses by less than double precision tells, and on where it meets their planes. So it is enough to show
  * that all other triangles of the scene leave the hit as it is. A triangle is left out of a square only in
  * one of three ways:
- * - Beside it (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the square,
- *   pad included. It is linear, so it is below that everywhere in the square: all rays miss the triangle, by more
- *   than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side of the
- *   region's pyramid, which is wider than the region by some pads.
+ * - Beside the square (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the
+ *   square, pad included. The side is linear, so it is below that everywhere in the square: all rays miss the triangle,
+ *   by more than core/bvh takes for a near miss. Regions hold every triangle whose corners are not all beyond one side
+ *   of the region's pyramid, which is wider than the region by some pads.
  * - Behind (region.c): another one covers the square (all sides above their doubts at all corners, so every ray
- *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes
- *   to it first, in whatever way its ranges are rounded. An edge that is nearly hit lies in its triangle's plane,
- *   so it comes later as well.
+ *   passes inside), and its plane . d is larger at all corners by more than the doubts of both. So every ray comes to
+ *   the covering triangle first, in whatever way the ray's ranges are rounded. An edge that is nearly hit lies in its
+ *   triangle's plane, so it comes later as well.
  * - Behind as a whole: where plane . d says nothing, since the plane is seen at a sine below SIGHT_GRAZE somewhere in
  *   the square, the triangle's nearest point is further away than all of the triangle that covers the square.
- * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: it lies outside of the box
- * that holds them, with the margin of regions. Behind as a whole: by the box's nearest point. Where a group is not left
- * out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that covers the square
- * (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A few are decided ray by ray with the same doubts (candidate_list.c).
- * Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover nor hide. Over a
- * square each doubt counts twice, since there d has a largest component of 1 and is up to sqrt(3) long. */
+ * Groups of small triangles (groups.c) are left out in two of these ways. Beside a square: the square lies outside of
+ * the box that holds the group, with the margin of regions. Behind as a whole: by the box's nearest point. Where a
+ * group is not left out of a square, the square asks core/bvh. The leaf holds the triangles that are left: one that
+ * covers the square (SIGHT_ONE), none (SIGHT_NOTHING), or a few. A few are decided ray by ray with the same doubts
+ * (candidate_list.c). Where a doubt remains, core/bvh decides. Planes seen at a sine below SIGHT_GRAZE neither cover
+ * nor hide. Over a square each doubt counts twice, since there d has a largest component of 1 and is up to sqrt(3)
+ * long. */
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 
@@ -80,9 +81,9 @@ struct sight_record {
     uint32_t triangle;
 } __attribute__((aligned(128)));
 
-/* The doubt of an edge's side, relative to the distance of its farther end times its length. It is 10 units
+/* The doubt of an edge's side, relative to the distance of its farther end times its length. The doubt is 10 units
  * of 2^-53 here: the difference of the corners 1, the cross product 6, the product with a direction 3. core/bvh
- * adds as many. It also takes a ray for a near miss up to 8 units beyond an edge. */
+ * adds as many. core/bvh also takes a ray for a near miss up to 8 units beyond an edge. */
 #define SIGHT_EDGE_DOUBT (32.0 * 0x1p-53)
 /* The doubt of a . (b x c), relative to the product of their lengths, here and in core/bvh together. */
 #define SIGHT_VOLUME_DOUBT (32.0 * 0x1p-53)

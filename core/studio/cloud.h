@@ -5,7 +5,7 @@
  *
  * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
  * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
- * is ignored. LAS: 1.2 to 1.4, not compressed. There the point source ID is the station, the return number
+ * is ignored. LAS: 1.2 to 1.4, not compressed. In LAS the point source ID is the station, the return number
  * the echo, and the extra bytes "label" the label. Further columns are read where they are asked for. Colours
  * have 8 bits in PLY; of LAS's 16 bits the upper 8 count. Ownership:
  * cloud_read_columns allocates, cloud_free releases. A cloud is constant after that, any thread.
@@ -107,7 +107,7 @@ struct cloud_compared {
     const uint32_t *triangle; /* [cloud->n] */
 };
 
-/* These return the station of point i, from 1, and its place in the scene. */
+/* These two functions return the station of point i, from 1, and its place in the scene. */
 static inline unsigned cloud_station(const struct cloud *cloud, size_t i)
 {
     return cloud->station != NULL ? cloud->station[i] : 1;

@@ -3,7 +3,7 @@
  * of the pixels' means.
  *
  * A pixel shows the mean of its points' figures: by colour_ramp, 0 is blue; `most`, and all beyond it, is red. Pixels
- * whose points have no finite figure are black. Those without points are white, a colour that the ramp lacks. The
+ * whose points have no finite figure are black. Pixels without points are white, a colour that the ramp lacks. The
  * longer side has up to CLOUD_PICTURE_PX pixels, fewer where there are few points, so that areas are filled. */
 #ifndef CORE_STUDIO_CLOUD_PICTURE_H
 #define CORE_STUDIO_CLOUD_PICTURE_H

@@ -63,7 +63,7 @@ struct coverage_pulses {
     uint64_t hits, front; /* such hits; those on the front of a triangle */
 };
 
-/* Casts a scan. Its result waits until it is kept or dropped. Reports progress after a second. */
+/* Casts a scan. The scan's result waits until it is kept or dropped. Reports progress after a second. */
 int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, const char *what,
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
 /* Gives figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
@@ -153,9 +153,9 @@ struct coverage_directions {
  * cell which no station sees stands for the area range^2 each_sr / cos(incidence), cos at least 0.02. Where this area
  * is less than the cell's, several rays hit the cell, and it counts as a whole, as it does in a scan. Where the area is
  * more, the ray stands for the cells around, too, and counts with its area. An infinite each_sr lets each cell that is
- * hit count as a whole. The estimate misses cells that lie between rays, if only a corner of them is seen. It is too
- * large by cells that a scan's points miss, and by the parts of rays' areas that reach beyond a surface's outline: on
- * average half a ray's area along all outlines. Glass counts as a wall, and moving bodies as nothing. */
+ * hit count as a whole. The estimate misses cells that lie between rays, if only a corner of them is seen. The estimate
+ * is too large by cells that a scan's points miss, and by the parts of rays' areas that reach beyond a surface's
+ * outline: on average half a ray's area along all outlines. Glass counts as a wall, and moving bodies as nothing. */
 struct coverage_gain {
     double gain_m2;
     double front; /* share of the rays' hits that are on the front of a triangle; NaN: no ray hits */

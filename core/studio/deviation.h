@@ -5,8 +5,8 @@
  *
  * Along the beam: the line from the station through the point is followed to the scene. The deviation is the measured
  * minus the exact range, so it is positive where the point lies beyond the surface. The exact range is that of the
- * BVH's first hit. Where the point belongs to another surface (a later echo, a point beyond glass), it is that of the
- * nearest triangle, if the line crosses that one.
+ * BVH's first hit. Where the point belongs to another surface (a later echo, a point beyond glass), the exact range is
+ * that of the nearest triangle, if the line crosses it.
  *
  * A point is on a smooth face where its distance from the nearest triangle equals the deviation times the cosine of
  * the incidence, to 1 % and 2 um. Then the surface that the beam hits is also the nearest one, and no edge or corner is
@@ -24,11 +24,11 @@
  *     angle noise      R sigma |n e| / cos i, e: the direction in which the angle moves the beam
  *     ball             f_k |n_k| radius / sqrt(5) / cos i for each axis k of the ball: points that fill a ball evenly
  *                      have the variance r^2 / 5 along an axis
- * The steps of counts add to that. They are summed separately, since they are no noise:
+ * The steps of counts add to that. These steps are summed separately, since they are no noise:
  *     of encoders      as angle noise of sigma = step / sqrt(12)
  *     of positions     step / sqrt(12) / cos i; of polar ranges without the cosine
- * This holds where all places within a count are equally likely. The angles of a schedule may repeat a few places: then
- * the sigma of their rounding is from 0 to sqrt(3) times that of the formula.
+ * The two formulas hold where all places within a count are equally likely. The angles of a schedule may repeat a few
+ * places: then the sigma of their rounding is from 0 to sqrt(3) times that of the formula.
  * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
  * instrument.
  *

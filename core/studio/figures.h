@@ -57,9 +57,9 @@ double figures_nice(double v);
 
 /* The density of one station's points on the surfaces. The scene is cut into cells: each triangle's plane is projected
  * along the axis that it faces most, and divided into squares of cell_m there. A cell is such a square of one plane,
- * by one station; its area is cell_m^2 / |n|, n the normal's part along that axis. Its density is points / area. Cells
- * at a border count as whole ones, so theirs is a lower limit. Percentiles are over points, by nearest rank: half of
- * the points lie where the density is p50 or more. */
+ * by one station; its area is cell_m^2 / |n|, n the normal's part along that axis. A cell's density is points / area.
+ * Cells at a border count as whole ones, so their density is a lower limit. Percentiles are over points, by nearest
+ * rank: half of the points lie where the density is p50 or more. */
 struct figures_cell {
     uint64_t key;
     uint32_t n;

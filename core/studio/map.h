@@ -5,13 +5,13 @@
  * x goes to the right, y (north) up. Per pixel the map keeps which height levels were hit, and the lowest
  * point.
  *   lightness  shows structure: a pixel with points on many levels (a wall) is dark, one with floor and
- *              ceiling only is light, one without points is white. It does not depend on the density of
+ *              ceiling only is light, one without points is white. Lightness does not depend on the density of
  *              points, so far walls stand out like near ones. Each point is drawn three pixels wide.
  *   hue        shows the height of the pixel's lowest point above the map's lowest
- * Both are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow. Each station has a
- * red triangle, a tick where its heading points, and its name and height beside it. A label stands near its
- * station where it covers neither another label nor a station, and as little of walls as possible. Without such a
- * place it is left out and counted. An SVG has the points as an image, and all else as vectors. There each
+ * Lightness and hue are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow. Each
+ * station has a red triangle, a tick where its heading points, and its name and height beside it. A label stands near
+ * its station where it covers neither another label nor a station, and as little of walls as possible. Without such a
+ * place the label is left out and counted. An SVG has the points as an image, and all else as vectors. In an SVG each
  * station has its name and height as a title, also where its label is left out.
  *
  * Ownership: map_create allocates everything, map_free releases it. Thread: one at a time. Not real-time
@@ -63,9 +63,9 @@ int map_add_station(struct map *map, const struct map_station *station, struct s
 
 enum map_line { MAP_OPEN_EDGE, MAP_FIELD, MAP_LINES };
 
-/* Adds a line from a to b, prcs: an open edge of the scene, red, or a line of a monitored field, blue. They are drawn
- * under the stations. Ends outside of the area are moved to its border. Beyond MAP_MAX_LINES of its kind it is left out
- * and counted. SH_ENOMEM. */
+/* Adds a line from a to b, prcs: an open edge of the scene, red, or a line of a monitored field, blue. Lines are drawn
+ * under the stations. Ends outside of the area are moved to its border. Beyond MAP_MAX_LINES of its kind a line is left
+ * out and counted. SH_ENOMEM. */
 int map_add_line(struct map *map, enum map_line kind, const double a[2], const double b[2], struct sh_err *err);
 
 struct map_counts {

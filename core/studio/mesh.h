@@ -48,7 +48,7 @@ struct mesh_part {
     const char *name; /* without control characters */
     uint32_t n_vertices, n_faces;
     const char *texture; /* as mesh.texture */
-    /* That image itself: it is written beside the file under that name, or into a .glb. NULL: it is the caller's. */
+    /* The image itself, written beside the file under that name, or into a .glb. NULL: the caller writes it. */
     const struct picture *image;
 };
 
@@ -80,7 +80,7 @@ int mesh_takes_points(const char *path);
 /* Returns 1 where the ending is that of a format whose coordinates are float. */
 int mesh_is_float(const char *path);
 
-/* SH_EINPUT where the ending is of a format of floats and they can't hold coordinates between low and high, with the
+/* SH_EINPUT where the ending is of a format of floats that can't hold coordinates between low and high, with the
  * figures and what to do. For an early refusal; mesh_write checks the same. */
 int mesh_check_box(const char *path, const double low[3], const double high[3], struct sh_err *err);
 

@@ -67,12 +67,12 @@ struct picture_part {
  * with `what` and name the path. */
 int picture_write_png(const struct picture *picture, const char *what, const char *path, struct sh_err *err);
 
-/* Writes its PNG to a stream, which is flushed. Errors give only the reason. */
+/* Writes the picture's PNG to a stream, which is flushed. Errors give only the reason. */
 int picture_put_png(FILE *out, const struct picture *picture, struct sh_err *err);
 
-/* These two are for pages that hold pictures. picture_put_uri writes the image as a data URI of a PNG, with one colour
- * transparent (NULL: none). picture_put_escaped writes a text for XML or HTML, also for an attribute. Bytes that are no
- * character of XML become U+FFFD. */
+/* These two functions are for pages that hold pictures. picture_put_uri writes the image as a data URI of a PNG, with
+ * one colour transparent (NULL: none). picture_put_escaped writes a text for XML or HTML, also for an attribute. Bytes
+ * that are no character of XML become U+FFFD. */
 int picture_put_uri(FILE *out, const struct picture *picture, const uint8_t *clear, struct sh_err *err);
 void picture_put_escaped(FILE *out, const char *text);
 

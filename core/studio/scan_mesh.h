@@ -2,11 +2,11 @@
 /* The mesh of a scan's grid. In: points with their places in the grid, a column a line and a row a shot. Out: triangles
  * that face the head, normals, and points spread evenly over them.
  *
- * A cell lies between two rows and two columns that follow each other. Where all four corners have a point it gives
- * two triangles, cut along the shorter diagonal (from the first row of the first column where both are as long). Where
- * three have one, it gives the triangle of these. Nothing is drawn across a missing row or column. The corners of a
- * triangle are in the order that makes its normal point to the head: counter-clockwise as the head sees it. A triangle
- * without area, or with the head in its plane, is left out and counted.
+ * A cell lies between two rows and two columns that follow each other. Where all four corners have a point the cell
+ * gives two triangles, cut along the shorter diagonal (from the first row of the first column where both are as long).
+ * Where three have one, the cell gives the triangle of these. Nothing is drawn across a missing row or column. The
+ * corners of a triangle are in the order that makes its normal point to the head: counter-clockwise as the head sees
+ * it. A triangle without area, or with the head in its plane, is left out and counted.
  *
  * The long-edge filter leaves out each triangle with an edge that is longer than `long_edge` times the mean edge. The
  * mean is over all edges of the mesh before the filter, each counted once: along columns, along rows, and diagonals.

@@ -60,11 +60,11 @@ struct viewpoint_place {
 enum { VIEWPOINT_MAX_PLACES = 1000000 };
 
 /* Places where a tripod can stand: on a surface at most 20 degrees steep, with 0.2 m of room above the head. Around the
- * place, at a distance of 0.3 m, the surface is looked at in 8 directions. In at least 6 of them it is on the place's
- * level, to 0.15 m. At the height of the head nothing is nearer than 0.3 m in these directions.
- * Which side of the surface is up does not matter: some of the places may lie within closed bodies. In order of x,
- * then y, then z downward. The BVH is that of the whole scene. The caller frees *out.
- * SH_EINPUT: more columns than VIEWPOINT_MAX_PLACES. */
+ * place, at a distance of 0.3 m, the surface is looked at in 8 directions. In at least 6 of these directions the
+ * surface is on the place's level, to 0.15 m. At the height of the head nothing is nearer than 0.3 m in these
+ * directions. Which side of the surface is up does not matter: some of the places may lie within closed bodies. In
+ * order of x, then y, then z downward. The BVH is that of the whole scene. The caller frees *out. SH_EINPUT: more
+ * columns than VIEWPOINT_MAX_PLACES. */
 int viewpoint_places(const struct bvh *bvh, const struct viewpoint_grid *grid, const struct sh_report *report,
                      struct viewpoint_place **out, uint32_t *n, struct sh_err *err);
 

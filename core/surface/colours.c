@@ -7,7 +7,7 @@
 #include "core/colour.h"
 #include "core/surface.h"
 
-/* Its rows go from the top down. Labels with the same image share it. */
+/* An image's rows go from the top down. Labels with the same image share it. */
 struct surface_image {
     struct texture_frame frame;
     uint32_t users;

@@ -157,8 +157,8 @@ static int has_long_table(const uint8_t *bytes, size_t n)
 }
 
 /* Loads a JPEG as stb_image does, but clears the tables first. Tables that a file uses and does not define are
- * uninitialised in stb_image, which then reads past their ends. Here they are empty, so that none of their codes is
- * known. */
+ * uninitialised in stb_image, which then reads past their ends. In this function such tables are empty, so that none of
+ * their codes is known. */
 static uint8_t *load_jpeg(stbi__context *s, int *width, int *height, int *channels)
 {
     int no_codes[16] = {0};
@@ -195,7 +195,7 @@ static int is_jpeg(const uint8_t *bytes, size_t n)
     return n > 3 && bytes[0] == 0xff && bytes[1] == 0xd8;
 }
 
-/* The segment of a JPEG with its size (SOF), or NULL. Its markers are 0xc0 to 0xcf, except three. */
+/* The segment of a JPEG with its size (SOF), or NULL. The segment's markers are 0xc0 to 0xcf, except three. */
 static const uint8_t *find_frame(const uint8_t *bytes, size_t n)
 {
     for (size_t at = 2; at + 9 <= n && bytes[at] == 0xff;) {

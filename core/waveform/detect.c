@@ -22,9 +22,9 @@ static double detect_signals(const struct finder *finder, double baseline, const
 }
 
 /* Marks samples that are limited, and those in which the receiver is blind. *until: number on the pulse's grid of
- * the first sample that is not blind any more; it goes on from window to window. A receiver that has not saturated
- * shows a signal right after the last limited sample. Then only the digitiser's range was exceeded, and the receiver
- * is not blind. */
+ * the first sample that is not blind any more; the number goes on from window to window. A receiver that has not
+ * saturated shows a signal right after the last limited sample. Then only the digitiser's range was exceeded, and the
+ * receiver is not blind. */
 static void detect_mark(const struct finder *finder, const struct waveform_window *window, double *y, uint8_t *mark,
                         uint32_t *until)
 {
@@ -42,8 +42,8 @@ static void detect_mark(const struct finder *finder, const struct waveform_windo
     }
 }
 
-/* A maximum has to stand out by 15 %: within the echo of one plane no second maximum does. It also has to stand out by
- * 6.5 sigma: the noise of 20 samples spans more than that once in 1,000. */
+/* A maximum has to stand out by 15 %: within the echo of one plane no second maximum does. A maximum also has to stand
+ * out by 6.5 sigma: the noise of 20 samples spans more than that once in 1,000. */
 static double detect_prominence(const struct finder *finder, double y)
 {
     return fmax(6.5 * finder->noise, 0.15 * y);
@@ -113,7 +113,7 @@ static double detect_crossing(const double *y, uint32_t a, uint32_t b, double le
     return (double)a + u * ((double)b - (double)a);
 }
 
-/* A spike that is no echo may rise and fall within a sample. Its width counts as half a sample. */
+/* A spike that is no echo may rise and fall within a sample. Such a spike's width counts as half a sample. */
 int finder_half(const struct finder_run *run, const struct finder_peak *peak, double height, double side[2])
 {
     const double level = 0.5 * height;

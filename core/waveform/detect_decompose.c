@@ -28,9 +28,10 @@ static void decompose_range(const struct finder_run *run, const struct finder_pe
     task->variance = run->finder->noise * run->finder->noise;
 }
 
-/* Returns the height of a top that stays above the limit for `span` samples. It widens an interval of the pulse's shape
- * h around its peak, at the higher end first, until the interval is that long. At its ends h then has the limit's share
- * of the peak. *centroid: samples from where the limit is reached to the pulse's centroid. */
+/* Returns the height of a top that stays above the limit for `span` samples. The function widens an interval of the
+ * pulse's shape h around its peak, at the higher end first, until the interval is that long. At the interval's ends h
+ * then has the limit's share of the peak. *centroid: samples from where the limit is reached to the pulse's
+ * centroid. */
 static double decompose_height(const struct finder *finder, double span, double *centroid)
 {
     const double *h = finder->shape, steps = span / (FINDER_SHAPE_STEP * finder->width);
@@ -63,7 +64,7 @@ static double decompose_flank(const struct finder *finder, double y0, double y1,
 }
 
 /* Fits a top that is limited. Where the receiver went blind after it, the last two samples of the rising flank
- * decide. Then it returns 1, since a fit to these has nothing to add. */
+ * decide. Then the function returns 1, since a fit to these two has nothing to add. */
 static int decompose_limited(const struct finder_run *run, const struct finder_peak *peak, struct finder_term *g)
 {
     const struct finder *finder = run->finder;
@@ -156,7 +157,8 @@ static struct finder_term decompose_largest(const struct finder_task *task, cons
     return best;
 }
 
-/* Puts two pulses in place of one component that is wider than the pulse. They have its energy and its variance. */
+/* Puts two pulses in place of one component that is wider than the pulse. Together they have the component's energy and
+ * variance. */
 static int decompose_split(const struct finder_task *task, struct finder_mix *mix)
 {
     const double sigma = task->run->finder->spread[0].sigma;

@@ -3,8 +3,8 @@
  *
  * h is the pulse as it leaves the receiver (waveform.h). One sample lies on each side of the crossing. Divided by the
  * peak, a sample is a share of the peak. The table of h says how long before its centroid h rises through that share.
- * So each sample alone gives a place of the echo's centroid. This corrects the range walk, and an echo of h's shape has
- * no interpolation error. The result lies between both places, as the level lies between both samples. */
+ * So each sample alone gives a place of the echo's centroid. The table so corrects the range walk, and an echo of h's
+ * shape has no interpolation error. The result lies between both places, as the level lies between both samples. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>
@@ -30,8 +30,8 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
 }
 
 /* Another echo may begin only once the signal has been 5 sigma below the level: else noise on a slow tail would cross
- * the level again. Where the noise is larger than the level, the sample at the crossing may itself be below `again`. It
- * belongs to the echo all the same. */
+ * the level again. Where the noise is larger than the level, the sample at the crossing may itself be below `again`.
+ * That sample belongs to the echo all the same. */
 void finder_threshold(const struct finder_run *run, struct finder_list *list)
 {
     const double *y = run->y, at = run->finder->peak;

@@ -24,7 +24,7 @@ enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 
 #define FINDER_SHAPE_LEAD 4.0          /* widths of the pulse before its centroid */
 #define FINDER_SHAPE_LAG  8.0          /* widths of the pulse after it */
 
-/* A fit is a sum of terms. A term is a Gaussian; where h is no Gaussian, it is h, stretched in time. Its middle is
+/* A fit is a sum of terms. A term is a Gaussian; where h is no Gaussian, it is h, stretched in time. A term's middle is
  * between its half maxima, and its sigma is that of a Gaussian of the same width. */
 struct finder_term {
     double at, sigma, peak;
@@ -42,7 +42,7 @@ struct finder_spread {
     double tail;      /* largest difference of echo and term further out, over its peak */
 };
 
-/* This is the pulse h, as detectors know it. It is constant after finder_learn. */
+/* This is the pulse h, as detectors know it. The struct is constant after finder_learn. */
 struct finder {
     int seen;       /* the table `shape` reaches the peak of h; else no echo is found */
     double peak;    /* of h */
@@ -132,8 +132,8 @@ struct finder_mix {
     double chi2;
 };
 
-/* Adds an echo. Its deviation is the RMS of the samples minus h at the echo, over the echo's peak. The other components
- * of its mixture are subtracted first. */
+/* Adds an echo. The echo's deviation is the RMS of the samples minus h at the echo, over the echo's peak. The other
+ * components of its mixture are subtracted first. */
 void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
                 uint32_t self, struct finder_list *list);
 /* Adds the echo that term `self` of a mixture stands for, if its peak is `least` or more. */

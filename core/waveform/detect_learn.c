@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* This file learns how the pulse's echoes look to the detectors. It measures them once, on signals without noise, as
- * a head is adjusted on targets. */
+/* This file learns how the pulse's echoes look to the detectors. The echoes are measured once, on signals without
+ * noise, as a head is adjusted on targets. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>

@@ -4,8 +4,8 @@
  * scanner, 2006.
  *
  * Parameters of a component are log peak, centre in its sigmas, and log sigma: all of one size, and no step makes a
- * peak or a sigma negative. A limited sample only says that the signal is at least so large: it counts where the
- * model is below it. That keeps a saturated echo from being fitted to its flat top. A blind sample does not count. */
+ * peak or a sigma negative. A limited sample only says that the signal is at least so large: it counts where the model
+ * is below the limit. So a saturated echo is kept from being fitted to its flat top. A blind sample does not count. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>

@@ -16,9 +16,9 @@
 
 enum { MIN_PHASES = 4, STEPS_PER_SCALE = 16, EDGE_STEPS = 4, FINEST = 64 };
 
-/* The outgoing pulse, which lasts from from_s to to_s, in seconds after its peak (a table: after its first value). It
- * consists of pieces of equal length. Sums over it take the same number of steps in each piece, and a step is at most
- * fine_s long. */
+/* The outgoing pulse, which lasts from from_s to to_s, in seconds after its peak (a table: after its first value). The
+ * pulse consists of pieces of equal length. Sums over it take the same number of steps in each piece, and a step is at
+ * most fine_s long. */
 struct outgoing {
     const struct waveform_spec *spec;
     double from_s, to_s, fine_s, pieces;
@@ -26,7 +26,7 @@ struct outgoing {
 
 /* Returns the log-normal pulse with its peak of 1 at 0: exp(-ln 2 (ln(1 + a t) / ln s)^2), a = (s - 1/s) / width.
  * Half of the peak is reached at ln(1 + a t) = -ln s and ln s, so the time from the peak to the half on the falling
- * side is s times that on the rising side, and both together are the width. With s -> 1 it is the Gaussian. */
+ * side is s times that on the rising side, and both together are the width. With s -> 1 the pulse is the Gaussian. */
 static double log_normal(double t_s, double width_s, double skew)
 {
     const double s = fmax(skew, 1.0 + 1e-6), x = (s - 1.0 / s) / width_s * t_s;
@@ -71,8 +71,8 @@ static double parts_of(const struct outgoing *o, double fine_s)
 }
 
 /* Returns sigma of the receiver's impulse response. The receiver is a Gaussian low-pass, exp(-ln 2 / 2 (f / B)^2), to
- * which chains of many stages tend. It is centred on the time that Elmore calls the delay, so it delays nothing here
- * (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
+ * which chains of many stages tend. The response is centred on the time that Elmore calls the delay, so the receiver
+ * delays nothing here (W. C. Elmore, The transient response of damped linear networks, J. Appl. Phys. 19, 1948). */
 static double receiver_sigma_s(double bandwidth_hz)
 {
     return bandwidth_hz > 0.0 ? sqrt(M_LN2) / (2.0 * M_PI * bandwidth_hz) : 0.0;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A return that has an extent spreads over time. Its signal is a sum of pulses, one for each node of a quadrature rule.
- * h is the outgoing pulse after the receiver (core/waveform.h). */
+/* A return that has an extent spreads over time. The return's signal is a sum of pulses, one for each node of a
+ * quadrature rule. h is the outgoing pulse after the receiver (core/waveform.h). */
 #include <math.h>
 #include <stdlib.h>
 
@@ -14,9 +14,9 @@ static uint32_t nodes_of(uint32_t level)
     return level % 2 == 1 ? 8U << level / 2 : 12U << (level / 2 - 1);
 }
 
-/* Returns node i of n of Gauss's and Chebyshev's rule (second kind), at x = cos a. Its weight is sin^2 a times the
- * marginal of the irradiance exp(-2 r^2) within the unit disc, over sqrt(1 - x^2). That quotient is an entire function,
- * so the rule converges fast. */
+/* Returns node i of n of Gauss's and Chebyshev's rule (second kind), at x = cos a. The node's weight is sin^2 a times
+ * the marginal of the irradiance exp(-2 r^2) within the unit disc, over sqrt(1 - x^2). That quotient is an entire
+ * function, so the rule converges fast. */
 static struct waveform_node disc_node(uint32_t i, uint32_t n)
 {
     const double a = M_PI * (i + 1) / (n + 1), x = cos(a), y = sin(a);
@@ -32,7 +32,7 @@ static struct waveform_node bell_node(uint32_t i, uint32_t n)
 }
 
 /* Sets Gauss's nodes of a spread that is even in x, by its moments m: three nodes have the right moments up to the 5th,
- * five nodes up to the 9th. They are the roots of the polynomials x (x^2 - a) and x (x^4 - a x^2 + b), which are
+ * five nodes up to the 9th. The nodes are the roots of the polynomials x (x^2 - a) and x (x^4 - a x^2 + b), which are
  * orthogonal to all of lower degree. */
 static void gauss_nodes(struct waveform_node three[3], struct waveform_node five[5], const double m[10])
 {
@@ -50,9 +50,10 @@ static void gauss_nodes(struct waveform_node three[3], struct waveform_node five
     five[4] = (struct waveform_node){sqrt(far2), far};
 }
 
-/* Returns the extent up to which n nodes have an error below 1e-5 of the amplitude (tests/unit/test_waveform.c). Its
- * unit is the scale of the pulse (waveform_inside.h). With Gauss's nodes the error is the next moment times the next
- * derivative of h. With the others it is the part of h's spectrum that the nodes no longer follow. */
+/* Returns the extent up to which n nodes have an error below 1e-5 of the amplitude (tests/unit/test_waveform.c). The
+ * extent's unit is the scale of the pulse (waveform_inside.h). With Gauss's nodes the error is the next moment times
+ * the next derivative of h. With the other nodes the error is the part of h's spectrum that the nodes no longer
+ * follow. */
 static double reach_of(enum waveform_spread spread, uint32_t n)
 {
     if (n == 3) return spread == WAVEFORM_DISC ? 0.5 : 0.2;
@@ -138,7 +139,7 @@ static double extent_of(const struct waveform *w, const struct waveform_return *
 }
 
 /* The ranges on a plane rise as 1 / (1 - b x) across the disc, b = extent / range where the beam has spread far beyond
- * its exit. Returns b, limited to 0.5 as in core/footprint.h; it weighs the second term of the series. */
+ * its exit. Returns b, limited to 0.5 as in core/footprint.h; b weighs the second term of the series. */
 static double bend_of(const struct waveform_return *part)
 {
     if (part->spread != WAVEFORM_DISC) return 0.0;

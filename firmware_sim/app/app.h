@@ -41,9 +41,9 @@ int app_fail(const struct sh_err *err);
 /* The same for each error of a configuration. */
 int app_fail_config(const struct config_diagnostics *diagnostics);
 
-/* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may
- * change it; it is freed afterwards. Returns the exit status. The reason of a failure is printed: each error of a
- * configuration is a line. */
+/* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may change
+ * the configuration, which is freed afterwards. Returns the exit status. The reason of a failure is printed: each error
+ * of a configuration is a line. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 /* The same for `links`, YAML that --link gives in place of a configuration. NULL: as app_with_config. */
@@ -66,9 +66,9 @@ int app_check_files(const struct app_input *in, const struct config *cfg, struct
  * n_ending: bytes of .ENDING; 0: no file of scans. */
 int app_is_name_of_scan(const char *file, size_t n_ending, const char *name);
 
-/* From here on a thread writes all lines of app_say to standard error. So no thread of a head waits for its reader, and
- * the end of the run does not, either. Messages that find no room in 64 KiB are dropped, and their number is printed.
- * app_end_messages, which main calls last, waits at most 2 s for a reader that has stopped. */
+/* From here on a thread writes all lines of app_say to standard error. So no thread of a head waits for standard
+ * error's reader, and the end of the run does not, either. Messages that find no room in 64 KiB are dropped, and their
+ * number is printed. app_end_messages, which main calls last, waits at most 2 s for a reader that has stopped. */
 int app_begin_messages(struct sh_err *err);
 void app_end_messages(void);
 
@@ -109,7 +109,8 @@ void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 
 /* Opens the file that a user names for output, empty; "-": standard output. */
 int app_open_new(const char *path, FILE **out, struct sh_err *err);
-/* Closes it, but not standard output. Returns the first error in writing it; its text begins with the path. */
+/* Closes a file that was written, but not standard output. Returns the first error in writing it; its text begins with
+ * the path. */
 int app_close_new(const char *path, FILE *out, struct sh_err *err);
 
 /* Writes one JSON value, by `put`, to a file; path "-" is standard output. */

@@ -71,7 +71,7 @@ static void print_utm(const struct locate_grid *utm, double height_m, FILE *out)
             utm->convergence_deg, utm->scale);
 }
 
-/* The error of a level range in a scene whose coordinates are a grid's. It comes from the grid's scale and
+/* The error of a level range in a scene whose coordinates are a grid's. The error comes from the grid's scale and
  * from the height above the ellipsoid, and is taken from two points 100 grid metres apart. */
 static int print_grid_ranges(const struct site *site, const double p_prcs[3], FILE *out, struct sh_err *err)
 {

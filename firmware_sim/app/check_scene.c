@@ -38,8 +38,8 @@ static const char *name_of(const struct part *p, uint32_t object)
     return p->scene->surface[p->objects.object[object].surface].object;
 }
 
-/* The surfaces of an object need not follow each other. *left: how many of them come from *i on. Returns NULL once it
- * is 0. */
+/* The surfaces of an object need not follow each other. *left: how many of them come from *i on. Returns NULL once
+ * *left is 0. */
 static const struct scene_surface *next_surface(const struct part *p, uint32_t object, uint32_t *i, uint32_t *left)
 {
     if (*left == 0) return NULL;

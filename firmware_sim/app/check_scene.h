@@ -8,8 +8,8 @@
 
 #include "firmware_sim/site/site.h"
 
-/* The objects of the scene come first, then those of each mesh that moves. n_warnings: so many were printed while it
- * was loaded. out NULL: there is no table. csv: a file for all rows; NULL: none; -: standard output. */
+/* The objects of the scene come first, then those of each mesh that moves. n_warnings: so many were printed while the
+ * site was loaded. out NULL: there is no table. csv: a file for all rows; NULL: none; -: standard output. */
 int check_print_scene(const struct site *site, unsigned n_warnings, const char *csv, FILE *out, struct sh_err *err);
 
 #endif

@@ -371,7 +371,7 @@ void app_set_help(void (*print)(const struct app_command *command))
 
 /* ---- parsing */
 
-/* Counts all operands. It keeps only as many as an error message shows. */
+/* Counts all operands, and keeps only as many as an error message shows. */
 static void count_operand(char *words[APP_MAX_OPERANDS + 1], int *n, char *word)
 {
     if (*n <= APP_MAX_OPERANDS) words[*n] = word;

@@ -103,7 +103,7 @@ struct app_file {
     int is_given; /* by the user, as an option's value: its folder must be there */
     /* Files that are written, as the command knows them: */
     size_t n_ending; /* bytes of the path's ending, as in .ply */
-    /* It is a sidecar of `path`, with this ending in place of its own; NULL: it is `path` itself. */
+    /* The file is a sidecar of `path`, with this ending in place of its own; NULL: `path` itself. */
     const char *ending;
     int each; /* 1: files STEM-N.ENDING are written, too, for N from 1 on */
 };
@@ -139,9 +139,9 @@ void app_set_help(void (*print)(const struct app_command *command));
 /* Adds KEY=VALUE, which must live on. APP_OK, or APP_USAGE with the reason printed. */
 int app_add_set(struct app_sets *sets, const char *set);
 
-/* Adds rows of another command's table to `rows`: those in `names`, which ends with NULL. They become APP_PASS, with
- * the struct app_words at `at`. `rows` ends with OPTION_END, and has room for APP_MAX_OPTIONS + 1. A table that has
- * such rows already stays as it is. */
+/* Adds rows of another command's table to `rows`: those in `names`, which ends with NULL. The added rows become
+ * APP_PASS, with the struct app_words at `at`. `rows` ends with OPTION_END, and has room for APP_MAX_OPTIONS + 1. A
+ * table that has such rows already stays as it is. */
 void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at);
 
 /* Reads n finite numbers with `between` between them, and nothing else. 0: the text is not that. */

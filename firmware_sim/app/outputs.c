@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Checks the files that a command names: it writes none twice, and none that it reads, so that none is destroyed.
- * It also checks that a file that an option or a link writes has a folder. */
+ * This file also checks that a file that an option or a link writes has a folder. */
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -52,7 +52,7 @@ int app_is_name_of_scan(const char *file, size_t n_ending, const char *name)
     return digits > 0 && strcmp(name + stem + 1 + digits, file + stem) == 0;
 }
 
-/* Whether both are one name in one folder: then they would be one file, also where it is not there yet. */
+/* Whether both are one name in one folder: then they would be one file, also where that file is not there yet. */
 static int is_same_name(const struct named *a, const struct named *b)
 {
     struct stat folder[2];

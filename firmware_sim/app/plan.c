@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead plan: which method each stage will use. It loads the scene as a run does and prints what the run
+/* scanhead plan: which method each stage will use. The command loads the scene as a run does and prints what the run
  * uses. */
 #include <math.h>
 #include <stdio.h>

@@ -7,7 +7,7 @@
 #include "firmware_sim/config/limits.h"
 #include "firmware_sim/site/site.h"
 
-/* They begin as zeros, and are to be freed. */
+/* The warnings begin as zeros, and are to be freed. */
 struct scanner_warnings {
     uint32_t n, n_scanners;
     struct {
@@ -17,7 +17,7 @@ struct scanner_warnings {
     int are_printed; /* from now on only a new warning is printed, at once */
 };
 
-/* A report that notes warnings, and hands on all else. It must not move. */
+/* A report that notes warnings, and hands on all else. The struct must not move. */
 struct scanner_report {
     struct sh_report report;
     const struct sh_report *to;

@@ -100,7 +100,7 @@ static int found(struct search *s, const char *name, const char *path, int depth
     return rc;
 }
 
-/* The name ends at `end`. It begins at `first`, or after one of the blanks between them. */
+/* The name ends at `end`, and begins at `first` or after one of the blanks between both. */
 static int try_names(struct search *s, const char *first, const char *end, int depth)
 {
     char name[NAME_MAX_LEN + 1], path[PATH_MAX];

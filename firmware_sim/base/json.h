@@ -3,7 +3,7 @@
  * member per line with two blanks per level, or all on one line without blanks.
  *
  * Each value takes the key it gets in an object, or NULL in an array and at the top. The FILE stays the
- * caller's. The C locale is assumed: nothing here calls setlocale. One writer belongs to one thread. It
+ * caller's. The C locale is assumed: nothing here calls setlocale. One writer belongs to one thread. The writer
  * allocates nothing. */
 #ifndef FIRMWARE_SIM_BASE_JSON_H
 #define FIRMWARE_SIM_BASE_JSON_H

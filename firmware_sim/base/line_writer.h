@@ -8,8 +8,8 @@
  * There are two kinds of lines. A remark is dropped when it would fill the queue beyond one half. So a flood of remarks
  * leaves room for the other lines.
  *
- * Thread: any but the pacing thread, since line_writer_put holds a lock while a line is copied. It neither allocates
- * nor writes, so it may be called with other locks held. */
+ * Thread: any but the pacing thread, since line_writer_put holds a lock while a line is copied. line_writer_put neither
+ * allocates nor writes, so it may be called with other locks held. */
 #ifndef FIRMWARE_SIM_BASE_LINE_WRITER_H
 #define FIRMWARE_SIM_BASE_LINE_WRITER_H
 

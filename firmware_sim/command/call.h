@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A call: a line whose row is found, with its value and its reply. It is all that the functions of rows are given. */
+/* A call: a line whose row is found, with its value and its reply. A call is all that the functions of rows are
+ * given. */
 #ifndef FIRMWARE_SIM_COMMAND_CALL_H
 #define FIRMWARE_SIM_COMMAND_CALL_H
 

@@ -38,16 +38,16 @@
  * Steps. With a live platform a step may carry the pose at its end: `TIME:STEP 10 MS, x, y, z, roll, pitch,
  * heading`, in metres of the scene frame and degrees (core/pose.h).
  *
- * Faults. `FAULt:ADD {kind: drop, every: 10}` adds a fault, written as in the configuration's list `faults`. It counts
- * from then on, and the reply is its number. `FAULt:CLEar 3` or `ALL` takes faults out. `FAULt:INJected?` replies with
- * how often faults struck; with a number, how often that one did. `FAULt:LIST?` lists the faults.
+ * Faults. `FAULt:ADD {kind: drop, every: 10}` adds a fault, written as in the configuration's list `faults`. The fault
+ * counts from then on, and the reply is its number. `FAULt:CLEar 3` or `ALL` takes faults out. `FAULt:INJected?`
+ * replies with how often faults struck; with a number, how often that one did. `FAULt:LIST?` lists the faults.
  *
  * Replays. `SCAN:REPLay 12.5, 2, ON` plays a recording from 12.5 s after its first frame on, at twice its speed, and
  * anew at its end. Fields may be left empty, and stay as they are then; speed 0 pauses. The query replies with PLAYING
  * or IDLE, time, length (0: not known), speed and loop; a head replies NONE.
  *
  * Replies. The value, or "OK", or `ERR -222,"Data out of range; HEAD:PRR 5000000 Hz, allowed 1000 to
- * 1200000"`. A value outside of the profile is -222. One that another setting or the state forbids is -221.
+ * 1200000"`. A value outside of the profile is -222. A value that another setting or the state forbids is -221.
  * *STB?: 4: errors are queued; 128: the head scans. *CLS, like SYSTem:ERRor?, needs no control.
  *
  * Pure: no clock, no I/O, no thread. The loop owns the device, calls from one thread, and carries out the
@@ -130,7 +130,7 @@ struct command_time_server {
     int32_t zone_h;    /* how far local time is ahead of UTC */
     uint32_t n_roles;  /* how often the role has changed, also where it changed and changed back */
 };
-/* Its answers since power-up. */
+/* The time server's answers since power-up. */
 struct command_time_answers {
     int64_t max_offset_ns;       /* once the clock is set, an answer that is farther from it is refused */
     int64_t offset_ns, delay_ns; /* of the last answer that set the clock */
@@ -167,7 +167,7 @@ struct command_replay_change {
     int loop;
 };
 
-/* These stand for the value of a setting that is not in the recording. */
+/* These two constants stand for the value of a setting that is not in the recording. */
 #define COMMAND_NOT_RECORDED     INT64_MIN
 #define COMMAND_NOT_RECORDED_U32 UINT32_MAX
 

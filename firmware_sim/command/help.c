@@ -41,7 +41,7 @@ int command_help_settings(struct command_call *call)
     return 0;
 }
 
-/* Adds the states in which it can be set or carried out: "all", or some with blanks between them. */
+/* Adds the states in which the row's command can be set or carried out: "all", or some with blanks between them. */
 static void add_states(struct command_call *call)
 {
     const struct command_row *row = call->row;

@@ -18,7 +18,7 @@ struct command_unit {
 
 struct command_row {
     const char *header;
-    /* Both return 0, or -1 when the command failed. */
+    /* Both functions return 0, or -1 when the command failed. */
     int (*query)(struct command_call *call); /* NULL: no query form */
     int (*act)(struct command_call *call);   /* NULL: only a query */
     const struct command_unit *unit;         /* of act's one number; NULL: act takes none */

@@ -377,8 +377,8 @@ static int check_value(struct command_call *call, int64_t value)
     if (is_setting(call, offsetof(struct head_settings, station)) && head_is_elsewhere(&call->dev->limits, value))
         return command_fail(call, CMD_E_SETTINGS, "%s %lld has another scanner; run that: --set head.station=%lld",
                             call->row->header, (long long)value, (long long)value);
-    /* DEF of a step brings back the rates of power-up. They are allowed together, even where the step that is computed
-     * from them is outside its present range (is_default_beyond). */
+    /* DEF of a step brings back the rates of power-up. These rates are allowed together, even where the step that is
+     * computed from them is outside its present range (is_default_beyond). */
     const int as_before = setting->derived != NULL && call->value.kind == COMMAND_VALUE_DEF;
     const enum emitter_kind head = call->dev->limits.emitter;
     const int sets = head == EMITTER_LINE || (head == EMITTER_SPHERE && setting->derived == &command_step_both);

@@ -90,7 +90,8 @@ static int64_t step_of_lines(const struct command_device *dev, int64_t lines_uhz
     return nearest((wide)lines_uhz * dev->limits.sweep_udeg * NDEG_PER_UDEG, dev->settings.prr_uhz);
 }
 
-/* Returns the largest step up to `most` at which the pan is fast enough for the lines. Both rates rise with it. */
+/* Returns the largest step up to `most` at which the pan is fast enough for the lines. Both rates rise with the
+ * step. */
 static int64_t most_of_both(const struct command_device *dev, int64_t most)
 {
     int64_t low = 0, high = most;

@@ -36,8 +36,8 @@ static void check_factor(struct cfg_reader *rd, const struct config *cfg, const 
                       f->factor, lines_hz, cfg->profile.name, most_hz / lines_hz);
 }
 
-/* A soiled window shows only in amplitudes, in noise that grows as the signal fades, or in LCMstate of cola. This is
- * checked for the scanner of head.station alone: it has the links, and one of them may speak cola. */
+/* A soiled window shows only in amplitudes, in noise that grows as the signal fades, or in LCMstate of cola. Windows
+ * are checked for the scanner of head.station alone: that scanner has the links, and one of them may speak cola. */
 static void check_window(struct cfg_reader *rd, const struct config *cfg, uint32_t i)
 {
     const int is_noisy = cfg->noise.range == RANGE_NOISE_ON && cfg->profile.range_sigma_m > 0.0;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Rows of injected faults, for the table of a configuration and for that of a scenario, which has nothing else. Define
- * FAULT_LIST_AT(member) before including it: a member's place in struct fault_list. Private to keys.c and faults.c. */
+ * FAULT_LIST_AT(member) before including this file: a member's place in struct fault_list. Private to keys.c and
+ * faults.c. */
 /* clang-format off */
 #define FAULT_MEMBER(member) CFG_MEMBER(struct fault, member)
 #define FAULT(member)        "faults[]." #member, FAULT_MEMBER(member)

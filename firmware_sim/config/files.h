@@ -10,8 +10,9 @@ struct config;
 typedef int config_take_file(void *ctx, const char *key, const char *path, int is_written);
 
 /* Calls `take` for each path in the configuration's and the profile's keys, for the head profile and for the scenario.
- * It goes through the rows of the tables, so a new key can't be forgotten. The configuration itself is not among them.
- * is_written: the program writes the file, as that of a `file` link. Returns the last result of `take`. */
+ * The function goes through the rows of the tables, so a new key can't be forgotten. The configuration itself is not
+ * among the paths. is_written: the program writes the file, as that of a `file` link. Returns the last result of
+ * `take`. */
 int config_each_file(const struct config *cfg, config_take_file *take, void *ctx);
 
 #endif

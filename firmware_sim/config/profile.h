@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A head profile: the figures of a kind of head from its file in config/heads, and values that follow from them. They
- * have the units that their names say, and are constant once the profile is loaded. */
+/* A head profile: the figures of a kind of head from its file in config/heads, and values that follow from them. All
+ * figures have the units that their names say, and are constant once the profile is loaded. */
 #ifndef FIRMWARE_SIM_CONFIG_PROFILE_H
 #define FIRMWARE_SIM_CONFIG_PROFILE_H
 
@@ -69,7 +69,7 @@ struct config_profile {
     double range_sigma_m, range_sigma_ppm; /* one sigma of the range noise: fixed part, and part per distance */
     double range_sigma_at_m, range_sigma_reflectance, range_sigma_floor_m; /* where the fixed part holds; its floor */
     double mirror_sigma_deg, pan_sigma_deg;                                /* one sigma of the angle noise */
-    /* These are the head's as a whole; they limit each program. */
+    /* These reaches are the head's as a whole; they limit each program. */
     struct config_reach reach[DETECT_MAX_REACHES];
     uint32_t n_reaches; /* at least 1: range_max_m on 90 % where the file has none */
     /* One for each pulse rate, the lowest rate first. n_programs 0: any rate from prr_min to prr_max; program[0] then
@@ -102,8 +102,8 @@ void config_fill_spec(const struct config_profile *profile, const struct head_se
 /* Sets the steps of a turn of a planar head, which are those of one of its geometries. */
 void config_set_steps(struct config_profile *profile, uint32_t steps);
 
-/* Reads the profile NAME. It is looked for in $SCANHEAD_HEADS, in heads/ beside the configuration config_file, beside
- * the program (installed or in its build folder), and in config/heads of the working directory. */
+/* Reads the profile NAME. The profile is looked for in $SCANHEAD_HEADS, in heads/ beside the configuration config_file,
+ * beside the program (installed or in its build folder), and in config/heads of the working directory. */
 int config_load_profile(const char *name, const char *config_file, struct config_profile *profile, struct sh_err *err);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* head.range_min_m and head.range_max_m: the head's smallest and largest range, within its profile. This also turns
- * ranges, noise and the step into settings, which commands may change, and back. */
+/* head.range_min_m and head.range_max_m: the head's smallest and largest range, within its profile. This file also
+ * turns ranges, noise and the step into settings, which commands may change, and back. */
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"

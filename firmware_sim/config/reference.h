@@ -30,12 +30,12 @@ void config_print_reference(FILE *out);
 int config_print_section(const char *section, FILE *out, struct sh_err *err);
 
 /* Prints a configuration that loads and has all keys, each with its help. Keys that need a value have one; the others
- * are commented out with their defaults. It names a profile and a mesh that come with the program. */
+ * are commented out with their defaults. The example names a profile and a mesh that come with the program. */
 int config_print_example(FILE *out, struct sh_err *err);
 
-/* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. With dir NULL it
- * takes the first directory that exists, in the order in which config_load_profile looks for a profile (profile.h).
- * heads/ beside a configuration is not among them. */
+/* Lists the profiles in a directory: name, programs, and how sure their figures are. Returns how many. With dir NULL
+ * the function takes the first directory that exists, in the order in which config_load_profile looks for a profile
+ * (profile.h). heads/ beside a configuration is not among these directories. */
 int config_list_profiles(const char *dir, FILE *out, struct sh_err *err);
 
 #endif

@@ -3,8 +3,8 @@
  * disturbance.
  *
  * A fault strikes at the pulses of a scan between from_pulse and until_pulse that fire at from_s or later, and before
- * until_s. That is exact, whatever the tick rate is: a tick ends where a fault begins or ends (claim_pulses), and the
- * rest of its pulses come with the next ones. So all pulses of a tick have the same faults. */
+ * until_s. These limits are exact, whatever the tick rate is: a tick ends where a fault begins or ends (claim_pulses),
+ * and the rest of its pulses come with the next ones. So all pulses of a tick have the same faults. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

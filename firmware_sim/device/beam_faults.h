@@ -41,7 +41,7 @@ void device_set_rates(struct device_beam *beam, uint64_t pulse);
 void device_turn_beam(struct device_beam *beam, int64_t until_ns);
 /* Returns the loss of optical power by the faults that strike, dB. */
 double device_beam_loss_db(const struct device_beam *beam);
-/* Ends all faults that strike, when a scan is over or before it begins. t_ns: time since the scan's start. */
+/* Ends all faults that strike, when a scan is over or before one begins. t_ns: time since the scan's start. */
 void device_end_beam(struct device_beam *beam, int64_t t_ns);
 
 #endif

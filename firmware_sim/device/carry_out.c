@@ -75,7 +75,7 @@ static const char *why_fixed(const struct device *device, uint32_t session)
 
 /* Carries out a command while power is gone. The old sessions are cut off when the tick without power is released, and
  * get no further answer. In the pace `step` links are back at once, so that new sessions can come while power is gone.
- * These may send queries and steps. */
+ * The new sessions may send queries and steps. */
 static void do_dead(struct device *device, uint32_t session, const char *line, uint64_t released,
                     struct command_result *out)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults of the head's time of day: jumps, gains, standstills, leap seconds, missing PPS, a lost PTP master.
- * They hold from their exact nanosecond on, not from a tick on. */
+ * The faults hold from their exact nanosecond on, not from a tick on. */
 #include <math.h>
 #include <stdio.h>
 

@@ -13,9 +13,9 @@ struct head_clock;
 /* Begins and ends the faults that do so in a tick. */
 void device_run_clock_faults(struct head_faults *faults, struct head_clock *clock, struct device_events *events,
                              uint64_t tick);
-/* These two are for kinds that strike at PPS pulses and at the receiver's sentences. They are called after
- * head_faults_step for the tick. The first says whether a fault of the kind holds at a device time. The other counts a
- * pulse or a sentence, for the note of the fault's end. */
+/* These two functions are for kinds that strike at PPS pulses and at the receiver's sentences. Both are called after
+ * head_faults_step for the tick. device_has_clock_fault says whether a fault of the kind holds at a device time.
+ * device_count_clock_fault counts a pulse or a sentence, for the note of the fault's end. */
 int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 void device_count_clock_fault(struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 

@@ -14,7 +14,8 @@
 #include "firmware_sim/site/plan_rows.h"
 
 /* With platform.kind live the head needs poses for all pulses that a tick casts. Pulses are cast in packets of 16, so
- * the first of these may have been fired 15 pulse periods before the tick. There is room for DEVICE_MAX_POSES ticks. */
+ * the first of a packet may have been fired 15 pulse periods before the tick. There is room for DEVICE_MAX_POSES
+ * ticks. */
 static int check_live(const struct device *device, struct sh_err *err)
 {
     const struct config *cfg = device->site->cfg;
@@ -85,7 +86,8 @@ static int open_journals(struct device *device, struct sh_err *err)
     return SH_OK;
 }
 
-/* Some parts of the device don't know struct device. Here they get pointers to those of its members that they need. */
+/* Some parts of the device don't know struct device. This function gives such parts pointers to the members that they
+ * need. */
 static void set_parts(struct device *device)
 {
     device->events.tick_hz = device->overrun.tick_hz = device->tick_hz;
@@ -232,8 +234,8 @@ static void run_faults(struct device *device, uint64_t tick, struct device_work 
     device_run_power(device, tick, work);
 }
 
-/* Pulses, echoes and lines are filled in at release (stream.c), since they count what was released. Here both counts of
- * lost pulses are set to the pulses cast; the release subtracts those delivered. */
+/* Pulses, echoes and lines are filled in at release (stream.c), since they count what was released. This function sets
+ * both counts of lost pulses to the pulses cast; the release subtracts those delivered. */
 static void fill_telemetry(const struct device *device, uint64_t tick, struct native_telemetry *t)
 {
     const struct device_counters *c = &device->counters;

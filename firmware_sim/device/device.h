@@ -72,7 +72,7 @@ struct device_work {
     struct native_anchor anchor;
     uint32_t surfaces_first, surfaces_n; /* names to send; 0: none */
     int scanning;
-    /* The site of the scan: that of the version, or one that is planned for its settings. It is valid until
+    /* The site of the scan: that of the version, or one that is planned for its settings. The site is valid until
      * device_done. */
     const struct site *site;
     struct device_variant *variant; /* NULL: that of the version */
@@ -131,15 +131,15 @@ int device_close_journal(void *self, struct sh_err *err);
  * no lock. */
 int device_files_fill(const void *self);
 
-/* Returns the board of injected faults, from the configuration and from commands. It belongs to the device. */
+/* Returns the board of injected faults, from the configuration and from commands. The board belongs to the device. */
 struct fault_board *device_faults(const void *self);
 
 struct device_counters *device_counters(void *self);
 
 /* Claims the next tick: its work. Returns 0, or 1 when the run is over and there is no next tick. */
 int device_claim(struct device *device, struct device_work *work);
-/* A claimed tick was lost, and with it the pulses that it should have cast. They are counted. The tick's other frames
- * go out with a later one. */
+/* A claimed tick was lost, and with it the pulses that it should have cast. The lost pulses are counted. The tick's
+ * other frames go out with a later one. */
 void device_lost(struct device *device, const struct device_work *work);
 /* Ends the use of a work, delivered or lost. Call it once for each claimed work. Any thread; takes no lock. */
 void device_done(struct device_work *work);
@@ -173,10 +173,11 @@ void device_session_closed(void *self, uint32_t session, const char *who, int pa
  * out of reach, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). */
 int device_pose(struct device *device, int64_t t_ns, const double v[6]);
 
-/* A command whose effect is COMMAND_MOVE has moved nothing yet. First call device_plan_move, in any thread. It plans
- * the station's new place (maps, beams), which takes milliseconds to seconds, without the device's lock. Then call
- * device_finish_move: the station stands there from the next tick on, journalled, with an event; or the move is refused
- * (-221) and nothing has changed. Either way *out has the reply. No other move and no scan begins in between. */
+/* A command whose effect is COMMAND_MOVE has moved nothing yet. First call device_plan_move, in any thread.
+ * device_plan_move plans the station's new place (maps, beams), which takes milliseconds to seconds, without the
+ * device's lock. Then call device_finish_move: the station stands there from the next tick on, journalled, with an
+ * event; or the move is refused (-221) and nothing has changed. Either way *out has the reply. No other move and no
+ * scan begins in between. */
 void device_plan_move(struct device *device);
 void device_finish_move(struct device *device, uint64_t released, struct command_result *out);
 
@@ -193,13 +194,14 @@ struct device_station {
     double legs_heading_deg;           /* of the first leg, from the scene's north */
 };
 void device_get_station(struct device *device, uint32_t station, struct device_station *out); /* 0.. */
-/* Holds the present site, for callers that need more of it. It is constant and valid until it is given back, which must
- * come before device_free, and soon: it may hold maps of hundreds of MiB. */
+/* Holds the present site, for callers that need more of it. The site is constant and valid until it is given back,
+ * which must come before device_free, and soon: it may hold maps of hundreds of MiB. */
 const struct site *device_hold_site(struct device *device, struct device_version **version);
 void device_give_back(struct device_version *version);
 const struct site *device_site_of(const struct device_version *version);
 
-/* Stored settings of a protocol's sessions (settings_file.h). Both return 1 where the head keeps nothing, 0 else. */
+/* Stored settings of a protocol's sessions (settings_file.h). Both functions return 1 where the head keeps nothing, 0
+ * else. */
 int device_store(void *self, const char *name, const char *text);
 int device_stored(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);
 
@@ -212,8 +214,8 @@ void device_report(void *self, int number, const char *text);
 int device_power_up(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
 
 /* The GNSS receiver (receiver_line.h). device_next_fix_ns: when its first sentence at or after t_ns arrives; INT64_MAX:
- * none does. device_fix gives the fix of the last sentence that had arrived at t_ns. Its place is where the head was at
- * the time of the fix. Returns 0 if there is none. */
+ * none does. device_fix gives the fix of the last sentence that had arrived at t_ns. The fix's place is where the head
+ * was at the time of the fix. Returns 0 if there is none. */
 int64_t device_next_fix_ns(void *self, int64_t t_ns);
 int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second, and the time since the top of the hour, at a device time that was claimed (pps.h). */
@@ -230,8 +232,8 @@ struct device_power_up {
 };
 struct device_power_up device_last_power(void *self);
 
-/* Loss of optical power at the window by injected faults, both ways together, dB; 0 without a scan. It is that of the
- * last tick that was claimed. */
+/* Loss of optical power at the window by injected faults, both ways together, dB; 0 without a scan. The loss is that of
+ * the last tick that was claimed. */
 double device_window_loss_db(void *self);
 
 /* The number of the last scan that began, which is how many have begun; 0: none. *station: where it stands, from 1;

@@ -22,8 +22,8 @@
 #include "firmware_sim/device/variant.h"
 #include "firmware_sim/device/versions.h"
 
-/* Poses of a live platform. Each tick begins with a pose of the head. It is made once, from the platform's poses that
- * had come by then. */
+/* Poses of a live platform. Each tick begins with a pose of the head. This pose is made once, from the platform's poses
+ * that had come by then. */
 struct device_live {
     struct device_sample {
         int64_t t_ns;     /* device time */

@@ -6,8 +6,8 @@
  *
  * The receiver runs from power-up on, also while the head does not scan. (In the pace fast device time itself
  * stands still while the head has nothing to do.) The antenna is at the head's origin plus gnss.lever_arm_m
- * in the head's frame. Its noise, if any, is normal and independent east, north and up. The noise is keyed by
- * noise.seed and the number of the position since power-up. Thread: constant after the clock is powered
+ * in the head's frame. The receiver's noise, if any, is normal and independent east, north and up. The noise is keyed
+ * by noise.seed and the number of the position since power-up. Thread: constant after the clock is powered
  * up. */
 #ifndef FIRMWARE_SIM_DEVICE_GNSS_H
 #define FIRMWARE_SIM_DEVICE_GNSS_H

@@ -139,8 +139,8 @@ static int64_t before_ns(const struct head_clock *clock, const struct head_clock
     return piece_ns(clock, begins ? piece - 1 : piece, t_ns - 1);
 }
 
-/* Does the work of head_clock_edge within one piece. There the clock never runs backwards. So the edge is the first
- * nanosecond that has reached the second, and is found by halving. */
+/* Does the work of head_clock_edge within one piece. Within a piece the clock never runs backwards. So the edge is the
+ * first nanosecond that has reached the second, and is found by halving. */
 static int find_edge(const struct head_clock *clock, const struct head_clock_piece *piece, int64_t from_ns,
                      int64_t to_ns, int64_t *edge_ns, int64_t *tai_s)
 {

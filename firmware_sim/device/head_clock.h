@@ -72,7 +72,7 @@ int head_clock_power_up(struct head_clock *clock, int64_t now_ns, struct sh_err 
 int64_t head_clock_true_ns(const struct head_clock *clock, int64_t t_ns);
 int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns);
 
-/* Changes the clock from a device time on. It never runs backwards: a rate that would be negative becomes 0. */
+/* Changes the clock from a device time on. The clock never runs backwards: a rate that would be negative becomes 0. */
 void head_clock_change(struct head_clock *clock, int64_t t_ns, const struct head_clock_change *change);
 
 /* Adds a leap second that no table has, at the end of the UTC minute that the head's clock shows at a device time.

@@ -2,13 +2,14 @@
 /* Injected faults in the head: finds those that are active in a tick, and notes when each begins and ends.
  *
  * In: the board of the run, and each tick as it is claimed. Out: the faults that are active in it. A fault is noted on
- * the board when it begins, with device time and, during a scan, the first pulse that it hits. It is noted again, as
- * ended, when it is over. Everything depends on device time only, so it is the same at any pace and number of threads.
+ * the board when it begins, with device time and, during a scan, the first pulse that it hits. The fault is noted
+ * again, as ended, when it is over. Everything depends on device time only, so it is the same at any pace and number of
+ * threads.
  *
  * A fault begins with the first tick that starts at from_s or later, and ends with the first that starts at until_s or
- * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse it is
- * active in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is off
- * for for_ms, rounded up to a whole tick. A fault that is taken out of the list while it is active ends.
+ * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse a fault
+ * is active in ticks of a scan that have such a pulse. A power cycle, a jump and a leap second strike once; power is
+ * off for for_ms, rounded up to a whole tick. A fault that is taken out of the list while it is active ends.
  *
  * Faults that change what is measured are not handled here: they are exact to the pulse (beam_faults.c).
  *
@@ -20,7 +21,7 @@
 
 /* A set of kinds. */
 #define HEAD_FAULT(kind) (UINT64_C(1) << (kind))
-/* They put the clock into holdover, in which it gains the fault's `ppm`. */
+/* These faults put the clock into holdover, in which it gains the fault's `ppm`. */
 #define HEAD_FAULTS_HOLDOVER (HEAD_FAULT(FAULT_PTP_LOST) | HEAD_FAULT(FAULT_PTP_NO_SYNC) | HEAD_FAULT(FAULT_PTP_FAULTY))
 #define HEAD_FAULTS_PTP                                                                      \
     (HEAD_FAULTS_HOLDOVER | HEAD_FAULT(FAULT_PTP_GRANDMASTER) | HEAD_FAULT(FAULT_PTP_STEP) | \
@@ -30,7 +31,7 @@
      HEAD_FAULT(FAULT_PPS_LOST) | HEAD_FAULT(FAULT_PPS_JITTER) | HEAD_FAULT(FAULT_NMEA_LOST) |     \
      HEAD_FAULT(FAULT_NMEA_LATE) | HEAD_FAULT(FAULT_NMEA_VOID) | HEAD_FAULT(FAULT_NMEA_CHECKSUM) | \
      HEAD_FAULT(FAULT_LEAP_SECOND) | HEAD_FAULTS_PTP)
-/* They strike at answers of a time server. */
+/* These faults strike at answers of a time server. */
 #define HEAD_FAULTS_SERVER                                                                      \
     (HEAD_FAULT(FAULT_NTP_SILENT) | HEAD_FAULT(FAULT_NTP_KISS) | HEAD_FAULT(FAULT_NTP_UNSYNC) | \
      HEAD_FAULT(FAULT_NTP_STEP))

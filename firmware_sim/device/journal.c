@@ -122,7 +122,7 @@ int journal_close(struct journal *journal, struct sh_err *err)
     return rc;
 }
 
-/* Takes a decimal number up to max and the blank after it. It takes digits only: strtoull would take signs, too. */
+/* Takes a decimal number up to max and the blank after it. Only digits are taken: strtoull would take signs, too. */
 static int journal_take_number(const char **p, uint64_t max, uint64_t *value)
 {
     const char *q = *p;

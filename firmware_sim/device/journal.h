@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* The journal: every command that had an effect, with its device time. Replayed, it reproduces the session.
  *
- * In: commands as the device carries them out. Out: a text file, which can be read back. It begins with the
- * line `# scanhead journal 1`. Then there is one line per command
+ * In: commands as the device carries them out. Out: a text file, which can be read back. The file begins with the line
+ * `# scanhead journal 1`. Then there is one line per command
  *   <device tick> <device time, ns> <session> <command line>
  * with decimal numbers and one blank between them. The last line has the session 0 and END in place of a command:
- * the run ended at that tick. It is missing where the head was killed. Other lines that begin with '#' and empty
- * lines are notes.
+ * the run ended at that tick. This last line is missing where the head was killed. Other lines that begin with '#' and
+ * empty lines are notes.
  *
  * A thread writes the lines at once (line_writer.h), so the caller never waits for the file. Where the file is too
  * slow, commands are dropped: a line `LOST <n>` stands for n of them, and journal_read refuses such a file. For dropped

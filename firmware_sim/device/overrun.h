@@ -26,8 +26,8 @@ struct device_overrun {
     uint64_t lines_tick; /* of the last event; 0: there was none */
 };
 
-/* Adds an event for the losses since the last one. It names the first lost pulse, or pulse_next, the scan's next one,
- * where none is known. */
+/* Adds an event for the losses since the last one. The event names the first lost pulse, or pulse_next, the scan's next
+ * one, where none is known. */
 void device_say_overrun(struct device_overrun *overrun, uint64_t pulse_next, uint64_t tick);
 /* Adds an event for lines that files lack, once a second at most. */
 void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick);

@@ -52,8 +52,8 @@ static void note_edge(struct device *device, double turn)
                      fabs(wrap(turn - (double)phase_udeg / TURN_UDEG)) * TURN_UDEG <= (double)HELD_UDEG;
 }
 
-/* Chooses the speed with which the azimuth is right a second after the edge. It holds from the scan's next pulse on,
- * the first one after the edge. */
+/* Chooses the speed with which the azimuth is right a second after the edge. The speed holds from the scan's next pulse
+ * on, the first one after the edge. */
 static void hold(struct device *device, int64_t edge_ns)
 {
     const struct device_scan *scan = &device->scan;

@@ -108,7 +108,7 @@ int device_end_boot(struct device *device, uint64_t tick)
     return 1;
 }
 
-/* Returns the tick at which power comes back, if it goes off in this tick; 0 if it does not. */
+/* Returns the tick at which power comes back, if power goes off in this tick; 0 if it does not. */
 static uint64_t goes_until(struct device *device, uint64_t tick)
 {
     const struct head_fault *f = NULL;

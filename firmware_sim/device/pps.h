@@ -13,9 +13,10 @@
  *     power comes -> counts from 0 -> locked pulse: its part of a second becomes 0 -> sentence: its minutes and seconds
  *                    by the head's own clock                                          are taken over
  *
- * While pulses aren't locked, neither pulses nor sentences set the counter: it goes on by the head's clock. While they
- * are locked but sentences are missing, its minutes and seconds are counted on, and pulses set its part of a second.
- * The last PPS_KEPT changes are kept, since sessions ask for past times. Pure; the owner has the lock. */
+ * While pulses aren't locked, neither pulses nor sentences set the counter: it goes on by the head's clock. While
+ * pulses are locked but sentences are missing, the counter's minutes and seconds are counted on, and pulses set the
+ * counter's part of a second. The last PPS_KEPT changes are kept, since sessions ask for past times. Pure; the owner
+ * has the lock. */
 #ifndef FIRMWARE_SIM_DEVICE_PPS_H
 #define FIRMWARE_SIM_DEVICE_PPS_H
 

@@ -17,7 +17,7 @@
  *     UNCALIBRATED, SLAVE --no Announce for 3 intervals--> LISTENING      any state --fault--> FAULTY --> LISTENING
  *
  * The servo is a PI controller. From the offset o, ns, and the Sync interval T it corrects the rate by 0.7 o / T, and
- * its estimate of the oscillator by 0.3 o / T. Those are linuxptp's gains for T = 1 s. Its states:
+ * its estimate of the oscillator by 0.3 o / T. Both gains are linuxptp's for T = 1 s. The servo's states:
  *     s0 unlocked   an offset is measured
  *     s1 jump       with the second one the rate is known; the clock is stepped where the offset is too large
  *     s2 locked     each Sync corrects the rate
@@ -78,7 +78,7 @@ struct ptp {
     int64_t sample_ns, sample_offset_ns; /* the first sample */
 };
 
-/* All that it points to must outlive it. seed: noise.seed. */
+/* All that *ptp points to must outlive *ptp. seed: noise.seed. */
 void ptp_init(struct ptp *ptp, const struct config_ptp *cfg, uint64_t seed);
 /* A tick, [t_ns, end_ns) of device time, after the faults of the tick have begun and ended. is_up: the head has power
  * and has booted. */

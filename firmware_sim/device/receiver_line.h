@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The line from the GNSS receiver: the fixes that were sent as sentences, the time at which each sentence arrived, and
- * the faults that it has.
+ * the faults that the line has.
  *
  * In: each tick, with the faults that are active in it. Out: the last sentence that had arrived by a device time. No
  * sentence overtakes another. The last RECEIVER_KEPT sentences are kept, since sessions ask for past times. For earlier

@@ -8,7 +8,7 @@
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/device/frames.h"
 
-/* Plans the site for the settings. This may fail although each setting was accepted: without memory, or because the
+/* Plans the site for the settings. The plan may fail although each setting was accepted: without memory, or because the
  * scan begins at another station. */
 static int plan_scan(struct device *device, struct device_variant **variant, uint64_t tick)
 {
@@ -104,7 +104,7 @@ static void count_pulses(struct device *device, struct device_work *work)
 }
 
 /* Returns the time from the scan's start after which it ends at the latest, by the option scan_s or by the end of its
- * path. It may end earlier by its number of frames. */
+ * path. The scan may end earlier by its number of frames. */
 static int64_t scan_end_ns(const struct device *device)
 {
     int64_t path_end_ns = device_path_end_ns(device);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The clock of a scanner that has a date of its own and no battery, as SICK's: device time -> ns since 1970.
  *
- * It runs as the head's clock does, with its errors (head_clock.h). At power-up it shows UTC where the head knows the
- * time of day and no time server is to be asked (ntp.role: client); else it begins with 1970. TIME:SHIFt sets it, and
- * so do answers of a time server. The commands are journalled, so a replayed session has the same dates.
+ * This clock runs as the head's clock does, with the same errors (head_clock.h). At power-up it shows UTC where the
+ * head knows the time of day and no time server is to be asked (ntp.role: client); else it begins with 1970. TIME:SHIFt
+ * sets it, and so do answers of a time server. The commands are journalled, so a replayed session has the same dates.
  *
  * Thread: any. */
 #ifndef FIRMWARE_SIM_DEVICE_SCANNER_CLOCK_H

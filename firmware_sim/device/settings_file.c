@@ -203,7 +203,7 @@ static int put_image(const void *source, FILE *out, struct sh_err *why)
 }
 
 /* Writes each new image. When the file is closed, this thread writes what is new, or tries a failed write once more.
- * Then it ends. */
+ * Then the thread ends. */
 static void *settings_file_main(void *arg)
 {
     struct settings_file *file = arg;

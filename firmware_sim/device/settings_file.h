@@ -9,8 +9,8 @@
  *   NAME LINE                     any number of them; the lines of a name are in their order
  *   end
  *
- * A thread writes it, as a new file that takes the place of the old one, so it is always whole. No caller waits for a
- * disk. The file is locked as long as it is open here. */
+ * A thread writes the file, as a new one that takes the place of the old one, so the file is always whole. No caller
+ * waits for a disk. The file is locked as long as it is open here. */
 #ifndef FIRMWARE_SIM_DEVICE_SETTINGS_FILE_H
 #define FIRMWARE_SIM_DEVICE_SETTINGS_FILE_H
 

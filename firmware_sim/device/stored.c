@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Settings that the head keeps without power. They are its settings of power-up, so *RST and DEF mean these, too. */
+/* Settings that the head keeps without power. These settings are the head's at power-up, so *RST and DEF mean them,
+ * too. */
 #include <stdio.h>
 
 #include "firmware_sim/command/stored.h"

@@ -82,7 +82,7 @@ static void follow_from_power_up(struct device *device, int64_t t_ns)
     pps_power_up(&device->pps, at, warm ? utc_posix_from_tai(&device->clock.table, at.head_ns) : 0, pulses);
 }
 
-/* Takes minutes and seconds as the sentence has them. One with a wrong checksum isn't used. */
+/* Takes minutes and seconds as the sentence has them. A sentence with a wrong checksum isn't used. */
 static void take_sentence(struct device *device, const struct receiver_sentence *sentence)
 {
     const int64_t tai_ns = head_clock_true_ns(&device->clock, gnss_time_ns(&device->gnss, sentence->index));

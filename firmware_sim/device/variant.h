@@ -12,7 +12,8 @@
 #include "firmware_sim/device/scan_state.h"
 #include "firmware_sim/device/versions.h"
 
-/* The site, planned again for settings that commands gave (site_vary). It is kept while a scan or a work uses it. */
+/* The site, planned again for settings that commands gave (site_vary). The variant is kept while a scan or a work uses
+ * it. */
 struct device_variant {
     struct device_variant *next;
     struct device_version *version; /* that it is made from, and that it holds */

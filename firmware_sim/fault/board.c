@@ -110,7 +110,7 @@ const void *fault_find(const void *items, uint32_t n, size_t size, uint32_t numb
     return NULL;
 }
 
-/* Returns a number for a new fault, whose count begins at 0. Without memory it returns 0. */
+/* Returns a number for a new fault, whose count begins at 0. Without memory the function returns 0. */
 static uint32_t board_take_number(struct fault_board *board)
 {
     const uint32_t number = board->last_number + 1;

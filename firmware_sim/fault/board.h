@@ -39,7 +39,7 @@ uint32_t fault_board_version(const struct fault_board *board);
 /* Copies the list, and returns its version. */
 uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[FAULT_MAX], uint32_t *n);
 
-/* The same, with the faults that were taken out last. These still hit frames from before they were taken out. */
+/* The same, with the faults that were taken out last. Such faults still hit frames from before. */
 uint32_t fault_board_copy_all(struct fault_board *board, struct fault_entry entries[FAULT_KEPT], uint32_t *n);
 
 /* Finds the item of a fault among n items of `size` bytes that begin with the faults' numbers. NULL: there is none. For
@@ -57,7 +57,7 @@ uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_n
 void fault_board_note(struct fault_board *board, const struct fault_note *note);
 /* Returns the number of the fault that was added last; 0: there never was one. */
 uint32_t fault_board_last(struct fault_board *board);
-/* Returns how often the fault of that number was injected; 0: all together. Those that were taken out count, too. */
+/* Returns how often the fault of that number was injected; 0: all together. Faults that were taken out count, too. */
 uint64_t fault_board_injected(struct fault_board *board, uint32_t number);
 /* Adds a listener, which is called for each note in the thread that injected it. Before the run; up to 4. */
 void fault_board_listen(struct fault_board *board, void (*heard)(void *ctx, const struct fault_note *note), void *ctx);

@@ -100,8 +100,8 @@ struct fault {
     uint64_t from, until; /* numbers; until 0: no end */
     uint64_t every;       /* from `from` on */
     double probability;
-    /* It strikes at most so often; 0: no limit. This counts in each session. For acts of the link (fault_is_act), and
-     * for faults at connections, it counts on the link. */
+    /* The fault strikes at most so often; 0: no limit. The limit is for each session. For acts of the link
+     * (fault_is_act), and for faults at connections, it is for the link. */
     uint64_t count;
     uint64_t from_pulse, until_pulse; /* of a scan, from 0; until UINT64_MAX: no end. Other frames have no pulses */
     double from_s, until_s;           /* until 0: no end */
@@ -131,7 +131,7 @@ struct fault_spot {
 
 extern const char *const fault_names[]; /* by kind, NULL at the end */
 enum fault_place fault_place_of(enum fault_kind kind);
-/* Whether it is an act of the link, at a frame: disconnect to short_packets. */
+/* Whether the kind is an act of the link, at a frame: disconnect to short_packets. */
 int fault_is_act(enum fault_kind kind);
 /* The kind by which a link carries out an act. acts: those that it can do; bit 0 is FAULT_DISCONNECT, and so on. For a
  * link that can't fall silent, a pulled cable is an unplugging. */
@@ -139,7 +139,7 @@ enum fault_kind fault_act_of(enum fault_kind kind, uint32_t acts);
 /* Returns n; if that is 0, the default of the kind. */
 uint32_t fault_n(const struct fault *fault);
 
-/* Whether it strikes there, without regard to its count. index: in the list; link: the spot's. */
+/* Whether the fault strikes there, without regard to its count. index: in the list; link: the spot's. */
 int fault_strikes(const struct fault *fault, uint32_t index, uint32_t link, const struct fault_spot *spot);
 /* Returns a random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
 uint64_t fault_random(const struct fault *fault, uint32_t index, uint32_t link, uint64_t number, uint32_t draw);

@@ -170,7 +170,7 @@ static int strikes(struct faulty_link *f, uint32_t i, int64_t t_ns)
     return fault_strikes(fault, entry->number, f->spec.number, &spot);
 }
 
-/* Carries it out, and notes it. session: -1: none. */
+/* Carries the fault out, and notes it. session: -1: none. */
 static int inject(struct faulty_link *f, uint32_t i, int session, int64_t t_ns)
 {
     const struct fault_entry *entry = &f->connections.fault[i].entry;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* A link with injected faults: a decorator of any link, with link_ops around link_ops (drivers/link/link.h).
  *
- * In: the calls of the link's owner. Out: the same calls on the inner link, with the faults of a board. These change
- * the bytes of sessions, end sessions, turn clients away, and take the link away for a time. As long as the board never
- * had a fault, calls only pass through.
+ * In: the calls of the link's owner. Out: the same calls on the inner link, with the faults of a board. The faults
+ * change the bytes of sessions, end sessions, turn clients away, and take the link away for a time. As long as the
+ * board never had a fault, calls only pass through.
  *
  * From the first fault on, each session has a wire (wire.h). A wire that stalls holds as many bytes as a session's
  * buffer; one that delays holds WIRE_DELAY_BYTES. A wire that is full makes write() take nothing, so its reader counts
@@ -49,7 +49,7 @@ void faulty_next(struct faulty_link *link, int session, int is_reply, int64_t t_
 /* All bytes from before device time t_ns were written to the session; INT64_MAX: none will follow. Passes on what is
  * due. Returns 1 if write() takes more; 0: not now; negative: as write(). */
 int faulty_pass(struct faulty_link *link, int session, int64_t t_ns);
-/* A command of the session changed the faults. Its own reply is the last of the next n ones. */
+/* A command of the session changed the faults. The command's own reply is the last of the next n ones. */
 void faulty_changed(struct faulty_link *link, int session, uint64_t n_replies);
 
 /* Notes the end of a pulled cable: it is plugged in, or another fault of the link replaces it, or the run ends. Does

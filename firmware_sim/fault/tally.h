@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How often each fault of the list has struck, over all sessions of a link. It serves faults whose `count` holds
+/* How often each fault of the list has struck, over all sessions of a link. The tally serves faults whose `count` holds
  * for the link, not for each session.
  *
  * In: a fault's number. Out: its count, which the caller raises. Thread: one. */

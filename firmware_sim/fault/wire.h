@@ -56,7 +56,8 @@ struct wire_item {
 };
 /* Returns 0, or SH_ENOMEM: the item is lost, or part of it. */
 int wire_put(struct wire *wire, const struct wire_item *item, int64_t now_ns);
-/* Puts the rest of a frame, unit or reply that was begun without the wire. It goes out as it is, and is not counted. */
+/* Puts the rest of a frame, unit or reply that was begun without the wire. The rest goes out as it is, and is not
+ * counted. */
 int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len);
 /* An act that should have ended the session could not be carried out. Items that were put since then are lost. */
 void wire_go_on(struct wire *wire);

@@ -170,8 +170,8 @@ static uint64_t flip_bits(struct change *c, uint64_t n_bits, uint64_t n)
     return done;
 }
 
-/* The reader's system drops a datagram that is damaged on its way, so a flip drops it. With reseal it is wrong before
- * it is sent, and arrives. */
+/* The reader's system drops a datagram that is damaged on its way, so a flip drops it. With reseal the datagram is
+ * wrong before it is sent, and arrives. */
 static int flip(struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;

@@ -47,7 +47,8 @@ static int claim(struct loop *loop, struct device_work *work, struct ring_slot *
     return got;
 }
 
-/* Makes the tick in its slot. 0: it has no room, and there is no memory for more. That is reported once per episode. */
+/* Makes the tick in its slot. 0: the slot has no room, and there is no memory for more. The lack is reported once per
+ * episode. */
 static int casters_fill(struct loop_caster *caster, const struct device_work *work, struct ring_slot *slot)
 {
     struct loop *loop = caster->loop;

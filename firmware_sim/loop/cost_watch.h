@@ -2,8 +2,8 @@
 /* Warns, once, where casting takes more than ten times the processor time that the plan has for a pulse.
  *
  * In: the casters' processor time, the pulses that they claimed, and the ticks that were released. A thread of its own
- * reads them once a second, so the casters and the pacing thread spend nothing on it. Out: one line, through the report
- * of the loop. Only processor time counts, so a busy machine gives no warning. */
+ * reads these figures once a second, so the casters and the pacing thread spend nothing on that. Out: one line, through
+ * the report of the loop. Only processor time counts, so a busy machine gives no warning. */
 #ifndef FIRMWARE_SIM_LOOP_COST_WATCH_H
 #define FIRMWARE_SIM_LOOP_COST_WATCH_H
 

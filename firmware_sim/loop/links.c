@@ -11,8 +11,8 @@
 #include "firmware_sim/loop/pump.h"
 
 /* Returns the bytes per second of the points at the present rates, with one echo per pulse, and one window of its
- * waveform. It is a lower bound: further echoes and the frames' headers come on top. A command can raise the rates
- * later. If a link can't carry the stream then, it announces what it loses. */
+ * waveform. The result is a lower bound: further echoes and the frames' headers come on top. A command can raise the
+ * rates later. If a link can't carry the stream then, it announces what it loses. */
 static double stream_rate(const struct links *links, const struct config *cfg)
 {
     double point_len = NATIVE_POINT_LEN + (cfg->output.attributes ? NATIVE_ATTRIBUTE_LEN : 0) +

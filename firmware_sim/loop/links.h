@@ -37,7 +37,7 @@ struct links_observer {
     void *ctx;
     /* A session begins (1) or ends (0). t_ns: device time from which on, or up to which, it is given the stream. */
     void (*session)(void *ctx, uint32_t session, int begins, const char *peer, int64_t t_ns);
-    /* Its client sent these bytes. */
+    /* The session's client sent these bytes. */
     void (*heard)(void *ctx, uint32_t session, const void *bytes, size_t len);
     /* A request was answered with an error, or could not be read. reply: of a native line; NULL in other protocols. */
     void (*refused)(void *ctx, uint32_t session, const char *line, const char *reply);

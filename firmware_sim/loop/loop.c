@@ -188,8 +188,8 @@ void loop_put_links(const struct loop *loop, struct json *json)
     json_close_array(json);
 }
 
-/* Locks the memory that is allocated now, so that nothing the pacing thread touches is paged out or in. It is called
- * before the threads start, since else their whole stacks would be locked. */
+/* Locks the memory that is allocated now, so that nothing the pacing thread touches is paged out or in. The function is
+ * called before the threads start, since else their whole stacks would be locked. */
 static void lock_memory(const struct loop *loop)
 {
     if (loop->stream.waits || mlockall(MCL_CURRENT) == 0) return;
@@ -197,8 +197,8 @@ static void lock_memory(const struct loop *loop)
             strerror(errno));
 }
 
-/* Only a SICK scanner in real time asks a time server. While a journal is replayed, it does not: the journal has the
- * effects of the server's answers. */
+/* Only a SICK scanner in real time asks a time server. While a journal is replayed, the scanner does not: the journal
+ * has the effects of the server's answers. */
 static int asks_time(const struct loop *loop)
 {
     const int asks = config_speaks(loop->cfg, PROTOCOL_COLA);

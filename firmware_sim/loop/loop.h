@@ -45,7 +45,8 @@ struct loop_stats {
 int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
                 struct sh_err *err);
 
-/* The same for a source that makes its ticks itself. It uses links, loop and the head's identity of cfg alone. */
+/* The same for a source that makes its ticks itself. loop_create_of uses links, loop and the head's identity of cfg
+ * alone. */
 int loop_create_of(const struct config *cfg, const struct loop_source *source, const struct loop_options *options,
                    struct loop **out, struct sh_err *err);
 

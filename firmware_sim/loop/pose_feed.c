@@ -73,7 +73,8 @@ static void take_datagram(struct pose_feed *feed)
     ssize_t n = recv(feed->fd, feed->text, DATAGRAM, MSG_DONTWAIT);
     if (n <= 0) return;
     feed->text[n] = '\0';
-    /* The text may end with NULs, as that of a C program does. Others would hide what follows them: they are errors. */
+    /* The text may end with NULs, as that of a C program does. Other NULs would hide what follows them: they are
+     * errors. */
     while (n > 0 && feed->text[n - 1] == '\0')
         n--;
     for (ssize_t i = 0; i < n; i++)

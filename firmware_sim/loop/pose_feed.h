@@ -6,11 +6,11 @@
  *   t_s x y z roll pitch heading
  *
  * in device time in seconds (TIME? asks for it), metres in the scene frame, and degrees as core/pose.h
- * defines them. Blanks or commas stand between the numbers. Out: calls of device_pose. A thread of its own
- * takes them in.
+ * defines them. Blanks or commas stand between the numbers. Out: calls of device_pose. A thread of its own takes the
+ * datagrams in.
  *
  * A line is not used when it is malformed, out of reach, not later than the one before, or more than
- * DEVICE_POSE_AHEAD_S ahead of device time. It is counted (bad_poses), and reported once per second at
+ * DEVICE_POSE_AHEAD_S ahead of device time. Such a line is counted (bad_poses), and reported once per second at
  * most. */
 #ifndef FIRMWARE_SIM_LOOP_POSE_FEED_H
 #define FIRMWARE_SIM_LOOP_POSE_FEED_H
@@ -24,7 +24,7 @@ struct pose_feed;
 /* Listens at platform.address and platform.port. */
 int pose_feed_open(struct device *device, const struct config *cfg, struct pose_feed **out, struct sh_err *err);
 int pose_feed_start(struct pose_feed *feed, struct sh_err *err);
-/* Writes where it listens, such as "udp:127.0.0.1:4711". */
+/* Writes where the feed listens, such as "udp:127.0.0.1:4711". */
 void pose_feed_endpoint(const struct pose_feed *feed, char *buf, size_t len);
 /* Ends the thread; feed may be NULL. */
 void pose_feed_close(struct pose_feed *feed);

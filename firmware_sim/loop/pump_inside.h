@@ -103,20 +103,21 @@ void pump_say(void *pump, const char *text);
 /* session.c */
 void session_open(struct pump *pump, struct session *s, const char *peer);
 void session_close(struct pump *pump, struct session *s);
-/* Its client sends nothing more. It still gets answers to what it sent, and the stream. */
+/* The session's client sends nothing more. The client still gets answers to what it sent, and the stream. */
 void session_shut(struct pump *pump, struct session *s);
 /* As session_close, but when power goes. Neither the protocol is told that the client went, nor does the session give
  * back its control: the device does that itself. */
 void session_cut(struct pump *pump, struct session *s);
 /* Returns the first tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
 uint64_t session_off_tick(const struct pump *pump, const struct session *s);
-/* Begins a session anew when power goes with a tick. For sessions that outlast it, such as that of a file. */
+/* Begins a session anew when power goes with a tick. For sessions that outlast the loss of power, such as that of a
+ * file. */
 void session_restart(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes released ticks and replies, and writes until the link is full (1) or nothing is left (0). index: of the session
  * on its link. */
 int session_write(struct pump *pump, struct session *s, int index);
-/* Whether a session whose bytes are all written is over. It is when its protocol ends it, or when its client sends
- * nothing more and nothing is due to it. */
+/* Whether a session whose bytes are all written is over. A session is over when its protocol ends it, or when its
+ * client sends nothing more and nothing is due to it. */
 int session_is_done(const struct pump *pump, const struct session *s);
 
 /* Lets the link know that all before the session's cursor was written, so that it passes on what is due. is_last:
@@ -124,8 +125,8 @@ int session_is_done(const struct pump *pump, const struct session *s);
 int session_pass(struct pump *pump, struct session *s, int is_last);
 /* Whether bytes that were written wait in the link. */
 int session_waits(const struct pump *pump, const struct session *s);
-/* In the paces that wait, sessions take no frames while the file of the truth is behind. Their clients still get their
- * replies. */
+/* In the paces that wait, sessions take no frames while the file of the truth is behind. The sessions' clients still
+ * get their replies. */
 int session_waits_for_files(const struct pump *pump);
 /* Returns the number of the session on its link. */
 static inline int session_index(const struct pump *pump, const struct session *s)
@@ -142,12 +143,12 @@ int pump_power(struct pump *pump, uint32_t full);
  * if it is that of the session's first frames. */
 void session_know_next(struct pump *pump, struct session *s);
 /* Moves the cursor on, since the ring no longer has its tick. The cursor goes to the oldest tick of the queue if no
- * frame is lost before that, else to the middle of the queue, so that the reader has time to recover. It does not go
- * beyond off_tick. */
+ * frame is lost before that, else to the middle of the queue, so that the reader has time to recover. The cursor does
+ * not go beyond off_tick. */
 void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick);
 /* Compares the number of a tick's first frame with the expected one, and counts a gap. A native reader gets an event
- * frame before the tick's frames. These lie at the end of its buffer, with REPLY_ROOM / 8 bytes free after them.
- * `released`: ticks released when the tick was read. Returns how many frames are missing. */
+ * frame before the tick's frames. The tick's frames lie at the end of the session's buffer, with REPLY_ROOM / 8 bytes
+ * free after them. `released`: ticks released when the tick was read. Returns how many frames are missing. */
 uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
 /* Counts n units of a protocol. */
 void session_count_units(struct pump *pump, struct session *s, uint64_t n);
@@ -166,18 +167,19 @@ void pump_end_move(struct pump *pump, struct session *s);
  * sends on and on without reading. */
 void pump_take_lines(struct pump *pump, struct session *s);
 /* A client that floods the link with wrong lines would cost a processor. So a link rests when one of its sessions had
- * WRONG_AT_ONCE of them, or when its input has no room. 1: it did, and more lines may wait. */
+ * WRONG_AT_ONCE of them, or when its input has no room. 1: the link rested, and more lines may wait. */
 int pump_rest(struct pump *pump);
 /* Reads what the client sent. */
 void pump_read(struct pump *pump, struct session *s, int index);
 /* The same; then carries out its lines. */
 void pump_read_commands(struct pump *pump, struct session *s, int index);
 
-/* pump_protocol.c: a session of a protocol that is not native. It has everything before the tick at its cursor. */
+/* pump_protocol.c: a session of a protocol that is not native. The session has everything before the tick at its
+ * cursor. */
 /* Returns 0 or a negative SH_E. */
 int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err);
 void session_close_protocol(struct pump *pump, struct session *s);
-/* Closes it and opens it again at the cursor. */
+/* Closes the session and opens it again at the cursor. */
 int session_restart_protocol(struct pump *pump, struct session *s);
 /* As session_write. */
 int session_write_protocol(struct pump *pump, struct session *s, int index);

@@ -30,14 +30,14 @@
  * the two that device_tick_lines adds. */
 enum { RING_MAX_READERS = 73, RING_MAX_MARKS = 104 };
 
-/* These count echoes, shots without echo, hits that gave none, and samples of waveforms without room (struct
+/* The members count echoes, shots without echo, hits that gave none, and samples of waveforms without room (struct
  * cast_counters). */
 struct ring_hits {
     uint32_t echoes, empty, crowded, faint, unfit, lost_samples;
 };
 void ring_hits_add(struct ring_hits *sum, const struct ring_hits *more);
 
-/* A line-end frame. Its counts of echoes are known at release: blocks before it may come from other ticks. */
+/* A line-end frame. The frame's counts of echoes are known at release: blocks before it may come from other ticks. */
 struct ring_mark {
     uint32_t frame_at;       /* offset of the frame in bytes */
     struct ring_hits before; /* of this tick since the mark before */

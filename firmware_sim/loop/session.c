@@ -169,7 +169,8 @@ static int take_tick(struct pump *pump, struct session *s)
     return 1;
 }
 
-/* Keeps the bytes of a tick that a link did not take. They begin with a whole frame, as count_unwritten expects. */
+/* Keeps the bytes of a tick that a link did not take. The kept bytes begin with a whole frame, as count_unwritten
+ * expects. */
 static void keep_rest(struct session *s, const struct ring_copy *tick, uint32_t taken)
 {
     uint32_t at = 0, len;

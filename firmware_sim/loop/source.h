@@ -58,9 +58,9 @@ struct loop_source_ops {
     uint32_t (*usual_bytes)(const void *self);
     /* Descriptor, emitter and anchor, for clients that join before the first tick. */
     void (*describe)(void *self, struct ring_tick *tick);
-    /* Makes the next tick, number `tick`. Its bytes stay until the next call. OVER: the run ends before it. IDLE:
-     * nothing happens without a command; returned only where `may_idle`. again: the frames of the tick before could not
-     * be sent; they go before those of this one. */
+    /* Makes the next tick, number `tick`. The tick's bytes stay until the next call. OVER: the run ends before it.
+     * IDLE: nothing happens without a command; returned only where `may_idle`. again: the frames of the tick before
+     * could not be sent; they go before those of this one. */
     enum loop_source_tick (*next)(void *self, uint64_t tick, int may_idle, int again, struct ring_tick *out);
 };
 

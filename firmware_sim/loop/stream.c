@@ -11,9 +11,9 @@ static const int64_t PATIENCE_NS = 2000000000;
 int stream_create(struct stream *stream, const struct ring_size *size, int64_t tick_ns, struct sh_err *err)
 {
     stream->tick_ns = tick_ns;
-    /* In real time casters are woken when a quarter of the ticks ahead is free. They then have three quarters of that
-     * time left if they have to wait for a processor. Fewer ticks per wake-up would cost more, since caches are cold
-     * each time. In the paces that wait, some threads fill the queue while others empty it. */
+    /* In real time casters are woken when a quarter of the ticks ahead is free. The casters then have the time of three
+     * quarters left if they have to wait for a processor. Fewer ticks per wake-up would cost more, since caches are
+     * cold each time. In the paces that wait, some threads fill the queue while others empty it. */
     stream->say_ticks = 1 + (stream->waits ? size->queue_ticks / 4 : size->ahead_ticks / 4);
     stream->lazy_ticks = 1 + size->queue_ticks / 8;
     atomic_store(&stream->wanted, UINT64_MAX);
@@ -121,7 +121,7 @@ static void complete_event(struct stream *stream, uint8_t *frame, const struct n
     native_encode_event(frame, native_frame_len(frame), &event, header->t_ns, header->flags);
 }
 
-/* Lost pulses were cast and not delivered. They are known here: all ticks before were released or lost. */
+/* Lost pulses were cast and not delivered. The lost pulses are known here: all ticks before were released or lost. */
 static void complete_counts(struct stream *stream, uint8_t *frame)
 {
     struct native_header header;
@@ -391,7 +391,7 @@ uint64_t stream_pass(struct stream *stream, uint64_t total_ns)
 {
     const uint64_t tick = total_ns / (uint64_t)stream->tick_ns;
     uint64_t seen = atomic_load(&stream->granted);
-    /* The run's end, or a later grant of another session, may have let more time pass by now. That is not taken
+    /* The run's end, or a later grant of another session, may have let more time pass by now. That time is not taken
      * back. */
     while (seen < tick && !atomic_compare_exchange_weak(&stream->granted, &seen, tick))
         continue;

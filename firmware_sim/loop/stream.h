@@ -5,11 +5,11 @@
  * reader at its own speed. Readers are the sessions of links (pump.h) and the hash of the stream (hash.c).
  *
  * The stream holds the ring, how far each reader is, the number of the next frame, the counts that are made at
- * release, the time that a peer granted (pace step), and all wake-ups. It knows nothing of casting, of links
+ * release, the time that a peer granted (pace step), and all wake-ups. The stream knows nothing of casting, of links
  * or of commands.
  *
  * Wake-ups. In real time a link is woken at each tick that it wants, or once in `every` ticks. Casters are woken once a
- * quarter of the ticks ahead is free, and the hash once an eighth of the queue was released: they have time. The pacing
+ * quarter of the ticks ahead is free, and the hash once an eighth of the queue was released: both have time. The pacing
  * thread sleeps up to the next tick that wakes one of them. In the paces that wait for readers, nobody waits for a
  * single tick. So wake-ups are saved up, and ticks pass from thread to thread in batches. One rule prevents a deadlock:
  * a thread that is about to sleep first wakes all threads that can go on by its work. Casters announce the ticks that
@@ -138,7 +138,8 @@ void stream_end(struct stream *stream);
  * end. Returns its listener. Before the pacing thread starts. */
 struct stream_listener *stream_listen(struct stream *stream, int fd, uint64_t every);
 /* Sets what wakes a listener from now on: frames, where `frames` is 1, and the release of each tick from `tick` on.
- * Returns 1 when it must look for itself once: that tick was released already, or frames did not wake it before. */
+ * Returns 1 when the listener must look for itself once: that tick was released already, or frames did not wake it
+ * before. */
 int stream_wake_at(struct stream *stream, struct stream_listener *listener, int frames, uint64_t tick);
 /* A reader begins (active) or ends, and has read everything before a tick. */
 void stream_set_reader(struct stream *stream, int reader, uint64_t cursor, int active);
@@ -147,7 +148,7 @@ void stream_move_reader(struct stream *stream, int reader, uint64_t cursor);
 /* A reader's link has taken all bytes before a tick. Wakes listeners that wait for that (stream_has_written). */
 void stream_note_written(struct stream *stream, int reader, uint64_t cursor);
 /* Pace step: whether all active readers but `reader` have written everything before a tick. If not, the listener is
- * woken once one of them has written what was granted; then it asks again. The hash does not count. */
+ * woken once one of them has written what was granted; then the listener asks again. The hash does not count. */
 int stream_has_written(struct stream *stream, struct stream_listener *listener, int reader, uint64_t tick);
 /* A reader is about to sleep: what it read may let the pacing thread go on. */
 void stream_rest_reader(struct stream *stream);

@@ -67,7 +67,7 @@ static void close_server(struct time_client *c)
     c->halvings = 0;
 }
 
-/* Where the machine has no route yet, it is tried again a period later. */
+/* Where the machine has no route yet, the connection is tried again a period later. */
 static void open_server(struct time_client *c)
 {
     const int64_t now_ns = clock_now_ns(), soonest_ns = c->asked_ns + LEAST_NS;

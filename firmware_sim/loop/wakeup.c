@@ -16,7 +16,7 @@ void wakeup_free(struct wakeup *wakeup)
 }
 
 /* Either this thread sees that an earlier signal was taken, and signals again; or the thread that took it sees the
- * change. Both need a store to be ordered before a later load, which a semaphore by itself does not promise. */
+ * change. Both cases need a store to be ordered before a later load, which a semaphore by itself does not promise. */
 void wakeup_signal(struct wakeup *wakeup, uint32_t n)
 {
     int kept = 0;

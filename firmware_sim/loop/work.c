@@ -329,7 +329,7 @@ static void find_angles(const struct device_work *work, uint64_t k, double *mirr
         *mirror_turn = disturbance->stuck_turn;
 }
 
-/* Writes the line-end frame. Its number of echoes is filled in at release: blocks may come from several
+/* Writes the line-end frame. The frame's number of echoes is filled in at release: blocks may come from several
  * ticks. */
 static void end_line(struct worker *worker, const struct device_work *work, const struct schedule_line *line,
                      uint64_t end)
@@ -397,7 +397,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
     if (worker->site->moving && work->pulse_end > work->pulse0) /* also in the blind part of a line */
         move_anchor(worker, work, site_stretch_at(worker->site, schedule_time_ns(&work->segment, work->pulse_end - 1)));
     if (!work->cut_short) return;
-    /* The line that was stopped. Its pulses are in this tick or in earlier ones. */
+    /* The line that was stopped. The line's pulses are in this tick or in earlier ones. */
     struct schedule_line line;
     schedule_get_line(&work->segment, schedule_line_of(&work->segment, work->pulse_end), &line);
     if (line.begin < work->pulse_end) end_line(worker, work, &line, work->pulse_end);

@@ -3,7 +3,7 @@
  *
  * In: a file of tcpdump's, Wireshark's or `record --raw` (.pcap, .pcapng). Out: a talk (drivers/protocol/talk.h) for
  * each port of a device in it. With TCP, the device is the end that the connection was made to. If the capture begins
- * later than the connection, the device is the end that sent more bytes. With UDP, it is the end that sent more
+ * later than the connection, the device is the end that sent more bytes. With UDP, the device is the end that sent more
  * datagrams, or, if both sent as many, the end that did not send first. TCP streams are put together as receivers do;
  * missing bytes are counted.
  *

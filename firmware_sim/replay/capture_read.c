@@ -127,9 +127,9 @@ static int add_packet(struct replay_capture *c, const struct ip_packet *p, int64
     return SH_OK;
 }
 
-/* Sets c->now_ns, the time of a packet since the first one. It never goes back, since packets lie in the order in which
- * they came, whatever their times are. Where the clock was set back, later times count from there, so that the delays
- * between later packets are right. */
+/* Sets c->now_ns, the time of a packet since the first one. The time never goes back, since packets lie in the order in
+ * which they came, whatever their times are. Where the clock was set back, later times count from there, so that the
+ * delays between later packets are right. */
 static int pass_time(struct replay_capture *c, const struct pcapng_packet *packet, struct sh_err *err)
 {
     if (!packet->has_time) {

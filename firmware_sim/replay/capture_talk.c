@@ -11,7 +11,7 @@
 enum { MAX_REQUESTS = 20000, MAX_STREAMS = 16, MOST_PENDING = 16, MOST_BACK = 4096, KIND_BYTES = 1024 };
 enum { OF_CONNECTION = -1 };
 
-/* A request of a client. One that came several times has an entry for each time. */
+/* A request of a client. A request that came several times has an entry for each time. */
 struct asked {
     uint32_t request; /* of the store */
     size_t at;
@@ -272,7 +272,7 @@ static int build_place(struct replay_capture *c, const struct capture_flow *firs
     return rc;
 }
 
-/* Whether it is the first flow of its place: those before it are of other places. */
+/* Whether a flow is the first of its place: flows before it are of other places. */
 static int is_first(const struct replay_capture *c, const struct capture_flow *f)
 {
     for (const struct capture_flow *before = c->flow; before < f; before++)

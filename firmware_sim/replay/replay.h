@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* A recording as a source of the loop (loop/source.h): the same bytes, with the timing that they had.
  *
- * In: a recording, and commands of clients. Out: ticks with its frames. It is played when a client commands SCAN:STARt,
- * or at once; SCAN:STARt begins it anew at any time. Queries are answered from its descriptor, and no setting changes.
+ * In: a recording, and commands of clients. Out: ticks with its frames. The recording is played when a client commands
+ * SCAN:STARt, or at once; SCAN:STARt begins it anew at any time. Queries are answered from its descriptor, and no
+ * setting changes.
  *
  * In its first round, each frame has the bytes that were recorded. In each further round the sequence numbers of frames
  * go back by 2^30; a reader takes that for a head that was started again. All else is as it was recorded, device times,
@@ -35,8 +36,8 @@ struct replay_options {
 };
 
 /* Opens the recording and reads it up to its first anchor. Of cfg, links, loop and faults are used; its profile and
- * settings are set from the recording, as far as links need them. Both must live until replay_free. SH_EINPUT: faults
- * in the head, or links of another protocol; SH_EFORMAT: the file has no descriptor. */
+ * settings are set from the recording, as far as links need them. cfg, and what options points to, must live until
+ * replay_free. SH_EINPUT: faults in the head, or links of another protocol; SH_EFORMAT: the file has no descriptor. */
 int replay_open(struct config *cfg, const struct replay_options *options, struct replay **out, struct sh_err *err);
 void replay_free(struct replay *replay);
 

@@ -2,13 +2,13 @@
 /* Finds the times at which a head released the frames of a recording.
  *
  * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end
- * the head released it. Most frames have that time in their header. For points it follows from their pulses: a head
- * releases packets of SCHEDULE_PACKET pulses, counted from the line's first, once the last pulse of a packet has fired.
- * Where a line, or the scan, ends within a packet, a later frame gives the time. In the pace `step` a head
- * on a live platform does not wait for whole packets. Its points may then be assigned a tick too late.
+ * the head released it. Most frames have that time in their header. For points the time follows from their pulses: a
+ * head releases packets of SCHEDULE_PACKET pulses, counted from the line's first, once the last pulse of a packet has
+ * fired. Where a line, or the scan, ends within a packet, a later frame gives the time. In the pace `step` a head
+ * on a live platform does not wait for whole packets. The points of such a head may be assigned a tick too late.
  *
  * The time is exact from the scan's start until the rates change, since the stream then says exactly when pulses fire.
- * After that, and where frames are missing, it is good to a nanosecond, and about one frame in a million may be
+ * After that, and where frames are missing, the time is good to a nanosecond, and about one frame in a million may be
  * assigned to the tick before or after its own. Pure; no allocation. */
 #ifndef FIRMWARE_SIM_REPLAY_TIMING_H
 #define FIRMWARE_SIM_REPLAY_TIMING_H

@@ -17,8 +17,8 @@ static double reach_m(const struct site *site, const struct site_stretch *stretc
     return (site->cfg->profile.range_max_m + way_m) * SITE_MARGIN;
 }
 
-/* Sets how far points can lie from centre_m. They are within the scene and within the head's range, with a margin of a
- * hundredth, and of ten sigma for noise. */
+/* Sets how far points can lie from centre_m. Points are within the scene and within the head's range, with a margin of
+ * a hundredth, and of ten sigma for noise. */
 static void extent_from(const struct site *site, const double centre_m[3], double reach, struct plan_georef_need *need)
 {
     double far[3], noise_m = site_noise_m(site);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A look is the stations that pulses are fired from, with setups like the run's. core/plan takes random samples of
- * these pulses to compare methods. The cost of methods is measured with them, too (rate.c). */
+ * these pulses to compare methods. The cost of methods is measured with these pulses, too (rate.c). */
 #ifndef FIRMWARE_SIM_SITE_LOOK_H
 #define FIRMWARE_SIM_SITE_LOOK_H
 
@@ -19,8 +19,8 @@ struct site_look {
     uint32_t n;
 };
 
-/* Opens a look from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that the site has now. It must not
- * be moved or copied: its places point into it. */
+/* Opens a look from up to SITE_LOOK_STATIONS stations, evenly chosen, with the beams that the site has now. The look
+ * must not be moved or copied: its places point into it. */
 void site_look_open(struct site_look *look, const struct site *site);
 
 #endif

@@ -32,7 +32,7 @@ static int is_ifc(const struct config_mesh *mesh)
     return len > 4 && strcasecmp(mesh->file + len - 4, ".ifc") == 0;
 }
 
-/* Finds the one IFC mesh. Its coordinate frame must be the scene's except for a shift. */
+/* Finds the one IFC mesh. The mesh's coordinate frame must be the scene's except for a shift. */
 static int find_ifc(const struct config *cfg, const struct config_mesh **out, struct sh_err *err)
 {
     *out = NULL;
@@ -54,8 +54,8 @@ static int find_ifc(const struct config *cfg, const struct config_mesh **out, st
 }
 
 /* Returns the height of a model above the ellipsoid: that of the configuration, else height_m of the file. Files give
- * heights above sea level. They are taken without a conversion, with a warning. height_m NaN: the file has no height,
- * and 0 is returned. */
+ * heights above sea level. Such heights are taken without a conversion, with a warning. height_m NaN: the file has no
+ * height, and 0 is returned. */
 static double ifc_height(const struct config *cfg, const struct sh_report *report, const char *file, const char *what,
                          double height_m)
 {

@@ -16,9 +16,9 @@ void site_cost_reason(const struct site *site, char *text, size_t room);
 /* Writes the methods that a run uses, in one line. */
 void site_plan_text(const struct site *site, char *text, size_t room);
 
-/* ---- rate.c: measures how many pulses per second this machine computes at a site. It casts pulses of the head to
- * points, and writes their frames. The figures hold for this machine at this moment, so no method is chosen by them. A
- * call takes about 8 ms of processor time; a few milliseconds more where pulses have many sub-rays. */
+/* ---- rate.c: measures how many pulses per second this machine computes at a site. The measurement casts pulses of the
+ * head to points, and writes their frames. The figures hold for this machine at this moment, so no method is chosen by
+ * them. A call takes about 8 ms of processor time; a few milliseconds more where pulses have many sub-rays. */
 /* The plan's last row, stage total. */
 int site_rate_row(const struct site *site, struct plan_row *row, struct sh_err *err);
 /* Warns where the configured rate, in real time, needs more than 80 % of the processors. */

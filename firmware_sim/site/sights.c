@@ -114,8 +114,8 @@ static void close_sight(struct site_station *s)
     free(s->sight_users);
 }
 
-/* Whether a map can be reused: it depends on the BVH, the place and the directions of rays. Its fineness changes no
- * hit. */
+/* Whether a map can be reused: it depends on the BVH, the place and the directions of rays. The map's fineness changes
+ * no hit. */
 static int still_holds(const struct site *site, const struct site *from, uint32_t i)
 {
     const struct site_station *a = &site->station[i], *b = &from->station[i];

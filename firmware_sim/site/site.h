@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The site: everything that a configuration loads once and all scans share. In: a checked configuration. Out:
  * the scene, its BVHs, the stations' places (scene frame, metres) and georeferences, and the planned methods.
- * load.c makes it, site.c reads it. It is constant once loaded: any thread. Moving a station makes another
+ * load.c makes it, site.c reads it. A site is constant once loaded: any thread. Moving a station makes another
  * site beside this one (site_load_moved). */
 #ifndef FIRMWARE_SIM_SITE_SITE_H
 #define FIRMWARE_SIM_SITE_SITE_H
@@ -94,7 +94,7 @@ struct site_plan {
 };
 
 /* The world: the meshes and their BVHs, which the sites of one scene share (world.c). The last of these
- * sites frees it. One thread loads and frees them; others may cast meanwhile. */
+ * sites frees it. One thread loads and frees sites; others may cast meanwhile. */
 struct site_world {
     uint32_t n_users;
     int written_out; /* copies are triangles of the scene */
@@ -187,8 +187,8 @@ int site_varies(const struct head_settings *a, const struct head_settings *b);
 /* Makes the site of a configuration with the ranges, the noise and the sphere's step of the settings. Detection, the
  * station's georeference and the scale on the wire are made again, by the steps of loading. All else is that
  * of `from`, which must outlive it: scene, BVHs, maps, and the methods that were chosen by trying them on the scene
- * (beam, optics). It serves scans from that station alone; maps are looked up in `from`. Takes milliseconds. SH_EINPUT:
- * there is no plan for these settings. Freed by site_vary_free. */
+ * (beam, optics). The new site serves scans from that station alone; maps are looked up in `from`. Takes milliseconds.
+ * SH_EINPUT: there is no plan for these settings. Freed by site_vary_free. */
 int site_vary(const struct site *from, const struct head_settings *settings, uint32_t station, struct site **out,
               struct sh_err *err);
 void site_vary_free(struct site *site);
@@ -224,11 +224,13 @@ int site_count_stations(const struct config *cfg, const struct sh_report *report
  * has that of the station at hand. Whether a map is used changes no hit. */
 enum { SITE_MAX_SIGHTS = 16 };
 
-/* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. It must be
- * called before these stations are scanned, and while no scan runs: casters take the map with the station's setup. */
+/* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. The function
+ * must be called before these stations are scanned, and while no scan runs: casters take the map with the station's
+ * setup. */
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err);
 
-/* These give parts of its configuration: the file, for messages; the head profile; the head's settings at power-up. */
+/* These functions give parts of the site's configuration: the file, for messages; the head profile; the head's settings
+ * at power-up. */
 const char *site_file(const struct site *site);
 const struct config_profile *site_profile(const struct site *site);
 const struct head_settings *site_settings(const struct site *site);

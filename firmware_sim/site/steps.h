@@ -100,8 +100,8 @@ void site_free_georeference(struct site *site, uint32_t station);
 
 /* ---- beam_choice.c: the beam of a pulse, and how far pulses are followed through glass and mirrors */
 /* After all else of the site. Sets beam, rings and depth of site->plan.methods and the rows of beam and optics, and
- * makes the stations' beams. Both are measured on the scene where the configuration leaves them open; for `plan`
- * (site->measures) the error of forced methods, too. Warns where no method holds the tolerances. */
+ * makes the stations' beams. Beam and optics are measured on the scene where the configuration leaves them open; for
+ * `plan` (site->measures) the error of forced methods, too. Warns where no method holds the tolerances. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- sights.c: the visibility maps of stations */

@@ -182,8 +182,8 @@ static int read_place(struct reader *r)
 
 /* ---- heights */
 
-/* Finds the value of an item of GDAL's metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. It is empty
- * where there is none. */
+/* Finds the value of an item of GDAL's metadata: <Item name="SCALE" sample="0" role="scale">0.1</Item>. The value is
+ * empty where there is no such item. */
 static struct text_span item(const char *metadata, const char *role)
 {
     char mark[40];

@@ -158,8 +158,8 @@ static int check_band(struct raster *r, struct sh_err *err)
         r->bits, r->format);
 }
 
-/* Refuses a raster whose vertices, triangles and labels may take too much memory. They count twice: the head's process
- * gets a copy of them. */
+/* Refuses a raster whose vertices, triangles and labels may take too much memory. This memory counts twice: the head's
+ * process gets a copy of it. */
 static int check_memory(struct raster *r, struct sh_err *err)
 {
     const struct scene *s = NULL;

@@ -13,7 +13,7 @@
 #include "core/import/gltf/gltf_bytes.h"
 #include "core/scene/build.h"
 
-/* Bytes of a buffer, view or accessor. They are made at the first use, and kept for later ones. */
+/* Bytes of a buffer, view or accessor. These bytes are made at the first use, and kept for later ones. */
 struct gltf_kept {
     struct gltf_bytes bytes;
     void *own; /* to be freed; NULL: they are part of something else */

@@ -16,7 +16,7 @@ static const char *const known[] = {
     /* image formats that are not read, and colours by shaders: where such an image or colour is missing, a warning
      * says so */
     "KHR_techniques_webgl", "KHR_technique_webgl", "KHR_texture_basisu", "EXT_texture_avif", "MSFT_texture_dds",
-    /* These make no difference to a laser: lights, gloss, movement, levels of detail, metadata of objects. */
+    /* These extensions don't change what a laser sees: lights, gloss, movement, levels of detail, metadata. */
     "KHR_materials_*", "ADOBE_materials_*", "NV_materials_mdl", "KHR_lights_*", "EXT_lights_*", "KHR_animation_pointer",
     "KHR_xmp", "KHR_xmp_json_ld", "KHR_node_selectability", "KHR_node_hoverability", "KHR_interactivity", "KHR_audio*",
     "KHR_physics_*", "OMI_*", "MSFT_lod", "MSFT_packing_*", "MSFT_audio_emitter", "AGI_articulations",

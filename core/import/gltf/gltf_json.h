@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* This reads values of the file's JSON, and checks each. `of` is the object that has the key. It may be NULL: then it
+/* This reads values of the file's JSON, and checks each. `of` is the object that has the key. `of` may be NULL: then it
  * has no keys. `at` says where the object is in the file, for messages. */
 #ifndef CORE_IMPORT_GLTF_GLTF_JSON_H
 #define CORE_IMPORT_GLTF_GLTF_JSON_H

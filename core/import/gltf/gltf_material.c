@@ -154,8 +154,8 @@ static int add_image(struct gltf *g, uint32_t i, struct build_image *image, uint
 
 /* ---- textures */
 
-/* Reports a texture whose only image has a format that isn't read. This is an error where colours are wanted and the
- * file requires that format's extension. */
+/* Reports a texture whose only image has a format that isn't read. Such a texture is an error where colours are wanted
+ * and the file requires that format's extension. */
 static int miss_image(struct gltf *g, const json_t *texture, const char *at)
 {
     const char *name = json_object_iter_key(json_object_iter(json_object_get(texture, "extensions")));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Morph targets with their default weights, and skins with their joints where the nodes are. This is the pose of a file
- * without its animations.
+/* Morph targets with their default weights, and skins with their joints where the nodes are. Both give the pose of a
+ * file without its animations.
  *
  *   p     = POSITION + sum of weight * target.POSITION
  *   joint = world of the joint's node * inverse bind matrix

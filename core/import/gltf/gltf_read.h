@@ -12,8 +12,8 @@ struct scene_build;
 /* Returns whether a file is glTF, by the ending of its name. */
 bool gltf_is_name(const char *file);
 
-/* Reads the file of b into b. This is called in a process of its own (import_apart.c). SH_ESTATE: Assimp has to read
- * this file (glTF 1.0, Draco). */
+/* Reads the file of b into b. The function is called in a process of its own (import_apart.c). SH_ESTATE: Assimp has to
+ * read this file (glTF 1.0, Draco). */
 int import_gltf(struct scene_build *b, struct sh_err *err);
 
 #endif

@@ -70,8 +70,8 @@ struct ifc_choice ifc_choose(const struct ifc_product *product, const struct ifc
     if (areas_differ(w, l, product->is_curved)) return (struct ifc_choice){preferred(product, web, lite), IFC_AREA};
     if (!web_closed) return (struct ifc_choice){IFC_WEB, IFC_OPEN};
     if (web->n_failures > 0 && lite->n_failures > 0) return (struct ifc_choice){IFC_WEB, IFC_FAILED};
-    /* The points of web-ifc are exact to a micrometre, also far from the origin. Its circles have as many sides as the
-     * tolerance asks for. */
+    /* The points of web-ifc are exact to a micrometre, also far from the origin. web-ifc's circles have as many sides
+     * as the tolerance asks for. */
     return (struct ifc_choice){web->n_failures > 0 ? IFC_LITE : IFC_WEB, IFC_AGREED};
 }
 

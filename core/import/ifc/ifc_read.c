@@ -163,7 +163,8 @@ static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
     return SH_OK;
 }
 
-/* Each product with a body has at least one surface. This is checked before minutes are spent on bodies. */
+/* Each product with a body has at least one surface. The number of surfaces is checked before minutes are spent on
+ * bodies. */
 static int check_number(struct reading *r)
 {
     size_t n = 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads the records of an IFC file. They say more of its products than web-ifc and ifc-lite do, which make the bodies.
- * In: a path. Out: products with type, GlobalId and name, metres per unit, and marks of what their geometry consists
- * of. */
+/* Reads the records of an IFC file. The records say more of the file's products than web-ifc and ifc-lite do, which
+ * make the bodies. In: a path. Out: products with type, GlobalId and name, metres per unit, and marks of what their
+ * geometry consists of. */
 #ifndef CORE_IMPORT_IFC_IFC_RECORDS_H
 #define CORE_IMPORT_IFC_IFC_RECORDS_H
 

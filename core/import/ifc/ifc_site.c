@@ -93,7 +93,7 @@ struct found {
     struct text_span arg[STEP_MAX_ARGS];
 };
 
-/* Gives the record that an attribute refers to. It must have this type and at least n attributes (n <=
+/* Gives the record that an attribute refers to. The record must have this type and at least n attributes (n <=
  * STEP_MAX_ARGS). */
 static int ifc_site_follow(struct reader *r, const struct step_record *from, struct text_span ref, const char *type,
                            size_t n, struct found *to)

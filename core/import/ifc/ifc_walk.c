@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Finds the entities in the geometry of each product. It walks through the product's shape, and those of its
+/* Finds the entities in the geometry of each product. The search walks through the product's shape, and those of its
  * openings, from record to record. */
 #include "core/import/ifc/ifc_walk.h"
 

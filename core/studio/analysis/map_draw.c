@@ -19,8 +19,8 @@ static const struct picture_type caption = {11, 0, 0};
 static const uint8_t ink[3] = {40, 44, 52}, red[3] = {214, 39, 40}, blue[3] = {31, 119, 180},
                      white[3] = {255, 255, 255};
 
-/* Heights between which the hues spread. They hold 99 % of the pixels, so that a single stray point does not take the
- * colours from all others. */
+/* Heights between which the hues spread. These heights hold 99 % of the pixels, so that a single stray point does not
+ * take the colours from all others. */
 struct height_range {
     double low_m, high_m;
 };

@@ -30,8 +30,8 @@ struct view {
 };
 
 /* Smooths depths within surfaces and closes small holes: depth_m[height][width]; INFINITY: nothing is there. near: for
- * each place, the index of the place that gives its colour. This is the place itself, or a neighbour where a hole was
- * closed. */
+ * each place, the index of the place that gives its colour. A place gives its own colour, or a neighbour does where a
+ * hole was closed. */
 int view_smooth(const struct view *view, float *depth_m, uint32_t *near, struct sh_err *err);
 /* Sets light to the brightness of each place, 0..1, from these depths. log_depth: working memory for as many figures.
  * SH_ESTOPPED where colours->report asks to stop. */

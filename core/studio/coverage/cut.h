@@ -4,8 +4,8 @@
  *
  *             T            The longest edge is the base; the foot F of its height cuts the triangle into two with a
  *            /|\           right angle, A F T and B F T. Each part is cut across its longer leg into columns of one
- *           / | \          width. They are counted from the tip, the end of that leg that is not F. Each column is cut
- *          /  |  \         into rows by lines through the tip, evenly.
+ *           / | \          width. Columns are counted from the tip, the end of that leg that is not F. Each column is
+ *          /  |  \         cut into rows by lines through the tip, evenly.
  *       A /___|___\ B
  *             F
  *

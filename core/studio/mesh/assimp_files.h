@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/studio/mesh: the files that Assimp's exporter opens. They belong to one output of ours (inside.h). */
+/* Private to core/studio/mesh: the files that Assimp's exporter opens. These files belong to one output of ours
+ * (inside.h). */
 #ifndef CORE_STUDIO_MESH_ASSIMP_FILES_H
 #define CORE_STUDIO_MESH_ASSIMP_FILES_H
 

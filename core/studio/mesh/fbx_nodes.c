@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Binary FBX files of Assimp 5.2 lack the empty node that ends each list of nodes: neither Blender nor Assimp itself
- * reads them. Here the nodes are copied, and each list gets its empty node. A node holds the offset of its end in the
+ * reads them. This file copies the nodes, and gives each list its empty node. A node holds the offset of its end in the
  * file, which grows by all empty nodes that were added before that end.
  *
  * A node (version 7500 and up) is its end's offset in the file, number and bytes of its properties, 64 bits each; the

@@ -21,8 +21,8 @@ static int fail_write(const struct mesh_file *file, struct sh_err *err)
                    is_full ? ": make room, or write to another disk; nothing of it is kept" : "");
 }
 
-/* ---- a stream that remembers why a write failed. It seems to take all later bytes, since Assimp's exporter of FBX
- * ends the whole program where the stream's position does not move with a write. */
+/* ---- a stream that remembers why a write failed. The stream seems to take all later bytes, since Assimp's exporter of
+ * FBX ends the whole program where the stream's position does not move with a write. */
 
 /* Returns whether the bytes are full, aligned buffers of a file that is long already. Such buffers can be written past
  * the system's cache. */
@@ -150,7 +150,7 @@ void mesh_output_drop(struct mesh_output *out, struct mesh_file *file)
     release(file);
 }
 
-/* Whether this is the mesh's own file. It is renamed last, after the files that it names. */
+/* Whether this is the mesh's own file, which is renamed last, after the files that it names. */
 static int is_mesh(const struct mesh_output *out, const struct mesh_file *file)
 {
     return strcmp(file->path, out->path) == 0;

@@ -2,7 +2,7 @@
 /* Triangles of a scan's grid. First come all triangles; then the mean of their edges; then the filter.
  *
  * Each edge counts once. Diagonals belong to one cell. An edge along a column, or across two columns, borders on two
- * cells. Its mark is stored at one of the edge's two points. Both cells set this same mark, and marks are counted
+ * cells. The edge's mark is stored at one of its two points. Both cells set this same mark, and marks are counted
  * afterwards. */
 #include <math.h>
 #include <stdlib.h>
@@ -46,7 +46,7 @@ static double distance2(const struct scan_grid *g, uint32_t p, uint32_t q)
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
 }
 
-/* Adds a triangle. It is left out if it has no area or is edge-on to the head, but its edges count even then. */
+/* Adds a triangle. A triangle without area or edge-on to the head is left out, but its edges count. */
 static void add_triangle(struct build *b, uint32_t p, uint32_t q, uint32_t r)
 {
     const struct scan_grid *g = b->grid;

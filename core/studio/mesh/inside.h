@@ -33,7 +33,7 @@ int mesh_output_open(struct mesh_output *out, const char *path, struct mesh_file
 int mesh_file_write(struct mesh_file *file, const void *data, size_t len, struct sh_err *err);
 /* Fails where something of it could not be written, and says why. */
 int mesh_file_check(struct mesh_file *file, struct sh_err *err);
-/* Writes a complete file to the disk, and closes it. It gets its name with the others. */
+/* Writes a complete file to the disk, and closes it. The file gets its name with the others. */
 int mesh_file_finish(struct mesh_file *file, struct sh_err *err);
 /* Removes this file alone. */
 void mesh_output_drop(struct mesh_output *out, struct mesh_file *file);

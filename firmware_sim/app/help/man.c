@@ -85,7 +85,7 @@ static void put_command(const struct app_command *command)
     put_ends(app_program, "1");
 }
 
-/* It names the commands that scanheadd has. */
+/* Names of the commands that scanheadd has. */
 #define SPACED(name) " " #name
 #define NOTHING(name)
 static const char HEAD_ALONE[] = APP_COMMANDS(SPACED, NOTHING);
@@ -165,7 +165,7 @@ static void list_pages(const struct app_command *const *commands)
     puts(KEYS);
 }
 
-/* Whether a page is the one that is wanted. It notes the page's name, which put_command prints. */
+/* Whether a page is the one that is wanted. The function also notes the page's name, which put_command prints. */
 static int is_page(const char *page, const char *wanted)
 {
     const size_t n = strlen(page);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A head that runs gives a page more than its stream, by these functions. Behind them is a watch: an observer that
- * reads the stream. `run` only opens, starts and closes it. The program scanhead has a watch
+ * reads the stream. `run` only opens, starts and closes the watch. The program scanhead has a watch
  * (firmware_sim/app/studio/watch); scanheadd has none, and its page shows the stream alone.
  *
  *     open(cfg, site, &options, &watch, err)            before the loop is made
@@ -35,9 +35,9 @@ struct run_page {
      * NULL. */
     int (*open)(const struct config *cfg, const struct site *site, const struct watch_options *options,
                 struct watch **out, struct sh_err *err);
-    /* Gives the link whose other end the watch reads. Its descriptor is the loop's from then on. */
+    /* Gives the link whose other end the watch reads. The link's descriptor is the loop's from then on. */
     const struct link_spec *(*link)(struct watch *watch);
-    /* Its get may be called by any thread from open until close. */
+    /* The source's get may be called by any thread from open until close. */
     const struct web_source *(*source)(const struct watch *watch);
     int (*start)(struct watch *watch, struct sh_err *err);
     void (*close)(struct watch *watch);

@@ -14,7 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* The longest name. It is below CFG_PATH_MAX, since errors may write it with more characters: "[1]" for ".1". */
+/* The longest name: shorter than CFG_PATH_MAX, since errors may write it with more characters: "[1]" for ".1". */
 enum { NAME_MAX_LEN = CFG_PATH_MAX - 8 };
 
 struct set {

@@ -20,7 +20,8 @@ static inline int cfg_line_of(const struct cfg_reader *rd, yaml_mark_t mark)
     return (int)(rd->set != NULL ? mark.index : mark.line) + 1;
 }
 
-/* Reads the document by the rows of the table, except the scanners of stations. SH_EINPUT: it is no section. */
+/* Reads the document by the rows of the table, except the scanners of stations. SH_EINPUT: the document is no
+ * section. */
 int cfg_read_document(struct cfg_reader *rd, struct cfg_document *doc);
 /* Parses a text that is one document; cfg_read_document then reads it. *doc is NULL after an error. */
 int cfg_parse_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);

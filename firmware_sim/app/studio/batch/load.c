@@ -56,8 +56,8 @@ int batch_load(struct batch *b, uint32_t combination, struct batch_loaded *loade
     struct loading loading = {b, &before, loaded};
     if (loaded->status != 0 && loaded->combination == combination) return loaded->status;
     *loaded = (struct batch_loaded){.n_reads = before.n_reads, .combination = combination};
-    /* Only the configuration of this line is used. Its outputs are named "x", which is no job's name, so they are left
-     * out. */
+    /* Only the configuration of this line is used. The line's outputs are named "x", which is no job's name, so the
+     * outputs are left out. */
     loaded->status = batch_line_make(b, combination, 1, "x", &loaded->line);
     if (loaded->status == APP_GO_ON) loaded->line->line.in.n_files = 0;
     if (loaded->status == APP_GO_ON) loaded->status = app_with_config(&loaded->line->line.in, load_site, &loading);

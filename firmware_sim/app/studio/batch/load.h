@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The scene that jobs of a campaign share. In: a combination of values. Out: its configuration and its site, which stay
- * loaded for further stations of it.
+ * loaded for further stations of the combination.
  *
  * The next combination takes over the meshes that it shares, and their BVHs. One thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_LOAD_H

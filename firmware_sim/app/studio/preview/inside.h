@@ -51,8 +51,8 @@ static inline size_t preview_words(const struct coverage *coverage)
     return ((size_t)coverage_cells(coverage) + 63) / 64;
 }
 
-/* A copy of a scanner's site, with the settings of a request and room for a place of its own. It shares all else with
- * the original. The struct is large. */
+/* A copy of a scanner's site, with the settings of a request and room for a place of its own. The copy shares all else
+ * with the original. The struct is large. */
 struct preview_site {
     struct site site;
     struct config cfg;
@@ -60,7 +60,7 @@ struct preview_site {
 int preview_site_open(const struct preview_work *work, const struct preview_request *request, struct preview_site **out,
                       struct sh_err *err);
 
-/* These make bodies, whose formats README.md has. number: the preview's. */
+/* preview_look and preview_next make bodies, whose formats README.md has. number: the preview's. */
 int preview_look(const struct preview_work *work, const struct preview_request *request, uint32_t number,
                  struct web_body *out, struct sh_err *err);
 /* Offsets in such a body: searches read cells and hits from there. */

@@ -13,7 +13,7 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/profile.h"
 
-/* The grid has about PLACES places. They are compared by rays RAYS_DEG apart, and the best SCANS of them are
+/* The grid has about PLACES places. The places are compared by rays RAYS_DEG apart, and the best SCANS of them are
  * scanned. */
 static const double PLACES = 250.0, LEAST_GRID_M = 0.25, RAYS_DEG = 3.0;
 enum { SCANS = 3, REACH_HEAD_BYTES = 16, REACH_VERSION = 1 };

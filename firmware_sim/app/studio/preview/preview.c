@@ -3,12 +3,12 @@
  *
  *     free --asked--> waiting --taken--> working --> done --asked--> its body, again and again
  *
- * A request is known by its text. One for a place stops the search for a next station, which takes longer. The search
- * begins again afterwards, so that a dragged station does not wait for it. The newest request is worked on first: while
- * a station is dragged, older ones are about places that it has left. A search that waited while MOST_PASSED others
- * were worked on is due: it is the next one, and no place stops it. Else a page that drags all the time would keep it
- * from ending. A request that nobody asked for lately gives its slot away, and so do the oldest
- * answers, except those that a search names. */
+ * A request is known by its text. A request for a place stops the search for a next station, which takes longer. The
+ * search begins again afterwards, so that a dragged station does not wait for it. The newest request is worked on
+ * first: while a station is dragged, older ones are about places that it has left. A search that waited while
+ * MOST_PASSED others were worked on is due: it is the next one, and no place stops it. Else a page that drags all the
+ * time would keep the search from ending. A request that nobody asked for lately gives its slot away, and so do the
+ * oldest answers, except those that a search names. */
 #include "firmware_sim/app/studio/preview/preview.h"
 
 #include <pthread.h>
@@ -145,7 +145,7 @@ static struct job *free_slot(struct preview *p)
     return job;
 }
 
-/* Whether a search has let enough places pass. One that its page has left is never due. */
+/* Whether a search has let enough places pass. A search that its page has left is never due. */
 static int is_due(const struct job *job)
 {
     return is_search(job) && job->passed >= MOST_PASSED && is_asked_within(job, LATELY_NS);

@@ -42,11 +42,11 @@ int record_files_add(struct record_files *files, const char *path, struct sh_err
 int record_files_check_each(const struct record_files *files, struct sh_err *err);
 /* To be called once all options are read: picks the format of each file according to them. */
 void record_files_shape(struct record_files *files);
-/* Whether one of them is a mesh, or points spread over one. */
+/* Whether one of the files is a mesh, or points spread over one. */
 int record_files_have_meshes(const struct record_files *files);
-/* Whether one of them has that ending, as recorders name it. */
+/* Whether one of the files has that ending, as recorders name it. */
 int record_files_have(const struct record_files *files, const char *ending);
-/* Whether one of them has a place for colours. */
+/* Whether one of the files has a place for colours. */
 int record_files_have_colours(const struct record_files *files);
 /* For a stream of geodetic coordinates: SH_EINPUT where a file can hold only metres. */
 int record_files_check_degrees(const struct record_files *files, struct sh_err *err);
@@ -67,7 +67,7 @@ int record_files_open(struct record_files *files, struct sh_err *err);
 int record_files_save(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);
-/* Closes all, also after a failure; keep 0: removes them. Returns the first error, if any; err may be NULL. */
+/* Closes all, also after a failure; keep 0: removes the files. Returns the first error, if any; err may be NULL. */
 int record_files_close(struct record_files *files, int keep, struct sh_err *err);
 
 #endif

@@ -181,8 +181,8 @@ static int check_fits(const struct heads *heads, uint32_t k, const struct site *
 }
 
 /* Opens the first head that is due. The other scanners are set up once and freed again, so that their errors come
- * before the first scan, and a warning of several of them comes once. Their BVHs stay in struct site_world, which
- * the sites share, and are found there when their turn comes. */
+ * before the first scan, and a warning of several of them comes once. The scanners' BVHs stay in struct site_world,
+ * which the sites share, and are found there when their turn comes. */
 static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct sh_err *err)
 {
     uint8_t is_known[CONFIG_MAX_STATIONS] = {1};

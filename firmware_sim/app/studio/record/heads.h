@@ -5,7 +5,7 @@
  *
  * The head of head.station is there from the start. Any other is opened beside it (site_load_for) when its first
  * station is due, and ends after its last. Before the first scan each is set up once, so that its errors come then.
- * Their clocks all begin at the same power-up. */
+ * The heads' clocks all begin at the same power-up. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_HEADS_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_HEADS_H
 

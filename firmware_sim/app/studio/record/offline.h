@@ -25,9 +25,9 @@ struct offline {
     int shares_site; /* it is the caller's */
 };
 
-/* Loads the scene and starts the head. Its own links stay closed. scan_s > 0: the head ends each scan after this device
- * time, to the pulse. cfg is changed (pace, links) and must live on. `offline` begins as zeros but for truth, and is to
- * be closed, also after an error. */
+/* Loads the scene and starts the head. The head's own links stay closed. scan_s > 0: the head ends each scan after this
+ * device time, to the pulse. cfg is changed (pace, links) and must live on. `offline` begins as zeros but for truth,
+ * and is to be closed, also after an error. */
 int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
                  struct sh_err *err);
 /* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and

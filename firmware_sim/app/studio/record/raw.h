@@ -3,7 +3,7 @@
  *
  * In: the command line. Out: Ethernet frames (drivers/protocol/ethernet.h) with the kernel's times of receiving. A
  * source is UDP, on sockets of its own, or TCP. TCP is a connection of its own or, with --relay, the connections of
- * other programs, which reach the device through it. */
+ * other programs, which reach the device through `record --raw`. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_H
 
@@ -34,7 +34,8 @@ struct raw;
 struct raw_ops {
     /* Opens sockets and connections; may wait up to r->wait_s. close follows in any case. */
     int (*open)(struct raw *r, struct sh_err *err);
-    /* Fills in the descriptors to wait for, up to RAW_MAX_POLLS; returns how many. It may make *timeout_ms shorter. */
+    /* Fills in the descriptors to wait for, up to RAW_MAX_POLLS; returns how many. The function may make *timeout_ms
+     * shorter. */
     int (*wait_for)(struct raw *r, struct pollfd *fds, int *timeout_ms);
     /* Writes the data that came, up to RAW_MAX_PASSES pieces, to the file. Returns how many, or SH_E. */
     int (*work)(struct raw *r, struct sh_err *err);

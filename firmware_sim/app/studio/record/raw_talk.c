@@ -12,8 +12,8 @@ enum { SILENT_MS = 50, ANSWER_MS = 1000, LOOK_MS = 10 };
 
 /* ---- frames */
 
-/* Bytes that a slow reader held back may have come before the last frame. They get that frame's time, so that times do
- * not go back. Times go back only where the clock itself was set back. */
+/* Bytes that a slow reader held back may have come before the last frame. Such bytes get the last frame's time, so that
+ * times do not go back. Times go back only where the clock itself was set back. */
 static int write_frame(struct talk *talk, int64_t t_ns, const uint8_t *frame, size_t len, size_t payload,
                        struct sh_err *err)
 {

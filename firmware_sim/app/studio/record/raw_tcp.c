@@ -84,7 +84,7 @@ static struct talk *find_unused(struct tcp *tcp)
     return NULL;
 }
 
-/* Where the device takes no connection, the client's is reset. That is no failure of the recording. */
+/* Where the device takes no connection, the client's is reset. Such a reset is no failure of the recording. */
 static int join(struct raw *r, struct talk *talk, int client, const char *name, struct sh_err *err)
 {
     struct tcp *tcp = r->state;

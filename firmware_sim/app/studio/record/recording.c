@@ -187,7 +187,7 @@ static int is_gone(const struct recording *r, int rc)
 }
 
 /* Waits for a head that is gone. Where it scans no more when it is back, the scan ended meanwhile. Where it still
- * scans, the rest of the scan will come. Its state is in r->reply. */
+ * scans, the rest of the scan will come. The head's state is in r->reply. */
 static int replug(struct recording *r, int why, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->o->replug_s);

@@ -7,7 +7,7 @@
 #include "firmware_sim/config/config.h"
 
 /* In a LAS file that `record` wrote, points of the first scan's station have the same integer coordinates as the
- * stream. Those of other stations were rounded once more. */
+ * stream. Points of other stations were rounded once more. */
 static double file_count_m(const struct report *r, uint32_t station, int polar)
 {
     const struct cloud *c = &r->cloud;

@@ -160,8 +160,8 @@ static uint32_t by_incidence(void *ctx, size_t i)
     return bin < REPORT_INCIDENCES ? (uint32_t)bin : REPORT_INCIDENCES - 1;
 }
 
-/* Bins are 1, 2 or 5 times a power of ten wide. They end at the farthest point that is near the scene: a stray one must
- * not put all others into one bin. */
+/* Bins are 1, 2 or 5 times a power of ten wide. The bins end at the farthest point that is near the scene: a stray one
+ * must not put all others into one bin. */
 static void choose_ranges(struct report *r)
 {
     double far_m = 0.0;

@@ -15,7 +15,8 @@
 enum { REPLY_MS = 5000, REPLY_LEN = SOAK_REPLY_LEN };
 static const double MARGIN_MS = 5.0;
 static const int64_t AFTER_END_NS = 1000000000;
-/* The library resynchronises with questions of its own. It repeats one that has no answer after a second. */
+/* The library resynchronises with questions of its own. The library repeats a question that has no answer after a
+ * second. */
 static const double ASKED_AGAIN_MS = 900.0;
 
 static int is_count(const char *text)

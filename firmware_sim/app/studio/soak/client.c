@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A client for each link, which behaves like a good recorder. It starts a scan, reads all frames, asks now and then,
- * opens the head again when the connection goes, and starts the scan again when the head has forgotten it. */
+/* A client for each link, which behaves like a good recorder. The client starts a scan, reads all frames, asks now and
+ * then, opens the head again when the connection goes, and starts the scan again when the head has forgotten it. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of it, and the clean
- * reader has it. */
+/* A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of the frame, and the
+ * clean reader has it. */
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"
 #include "firmware_sim/app/studio/soak/frame.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* scanhead soak runs a head with injected faults and our own clients. At the end it prints a sheet of what each client
- * noticed. With --client it runs somebody else's client instead (verdicts.h). */
+/* scanhead soak runs a head with injected faults and our own clients. At the end the command prints a sheet of what
+ * each client noticed. With --client the command runs somebody else's client instead (verdicts.h). */
 #include "drivers/link/link.h"
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/client.h"

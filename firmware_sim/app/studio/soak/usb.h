@@ -13,9 +13,10 @@ struct soak_row;
 
 /* Whether the link's device is attached to this machine, and has the native stream. */
 int soak_usb_is_here(const struct link_spec *spec);
-/* Gives it a serial number where none is configured, so that its client can name it. number: of the link, from 1. */
+/* Gives the link's device a serial number where none is configured, so that its client can name the device. number: of
+ * the link, from 1. */
 void soak_usb_name(struct link_spec *spec, uint32_t number);
-/* Writes the source that its client opens. */
+/* Writes the source that the link's client opens. */
 void soak_usb_source(const struct link_spec *spec, char *source, size_t len);
 
 /* The faults of the enumeration at hand, until a client opens the device. */

@@ -154,8 +154,8 @@ static int is_written(const struct verdict_options *o, const char *ending)
     return strcmp(ending, "points") != 0 || has_out(o->command) || has_out(o->file);
 }
 
-/* Adds the files that the runs will write. They join the list of the command line's files, in which no file may stand
- * twice. `paths` keeps their names. */
+/* Adds the files that the runs will write. These files join the list of the command line's files, in which no file may
+ * stand twice. `paths` keeps their names. */
 static int add_outputs(const struct verdicts *v, struct app_input *in, char (*paths)[N_ENDINGS][VERDICTS_PATH])
 {
     static const char *const endings[N_ENDINGS] = {"log", "stdout", "points"};

@@ -28,11 +28,11 @@ struct client {
     int has_others; /* this process had children before: only the client's group is waited for and ended then */
 };
 
-/* out: the file for standard output; NULL: it goes into the log, as standard error does. Both are emptied. */
+/* out: the file for standard output; NULL: it goes into the log, as standard error does. Both files are emptied. */
 int client_start(struct client *client, const char *line, const char *log, const char *out, struct sh_err *err);
 /* Returns 1 when the shell and all processes that descend from it have ended. */
 int client_has_ended(struct client *client);
-/* Sends SIGTERM, and SIGKILL after grace_s. It must be called once after each client_start. */
+/* Sends SIGTERM, and SIGKILL after grace_s. client_end must be called once after each client_start. */
 void client_end(struct client *client, double grace_s);
 
 #endif

@@ -6,8 +6,8 @@
 
 #include <sys/types.h>
 
-/* Calls `see` for each of them, descendants before their ancestors, until a call returns 1. Returns 1 then, else 0. A
- * process that starts meanwhile may be missing. */
+/* Calls `see` for each process that descends from this one, descendants before their ancestors, until a call returns 1.
+ * Returns 1 then, else 0. A process that starts meanwhile may be missing. */
 int family_any(int (*see)(void *ctx, pid_t pid), void *ctx);
 
 #endif

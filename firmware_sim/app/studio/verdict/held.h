@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Connections that the head has ended, and that the client still has. In: the peers of sessions that have ended. Out:
- * whether there is one. It reads Linux's /proc, so it knows only clients on this machine, and only those that connect
- * by IPv4. */
+ * whether there is one. The module reads Linux's /proc, so it knows only clients on this machine, and only those that
+ * connect by IPv4. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_HELD_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_HELD_H
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Finds each point of a client among those that the head had, and how often it came.
  *
- * A point of the client's may agree with several of the head's. These are then one group, and counts are compared by
- * group. Each point of the client's agrees with the head's point that it comes from, so both are in the same group.
- * Where the client has no point more often than it was sent, no group has more points than were sent. Dense points
- * therefore give no false finding. */
+ * A point of the client's may agree with several of the head's. These points of the head's are then one group, and
+ * counts are compared by group. Each point of the client's agrees with the head's point that it comes from, so both are
+ * in the same group. Where the client has no point more often than it was sent, no group has more points than were
+ * sent. Dense points therefore give no false finding. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>

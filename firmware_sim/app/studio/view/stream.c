@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Points and meshes of a .shs. Its frames go through drivers/record/track.h, as for recorders, and grids are those of
- * drivers/record/mesh.c. */
+/* Points and meshes of a .shs. The file's frames go through drivers/record/track.h, as for recorders, and grids are
+ * those of drivers/record/mesh.c. */
 #include "firmware_sim/app/studio/view/stream.h"
 
 #include <stdio.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Loads a recording, by its ending and first bytes. Here are the steps that all formats share. */
+/* Loads a recording, by its ending and first bytes. This file has the steps that all formats share. */
 #include "firmware_sim/app/studio/view/viewed.h"
 
 #include <math.h>

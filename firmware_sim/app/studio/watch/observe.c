@@ -43,8 +43,8 @@ static void let_go(struct watch *w)
     w->now_georef = NULL;
 }
 
-/* Takes the settings and the place of the scan, and returns the site that has them. Where the scan is over already, it
- * takes the configuration's settings, at the place that the stream says. */
+/* Takes the settings and the place of the scan, and returns the site that has them. Where the scan is over already, the
+ * function takes the configuration's settings, at the place that the stream says. */
 static const struct site *find_head(struct watch *w, const struct scanhead_info *info)
 {
     const uint32_t station = info->station - 1;
@@ -188,7 +188,8 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
 }
 
 /* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no
- * telemetry: where the end of its scan was lost, nothing else says that it is over. Its descriptor may be lost, too. */
+ * telemetry: where the end of its scan was lost, nothing else says that it is over. The scan's descriptor may be lost,
+ * too. */
 static void rest(struct watch *w)
 {
     uint32_t station;
@@ -207,7 +208,7 @@ static int is_due(const struct watch *w)
     return w->dirty && clock_now_ns() - w->published_ns >= (rest_ns > PUBLISH_NS ? rest_ns : PUBLISH_NS);
 }
 
-/* Takes the next frame. Where there is none yet it sleeps first, unless the head would wait for it. */
+/* Takes the next frame. Where there is none yet the function sleeps first, unless the head would wait for it. */
 static int next_frame(const struct watch *w, struct scanhead_frame *frame)
 {
     if (w->options.cpu_share > 0.0) {
@@ -218,8 +219,9 @@ static int next_frame(const struct watch *w, struct scanhead_frame *frame)
     return scanhead_next(w->sh, frame, NEXT_MS);
 }
 
-/* Lowers the processor priority of this thread alone; where that fails, it stays as it is. An observer that the head
- * waits for keeps the head's priority: else, on a busy machine, the whole head would be as slow as the observer. */
+/* Lowers the processor priority of this thread alone; where that fails, the priority stays as it is. An observer that
+ * the head waits for keeps the head's priority: else, on a busy machine, the whole head would be as slow as the
+ * observer. */
 static void be_last(void)
 {
     setpriority(PRIO_PROCESS, (id_t)gettid(), WATCH_NICE);

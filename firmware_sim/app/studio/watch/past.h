@@ -5,12 +5,12 @@
  * format). A piece begins with the descriptor, the emitter and the anchor that its points need, so that a reader of the
  * protocol can begin with any piece.
  *
- * It keeps points with their attributes and colours, poses, and the frames that place them. It keeps no waveforms:
- * those of one second may take as much memory as everything else. When there are more than `points` or `bytes`, the
- * oldest piece goes, and its points are counted as gone.
+ * The past keeps points with their attributes and colours, poses, and the frames that place them. The past keeps no
+ * waveforms: those of one second may take as much memory as everything else. When there are more than `points` or
+ * `bytes`, the oldest piece goes, and its points are counted as gone.
  *
- * Memory: pieces with room for PAST_PIECE bytes and four more frames, allocated as points come. They hold up to `bytes`
- * of frames. None is allocated before the first points.
+ * Memory: pieces with room for PAST_PIECE bytes and four more frames, allocated as points come. All pieces together
+ * hold up to `bytes` of frames. No piece is allocated before the first points.
  * Threads: one takes frames; any number of others read. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H

@@ -117,7 +117,8 @@ static int write_file(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* A recorder that fails leaves parts, from which --repair could make a file. Here nobody asks for that. */
+/* A recorder that fails leaves parts, from which --repair could make a file. Nobody asks for a repair of a page's
+ * file. */
 static void empty_folder(const struct save *s)
 {
     DIR *folder = s->folder[0] != '\0' ? opendir(s->folder) : NULL;

@@ -9,7 +9,8 @@
 #include "firmware_sim/config/config.h"
 
 /* Limits of the number of cells, which is approximate, and of memory. Each triangle has at least one piece of a cell.
- * It is counted below with 148 bytes, a little more than it takes (PIECE_BYTES in core/studio/coverage/cells.c). */
+ * A piece is counted below with 148 bytes, a little more than it takes (PIECE_BYTES in
+ * core/studio/coverage/cells.c). */
 static const double MOST_CELLS = 20000.0, MOST_MIB = 160.0;
 enum { TRIES = 12 };
 
