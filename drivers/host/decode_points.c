@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Decodes the points of a stream frame into doubles. It is the hot path of every recorder.
+/* Decodes the points of a stream frame into doubles: the hot path of every recorder.
  *
  * A frame is taken in blocks of rows. The rows of a block become columns of words, and loops that compilers turn into
  * vectors make each column of figures from these. */
@@ -304,7 +304,7 @@ int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, ui
     return n;
 }
 
-/* It holds a block of points. */
+/* The room holds a block of points. */
 struct points_room {
     double x[BLOCK], y[BLOCK], z[BLOCK], range_m[BLOCK], mirror_rad[BLOCK], pan_rad[BLOCK], reflectance_db[BLOCK];
     int64_t t_ns[BLOCK];

@@ -89,7 +89,7 @@ struct scanhead {
     struct host_turn_part turn_part[HOST_TURN_PARTS]; /* sines and cosines of whole 1/256 turns */
 };
 
-/* notices.c: hands on the parser's notices. It is called once, after native_parser_init. */
+/* notices.c: hands on the parser's notices. To be called once, after native_parser_init. */
 void host_listen(struct scanhead *sh);
 /* Gives the notice for the parser's present line: nobody waits for it, or it echoes what was just sent. */
 void host_note_line(struct scanhead *sh, int is_echo);
@@ -97,7 +97,7 @@ void host_note_line(struct scanhead *sh, int is_echo);
 void host_note_closed(struct scanhead *sh);
 void host_note_reattached(struct scanhead *sh);
 
-/* Takes a frame into the state: descriptor, anchor, names, counters, hash. It is called once per frame, in stream
+/* Takes a frame into the state: descriptor, anchor, names, counters, hash. To be called once per frame, in stream
  * order. */
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload);
 

@@ -324,8 +324,8 @@ int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_
     return SCANHEAD_OK;
 }
 
-/* Returns 0 unless all t_ns + shift_ns are 0 to 999999999. They count from the second that begins 1e9 + whole_s seconds
- * after 1980-01-06. */
+/* Returns 0 unless all t_ns + shift_ns are 0 to 999999999. The sums count from the second that begins 1e9 + whole_s
+ * seconds after 1980-01-06. */
 VEC_CLONES static int times_of_second(const int64_t *restrict t_ns, uint32_t n, uint64_t shift_ns, double whole_s,
                                       double *restrict to)
 {
