@@ -70,7 +70,7 @@ uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
  * and ends when the host has taken none of the waiting bytes for one or two seconds. Bytes that the tty then still
- * holds can't be taken back, and may end within a stream frame. The next reader gets them first. Then it gets an event
+ * holds can't be taken back, and may end within a stream frame. The next reader gets these bytes first, then an event
  * frame, from which on it reads frames and replies correctly. */
 struct ffs_console {
     struct usb_device *device;

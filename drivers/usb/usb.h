@@ -13,14 +13,14 @@
  * A transfer is one request of the host's driver (a URB). An IN transfer waits until the function writes, an
  * OUT transfer until the function has read all of it, as a real bus does by NAK. So a function that does not
  * read holds the host back. A transfer belongs to the core from submit until the back end's complete() is
- * called with it. That happens exactly once, maybe within submit.
+ * called with it. This call happens exactly once, maybe within submit.
  *
  * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end with a
  * short packet, or with a zero-length packet where they are a whole number of packets. Where they filled the transfer
  * exactly, the zero-length packet ends the next transfer, unless more is written first. On an endpoint that has `units`
  * (model.h: the data of one write are a unit) that packet always comes before further data: at once if another transfer
  * waits, else with the next one that is submitted. A transfer whose rest is smaller than the next packet fails with
- * USB_OVERFLOW, as on a real bus. That packet stays with the function: nothing is lost.
+ * USB_OVERFLOW, as on a real bus. The packet that did not fit stays with the function: nothing is lost.
  *
  * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN
  * 1.2; Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.
@@ -124,14 +124,14 @@ void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int du
 /* Halts the endpoint, until the host clears the halt. 0: there is no such endpoint now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
- * into the one after it. This holds until the interface ends. */
+ * into the one after it. The shortening holds until the interface ends. */
 void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
 /* Sets how long each control request takes. 0: it is answered at once. */
 void usb_device_set_slow(struct usb_device *device, double ms);
 /* This and the next four functions are for back ends, which keep the list `held` of requests that wait. Returns whether
  * another request has to wait. */
 int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held);
-/* Appends a request, with its id set. They are answered one after the other; each takes the time asked for. */
+/* Appends a request, with its id set. Requests are answered one after the other; each takes the time asked for. */
 void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request);
 /* Takes out the request of that id; NULL: there is none. */
 struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id);
