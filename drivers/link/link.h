@@ -119,8 +119,8 @@ struct link_ops {
      * of all links need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
-    /* They don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED: the
-     * session is gone (a LINK_CLOSED follows from poll). */
+    /* read and write don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED:
+     * the session is gone (a LINK_CLOSED follows from poll). */
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
 
@@ -132,9 +132,9 @@ struct link_ops {
      * route. NULL: none. To be called by the link's thread, or after it has ended. */
     uint64_t (*refused)(const void *link);
 
-    /* Bytes written to a session that its reader has not taken: closing the link loses them. There may be more: the
-     * system learns of the last ones a moment late, and counts only up to a limit. 0 also where it can't be known.
-     * NULL: closing loses no byte, as long as the client goes on reading. */
+    /* Bytes written to a session that its reader has not taken: closing the link loses them. More bytes may wait than
+     * are counted: the system learns of the last ones a moment late, and counts only up to a limit. 0 also where it
+     * can't be known. NULL: closing loses no byte, as long as the client goes on reading. */
     int (*unread)(void *link, int session);
 
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of

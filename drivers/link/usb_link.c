@@ -107,7 +107,8 @@ static int has_to_report(const struct usb_link *self, int i)
     return self->reported[i] != self->head.session[i].open;
 }
 
-/* Whether a host has got the device since the last report. It can enumerate the device only once this is reported. */
+/* Whether a host has got the device since the last report. The host can enumerate the device only once that is
+ * reported. */
 static int is_plugged_anew(const struct usb_link *self)
 {
     return self->plugged != usb_device_attaches(self->head.device);

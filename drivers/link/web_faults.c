@@ -15,7 +15,7 @@ static void web_break(struct lws *wsi)
         socket_break(fd);
 }
 
-/* Cuts a session off. It gets no close frame, and none of the bytes that wait for it. */
+/* Cuts a session off. The session's client gets no close frame, and none of the bytes that wait for it. */
 static int web_cut(struct web_link *web, int session)
 {
     struct web_session *s = web_session(web, session);

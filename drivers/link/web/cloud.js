@@ -204,8 +204,8 @@ export class Cloud {
     for (const block of blocks) this.gone += block.n;
   }
 
-  /** A scan replaces the earlier scans of its station, which may be from another place. Call it before add(). It
-   * returns false for a batch of such an older scan, which comes late (`past`). */
+  /** A scan replaces the earlier scans of its station, which may be from another place. Call replace() before add().
+   * replace() returns false for a batch of such an older scan, which comes late (`past`). */
   replace({station, scan, past = false}) {
     const now = this.#scans.get(station);
     if (past && now !== undefined && scan < now) return false;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This module reads the native protocol, by PROTOCOL.md and its pages alone. A Parser turns bytes into frames; a
-// Decoder turns frames into values and batches of points in the scene frame. It is pure: it runs in a page, a worker
-// and node.
+// Decoder turns frames into values and batches of points in the scene frame. The module is pure: it runs in a page, a
+// worker and node.
 import {LOCAL, Parser, REPEAT} from './native_parser.js';
 import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLineEnd, readNames, readPoses,
   readTelemetry, refuse, Refused} from './native_fields.js';

@@ -79,7 +79,8 @@ export class Sequence {
     return false;
   }
 
-  // Returns whether LATE_RUN late frames came in a row. They are another sequence then: its numbers all lie in gaps.
+  // Returns whether LATE_RUN late frames came in a row. Such frames are another sequence, whose numbers all lie in
+  // gaps.
   #isRun(seq) {
     this.#lateRun = this.#lateRun > 0 && seq === (this.#lastLate + 1) >>> 0 ? this.#lateRun + 1 : 1;
     this.#lastLate = seq;

@@ -21,7 +21,7 @@ const pick = (from, keys) => Object.fromEntries(keys.map((key) => [key, from[key
 const round = (value) => (typeof value === 'number' ? Math.round(value * 1e4) / 1e4 : value);
 const turned = (deg) => ((deg + 180) % 360 + 360) % 360 - 180;
 
-// It sends `change` whenever something is to be shown again, and `seen` once what the stations see has changed.
+// A Trial sends `change` whenever something is to be shown again, and `seen` once what the stations see has changed.
 export class Trial extends EventTarget {
   stations = [];
   cells = null; // null: not there yet, or there are none

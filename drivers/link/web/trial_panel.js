@@ -338,7 +338,7 @@ export class TrialPanel {
     this.text.select();
   }
 
-  // Sends the tried places to the head. Its stations then stand there for everybody.
+  // Sends the tried places to the head. The head's stations then stand there for everybody.
   async #apply() {
     this.#isApplying = true;
     this.#allow();

@@ -113,7 +113,7 @@ export class View extends EventTarget {
     this.#fitUntouched();
   }
 
-  // It takes {origin, positions, triangles, drawTriangles} or null.
+  // Takes {origin, positions, triangles, drawTriangles} or null.
   setMesh(mesh) {
     this.#solids.setMesh(mesh);
     this.#fitUntouched();

@@ -30,8 +30,8 @@ export class Budget {
   }
 }
 
-// Returns for each part how many of its elements are to be in the picture after `more` further points were drawn. It is
-// the same share of each part. The function is pure.
+// Returns for each part how many of its elements are to be in the picture after `more` further points were drawn. The
+// share is the same in each part. The function is pure.
 export function shares(parts, more) {
   let all = 0, done = 0;
   for (const part of parts) {
@@ -60,7 +60,7 @@ export function restShares(parts, more) {
 
 // There are three targets: one with the picture that is shown, one that is drawn into (the same, or one that replaces
 // it once it has enough points), and one for the page, into which the shown picture is drawn with its shading. Targets
-// of a moving view may be smaller. The one for the page is put onto the canvas only once the GPU has finished it: a
+// of a moving view may be smaller. The page's target is put onto the canvas only once the GPU has finished it: a
 // browser that composes in software waits for the canvas, and the page waits, too.
 export class Painter {
   moving = new Budget(MOVE_MS, 150_000);

@@ -233,8 +233,8 @@ export class Programs {
     return this.#made.get(key);
   }
 
-  // Makes a program of this kind current, and returns it. It draws with this camera. Positions of the things that it
-  // draws are relative to `origin`.
+  // Makes a program of this kind current, and returns it. The program draws with this camera. Positions of the things
+  // that it draws are relative to `origin`.
   use(kind, camera, origin, section = camera.section) {
     const gl = this.#gl;
     const program = this.#of(kind, [camera.flat && 'FLAT', section && 'CUT'].filter(Boolean));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module finds the point under the pointer: the nearest one on the screen, where points near the eye win over
-// those behind them. It is pure.
+// points behind them. The module is pure.
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 
@@ -24,8 +24,8 @@ function meets(block, eye, forward, slope, beside_m) {
   return across <= r * Math.hypot(1, slope) + Math.max(0, along) * slope + beside_m;
 }
 
-// Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null. It is null,
-// too, if the cloud was cleared meanwhile: places in its blocks would be relative to another origin.
+// Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null. The value
+// is null, too, if the cloud was cleared meanwhile: places in its blocks would be relative to another origin.
 // limit is the number of points of each block that it tests. The rays of a flat view are parallel: there w may be less
 // than 0, and a depth of a tenth of the target's distance counts as much as a tenth in a view with perspective.
 export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
@@ -70,8 +70,9 @@ export function nearest(cloud, camera, x, y, radius_px, limit) {
   }
 }
 
-// Returns the place that a gesture keeps at (x, y). It is as far away as the point found there, or else as the target.
-// The search looks at the first 4096 points of each block: in a closed block these are spread evenly (cloud.js).
+// Returns the place that a gesture keeps at (x, y). The place is as far away as the point found there, or else as the
+// target. The search looks at the first 4096 points of each block: in a closed block these are spread evenly
+// (cloud.js).
 export function grip(cloud, camera, x, y) {
   const found = nearest(cloud, camera, x, y, 14, 4096);
   return camera.at(x, y, found ? found.w : camera.distance);

@@ -2,8 +2,8 @@
 // This module has the colour scales: a figure's place between its limits, 0 to 1, becomes a colour. The module is pure.
 //
 // Low and high mean the same on every scale, and the same as in files (core/colour.h): low is blue or dark, high is red
-// or bright. `even` and `blue` are computed in OKLab (Ottosson 2020), whose lightness is that of the eye. It rises
-// evenly from end to end, so people who don't tell red from green see every step, and so does a grey print.
+// or bright. `even` and `blue` are computed in OKLab (Ottosson 2020), whose lightness is that of the eye. The lightness
+// rises evenly from end to end, so people who don't tell red from green see every step, and so does a grey print.
 
 // The stops are evenly spaced. On `spectrum` the hue says the figure, in the order of the files' colours.
 const STOPS = {

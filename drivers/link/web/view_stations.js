@@ -9,7 +9,7 @@ import {toSegment} from './view_pick.js';
 const GRAB_PX = 18;
 const KEYS_END_MS = 700; // after so long without a key the station is let go
 
-// Returns the directions right, forward and up of a head. It is turned by its heading, then pitch, then roll.
+// Returns the directions right, forward and up of a head. The head is turned by its heading, then pitch, then roll.
 export function headAxes({heading_deg, pitch_deg, roll_deg}) {
   const [h, p, r] = [heading_deg, pitch_deg, roll_deg].map((deg) => radians(deg ?? 0));
   return [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(([x, y, z]) => {
