@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* A LAS 1.4 file may have waveforms (ASPRS LAS 1.4 R15). Windows of samples go in, packets come out in a file of their
- * own, X.wdp beside X.las. Without --wdp they are copied to the end of X.las when all points are there.
+ * own, X.wdp beside X.las. Without --wdp the packets are copied to the end of X.las when all points are there.
  *
  * A packet has as many samples as its descriptor says, and there are at most 255 descriptors. The first 128 lengths of
- * windows each get a descriptor. Later lengths are rounded up. Their packets are filled up with samples without light,
- * which are counted. Samples have 8 bits, or 16 where the digitiser has more than 8. One thread. */
+ * windows each get a descriptor. Later lengths are rounded up. Packets of these lengths are filled up with samples
+ * without light, which are counted. Samples have 8 bits, or 16 where the digitiser has more than 8. One thread. */
 #ifndef DRIVERS_RECORD_LAS_WAVES_H
 #define DRIVERS_RECORD_LAS_WAVES_H
 

@@ -26,7 +26,7 @@ static int packets_open(struct las_packets *p, int is_part, struct sh_err *err)
     return rc;
 }
 
-/* A completed record says its length. One that is being written says 0. */
+/* A completed record says its length. A record that is being written says 0. */
 static int read_len(struct las_packets *p, struct sh_err *err)
 {
     uint8_t at[8];

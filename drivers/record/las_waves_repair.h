@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The waveforms of a .las are repaired with it (las_repair.c). Its packets are inside, or in a file of their own:
- * X.wdp.part of a recording that was not completed, else X.wdp. Whole packets are kept. A point whose packet did not
- * reach the disk keeps its place, and says that it has no waveform. Nothing is copied, since a full disk has no
+/* The waveforms of a .las are repaired with the file (las_repair.c). The packets are inside the file, or in a file of
+ * their own: X.wdp.part of a recording that was not completed, else X.wdp. Whole packets are kept. A point whose packet
+ * did not reach the disk keeps its place, and says that it has no waveform. Nothing is copied, since a full disk has no
  * room: packets that were not yet inside stay in X.wdp. */
 #ifndef DRIVERS_RECORD_LAS_WAVES_REPAIR_H
 #define DRIVERS_RECORD_LAS_WAVES_REPAIR_H

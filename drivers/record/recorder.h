@@ -55,8 +55,8 @@ struct recorder_options {
     double long_edge;     /* of meshes: leaves out triangles with an edge longer than so many mean edges; 0: none */
     double sparse_per_m2; /* > 0: .ply has points spread over the mesh, so many per square metre */
     uint64_t sparse_seed; /* of the random choice of these points */
-    /* At the end this report gets warnings of what the format had no room for. Its function stop can give up a file
-     * that is being completed, which may take long. May be NULL; must live until close. */
+    /* At the end this report gets warnings of what the format had no room for. The report's function stop can give up a
+     * file that is being completed, which may take long. May be NULL; must live until close. */
     const struct sh_report *report;
     /* Files of one recording share the limit of empty places. NULL: a file alone; else it must live until close. */
     struct recorder_padding *padding;

@@ -5,8 +5,8 @@
  * a shot), and with the header, the index or the end that the format needs. Nothing is invented: a figure that the
  * recorder would have learnt from later frames keeps its first value, or is counted again from the data.
  *
- * It works in place, since a full disk has no room for a copy. An interrupted repair can begin again: no byte that it
- * needs is overwritten before the file is whole. One thread. */
+ * The repair works in place, since a full disk has no room for a copy. An interrupted repair can begin again: no byte
+ * that it needs is overwritten before the file is whole. One thread. */
 #ifndef DRIVERS_RECORD_REPAIR_H
 #define DRIVERS_RECORD_REPAIR_H
 
@@ -29,7 +29,7 @@ struct repair {
     int was_whole;      /* there was nothing to repair, and nothing was changed */
 };
 
-/* The result of repair_file. That function takes the name FILE or FILE.part, as the user gives it. A repaired FILE.part
+/* The result of repair_file. repair_file takes the name FILE or FILE.part, as the user gives it. A repaired FILE.part
  * is renamed to FILE, unless FILE exists: nothing is replaced. A FILE without a FILE.part beside it is checked, and
  * repaired if it needs that. */
 struct repaired {

@@ -91,7 +91,7 @@ static int find_head(const struct track *t, const struct scanhead_point *p, doub
 
 /* In the geo layout a point has no range, but its window says how coordinates change along a metre of it. The range
  * is the length of the way from the head to the point, projected onto the beam's direction. In some CRS a beam is
- * slightly curved. It then leaves that direction sideways, so the error of the range is of second order. NaN: the
+ * slightly curved. Such a beam leaves that direction sideways, so the error of the range is of second order. NaN: the
  * head's place is not known. */
 static double range_along(const struct track *t, const struct scanhead_point *p, const struct scanhead_wave *wave)
 {
