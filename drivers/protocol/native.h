@@ -349,7 +349,7 @@ struct native_notice {
 };
 #define NATIVE_NO_TIME INT64_MIN
 
-/* A run of bytes that belong to no item. Its notice is given once it ends. */
+/* A run of bytes that belong to no item. The run's notice is given once the run ends. */
 struct native_bad {
     enum native_notice_kind kind; /* NATIVE_NO_NOTICE: there is no such run now */
     int has_header;               /* the run begins with a correct header, whose values follow: */
@@ -386,7 +386,7 @@ uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room
 void native_parser_added(struct native_parser *parser, size_t n);
 /* Gives the parser whole items that this process made in memory, without a copy, in place of native_parser_room() and
  * native_parser_added(). The items stay there until the parser has given them all and the last one is no longer used.
- * CRCs of payloads are not checked, since nothing can have changed them. It is called after NATIVE_MORE; or at any time
+ * CRCs of payloads are not checked, since nothing can have changed them. To be called after NATIVE_MORE; or at any time
  * with n 0, which drops the items that were not given yet. A parser gets all its bytes in one of the two ways. */
 void native_parser_lend(struct native_parser *parser, const uint8_t *items, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
@@ -397,7 +397,7 @@ void native_parser_finish(struct native_parser *parser);
  * Counters and sequence go on (native_sequence_resume). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
-/* Returns 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points,
+/* Returns 1 if a frame with this header belongs to stream_sha256. Such frames are descriptor, emitter, anchor, points,
  * line-end, poses, attributes, colours and waveforms frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs
  * over u8 type, u32 length (LE) and the payload of each. */
 int native_is_hashed(const struct native_header *header);

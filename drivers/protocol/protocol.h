@@ -105,10 +105,11 @@ struct protocol_host {
     /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has
      * set it, it is UTC, or the time since power-up. */
     int64_t (*date_ns)(void *ctx, int64_t t_ns);
-    /* Stores this protocol's settings, which then outlast a power cycle. They replace those stored before, and each new
-     * session gets them (spec.stored). lines: printable ASCII with '\n' at each end, at most PROTOCOL_STORED bytes with
-     * the NUL; "": none. 0; or 1: the head stores none (spec.keeps is 0), or these are no such lines. May be NULL: it
-     * stores none. The command HEAD:STORe stores settings of the head itself, which native commands set. */
+    /* Stores this protocol's settings, which then outlast a power cycle. The new settings replace those stored before,
+     * and each new session gets them (spec.stored). lines: printable ASCII with '\n' at each end, at most
+     * PROTOCOL_STORED bytes with the NUL; "": none. 0; or 1: the head stores none (spec.keeps is 0), or these are no
+     * such lines. May be NULL: it stores none. The command HEAD:STORe stores settings of the head itself, which native
+     * commands set. */
     int (*store)(void *ctx, const char *lines);
     /* Loss of optical power at the window, both ways together, dB. May be NULL: 0. */
     double (*window_loss_db)(void *ctx);
@@ -191,8 +192,8 @@ struct protocol_ops {
     /* The client is there. t_ns: device time of the tick from which on it gets frames. */
     void (*open)(void *protocol, int64_t t_ns);
     /* One whole native frame, checked, in the order of the stream. A client that joins late gets descriptor,
-     * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. May be NULL: it
-     * needs none. */
+     * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. May be NULL: the
+     * protocol needs none. */
     void (*frame)(void *protocol, const uint8_t *frame, size_t len);
     /* Frames are missing before the next one: the client, or the head, was too slow. May be NULL, as frame. */
     void (*gap)(void *protocol, uint32_t n_frames);
@@ -210,7 +211,7 @@ struct protocol_ops {
     /* The client has gone. Something that it asked for may still be due, such as a reboot. May be NULL. */
     void (*gone)(void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
-     * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
+     * each tick. next_ns saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);
 };
 
