@@ -107,7 +107,8 @@ void host_count_reader_lost(struct scanhead *sh, uint64_t n);
 /* SCANHEAD_EINPUT, unless frame is the one that scanhead_next returned last, and of this type. */
 int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type);
 
-/* attributes.c: returns whether the descriptor says that the stream has this; SCANHEAD_ESTATE before it has come. */
+/* attributes.c: returns whether the descriptor says that the stream has this content; SCANHEAD_ESTATE before a
+ * descriptor has come. */
 int host_has_content(const struct scanhead *sh, enum native_content content);
 
 /* poses.c: the first takes a poses frame in. The second forgets all poses, as another scan begins. */

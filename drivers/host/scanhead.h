@@ -92,7 +92,8 @@ struct scanhead_usb_head {
     double speed_bit_s; /* 0: unknown */
     char problem[320];  /* why it can't be opened, for instance no permission; empty: it can */
 };
-/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be NULL). */
+/* Describes at most max heads that are on USB now. Returns how many there are, or SCANHEAD_EIO with the reason in err
+ * (may be NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
@@ -184,7 +185,7 @@ enum scanhead_notice_kind {
      * correct frame. Where bytes were lost, n is less than the frame's length field says. */
     SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
     /* n bytes that belong to no frame or reply: garbage, a frame with a broken header, a broken reply, or replies
-     * between these and the next frame. A whole run of them is one notice, before the next frame or reply. */
+     * between these and the next frame. A whole run of such bytes is one notice, before the next frame or reply. */
     SCANHEAD_NOTICE_BAD_BYTES = 6,
     /* The connection or the recording ended within a frame or a reply, of which n bytes had come. seq: the frame's
      * number, if its header had come. */
@@ -268,7 +269,8 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
-/* A colour for each point, sRGB. The head's key output.colour decides what it shows. A shot without echo is grey. */
+/* A colour for each point, sRGB. The head's key output.colour decides what the colour shows. A shot without echo is
+ * grey. */
 struct scanhead_colour {
     uint8_t red, green, blue;
 };
@@ -279,7 +281,7 @@ int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, ui
 /* Returns 1 if a frame of colours follows each frame of points; else as scanhead_has_attributes. */
 int scanhead_has_colours(const struct scanhead *sh);
 
-/* A head that finds echoes in waveforms reports how far the shape of each echo is from the pulse's, RMS over its
+/* A head that finds echoes in waveforms reports how far the shape of each echo is from the pulse's, RMS over the echo's
  * amplitude. These deviations are in the frames of SCANHEAD_ATTRIBUTES, and decoded as scanhead_attributes does.
  * 65.535: that or more; 0 for an empty shot. */
 int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, double *deviation,
@@ -287,7 +289,8 @@ int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame,
 /* Returns 1 if attributes have deviations; else as scanhead_has_attributes. */
 int scanhead_has_deviations(const struct scanhead *sh);
 
-/* A window of samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when it fires. */
+/* A window of samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when the pulse
+ * fires. */
 struct scanhead_wave {
     uint64_t pulse;         /* its number in the scan */
     int64_t t_ns;           /* firing time since the scan's start */
@@ -374,7 +377,7 @@ struct scanhead_emitter {
     uint32_t rings; /* sphere: how many rings a scan frame has */
     /* ring i has the elevation first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
     double first_ring_deg, ring_step_deg;
-    int echoes;                                /* which ones of a pulse are sent: 0 all, 1 first, 2 last, 3 strongest */
+    int echoes;                                /* echoes sent of a pulse: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
     struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
@@ -399,7 +402,7 @@ enum scanhead_pose_flags {
     SCANHEAD_POSE_NONE = 4,         /* the head had not been given any yet */
 };
 /* Gets the pose at t_ns since the scan's start. The pose is known for the points that came last, and some seconds back.
- * SCANHEAD_ESTATE where the stream has not reported it, or the head stands still. */
+ * SCANHEAD_ESTATE where the stream has not reported the pose, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
 /* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`.
  * Returns how many. */

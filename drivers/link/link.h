@@ -19,8 +19,8 @@ enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
 
 enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_WEB, LINK_FD, LINK_MEMORY };
 
-/* Whether the paces fast and step wait for the readers of a link, so that they lose nothing. Readers of other links
- * lose frames as in real time. */
+/* Whether the paces fast and step wait for the readers of a link, so that these readers lose nothing. Readers of other
+ * links lose frames as in real time. */
 enum link_waits { LINK_WAITS_BY_TYPE /* all but web do */, LINK_WAITS_YES, LINK_WAITS_NO };
 
 struct web_source;  /* web.h */
@@ -61,7 +61,7 @@ struct link_spec {
 
 enum link_event_kind {
     LINK_OPENED,   /* a session began: it will read, and may command */
-    LINK_CLOSED,   /* it is gone; what was queued for it is void; its number may be used again */
+    LINK_CLOSED,   /* the session is gone; what was queued for it is void; its number may be used again */
     LINK_READABLE, /* read() has something */
     LINK_WRITABLE, /* write() will take something; only for sessions in want_write */
     LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */

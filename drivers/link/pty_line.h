@@ -2,8 +2,8 @@
 /* Carries the bytes of a pty link to and from a client whose bit rate may differ from the head's. Private to the link.
  *
  * Where both rates are the same, or the head has none, bytes pass through unchanged. Else the receiver gets what its
- * UART reads of them (uart.h). The bytes of one write follow each other without a pause, as do those that one read
- * takes. Before and after them the line rests. */
+ * UART reads of these bytes (uart.h). The bytes of one write follow each other without a pause, as do those that one
+ * read takes. Before and after them the line rests. */
 #ifndef DRIVERS_LINK_PTY_LINE_H
 #define DRIVERS_LINK_PTY_LINE_H
 

@@ -28,7 +28,7 @@ struct las_kind {
     double gain, offset;         /* signal in units of the detection threshold = offset + gain * count */
 };
 
-/* A point refers to its waveform by this; zeros: it has none. */
+/* A point refers to its waveform by this; zeros: the point has none. */
 struct las_packet {
     uint8_t kind; /* from 1 on */
     uint64_t at;  /* bytes from the beginning of the record of packets */

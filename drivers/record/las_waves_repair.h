@@ -30,7 +30,7 @@ uint64_t las_packets_limit(const struct las_packets *packets, const struct repai
  * changed, 0 where nothing had to be, or a negative error. */
 int las_packets_repair(struct las_packets *packets, struct repair *repair, const struct repair_rows *points,
                        uint8_t *header, struct sh_err *err);
-/* Gives the .wdp its name; one without any packet is removed. */
+/* Gives the .wdp its name; a .wdp without any packet is removed. */
 int las_packets_settle(struct las_packets *packets, struct sh_err *err);
 void las_packets_free(struct las_packets *packets);
 

@@ -40,8 +40,8 @@ struct repaired {
     const char *unit;
     int was_whole;
 };
-/* SH_EINPUT: no such file, no such format; SH_ESTATE: it is still being written, or FILE is named and FILE.part exists,
- * too; SH_EFORMAT: it can't be repaired, and is unchanged. */
+/* SH_EINPUT: no such file, no such format; SH_ESTATE: the file is still being written, or FILE is named and FILE.part
+ * exists, too; SH_EFORMAT: the file can't be repaired, and is unchanged. */
 int repair_file(const char *path, const struct sh_report *report, struct repaired *repaired, struct sh_err *err);
 void repair_free(struct repaired *repaired);
 
@@ -77,7 +77,8 @@ int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx
 /* Checks that nothing follows `end` but a piece of a unit, of at most `most` bytes, and then zeros (after a power cut).
  * Else SH_EFORMAT: no kill and no full disk causes that damage. */
 int repair_check_rest(const struct repair *repair, uint64_t end, uint64_t most, struct sh_err *err);
-/* Puts a note at the end that the file may be incomplete. Where a full disk has no room for it, that is reported. */
+/* Puts a note at the end that the file may be incomplete. Where a full disk has no room for the note, that is
+ * reported. */
 void repair_append_note(const struct repair *repair, uint64_t end, const void *note, size_t len);
 /* SH_EFORMAT: there is damage at that byte, which no recorder leaves. */
 int repair_fail_damaged(const struct repair *repair, uint64_t at, struct sh_err *err);

@@ -19,7 +19,7 @@ struct station_pose {
     double rotation[9]; /* head's frame (SOCS) -> recording's frame, row by row; proper */
 };
 
-/* Shift and rotation are the anchor's. Where the head moves, they don't say where it is: see track.h. In
+/* Shift and rotation are the anchor's. Where the head moves, they don't say where the head is: see track.h. In
  * geodetic coordinates the shift is degrees, degrees, metres, and the axes are east, north, up. */
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose);
 

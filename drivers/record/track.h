@@ -131,7 +131,7 @@ struct track {
 
 /* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
  * kind of heights, a head that begins or ceases to move or to send (wanted) attributes, colours or waveforms, a
- * station number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
+ * station number above 65535. SH_EFORMAT also if the points lack the figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* For recorders: leaves only points index[0..n-1] of the batch in it; the indices rise. */

@@ -13,7 +13,7 @@
  * peers have confirmed what was sent to them. Keep-alive probes stop, so that a connection lasts. Returns 0, or
  * SH_ESTATE: the system can't do it, and all sockets are as before. */
 int sockets_silence(int listener, const int *fds, int n);
-/* Ends it: the connections go on. */
+/* Ends the silence: the connections go on. */
 void sockets_speak(int listener, const int *fds, int n);
 
 #endif

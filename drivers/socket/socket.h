@@ -60,7 +60,7 @@ int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size);
 
 /* Sets up a connected TCP socket; others stay as they are. Small packets leave at once. A peer that has vanished
- * without a word ends the connection after about 25 s. With bytes under way to it, that takes until the
+ * without a word ends the connection after about 25 s. With bytes under way to the peer, the end takes until the
  * system gives up repeating them (Linux: some 15 minutes). */
 void socket_tune(int fd);
 /* After socket_tune, for a peer that always reads: the connection ends after about 25 s with bytes under way, too.
@@ -77,7 +77,7 @@ ssize_t socket_write_heard(int fd, const void *buf, size_t len);
 /* Breaks a connected TCP socket: its peer sees a reset, and loses what it has not taken. The descriptor stays. */
 void socket_break(int fd);
 /* Reads and throws away what has come, so that closing the socket does not reset the connection. A peer that sends
- * faster than this reads is not waited for. */
+ * faster than socket_drain reads is not waited for. */
 void socket_drain(int fd);
 
 /* The state of a connected socket, from the events of poll(2). */

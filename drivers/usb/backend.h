@@ -78,7 +78,7 @@ struct usb_backend_ops {
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
 
 /* backend_socket.c: opens a listening or (attach) connected socket, which does not block. The path of a Unix socket
- * whose process is gone is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. */
+ * whose process is gone is taken over. `what` names the socket in errors; name gets "127.0.0.1:3240" or the path. */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
 /* Returns the next client's descriptor, which does not block; -1: none. reserve: socket_reserve()'s. The owner hears of

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The USB device core: descriptors, control requests, endpoints and cancellation, with no transport in it.
  *
- * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from it.
+ * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from the model.
  * Above the core stands the function (a link, or a test), which reads and writes endpoints and answers class
  * and vendor requests by hooks; below it stands a back end (usbip, usbredir, functionfs), which carries what
  * the host does:
@@ -84,7 +84,7 @@ void usb_device_free(struct usb_device *device);
 
 typedef void (*usb_complete)(void *ctx, struct usb_transfer *transfer);
 
-/* The host has the device: it is in the state default, at that rate. */
+/* The host has the device: the device is in the state default, at that rate. */
 void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_complete complete, void *ctx);
 /* The device is unplugged: transfers that are pending complete with USB_GONE. */
 void usb_device_detach(struct usb_device *device);
@@ -111,7 +111,7 @@ enum usb_end usb_device_end(const struct usb_device *device);
 /* Returns USB_CONFIGURATION, or 0 if the device is not configured. */
 int usb_device_configuration(const struct usb_device *device);
 
-/* Returns how often it was attached. */
+/* Returns how often the device was attached. */
 uint32_t usb_device_attaches(const struct usb_device *device);
 
 /* ---- injected faults */
@@ -124,7 +124,7 @@ void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int du
 /* Halts the endpoint, until the host clears the halt. 0: there is no such endpoint now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
- * into the one after it. The shortening holds until the interface ends. */
+ * into the transfer after it. The shortening holds until the interface ends. */
 void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
 /* Sets how long each control request takes. 0: it is answered at once. */
 void usb_device_set_slow(struct usb_device *device, double ms);
@@ -137,7 +137,7 @@ void usb_hold(const struct usb_device *device, struct usb_transfer **held, struc
 struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id);
 /* Takes out the first request if its time has come; NULL: it has not, or there is none. */
 struct usb_transfer *usb_take_due(struct usb_transfer **held);
-/* Returns when the first one is due; INT64_MAX: there is none. */
+/* Returns when the first request is due; INT64_MAX: there is none. */
 int64_t usb_due_ns(const struct usb_transfer *held);
 /* Makes the configuration descriptor claim n bytes more than it has, with back ends that ask the core for it. */
 void usb_device_lengthen(struct usb_device *device, uint32_t n);
