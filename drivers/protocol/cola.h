@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One session of CoLa, for the files of this module. COLA.md says what it does and doesn't. */
+/* One session of CoLa, for the files of this module. COLA.md says what a session does and doesn't. */
 #ifndef DRIVERS_PROTOCOL_COLA_H
 #define DRIVERS_PROTOCOL_COLA_H
 

@@ -68,8 +68,8 @@ int cola_shape_has(const struct cola_shape *shape, const struct cola_measured *p
 /* The nearest and the farthest place of a polygon or a sector on a ray from the head, to the nearest micrometre; a head
  * inside has nearest 0. Returns 0 where the ray misses the shape. */
 int cola_shape_cut(const struct cola_shape *shape, double turns, int32_t *near_um, int32_t *far_um);
-/* The outline of a polygon or a sector as corners, the arcs of a sector in steps. Returns how many, up to
- * COLA_SHAPE_CORNERS; 0: it has none. */
+/* The outline of a polygon or a sector as corners, the arcs of a sector in steps. Returns how many corners, up to
+ * COLA_SHAPE_CORNERS; 0: the shape has none. */
 uint32_t cola_shape_outline(const struct cola_shape *shape, double out_m[COLA_SHAPE_CORNERS][2]);
 /* Adds a corner of a polygon. Returns -1 where it is farther than COLA_SHAPE_REACH_UM, or there are too many. */
 int cola_shape_add(struct cola_shape *shape, double x_um, double y_um);

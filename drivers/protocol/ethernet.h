@@ -50,7 +50,7 @@ struct tcp_talk {               /* The caller sets both ends, and all other memb
 
 /* The handshake is tcp_put_syn for side 0, then for side 1, then tcp_put_ack for side 0. */
 size_t tcp_put_syn(struct tcp_talk *talk, int side, uint8_t *to);
-/* 1 <= len <= ETHERNET_MAX_SEGMENT; it acknowledges all that came so far. */
+/* 1 <= len <= ETHERNET_MAX_SEGMENT; the frame acknowledges all that came so far. */
 size_t tcp_put_data(struct tcp_talk *talk, int side, const void *data, size_t len, uint8_t *to);
 /* None where everything is acknowledged. */
 size_t tcp_put_ack(struct tcp_talk *talk, int side, uint8_t *to);

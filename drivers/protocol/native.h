@@ -56,7 +56,7 @@ enum native_flags {
 
 /* The header of the whole frame at `frame`. */
 void native_read_header(const uint8_t *frame, struct native_header *header);
-/* Bytes of that frame: header and payload. The one place that knows where its length stands. */
+/* Bytes of that frame: header and payload. The one place that knows where a frame's length stands. */
 static inline size_t native_frame_len(const uint8_t *frame)
 {
     return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
@@ -87,7 +87,7 @@ struct native_descriptor {
     uint32_t content, reserved; /* enum native_content; where content is 0, neither is sent */
 };
 
-/* How beams are arranged. All of them have the same two angles in a polar point: the mirror count is the
+/* How beams are arranged. All arrangements have the same two angles in a polar point: the mirror count is the
  * elevation, the pan count the azimuth, clockwise from y seen from above; direction = (sin pan cos mirror, cos pan
  * cos mirror, sin mirror). */
 enum native_emitter_kind {
@@ -124,9 +124,9 @@ struct native_beam { /* 0 i32 elevation, 4 i32 azimuth offset, 8 u32 firing time
 };
 
 enum native_content {
-    NATIVE_HAS_ATTRIBUTES = 1, /* a frame of attributes follows each one of points */
-    NATIVE_HAS_COLOURS = 2,    /* a frame of colours follows it, after that of the attributes */
-    NATIVE_HAS_WAVES = 4,      /* frames of waveforms follow it, after these */
+    NATIVE_HAS_ATTRIBUTES = 1, /* a frame of attributes follows each points frame */
+    NATIVE_HAS_COLOURS = 2,    /* a frame of colours follows each points frame, after its attributes */
+    NATIVE_HAS_WAVES = 4,      /* frames of waveforms follow each points frame, after both */
     NATIVE_HAS_DEVIATIONS = 8, /* attributes have deviations after their records */
 };
 
