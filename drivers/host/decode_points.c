@@ -229,7 +229,7 @@ static void columns_polar(const struct scanhead *sh, struct block *b, int n, con
     const struct native_descriptor *d = &sh->descriptor;
     const int one_mirror = is_one_mirror(b, n), m = one_mirror ? 1 : n;
     /* The mirror angle lies within half a turn of the line's middle, so that it has no jump along the line. With other
-     * heads it is an elevation. */
+     * heads the angle is an elevation. */
     const double middle = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6;
     const double lo = (sh->emitter.kind == NATIVE_EMIT_LINE ? middle : 0) - 0.5;
     set_turns(b->b, m, 1 / d->mirror_counts_per_turn, b->mirror);

@@ -170,8 +170,8 @@ static int gone_or_reset(struct host_usb *usb)
 }
 
 /* After a reset of the bus Linux may end transfers as if each had been answered with no bytes. New transfers are
- * accepted, but wait for ever, since the session is over. So this asks the head whether the session is open. A head
- * that doesn't know this request stalls it. */
+ * accepted, but wait for ever, since the session is over. So session_is_over asks the head whether the session is open.
+ * A head that doesn't know this request stalls it. */
 static int session_is_over(struct host_usb *usb)
 {
     const uint8_t type = (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_IN;

@@ -3,8 +3,8 @@
  * and stream, or one alone.
  *
  * The back end carries out the host's acts one at a time. An act that begins or ends a session stops the back end until
- * this has been reported. So a session begins or ends at most once between two polls. The end of a session is reported
- * after all its bytes have been read. */
+ * the begin or end has been reported. So a session begins or ends at most once between two polls. The end of a session
+ * is reported after all its bytes have been read. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>

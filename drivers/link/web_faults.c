@@ -5,7 +5,7 @@
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/silence.h"
 
-/* Breaks the connection, or the listening socket, at once; libwebsockets closes it when it finds out. */
+/* Breaks the connection, or the listening socket, at once; libwebsockets closes the socket when it notices. */
 static void web_break(struct lws *wsi)
 {
     const int fd = web_lws.lws_get_socket_fd(wsi);

@@ -73,7 +73,7 @@ static void talk_begin(struct capture_session *s, int run, int request)
 }
 
 /* A request waits while no place is free. If the device speaks in turns, a request ends the answer to the one before.
- * So it also waits until that answer has begun. */
+ * So a request also waits until that answer has begun. */
 static int must_wait(const struct capture_session *s)
 {
     const int takes_turns = s->talk->kind->stops == NULL;

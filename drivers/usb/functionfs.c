@@ -229,7 +229,7 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, con
     int going = owner->go_on(owner->ctx), any = 1;
     const int hung_up = fds[AT_TTY].fd == self->console.fd && (fds[AT_TTY].revents & POLLHUP) != 0;
     if (going && self->ep0 < 0 && (fds[AT_EP0].revents != 0 || hung_up)) take_state(self, hung_up);
-    /* Data on the endpoints came before the event on ep0. So they are taken first: a session is not closed before
+    /* Data on the endpoints came before the event on ep0. So the data are taken first: a session is not closed before
      * its last data are in. */
     for (int events = 0; going && any && events < MAX_EVENTS; events++) {
         int taken = 0;

@@ -25,8 +25,8 @@ export class Sequence {
   n = 1;
 
   /** Returns '', or a notice about the frame: 'gap': `n` frames are missing from number `first` on; 'restarted':
-   * another sequence begins; 'repeated' or 'late': it is to be dropped. Except for a gap, `first` is the frame's own
-   * number. */
+   * another sequence begins; 'repeated' or 'late': the frame is to be dropped. Except for a gap, `first` is the frame's
+   * own number. */
   take(frame) {
     const {seq} = frame;
     this.first = seq;

@@ -189,7 +189,7 @@ export class Panorama {
     return {pixels, limits};
   }
 
-  // Returns whether points came or went since it was made, or others are shown now.
+  // Returns whether points came or went since the panorama was made, or others are shown now.
   isOld(cloud, section) {
     if (cloud !== this.cloud || cloud.origin !== this.#origin) return true;
     const cut = section?.relativeTo(cloud.origin) ?? null;

@@ -5,8 +5,8 @@
 
 import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from './previews.js';
 
-// Points are shown with the angular step of the station. The cells that it sees are found with these finer steps: the
-// first at once, the second once the station rests. Surfaces at grazing incidence need the second.
+// Points are shown with the angular step of the station. The cells that the station sees are found with these finer
+// steps: the first at once, the second once the station rests. Surfaces at grazing incidence need the second.
 const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station must rest for this time before the second step
 const COVER_MS = 500; // while a station is dragged, its cells are asked for at most once in this time

@@ -139,7 +139,7 @@ export class Painter {
     return did;
   }
 
-  // Call it after a step's last command. Once the GPU has done the step, busy() calls then(ms).
+  // Call fence() after a step's last command. Once the GPU has done the step, busy() calls then(ms).
   fence(then) {
     const gl = this.#gl;
     this.#fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -148,7 +148,7 @@ export class Painter {
     this.#then = then;
   }
 
-  // Returns whether the GPU still does the last step. Call it between tasks of the page.
+  // Returns whether the GPU still does the last step. Call busy() between tasks of the page.
   busy() {
     const gl = this.#gl;
     if (this.#fence === null) return false;

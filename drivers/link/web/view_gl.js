@@ -293,7 +293,7 @@ export class Target {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
-  // Puts it onto the canvas, which has so many pixels.
+  // Puts the picture onto the canvas, which has so many pixels.
   toPage(width, height) {
     const {gl} = this;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.buffer);

@@ -219,8 +219,8 @@ export function useMesh(gl, programs, camera, origin, {colour, edge = 0, push = 
   gl.activeTexture(gl.TEXTURE0);
 }
 
-// This is a mesh on the GPU: {origin (scene frame), positions Float32 relative to it, triangles Uint32, lines Uint32
-// or none}
+// This is a mesh on the GPU: {origin (scene frame), positions Float32 relative to origin, triangles Uint32, lines
+// Uint32 or none}
 export class Mesh {
   weight = 2;
   drawn = 0;

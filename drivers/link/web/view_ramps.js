@@ -27,7 +27,7 @@ export const SCALES = [['usual', 'Usual'], ['even', 'Violet to yellow'], ['blue'
 
 export const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 
-// Converts OKLab to linear light of sRGB, and that to its bytes (IEC 61966-2-1).
+// Converts OKLab to linear light of sRGB, and that light to sRGB's bytes (IEC 61966-2-1).
 function fromOklab(L, a, b) {
   const [l, m, s] = [L + 0.3963377774 * a + 0.2158037573 * b, L - 0.1055613458 * a - 0.0638541728 * b,
     L - 0.0894841775 * a - 1.291485548 * b].map((v) => v ** 3);

@@ -74,14 +74,15 @@ export class Stations {
     this.select(this.list[at < 0 ? 0 : (at + step + this.list.length) % this.list.length].number);
   }
 
-  // Returns the place where it is drawn, moved or not.
+  // Returns the place where the station is drawn, moved or not.
   placeOf(station) {
     const m = this.moved?.number === station.number ? this.moved : null;
     return m ? {at: [m.x, m.y, m.z], heading_deg: m.heading_deg, ghost: true} :
       {at: [station.x_m, station.y_m, station.z_m], heading_deg: station.heading_deg, ghost: false};
   }
 
-  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: it is out of sight.
+  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: the station is out of
+  // sight.
   ring(camera, station) {
     const {at, heading_deg} = this.placeOf(station);
     const {w} = camera.project(at);
