@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A source of bytes: the bulk endpoints of the head's vendor interface.
  *
- * Several reads are always under way, so that the bus never waits for this program. They are a ring of
- * transfers, which the kernel completes in order, and which are read and submitted again in order. There is no
+ * Several reads are always under way, so that the bus never waits for this program. The reads are a ring of transfers,
+ * which the kernel completes in order, and which are read and submitted again in order. There is no
  * thread: completions are taken in while the caller reads or waits, and between these calls the kernel fills
  * the transfers under way. */
 #include "drivers/host/usb_inside.h"

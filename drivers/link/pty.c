@@ -245,9 +245,9 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
 }
 
-/* When the master is closed the kernel throws away what waits in the terminal. It reports the count through the slave
- * alone, which we therefore open. The slave is opened only at the end, when no new client is expected, since the watch
- * would see our own opening. A slave that a client holds exclusively (TIOCEXCL) can't be opened. */
+/* When the master is closed the kernel throws away what waits in the terminal. The kernel reports the count through the
+ * slave alone, which we therefore open. The slave is opened only at the end, when no new client is expected, since the
+ * watch would see our own opening. A slave that a client holds exclusively (TIOCEXCL) can't be opened. */
 static int pty_unread(void *link, int session)
 {
     struct pty_link *pty = link;

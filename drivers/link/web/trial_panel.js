@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This part of the stations' panel is for trying places. It has stations that are moved, added and set in this page
-// alone, the surface that they see together, and the best next place. It takes the place of the list of stations while
-// it is open.
+// alone, the surface that they see together, and the best next place. The part takes the place of the list of stations
+// while it is open.
 
 import {bodyOf, grouped, kept, make, markField, numberOf, percent, placeText, say} from './page.js';
 import {why} from './session.js';
