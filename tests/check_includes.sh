@@ -34,7 +34,7 @@ prepares='core/scene/build.c core/bvh/bvh.c core/sight/sight.c'
 #   host           itself, protocol, core's headers without a source (vectors, matrices, arithmetic, growing arrays)
 #   record         the same, host's public header, core/newfile.h, core/infile.h, core/colour.h, core/decimal.h, core/digits.h, core/direct.h, the studio's rooms mesh and picture
 # The arrows that run upward, one a line as FROM TO REASON: room FROM includes header TO, or calls what that header declares.
-# There is at most one in core, one in firmware_sim and one in drivers.
+# There is at most one arrow in core, one in firmware_sim and one in drivers.
 upward='
 '
 #

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The examples of lock-step: a car in a simulator of its own, in C and in Python, with numpy and without. They check
-# themselves. Prints TAP. $SCANHEAD: the program of the build, with the library beside it.
+# The examples of lock-step: a car in a simulator of its own, in C and in Python, with numpy and without. The examples
+# check themselves. Prints TAP. $SCANHEAD: the program of the build, with the library beside it.
 set -u
 program=${SCANHEAD:-build/scanhead}
 work=$(mktemp -d) || exit 1
@@ -52,7 +52,7 @@ check "Python, too" python drivers/host/examples/lockstep.py "$source" 200
 check "Python without site packages, so without numpy" python -S drivers/host/examples/lockstep.py "$source" 100
 stop
 
-# Their checks can fail: frames that are dropped, a head that is mounted 2 um higher than the simulator thinks.
+# The examples' checks can fail: frames that are dropped, a head that is mounted 2 um higher than the simulator thinks.
 start faults[0].kind=drop faults[0].from=40 faults[0].every=25 || exit 1
 check "C: missing pulses are seen" wrong 'pulses: some are missing' timeout 120 "$work/lockstep" "$source" 200
 check "Python: missing pulses are seen" wrong 'pulses: some are missing' python drivers/host/examples/lockstep.py "$source" 100

@@ -202,7 +202,7 @@ removed_leaves() {
         lacks "$toy/build/libscanhead.so" host/four && lacks "$toy/build/libscanhead.o" host/four
 }
 check "a source that is removed leaves the archives" removed_leaves
-# Its program stays in the folder, but make does not ask for it.
+# The program of a test that is removed stays in the folder, but make does not ask for it.
 removed_test() {
     [ -e "$toy/build/test/tests/unit/test_toy" ] && rm "$toy/tests/unit/test_toy.c" && ! toy test T=test_toy >"$work/gone" &&
         says "$work/gone" "no tests/\*/test_toy.c"

@@ -50,7 +50,7 @@ options_are_there() {
     done
     twice=$(grep ') echo' "$work/completion" | sort | uniq -d)
     [ -z "$twice" ] || { echo "twice in the completion: $twice"; return 1; }
-    # There are more than 200. With far fewer the help was read wrongly.
+    # There are more than 200 options. With far fewer the help was read wrongly.
     [ $n -gt 150 ] || { echo "only $n options were found"; return 1; }
 }
 

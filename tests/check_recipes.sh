@@ -15,11 +15,11 @@
 #
 # (c and yaml take `not run: REASON`, too.) A block of these languages without such a word fails, and so does a
 # block without a language, or an indented one that begins with a command. Other languages (text, csv) are free.
-# The blocks of a document share a folder that looks like the checkout after `make`; each document has a new one. There the
-# ready configurations have fewer pulses, and turn faster: the same recipe in a fraction of the time. The heads of demo.yaml
-# and glass.yaml have single rays, which is what they choose (wire/test_plan): to choose takes up to 1 s of processor time a
-# run. The recipes of core/plan choose. Outside of the first page Assimp reads the house: its other readers take 3 s of
-# processor time. With THOROUGH=1 configurations stay as they are.
+# The blocks of a document share a folder that looks like the checkout after `make`; each document has a new one. In
+# that folder the ready configurations have fewer pulses, and turn faster: the same recipe in a fraction of the time.
+# The heads of demo.yaml and glass.yaml have single rays, which is what they choose (wire/test_plan): to choose takes up
+# to 1 s of processor time a run. The recipes of core/plan choose. Outside of the first page Assimp reads the house: its
+# other readers take 3 s of processor time. With THOROUGH=1 configurations stay as they are.
 # First the script is tried on planted documents, whose failures are known.
 set -u
 
@@ -88,8 +88,8 @@ checkout() { # document
     ln -s "$program" "$(dirname "$program")/libscanhead.a" "$work/tree/build/"
 }
 
-# within COMMAND...: runs a command in the checkout, within the limit, in a group of its own that ends with it. Its output
-# goes to $work/out.
+# within COMMAND...: runs a command in the checkout, within the limit, in a group of its own that ends with it. The
+# command's output goes to $work/out.
 within() {
     : >"$work/out"
     set -m

@@ -45,7 +45,7 @@ commands() {
     [ $? = 2 ] && [[ $said == *"did you mean list?"* ]]
 }
 
-# Its messages, its help and its pages have its own name; there are pages of its own commands alone.
+# scanheadd's messages, help and pages have its own name; there are pages of its own commands alone.
 name() {
     pages=$("$head" help --man list | tr '\n' ' ')
     [ "$pages" = "scanheadd.1 scanheadd-run.1 scanheadd-plan.1 scanheadd-check.1 scanheadd-list.1 scanheadd-help.1 scanhead.yaml.5 " ] || { echo "$pages"; return 1; }

@@ -29,9 +29,9 @@ cut -d ' ' -f 2- "$work/list" | tr ' ' '\n' | sort -u | xargs nm -P -g -A --defi
 awk 'NR == FNR { own[$1] = 1; next } { for (i = 2; i <= NF; i++) if ($i in own) { print; next } }' "$work/own" "$work/list" >"$work/apart"
 grep -v -x -F -f "$work/apart" "$work/list" >"$work/together" || : # none
 
-# one FOLDER/NAME OBJECT...: makes an object in which main has the program's name. It is kept until one of its own
-# objects, or this script, is newer. Groups of sections end here: of groups of one name in two programs the linker would
-# take one, and clang 19 makes a group of each variable.
+# one FOLDER/NAME OBJECT...: makes an object in which main has the program's name. The object is kept until one of its
+# own objects, or this script, is newer. Groups of sections end here: of groups of one name in two programs the linker
+# would take one, and clang 19 makes a group of each variable.
 one() {
     local program=$1 name=${1##*/}
     local out=$work/${program%/*}-$name.o object

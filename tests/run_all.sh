@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # Runs the tests that make has built: sh tests/run_all.sh BUILD [unit|wire|accuracy|stability|guest]. Without a part it
-# runs all: the unit tests with sanitizers, and once more those that make built as shipped. It ends with one line of
-# counts.
+# runs all: the unit tests with sanitizers, and once more those that make built as shipped. The script ends with one
+# line of counts.
 #
 # As many at a time as there are processors, those that take longest first in each folder:
 #   1. accuracy, stability, unit: they compute; beside them the guests, which take longest and so begin first, and the
@@ -23,7 +23,7 @@ wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]
 }
 
-# These unit tests run as shipped beside those with sanitizers. All do when the unit tests run alone.
+# These unit tests run as shipped beside those with sanitizers. All unit tests do so when they run alone.
 if [ -z "$part" ]; then shipped=$(sh tests/shipped.sh | sed 's|.*/test_||; s/\.c$//' | tr '\n' ' '); else shipped=all; fi
 runs() { # FOLDER NAME [BUILD]
     [ -e "tests/$1/test_$2.c" ] || return 1

@@ -6,9 +6,9 @@
 #
 # SECONDS per program; default $TAP_LIMIT_S, or 300; longer by the load, where more want to run than there are processors.
 # A test program ends itself then, and says where it was (tests/common/limit.c). A program that goes on for GRACE_S
-# more, such as a script, is killed with all that it started. N programs at a time, default 1; one that begins with
-# `+` runs beside these. Those after `--M` begin once all before have ended, M at a time. Those after `--` have the
-# machine to themselves, one after the other.
+# more, such as a script, is killed with all that it started. N programs at a time, default 1; a program that begins
+# with `+` runs beside these. Programs after `--M` begin once all before have ended, M at a time. Programs after `--`
+# have the machine to themselves, one after the other.
 # Prints one line per program, in the order given, and the tables of those that have some. For one that fails, it
 # prints all output but the passed tests. The reasons of skips follow.
 # The last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
@@ -68,8 +68,8 @@ total_passed=0 total_failed=0 total_skipped=0
 
 programs=() started_ms=() ended_ms=() statuses=() reported=0
 
-# start PROGRAM: starts it in the background, so that an interrupt doesn't wait for the program. Its streams go to
-# separate files, as lines of one must not mix with lines of the other.
+# start PROGRAM: starts it in the background, so that an interrupt doesn't wait for the program. The program's streams
+# go to separate files, as lines of one must not mix with lines of the other.
 start() {
     local number=${#programs[@]} program=$1
     programs+=("$program")

@@ -29,7 +29,8 @@ int scanhead_has_deviations(const struct scanhead *sh)
     return host_has_content(sh, NATIVE_HAS_DEVIATIONS);
 }
 
-/* Returns whether the frame's number is that of the last points frame plus `after`, and it belongs to these points. */
+/* Returns whether the frame's number is that of the last points frame plus `after`, and the frame belongs to these
+ * points. */
 static int is_of_points(const struct scanhead *sh, const struct scanhead_frame *frame, uint32_t after)
 {
     return sh->have_points && frame->seq == sh->points_seq + after && frame->pulse0 == sh->of_points.pulse0 &&

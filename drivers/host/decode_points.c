@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Decodes the points of a stream frame into doubles. It is the hot path of every recorder.
+/* Decodes the points of a stream frame into doubles: the hot path of every recorder.
  *
  * A frame is taken in blocks of rows. The rows of a block become columns of words, and loops that compilers turn into
  * vectors make each column of figures from these. */
@@ -229,7 +229,7 @@ static void columns_polar(const struct scanhead *sh, struct block *b, int n, con
     const struct native_descriptor *d = &sh->descriptor;
     const int one_mirror = is_one_mirror(b, n), m = one_mirror ? 1 : n;
     /* The mirror angle lies within half a turn of the line's middle, so that it has no jump along the line. With other
-     * heads it is an elevation. */
+     * heads the angle is an elevation. */
     const double middle = ((double)d->line_start_udeg + (double)d->line_stop_udeg) / 720e6;
     const double lo = (sh->emitter.kind == NATIVE_EMIT_LINE ? middle : 0) - 0.5;
     set_turns(b->b, m, 1 / d->mirror_counts_per_turn, b->mirror);
@@ -304,7 +304,7 @@ int scanhead_columns(struct scanhead *sh, const struct scanhead_frame *frame, ui
     return n;
 }
 
-/* It holds a block of points. */
+/* The room holds a block of points. */
 struct points_room {
     double x[BLOCK], y[BLOCK], z[BLOCK], range_m[BLOCK], mirror_rad[BLOCK], pan_rad[BLOCK], reflectance_db[BLOCK];
     int64_t t_ns[BLOCK];

@@ -184,9 +184,9 @@ static int is_late(struct scanhead *sh, const char *command)
 }
 
 /* Comes into step with the replies, before the first exchange on a terminal and after a command that was given up.
- * Between open() and raw mode the terminal echoes what the head sends, and the head takes it for commands; another
- * program may have left half a line. So an empty line ends that line, and all replies are skipped up to the answer to a
- * question of our own. The head may have sent half a frame to the program before; that half may swallow the
+ * Between open() and raw mode the terminal echoes what the head sends, and the head takes the echo for commands;
+ * another program may have left half a line. So an empty line ends that line, and all replies are skipped up to the
+ * answer to a question of our own. The head may have sent half a frame to the program before; that half may swallow the
  * answer. So the question is asked again. */
 static int exchange_settle(struct scanhead *sh, int64_t deadline_ns)
 {

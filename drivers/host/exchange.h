@@ -12,12 +12,12 @@ int host_is_hang_up(const struct scanhead *sh, int error);
 void host_note_loss(struct scanhead *sh, int error);
 /* host.c: sets and returns the error of a connection from which nothing more will come. */
 int host_gone(struct scanhead *sh);
-/* The same, when all items that had come were taken: it also gives the notice that the connection is over. */
+/* The same, when all items that had come were taken: also gives the notice that the connection is over. */
 int host_over(struct scanhead *sh);
 
 /* exchange.c: gives the notice, if one is due, for the parser's present line, which nobody waits for. */
 void host_stray_line(struct scanhead *sh);
-/* Nothing more will come: keeps the frames that are in the parser. The rest of it is garbage. */
+/* Nothing more will come: keeps the frames that are in the parser. The rest of the parser's bytes is garbage. */
 int host_keep_rest(struct scanhead *sh);
 
 /* io.c: waits for `events` on the source: 0, SH_ETIMEOUT (also for a signal, if the call has no time limit), SH_EIO. */

@@ -143,7 +143,7 @@ static struct host_node *pop(struct scanhead *sh)
     return node;
 }
 
-/* Drops the oldest frame. Its facts about the stream are taken in first, and it stays in the hash. */
+/* Drops the oldest frame. The frame's facts about the stream are taken in first, and the frame stays in the hash. */
 static int drop_oldest(struct scanhead *sh)
 {
     struct host_node *node = pop(sh);

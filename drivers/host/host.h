@@ -89,7 +89,7 @@ struct scanhead {
     struct host_turn_part turn_part[HOST_TURN_PARTS]; /* sines and cosines of whole 1/256 turns */
 };
 
-/* notices.c: hands on the parser's notices. It is called once, after native_parser_init. */
+/* notices.c: hands on the parser's notices. To be called once, after native_parser_init. */
 void host_listen(struct scanhead *sh);
 /* Gives the notice for the parser's present line: nobody waits for it, or it echoes what was just sent. */
 void host_note_line(struct scanhead *sh, int is_echo);
@@ -97,7 +97,7 @@ void host_note_line(struct scanhead *sh, int is_echo);
 void host_note_closed(struct scanhead *sh);
 void host_note_reattached(struct scanhead *sh);
 
-/* Takes a frame into the state: descriptor, anchor, names, counters, hash. It is called once per frame, in stream
+/* Takes a frame into the state: descriptor, anchor, names, counters, hash. To be called once per frame, in stream
  * order. */
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload);
 
@@ -107,7 +107,8 @@ void host_count_reader_lost(struct scanhead *sh, uint64_t n);
 /* SCANHEAD_EINPUT, unless frame is the one that scanhead_next returned last, and of this type. */
 int host_check_last(struct scanhead *sh, const struct scanhead_frame *frame, enum scanhead_frame_type type);
 
-/* attributes.c: returns whether the descriptor says that the stream has this; SCANHEAD_ESTATE before it has come. */
+/* attributes.c: returns whether the descriptor says that the stream has this content; SCANHEAD_ESTATE before a
+ * descriptor has come. */
 int host_has_content(const struct scanhead *sh, enum native_content content);
 
 /* poses.c: the first takes a poses frame in. The second forgets all poses, as another scan begins. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: the client side of a scan head. It connects, sends commands, and hands out frames and points.
+/* libscanhead: the client side of a scan head. The library connects, sends commands, and hands out frames and points.
  *
- * The stream is the native protocol (drivers/protocol/PROTOCOL.md). `make install` installs this header. It
- * needs no other header of the project. In ten lines:
+ * The stream is the native protocol (drivers/protocol/PROTOCOL.md). `make install` installs this header, which needs no
+ * other header of the project. In ten lines:
  *
  *     struct scanhead *sh;
  *     struct scanhead_frame frame;
@@ -68,12 +68,12 @@ struct scanhead;
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
 /* The same, but tries again for up to timeout_ms while the source isn't there: a head that is not plugged in, a device
  * node without permissions yet. timeout_ms < 0: for ever. On USB the system's hot-plug events start the next try. A
- * wrong source ends the tries at once, except a "tty:", which may still appear. A signal ends them early. One try to
- * connect by TCP may take 10 s, also beyond timeout_ms or after a signal. err gets the reason of the last try. */
+ * wrong source ends the tries at once, except a "tty:", which may still appear. A signal ends the tries early. One try
+ * to connect by TCP may take 10 s, also beyond timeout_ms or after a signal. err gets the reason of the last try. */
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
 /* sh may be NULL. */
 void scanhead_close(struct scanhead *sh);
-/* Returns the text of the last error. It is the handle's, until its next call. */
+/* Returns the text of the last error. The text is the handle's, until the handle's next call. */
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
@@ -92,7 +92,8 @@ struct scanhead_usb_head {
     double speed_bit_s; /* 0: unknown */
     char problem[320];  /* why it can't be opened, for instance no permission; empty: it can */
 };
-/* Describes at most max of them. Returns how many there are, or SCANHEAD_EIO with the reason in err (may be NULL). */
+/* Describes at most max heads that are on USB now. Returns how many there are, or SCANHEAD_EIO with the reason in err
+ * (may be NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
@@ -163,15 +164,15 @@ int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout
 /* Notices about a stream, one for each event. Losses are counted in two independent ways:
  *   By frame number: GAP, REPEATED, LATE, RESTARTED. Each frame that did not come in order is in one GAP, even if it
  *   comes later. Only a restart hides missing frames. The n of all GAPs add up to stats.seq_lost.
- *   By byte: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte that belongs to no frame and no reply is in one of them. Their n
- *   add up to stats.bad_bytes.
+ *   By byte: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte that belongs to no frame and no reply is in one of these notices,
+ *   whose n add up to stats.bad_bytes.
  * A damaged frame is counted both ways: first its bytes, then its number, once the next frame shows the gap. */
 enum scanhead_notice_kind {
     /* n frames are missing, from seq on. at_byte: of the frame that came instead. Where the head reports that the
      * reader was too slow (SCANHEAD_EV_READER_LOST), the head has left these frames out. */
     SCANHEAD_NOTICE_GAP = 1,
-    /* A frame came again: its number, time, type and checksum equal those of one of the last 256 frames. It is not
-     * handed out again. A LOCAL frame has no number; it is compared only with the frame before it. */
+    /* A frame came again: its number, time, type and checksum equal those of one of the last 256 frames. The frame is
+     * not handed out again. A LOCAL frame has no number; it is compared only with the frame before it. */
     SCANHEAD_NOTICE_REPEATED = 2,
     /* A frame that was missing came after newer ones. It is not handed out, and stays counted as lost. Only the last 64
      * gaps of at most 65536 frames are remembered. 256 late frames with consecutive numbers count as a restart. */
@@ -184,7 +185,7 @@ enum scanhead_notice_kind {
      * correct frame. Where bytes were lost, n is less than the frame's length field says. */
     SCANHEAD_NOTICE_BAD_PAYLOAD = 5,
     /* n bytes that belong to no frame or reply: garbage, a frame with a broken header, a broken reply, or replies
-     * between these and the next frame. A whole run of them is one notice, before the next frame or reply. */
+     * between these and the next frame. A whole run of such bytes is one notice, before the next frame or reply. */
     SCANHEAD_NOTICE_BAD_BYTES = 6,
     /* The connection or the recording ended within a frame or a reply, of which n bytes had come. seq: the frame's
      * number, if its header had come. */
@@ -238,7 +239,7 @@ struct scanhead_point {
 /* Decodes points of the frame that scanhead_next returned last: at most max, from the index `first`. Returns
  * how many, or SCANHEAD_ESTATE before the descriptor and the anchor of the stream have come. In the geo
  * layout range_m is the distance from the anchor, which is the station: in utm within the grid, in geodetic
- * coordinates straight through space on WGS 84. It is NaN where the head moves. */
+ * coordinates straight through space on WGS 84. The distance is NaN where the head moves. */
 int scanhead_points(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                     struct scanhead_point *points, uint32_t max);
 
@@ -268,18 +269,19 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
-/* A colour for each point, sRGB. The head's key output.colour decides what it shows. A shot without echo is grey. */
+/* A colour for each point, sRGB. The head's key output.colour decides what the colour shows. A shot without echo is
+ * grey. */
 struct scanhead_colour {
     uint8_t red, green, blue;
 };
-/* Decodes colours from a frame of SCANHEAD_COLOURS, as scanhead_attributes does attributes. That frame comes after the
- * points, and after their attributes where the head sends both. */
+/* Decodes colours from a frame of SCANHEAD_COLOURS, as scanhead_attributes does attributes. The frame of colours comes
+ * after the points, and after their attributes where the head sends both. */
 int scanhead_colours(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first,
                      struct scanhead_colour *colours, uint32_t max);
 /* Returns 1 if a frame of colours follows each frame of points; else as scanhead_has_attributes. */
 int scanhead_has_colours(const struct scanhead *sh);
 
-/* A head that finds echoes in waveforms reports how far the shape of each echo is from the pulse's, RMS over its
+/* A head that finds echoes in waveforms reports how far the shape of each echo is from the pulse's, RMS over the echo's
  * amplitude. These deviations are in the frames of SCANHEAD_ATTRIBUTES, and decoded as scanhead_attributes does.
  * 65.535: that or more; 0 for an empty shot. */
 int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame, uint32_t first, double *deviation,
@@ -287,7 +289,8 @@ int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame,
 /* Returns 1 if attributes have deviations; else as scanhead_has_attributes. */
 int scanhead_has_deviations(const struct scanhead *sh);
 
-/* A window of samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when it fires. */
+/* A window of samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when the pulse
+ * fires. */
 struct scanhead_wave {
     uint64_t pulse;         /* its number in the scan */
     int64_t t_ns;           /* firing time since the scan's start */
@@ -336,7 +339,7 @@ struct scanhead_info {
     int crs;           /* 0 local (scene frame), 1 ECEF, 2 UTM/UPS, 3 geodetic */
     int epsg;          /* 0 for local */
     int geoid_heights; /* 1: heights of UTM and geodetic points are above the geoid; 0: ellipsoidal */
-    double anchor[3];  /* metres; geodetic: degrees, degrees, metres. It moves along with a head on a trajectory */
+    double anchor[3];  /* metres; geodetic: degrees, degrees, metres; moves along with a head on a trajectory */
     double scale_m;    /* the step of coordinates on the wire is at most this long on the ground */
     double scale[3];   /* units of the CRS per count */
     double lat_deg, lon_deg, height_m; /* the station on WGS 84, ellipsoidal height; 0 where no place is configured */
@@ -374,7 +377,7 @@ struct scanhead_emitter {
     uint32_t rings; /* sphere: how many rings a scan frame has */
     /* ring i has the elevation first_ring_deg + i ring_step_deg; ring_step_deg 0: one ring alone */
     double first_ring_deg, ring_step_deg;
-    int echoes;                                /* which ones of a pulse are sent: 0 all, 1 first, 2 last, 3 strongest */
+    int echoes;                                /* echoes sent of a pulse: 0 all, 1 first, 2 last, 3 strongest */
     uint64_t sequence_ns_num, sequence_ns_den; /* beams: a firing sequence lasts num / den nanoseconds */
     uint32_t n_beams;                          /* pulse k of a scan is firing k mod n_beams */
     struct scanhead_beam beam[SCANHEAD_MAX_BEAMS];
@@ -383,9 +386,9 @@ struct scanhead_emitter {
  * settings change within a scan, the head sends another emitter. */
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
-/* The place and attitude of a moving head at a time. Between two poses of one frame of SCANHEAD_POSES it moves along
- * the straight line, and turns the shorter way about one fixed axis at constant rate (slerp). This is no approximation:
- * the head casts its pulses from these poses. */
+/* The place and attitude of a moving head at a time. Between two poses of one frame of SCANHEAD_POSES the head moves
+ * along the straight line, and turns the shorter way about one fixed axis at constant rate (slerp). The motion is no
+ * approximation: the head casts its pulses from these poses. */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */
@@ -398,8 +401,8 @@ enum scanhead_pose_flags {
     SCANHEAD_POSE_LATE = 2,         /* too long after the last pose: the head assumed that the platform stands */
     SCANHEAD_POSE_NONE = 4,         /* the head had not been given any yet */
 };
-/* Gets the pose at t_ns since the scan's start. It is known for the points that came last, and some seconds back.
- * SCANHEAD_ESTATE where the stream has not reported it, or the head stands still. */
+/* Gets the pose at t_ns since the scan's start. The pose is known for the points that came last, and some seconds back.
+ * SCANHEAD_ESTATE where the stream has not reported the pose, or the head stands still. */
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose);
 /* Decodes poses of the frame of SCANHEAD_POSES that scanhead_next returned last: at most max, from the index `first`.
  * Returns how many. */
@@ -413,13 +416,13 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
 
 /* Gets the GPS time of t_ns since the scan's start (scanhead_point.t_ns), in the adjusted standard form of LAS: seconds
  * since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second of week.
- * It is valid for frames up to the one that scanhead_next returned last. It counts from the last time of the head's
- * clock, which comes at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the nanosecond
- * where the head's clock has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the head
- * doesn't know the time, or before the time and the scan's start have come. A head that knows the time sends it before
- * the first points that can be decoded. */
+ * The time is valid for frames up to the one that scanhead_next returned last. It counts from the last time of the
+ * head's clock, which comes at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the
+ * nanosecond where the head's clock has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the
+ * head doesn't know the time, or before the time and the scan's start have come. A head that knows the time sends it
+ * before the first points that can be decoded. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
-/* Does the same for n times, bit for bit. It is faster where all times lie within one second. */
+/* Does the same for n times, bit for bit, and faster where all times lie within one second. */
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,
                        double *adjusted_standard_gps_time_s);
 
@@ -440,7 +443,7 @@ struct scanhead_stats { /* over all connections of the handle */
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 
 /* scanhead_hash_hex() gives the hash of the stream so far, as COUNTS.md defines stream_sha256: 64 hex digits and a NUL.
- * It begins with the frames after scanhead_hash_start(), and costs about a nanosecond per byte. */
+ * The hash begins with the frames after scanhead_hash_start(), and costs about a nanosecond per byte. */
 void scanhead_hash_start(struct scanhead *sh);
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65]);
 

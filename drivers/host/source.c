@@ -47,7 +47,7 @@ static int open_tty(const char *path, struct host_source *out, struct sh_err *er
     tio.c_cc[VTIME] = 0;
     if (tcsetattr(out->fd, TCSANOW, &tio) != 0)
         return sh_fail(err, SH_EIO, "%s: cannot set raw mode: %s", out->name, strerror(errno));
-    /* The terminal has changed earlier bytes and echoed them to the head. So they are dropped. */
+    /* The terminal has changed earlier bytes and echoed them to the head. So these bytes are dropped. */
     if (cooked) tcflush(out->fd, TCIOFLUSH);
     out->unsettled = 1;
     return 0;

@@ -16,8 +16,8 @@
 struct host_source;
 struct scanhead;
 struct host_source_ops {
-    /* These return the bytes moved, or -1 with errno, which is EAGAIN when none can be moved now. read returns 0 at the
-     * end. */
+    /* read and write return the bytes moved, or -1 with errno, which is EAGAIN when none can be moved now. read returns
+     * 0 at the end. */
     ssize_t (*read)(struct host_source *source, void *to, size_t len);
     /* In place of read: sets *bytes to whole frames and reply lines, as native_parser_lend() needs them. NULL: there is
      * only read. Returns as read does. The bytes stay until the next call of wait or close. */

@@ -280,7 +280,8 @@ int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)
     return SCANHEAD_OK;
 }
 
-/* On the wire the first elevation is rounded to a micro-degree; it is a multiple of the step from -90 degrees. */
+/* On the wire the first elevation is rounded to a micro-degree; the exact one is a multiple of the step from -90
+ * degrees. */
 static void set_rings(struct scanhead_emitter *out, uint32_t gaps)
 {
     if (gaps == 0) return;
@@ -324,8 +325,8 @@ int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_
     return SCANHEAD_OK;
 }
 
-/* Returns 0 unless all t_ns + shift_ns are 0 to 999999999. They count from the second that begins 1e9 + whole_s seconds
- * after 1980-01-06. */
+/* Returns 0 unless all t_ns + shift_ns are 0 to 999999999. The sums count from the second that begins 1e9 + whole_s
+ * seconds after 1980-01-06. */
 VEC_CLONES static int times_of_second(const int64_t *restrict t_ns, uint32_t n, uint64_t shift_ns, double whole_s,
                                       double *restrict to)
 {
@@ -394,7 +395,7 @@ void scanhead_hash_start(struct scanhead *sh)
 
 void scanhead_hash_hex(const struct scanhead *sh, char hex[65])
 {
-    struct sha256_ctx ctx = sh->sha256; /* a copy: taking the digest ends it */
+    struct sha256_ctx ctx = sh->sha256; /* a copy: taking the digest ends the hash */
     if (!sh->hashing) sha256_init(&ctx);
     uint8_t digest[SHA256_DIGEST_SIZE];
     sha256_digest(&ctx, sizeof digest, digest);

@@ -51,8 +51,8 @@ VEC_CLONES static void add_rests(const struct host_turn_part *restrict part, con
     }
 }
 
-/* The table is read between the loops of vectors, one whole part at a time. That costs less than gathering its figures
- * into vectors. */
+/* The table is read between the loops of vectors, one whole part at a time. Reading so costs less than gathering the
+ * table's figures into vectors. */
 void host_sincos_turns(const struct host_turn_part *table, const double *u, int n, double *s, double *c)
 {
     uint32_t k[HOST_BLOCK];

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A source of bytes: the bulk endpoints of the head's vendor interface.
  *
- * Several reads are always under way, so that the bus never waits for this program. They are a ring of
- * transfers, which the kernel completes in order, and which are read and submitted again in order. There is no
+ * Several reads are always under way, so that the bus never waits for this program. The reads are a ring of transfers,
+ * which the kernel completes in order, and which are read and submitted again in order. There is no
  * thread: completions are taken in while the caller reads or waits, and between these calls the kernel fills
  * the transfers under way. */
 #include "drivers/host/usb_inside.h"
@@ -170,8 +170,8 @@ static int gone_or_reset(struct host_usb *usb)
 }
 
 /* After a reset of the bus Linux may end transfers as if each had been answered with no bytes. New transfers are
- * accepted, but wait for ever, since the session is over. So this asks the head whether the session is open. A head
- * that doesn't know this request stalls it. */
+ * accepted, but wait for ever, since the session is over. So session_is_over asks the head whether the session is open.
+ * A head that doesn't know this request stalls it. */
 static int session_is_over(struct host_usb *usb)
 {
     const uint8_t type = (uint8_t)LIBUSB_REQUEST_TYPE_VENDOR | LIBUSB_RECIPIENT_INTERFACE | LIBUSB_ENDPOINT_IN;

@@ -12,8 +12,8 @@ int scanhead_has_waves(const struct scanhead *sh)
     return host_has_content(sh, NATIVE_HAS_WAVES);
 }
 
-/* Several frames of waveforms may follow the points, and some may be lost. So the frame's number can't show whether it
- * follows these points. */
+/* Several frames of waveforms may follow the points, and some may be lost. So the frame's number can't show whether the
+ * frame follows these points. */
 static int is_of_last_points(const struct scanhead *sh, const struct scanhead_frame *frame)
 {
     return sh->have_points && frame->t_ns == sh->points_t_ns && frame->pulse0 == sh->of_points.pulse0 &&

@@ -19,8 +19,8 @@ enum { LINK_MAX_SESSIONS = 8, LINK_MAX_EVENTS = 2 * LINK_MAX_SESSIONS + 2 };
 
 enum link_type { LINK_NULL, LINK_FILE, LINK_PTY, LINK_TCP, LINK_USB, LINK_UDP, LINK_WEB, LINK_FD, LINK_MEMORY };
 
-/* Whether the paces fast and step wait for the readers of a link, so that they lose nothing. Readers of other links
- * lose frames as in real time. */
+/* Whether the paces fast and step wait for the readers of a link, so that these readers lose nothing. Readers of other
+ * links lose frames as in real time. */
 enum link_waits { LINK_WAITS_BY_TYPE /* all but web do */, LINK_WAITS_YES, LINK_WAITS_NO };
 
 struct web_source;  /* web.h */
@@ -61,7 +61,7 @@ struct link_spec {
 
 enum link_event_kind {
     LINK_OPENED,   /* a session began: it will read, and may command */
-    LINK_CLOSED,   /* it is gone; what was queued for it is void; its number may be used again */
+    LINK_CLOSED,   /* the session is gone; what was queued for it is void; its number may be used again */
     LINK_READABLE, /* read() has something */
     LINK_WRITABLE, /* write() will take something; only for sessions in want_write */
     LINK_WOKEN,    /* wake_fd was signalled; poll has drained it (eventfd) */
@@ -119,8 +119,8 @@ struct link_ops {
      * of all links need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
-    /* They don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED: the
-     * session is gone (a LINK_CLOSED follows from poll). */
+    /* read and write don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED:
+     * the session is gone (a LINK_CLOSED follows from poll). */
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
 
@@ -132,9 +132,9 @@ struct link_ops {
      * route. NULL: none. To be called by the link's thread, or after it has ended. */
     uint64_t (*refused)(const void *link);
 
-    /* Bytes written to a session that its reader has not taken: closing the link loses them. There may be more: the
-     * system learns of the last ones a moment late, and counts only up to a limit. 0 also where it can't be known.
-     * NULL: closing loses no byte, as long as the client goes on reading. */
+    /* Bytes written to a session that its reader has not taken: closing the link loses them. More bytes may wait than
+     * are counted: the system learns of the last ones a moment late, and counts only up to a limit. 0 also where it
+     * can't be known. NULL: closing loses no byte, as long as the client goes on reading. */
     int (*unread)(void *link, int session);
 
     /* Ends a session from this side: what was written goes out, and a LINK_CLOSED follows from poll. NULL: sessions of

@@ -22,7 +22,7 @@ int link_wait(struct pollfd *fds, nfds_t n, int timeout_ms);
 void link_take_wake(const struct pollfd *slot, struct link_events *events);
 
 /* Polls a link that has no descriptor to wait for. Reports LINK_WRITABLE of session 0 if `writable` is set, and the
- * owner's wake-up. It waits only where there is no event yet. */
+ * owner's wake-up. Waits only where there is no event yet. */
 int link_poll_sink(int wake_fd, int writable, int timeout_ms, struct link_events *events);
 
 #endif

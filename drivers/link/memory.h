@@ -13,10 +13,10 @@
 
 enum { MEMORY_ROOM = 4096, MEMORY_PIECES = 16 /* between two turns */ };
 
-/* Both ends share this. It begins as zeros, and outlives the link. */
+/* Both ends share this struct, which begins as zeros and outlives the link. */
 struct link_memory {
-    /* The link's owner sets this. It works until there is something for the client, or for at most timeout_ms (-1: for
-     * ever). NULL: the owner has not begun. */
+    /* The link's owner sets this function, which works until there is something for the client, or for at most
+     * timeout_ms (-1: for ever). NULL: the owner has not begun. */
     void (*turn)(void *owner, int timeout_ms);
     void *owner;
     struct {

@@ -2,7 +2,7 @@
 /* The pty link: one session, a virtual serial port that clients open and close as they like.
  *
  * When does a session begin and end? The kernel offers two signals, each with a weakness:
- *   hang-up   poll(2) on the master reports POLLHUP exactly while nobody has the slave open. It is a level: a
+ *   hang-up   poll(2) on the master reports POLLHUP exactly while nobody has the slave open. The hang-up is a level: a
  *             close followed by an open before we look leaves no trace. And POLLHUP makes every poll return at
  *             once. So a master that hangs up must stay out of the descriptors that we wait for, and can't
  *             report that somebody comes.
@@ -10,7 +10,7 @@
  *             as we have not read them, so opens and closes can't be counted when clients overlap.
  * So inotify wakes us, and the hang-up decides:
  *   - We keep no descriptor on the slave: it would hide the hang-up. Settings and data survive without one,
- *     because the slave lives as long as the master. pty_device_rest opens it for a moment, while we do not
+ *     because the slave lives as long as the master. pty_device_rest opens the slave for a moment, while we do not
  *     watch it.
  *   - No session: we wait for inotify only. An open event starts a session, even if the hang-up says that the
  *     client has left already: its bytes are still to be read (echo '*RST' > /dev/pts/3).
@@ -245,9 +245,9 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
 }
 
-/* When the master is closed the kernel throws away what waits in the terminal. It reports the count through the slave
- * alone, which we therefore open. This is done only at the end, when no new client is expected, since the watch would
- * see our own opening. A slave that a client holds exclusively (TIOCEXCL) can't be opened. */
+/* When the master is closed the kernel throws away what waits in the terminal. The kernel reports the count through the
+ * slave alone, which we therefore open. The slave is opened only at the end, when no new client is expected, since the
+ * watch would see our own opening. A slave that a client holds exclusively (TIOCEXCL) can't be opened. */
 static int pty_unread(void *link, int session)
 {
     struct pty_link *pty = link;

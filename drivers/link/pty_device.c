@@ -22,8 +22,8 @@ static int pair_open(int *master, char *slave, size_t slave_len)
 }
 
 /* The master's ioctls for settings act on the slave. TCOFLUSH drops what is still on its way to the slave's line
- * discipline. Then TCSAFLUSH drops what the line discipline holds. Unlike tcflush on the slave they need no open slave.
- * The settings are read just before they are written, as the next client may set its own at any moment. */
+ * discipline. Then TCSAFLUSH drops what the line discipline holds. Unlike tcflush on the slave these ioctls need no
+ * open slave. The settings are read just before they are written, as the next client may set its own at any moment. */
 static int drop_output(int master, int makes_raw)
 {
     struct termios settings;
@@ -108,7 +108,7 @@ static int symlink_replace(const char *path, const char *slave)
     return -1;
 }
 
-/* Both ways are atomic: a client finds the old target, ours, or nothing. */
+/* symlink and symlink_replace are both atomic: a client finds the old target, ours, or nothing. */
 static int symlink_make(const char *path, const char *slave, struct sh_err *err)
 {
     int rc = symlink_look(path, slave, err);

@@ -25,8 +25,8 @@ int pty_device_open(struct pty_device *device, const char *path, struct sh_err *
  * the same symlink; slave is then another name. SH_EIO when that fails as well. */
 int pty_device_rest(struct pty_device *device);
 
-/* Hangs up all clients, and drops what they have not read: a new pair at rest takes its place under the same symlink,
- * and slave is another name. SH_EIO: no new pair can be had, and the old one stays. */
+/* Hangs up all clients, and drops what they have not read: a new pair at rest takes the old one's place under the same
+ * symlink, and slave is another name. SH_EIO: no new pair can be had, and the old one stays. */
 int pty_device_renew(struct pty_device *device);
 
 /* Drops what was sent and not read. Settings stay, since a client may have the slave open. */

@@ -2,8 +2,8 @@
 /* Carries the bytes of a pty link to and from a client whose bit rate may differ from the head's. Private to the link.
  *
  * Where both rates are the same, or the head has none, bytes pass through unchanged. Else the receiver gets what its
- * UART reads of them (uart.h). The bytes of one write follow each other without a pause, as do those that one read
- * takes. Before and after them the line rests. */
+ * UART reads of these bytes (uart.h). The bytes of one write follow each other without a pause, as do those that one
+ * read takes. Before and after them the line rests. */
 #ifndef DRIVERS_LINK_PTY_LINE_H
 #define DRIVERS_LINK_PTY_LINE_H
 
@@ -18,8 +18,8 @@ struct pty_line {
     size_t out_room;
 };
 
-/* These work as read(2) and write(2) on the master, with errno. Where the rates differ, a byte may be read as up to
- * UART_MOST_PER_BYTE bytes: with less room than that, pty_line_read returns 0. */
+/* pty_line_read and pty_line_write work as read(2) and write(2) on the master, with errno. Where the rates differ, a
+ * byte may be read as up to UART_MOST_PER_BYTE bytes: with less room than that, pty_line_read returns 0. */
 ssize_t pty_line_read(const struct pty_line *line, int master, void *buf, size_t len);
 ssize_t pty_line_write(struct pty_line *line, int master, const void *buf, size_t len);
 /* Writes what waits. 1: nothing waits any more. */

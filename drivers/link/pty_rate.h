@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Reads the rates that a terminal's client has set. Private to the pty link. It has a file of its own, since
+/* Reads the rates that a terminal's client has set. Private to the pty link. The code has a file of its own, since
  * <asm/termbits.h>, whose struct termios2 holds rates of any number, can't be included together with <termios.h>. */
 #ifndef DRIVERS_LINK_PTY_RATE_H
 #define DRIVERS_LINK_PTY_RATE_H

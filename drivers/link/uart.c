@@ -4,7 +4,7 @@
 enum { START = 0, STOP = 9, BITS = 10 };
 
 /* Returns the number of the sender's bit in which the receiver's sample number k lies, counted from the falling edge.
- * It is (k + 1/2) times the ratio of the rates, rounded down; whole numbers make it exact. */
+ * The number is (k + 1/2) times the ratio of the rates, rounded down; whole numbers make it exact. */
 static uint64_t bit_at(const struct uart *uart, unsigned k)
 {
     return (2 * k + UINT64_C(1)) * uart->sender_baud / (2 * (uint64_t)uart->receiver_baud);

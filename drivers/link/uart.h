@@ -6,8 +6,8 @@
  * The sender: a start bit (0), eight data bits, the lowest first, and a stop bit (1); before and after its bytes the
  * line is at 1. The receiver waits for a falling edge. From there it looks at the line in the middle of each of its own
  * bits: 0.5 for the start bit, which must be 0, 1.5 to 8.5 for the data, 9.5 for the stop bit. Then it waits for the
- * next falling edge. (ATmega328P's data sheet, "Asynchronous Data Recovery", describes such a receiver. It is taken as
- * ideal here: real ones find the edge to a sixteenth of a bit.)
+ * next falling edge. (ATmega328P's data sheet, "Asynchronous Data Recovery", describes such a receiver. The receiver is
+ * taken as ideal here: real ones find the edge to a sixteenth of a bit.)
  * All samples are right where the sender is less than 5.2 % faster, or 5.2 % slower. */
 #ifndef DRIVERS_LINK_UART_H
 #define DRIVERS_LINK_UART_H

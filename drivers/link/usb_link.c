@@ -3,8 +3,8 @@
  * and stream, or one alone.
  *
  * The back end carries out the host's acts one at a time. An act that begins or ends a session stops the back end until
- * this has been reported. So a session begins or ends at most once between two polls. The end of a session is reported
- * after all its bytes have been read. */
+ * the begin or end has been reported. So a session begins or ends at most once between two polls. The end of a session
+ * is reported after all its bytes have been read. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -107,7 +107,8 @@ static int has_to_report(const struct usb_link *self, int i)
     return self->reported[i] != self->head.session[i].open;
 }
 
-/* Whether a host has got the device since the last report. It can enumerate the device only once this is reported. */
+/* Whether a host has got the device since the last report. The host can enumerate the device only once that is
+ * reported. */
 static int is_plugged_anew(const struct usb_link *self)
 {
     return self->plugged != usb_device_attaches(self->head.device);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Serves connections until their request is whole. The request is judged here as it comes, without taking it out of the
- * socket. A wrong one is answered at its first wrong byte, and libwebsockets never sees it. For a correct one
+ * socket. A wrong request is answered at its first wrong byte, and libwebsockets never sees it. For a correct request
  * libwebsockets gets a new request with only the fields that it needs, and no byte from after the request. Given the
  * client's own request, libwebsockets would act on fields that we don't support (h2c). It would also close the
  * connection without an answer if the request had more fields or arguments than it has room for. */
@@ -76,7 +76,8 @@ void web_linger(struct web_link *web, struct web_conn *conn)
 
 /* ---- clients that come */
 
-/* A client with half a request gets the reason; others get nothing. One without a whole answer counts as refused. */
+/* A client with half a request gets the reason; others get nothing. A client without a whole answer counts as
+ * refused. */
 static void web_accept_make_room(struct web_link *web, struct web_conn *conn)
 {
     if (conn->place.phase == WEB_ASKING || conn->place.phase == WEB_ANSWERING) web_refused(web, conn->peer);

@@ -5,7 +5,7 @@
 #include "drivers/link/web_inside.h"
 #include "drivers/socket/silence.h"
 
-/* Breaks the connection, or the listening socket, at once; libwebsockets closes it when it finds out. */
+/* Breaks the connection, or the listening socket, at once; libwebsockets closes the socket when it notices. */
 static void web_break(struct lws *wsi)
 {
     const int fd = web_lws.lws_get_socket_fd(wsi);
@@ -15,7 +15,7 @@ static void web_break(struct lws *wsi)
         socket_break(fd);
 }
 
-/* Cuts a session off. It gets no close frame, and none of the bytes that wait for it. */
+/* Cuts a session off. The session's client gets no close frame, and none of the bytes that wait for it. */
 static int web_cut(struct web_link *web, int session)
 {
     struct web_session *s = web_session(web, session);

@@ -40,8 +40,8 @@
 
 LATE_LIBRARY(websockets, WEBSOCKETS_CALLS)
 
-/* The functions of libwebsockets. It is loaded when the first link opens, since it brings OpenSSL (core/late.h). They
- * are global since libwebsockets' callbacks need them to find their link. */
+/* The functions of libwebsockets. The library is loaded when the first link opens, since it brings OpenSSL
+ * (core/late.h). The functions are global since libwebsockets' callbacks need them to find their link. */
 extern struct websockets_lib web_lws;
 
 enum {
@@ -83,8 +83,8 @@ struct web_request {
     int names_protocol;
 };
 
-/* One client, from its coming to its end. To libwebsockets it is first a plain descriptor (web_accept.c), then an HTTP
- * answer or a WebSocket, and after an answer a descriptor again; wsi is the present one. */
+/* One client, from its coming to its end. To libwebsockets the client is first a plain descriptor (web_accept.c), then
+ * an HTTP answer or a WebSocket, and after an answer a descriptor again; wsi is the present one. */
 struct web_conn {
     struct web_place place;
     struct lws *wsi;
@@ -131,7 +131,8 @@ static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
 void web_refused(struct web_link *web, const char *peer);
 /* Forgets a connection whose wsi has ended or belongs to nobody any more. Twice does no harm. */
 void web_conn_end(struct web_conn *conn);
-/* Returns the session, if its owner may use it; else NULL. Its client may be gone, and left something to be read. */
+/* Returns the session, if its owner may use it; else NULL. The session's client may be gone, and left something to be
+ * read. */
 struct web_session *web_session(struct web_link *web, int session);
 /* The connection's session is over; LINK_CLOSED is to be reported. */
 void web_session_gone(struct web_conn *conn);
@@ -146,7 +147,8 @@ void web_speak(struct web_link *web, int resets);
  * connections whose request has not come whole or whose answer is out. */
 #define WEB_BARE "bare"
 int web_bare_callback(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len);
-/* Makes lws_service wait for a descriptor. It is closed with the context, or at once if NULL is returned. */
+/* Makes lws_service wait for a descriptor. The descriptor is closed with the context, or at once if NULL is
+ * returned. */
 struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn);
 /* Takes a connection whose answer is out from libwebsockets' HTTP. Ends its sending side, and gives the client some
  * time to end its own. */
@@ -157,7 +159,8 @@ void web_linger(struct web_link *web, struct web_conn *conn);
 int web_request_read(const struct web_link *web, const char *head, size_t len, struct web_request *out,
                      const char **words);
 
-/* web_http.c. These two return as libwebsockets' callbacks do: 0, or -1 to close the connection. */
+/* web_http.c. web_http_begin and web_http_go_on return as libwebsockets' callbacks do: 0, or -1 to close the
+ * connection. */
 int web_http_begin(struct web_link *web, struct web_conn *conn);
 int web_http_go_on(struct web_link *web, struct web_conn *conn);
 /* Writes a whole answer whose content is `words`. Returns its length, as snprintf does. */

@@ -39,10 +39,11 @@ struct web_places {
     size_t stride;
 };
 
-/* Returns the index of a place for a new client from this address. If its phase isn't NOBODY, its present client has to
- * go. It is one of this address if the address holds as many as it may, else one of the address that holds the most.
- * Clients go in this order: those that are PARTING or LINGERING, those that are ASKING, and those that took nothing of
- * their answer for WEB_GOODBYE_MS; the oldest first in each group. -1: no client may go. */
+/* Returns the index of a place for a new client from this address. If that place's phase isn't NOBODY, its present
+ * client has to go. The client that goes is one of this address if the address holds as many as it may, else one of the
+ * address that holds the most. Clients go in this order: those that are PARTING or LINGERING, those that are ASKING,
+ * and those that took nothing of their answer for WEB_GOODBYE_MS; the oldest first in each group. -1: no client may
+ * go. */
 int web_places_take(struct web_places places, const unsigned char address[8], int64_t now_us);
 
 #endif

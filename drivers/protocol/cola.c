@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SICK CoLa-A and CoLa-B (SOPAS): TiM5xx, TiM7xx, LMS1xx. COLA.md is its page. */
+/* SICK CoLa-A and CoLa-B (SOPAS): TiM5xx, TiM7xx, LMS1xx. COLA.md is the protocol's page. */
 #include <stdio.h>
 #include <stdlib.h>
 

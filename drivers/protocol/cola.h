@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One session of CoLa, for the files of this module. COLA.md says what it does and doesn't. */
+/* One session of CoLa, for the files of this module. COLA.md says what a session does and doesn't. */
 #ifndef DRIVERS_PROTOCOL_COLA_H
 #define DRIVERS_PROTOCOL_COLA_H
 
@@ -163,8 +163,8 @@ cola_handler cola_read_scan_cfg, cola_set_scan_cfg;
 
 /* 12 of "field012"; UINT32_MAX: another name. */
 uint32_t cola_field_number(const char *name);
-/* They read and write the field whose number is in `field`. Reading answers with a record, or with a single 0 for a
- * field beyond the model's n_records. */
+/* cola_read_field and cola_write_field read and write the field whose number is in `field`. Reading answers with a
+ * record, or with a single 0 for a field beyond the model's n_records. */
 cola_handler cola_read_field, cola_write_field;
 cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_set_method, cola_write_set_method,
     cola_read_set, cola_write_set, cola_set_results_event, cola_set_outputs_event, cola_set_inputs_event;

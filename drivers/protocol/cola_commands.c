@@ -98,7 +98,8 @@ static enum cola_error set_scan_event(struct cola *self, struct cola_args *args,
     return COLA_OK;
 }
 
-/* Sends an error. It is made in a buffer of its own: self->unit may hold the unfinished answer to another request. */
+/* Sends an error. The error is made in a buffer of its own: self->unit may hold the unfinished answer to another
+ * request. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error)
 {
     uint8_t unit[32];

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa-A or CoLa-B. Where the configuration chooses one (links[].dialect), the link answers in that one alone, until
- * EIHstCola changes it, at once and for all sessions of the link. Else each request is answered in its own form. */
+/* CoLa-A or CoLa-B. Where the configuration chooses one (links[].dialect), the link answers in that dialect alone.
+ * EIHstCola changes the dialect at once, and for all sessions of the link. Without such a choice each request is
+ * answered in its own form. */
 #include <stdatomic.h>
 
 #include "drivers/protocol/cola.h"

@@ -140,7 +140,8 @@ static int32_t length_um(const struct cola_record *r, uint32_t counts)
 
 static enum cola_error chain(const struct cola_record *r, const struct planar_head *head, struct cola_shape *shape)
 {
-    /* A quarter of a turn lies between SICK's 0 and the front. With four times the steps it is a whole number. */
+    /* A quarter of a turn lies between SICK's 0 and the front. With four times the steps that quarter is a whole
+     * number. */
     const int on_beams = is_on_beams(r, head);
     const int32_t steps = on_beams ? 4 * (int32_t)head->steps : COLA_TURN_E4;
     for (uint32_t i = 0; i < r->n; i++) {

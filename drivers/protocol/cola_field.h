@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Monitored fields: what the configuration or a client gives, and the record that telegrams carry.
  *
- * A field that the configuration gives is evaluated as it is given. Its record is rounded to beams and millimetres, as
- * telegrams have no finer ones. A field that a client writes is evaluated as its record says, and read back as it was
- * written. Lengths of a record are counts of `scale` millimetres; angles are counts of `step_e4` from `first_e4`.
+ * A field that the configuration gives is evaluated as it is given. The field's record is rounded to beams and
+ * millimetres, as telegrams have no finer ones. A field that a client writes is evaluated as its record says, and read
+ * back as it was written. Lengths of a record are counts of `scale` millimetres; angles are counts of `step_e4` from
+ * `first_e4`.
  *
  * FIELDS.md draws the record, with its sources. Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_FIELD_H

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* LMPscancfg and mLMPsetscancfg: line rate and step. They belong to the head, so all its readers see a change. */
+/* LMPscancfg and mLMPsetscancfg: line rate and step. Rate and step belong to the head, so all the head's readers see a
+ * change. */
 #include <stdio.h>
 #include <stdlib.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The SICK scanners that CoLa speaks for, as a table of rows. COLA.md has it for readers, with sources. */
+/* The SICK scanners that CoLa speaks for, as a table of rows. COLA.md has the table for readers, with sources. */
 #ifndef DRIVERS_PROTOCOL_COLA_MODEL_H
 #define DRIVERS_PROTOCOL_COLA_MODEL_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Telegrams of fields, inputs and outputs, in the form of the real scanners. FIELDS.md draws them. */
+/* Telegrams of fields, inputs and outputs, in the form of the real scanners. FIELDS.md draws the telegrams. */
 #include <stdio.h>
 #include <string.h>
 

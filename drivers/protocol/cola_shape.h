@@ -5,15 +5,15 @@
  * counter-clockwise seen from above. Lengths are whole micrometres and angles are compared as fractions of a turn, so
  * each decision is exact.
  *
- * Polygon: corners in order, of either sense; the last one is joined to the first. It may be concave, may have the head
- * inside and may lie across any angle. A point on an edge or on a corner is in it. Where edges cross, a point is in it
- * if the outline winds about it (nonzero rule).
+ * Polygon: corners in order, of either sense; the last one is joined to the first. The polygon may be concave, may have
+ * the head inside and may lie across any angle. A point on an edge or on a corner is in it. Where edges cross, a point
+ * is in it if the outline winds about it (nonzero rule).
  *
  * Sector: from start to stop counter-clockwise, and from the inner to the outer radius; all four limits are in it.
  *
- * Chain: a list of directions in ascending order, which spans a turn at most. Each has a nearest and a farthest
- * distance. Straight lines join the nearest points of neighbouring directions, and likewise the farthest ones. A beam
- * that looks exactly in a direction is compared with its two distances; both limits are in it.
+ * Chain: a list of directions in ascending order, which spans a turn at most. Each direction has a nearest and a
+ * farthest distance. Straight lines join the nearest points of neighbouring directions, and likewise the farthest ones.
+ * A beam that looks exactly in a direction is compared with that direction's two distances; both limits are in it.
  *
  * Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_SHAPE_H
@@ -68,13 +68,13 @@ int cola_shape_has(const struct cola_shape *shape, const struct cola_measured *p
 /* The nearest and the farthest place of a polygon or a sector on a ray from the head, to the nearest micrometre; a head
  * inside has nearest 0. Returns 0 where the ray misses the shape. */
 int cola_shape_cut(const struct cola_shape *shape, double turns, int32_t *near_um, int32_t *far_um);
-/* The outline of a polygon or a sector as corners, the arcs of a sector in steps. Returns how many, up to
- * COLA_SHAPE_CORNERS; 0: it has none. */
+/* The outline of a polygon or a sector as corners, the arcs of a sector in steps. Returns how many corners, up to
+ * COLA_SHAPE_CORNERS; 0: the shape has none. */
 uint32_t cola_shape_outline(const struct cola_shape *shape, double out_m[COLA_SHAPE_CORNERS][2]);
 /* Adds a corner of a polygon. Returns -1 where it is farther than COLA_SHAPE_REACH_UM, or there are too many. */
 int cola_shape_add(struct cola_shape *shape, double x_um, double y_um);
-/* Adds a link. Its direction must be beyond the last one's, at most a turn beyond the first one's, and near not above
- * far: else -1, as also for the reasons above. All links of a shape have the same steps. */
+/* Adds a link. The link's direction must be beyond the last one's, at most a turn beyond the first one's, and near not
+ * above far: else -1, as also for the reasons above. All links of a shape have the same steps. */
 int cola_shape_link(struct cola_shape *shape, int32_t step, int32_t steps, int32_t near_um, int32_t far_um);
 /* A rectangle: width to the right and length forward from its corner, then turned counter-clockwise about the corner.
  * -1 as above. */

@@ -45,7 +45,7 @@ static uint32_t measure(const struct planar_head *head, const struct planar_turn
     for (uint32_t k = first; k < first + n; k++) {
         const double range_m = turn->echo[beam][k].range * head->m_per_count;
         if (range_m * 1e6 > COLA_SHAPE_REACH_UM || turn->echo[beam][k].range == 0) continue;
-        /* A range equal to the minimum counts. Rounded for the stream, it may be half a count lower. */
+        /* A range equal to the minimum counts. Rounded for the stream, that range may be half a count lower. */
         if (range_m < head->range_min_m - 0.5 * head->m_per_count) continue;
         out[n_out++] = cola_measured_at(step, steps, (int32_t)lround(range_m * 1e6));
     }

@@ -110,7 +110,8 @@ static uint8_t *put_front(uint8_t *to, const struct ethernet_end *from, const st
     return to + LINK_LEN + (from->is_v6 ? IPV6_LEN : IPV4_LEN);
 }
 
-/* The checksum covers addresses, protocol and length, too (RFC 768, RFC 8200 8.1). Its own place is still zero. */
+/* The checksum covers addresses, protocol and length, too (RFC 768, RFC 8200 8.1). The checksum's own place is still
+ * zero. */
 static uint16_t checksum(const uint8_t *packet, size_t len, const struct ethernet_end *from,
                          const struct ethernet_end *dest, int protocol)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Makes Ethernet frames around the payload of a datagram or of a piece of a TCP stream. They stand for a capture on the
- * wire, where only a socket's bytes are at hand.
+/* Makes Ethernet frames around the payload of a datagram or of a piece of a TCP stream. The frames stand for a capture
+ * on the wire, where only a socket's bytes are at hand.
  *
  * In: both ends and the payload. Out: bytes of a frame: Ethernet, IPv4 or IPv6, UDP or TCP, with right lengths and
  * checksums. Addresses and ports are true. The rest of the headers is made up:
@@ -32,7 +32,7 @@ struct ethernet_end {
     uint16_t port;
 };
 
-/* Both of one family, data_len <= ETHERNET_MAX_DATAGRAM (IPv4: 20 less). Returns the frame's length. */
+/* Both ends are of one family, data_len <= ETHERNET_MAX_DATAGRAM (IPv4: 20 less). Returns the frame's length. */
 size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const struct ethernet_end *dest, const void *data,
                         size_t data_len);
 
@@ -50,7 +50,7 @@ struct tcp_talk {               /* The caller sets both ends, and all other memb
 
 /* The handshake is tcp_put_syn for side 0, then for side 1, then tcp_put_ack for side 0. */
 size_t tcp_put_syn(struct tcp_talk *talk, int side, uint8_t *to);
-/* 1 <= len <= ETHERNET_MAX_SEGMENT; it acknowledges all that came so far. */
+/* 1 <= len <= ETHERNET_MAX_SEGMENT; the frame acknowledges all that came so far. */
 size_t tcp_put_data(struct tcp_talk *talk, int side, const void *data, size_t len, uint8_t *to);
 /* None where everything is acknowledged. */
 size_t tcp_put_ack(struct tcp_talk *talk, int side, uint8_t *to);

@@ -32,7 +32,8 @@ struct field_table {
 
 /* The descriptor has two lengths: its last two fields are sent only where content is not 0. Telemetry has three:
  * the state of a PTP follower comes last, and is sent only where the head has one. Before this state
- * is the number of lines that journal and truth have lost. It is sent where it is not 0, or where the state follows. */
+ * is the number of lines that journal and truth have lost. The number is sent where it is not 0, or where the state
+ * follows. */
 extern const struct field_table fields_descriptor, fields_descriptor_content, fields_anchor, fields_emitter,
     fields_points, fields_attributes, fields_waves, fields_line_end, fields_telemetry, fields_telemetry_lines,
     fields_telemetry_ptp, fields_event, fields_pose;

@@ -27,7 +27,7 @@ enum http_result {
 };
 
 struct http_request {
-    char method[8], path[64]; /* the path without its query; one that is too long is cut, and so unknown */
+    char method[8], path[64]; /* the path without its query; a path that is too long is cut, and so unknown */
     int minor;                /* of HTTP/1.x */
     int keep_alive;
     int foreign; /* it has an Origin that is, or may be, another server: a browser sends it for a page from there */

@@ -56,7 +56,7 @@ enum native_flags {
 
 /* The header of the whole frame at `frame`. */
 void native_read_header(const uint8_t *frame, struct native_header *header);
-/* Bytes of that frame: header and payload. The one place that knows where its length stands. */
+/* Bytes of that frame: header and payload. The one place that knows where a frame's length stands. */
 static inline size_t native_frame_len(const uint8_t *frame)
 {
     return NATIVE_HEADER_LEN + (size_t)le_get32(frame + 4);
@@ -87,7 +87,7 @@ struct native_descriptor {
     uint32_t content, reserved; /* enum native_content; where content is 0, neither is sent */
 };
 
-/* How beams are arranged. All of them have the same two angles in a polar point: the mirror count is the
+/* How beams are arranged. All arrangements have the same two angles in a polar point: the mirror count is the
  * elevation, the pan count the azimuth, clockwise from y seen from above; direction = (sin pan cos mirror, cos pan
  * cos mirror, sin mirror). */
 enum native_emitter_kind {
@@ -124,9 +124,9 @@ struct native_beam { /* 0 i32 elevation, 4 i32 azimuth offset, 8 u32 firing time
 };
 
 enum native_content {
-    NATIVE_HAS_ATTRIBUTES = 1, /* a frame of attributes follows each one of points */
-    NATIVE_HAS_COLOURS = 2,    /* a frame of colours follows it, after that of the attributes */
-    NATIVE_HAS_WAVES = 4,      /* frames of waveforms follow it, after these */
+    NATIVE_HAS_ATTRIBUTES = 1, /* a frame of attributes follows each points frame */
+    NATIVE_HAS_COLOURS = 2,    /* a frame of colours follows each points frame, after its attributes */
+    NATIVE_HAS_WAVES = 4,      /* frames of waveforms follow each points frame, after both */
     NATIVE_HAS_DEVIATIONS = 8, /* attributes have deviations after their records */
 };
 
@@ -349,7 +349,7 @@ struct native_notice {
 };
 #define NATIVE_NO_TIME INT64_MIN
 
-/* A run of bytes that belong to no item. Its notice is given once it ends. */
+/* A run of bytes that belong to no item. The run's notice is given once the run ends. */
 struct native_bad {
     enum native_notice_kind kind; /* NATIVE_NO_NOTICE: there is no such run now */
     int has_header;               /* the run begins with a correct header, whose values follow: */
@@ -386,7 +386,7 @@ uint8_t *native_parser_room(struct native_parser *parser, size_t *room); /* room
 void native_parser_added(struct native_parser *parser, size_t n);
 /* Gives the parser whole items that this process made in memory, without a copy, in place of native_parser_room() and
  * native_parser_added(). The items stay there until the parser has given them all and the last one is no longer used.
- * CRCs of payloads are not checked, since nothing can have changed them. It is called after NATIVE_MORE; or at any time
+ * CRCs of payloads are not checked, since nothing can have changed them. To be called after NATIVE_MORE; or at any time
  * with n 0, which drops the items that were not given yet. A parser gets all its bytes in one of the two ways. */
 void native_parser_lend(struct native_parser *parser, const uint8_t *items, size_t n);
 enum native_item native_parser_next(struct native_parser *parser);
@@ -397,7 +397,7 @@ void native_parser_finish(struct native_parser *parser);
  * Counters and sequence go on (native_sequence_resume). Items that were not taken are bad bytes. */
 void native_parser_resume(struct native_parser *parser);
 
-/* Returns 1 if a frame with this header belongs to stream_sha256. These are descriptor, emitter, anchor, points,
+/* Returns 1 if a frame with this header belongs to stream_sha256. Such frames are descriptor, emitter, anchor, points,
  * line-end, poses, attributes, colours and waveforms frames with neither NATIVE_REPEAT nor NATIVE_LOCAL. The hash runs
  * over u8 type, u32 length (LE) and the payload of each. */
 int native_is_hashed(const struct native_header *header);

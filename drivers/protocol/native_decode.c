@@ -54,7 +54,7 @@ int native_decode_points(const uint8_t *payload, size_t len, struct native_point
     return rc == 0 && out->n_points > (len - NATIVE_POINTS_HEAD_LEN) / NATIVE_POINT_LEN ? SH_EFORMAT : rc;
 }
 
-/* It has no branches, and one load per point: some readers only count points, millions a second. */
+/* The loop has no branches, and one load per point: some readers only count points, millions a second. */
 void native_count_points(const uint8_t *payload, uint32_t n, uint32_t *n_empty, uint32_t *n_reflectances)
 {
     const uint8_t *p = payload + NATIVE_POINTS_HEAD_LEN + 12;

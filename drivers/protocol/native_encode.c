@@ -230,7 +230,7 @@ static int has_waves(const struct encode_cut *cut)
     return cut->wave < waves->n && (cut->is_last || waves->wave[cut->wave].pulse - cut->pulse0 < cut->head.n_pulses);
 }
 
-/* Writes the next windows of these pulses, as many as one frame holds. It returns 0 also where a window has no samples,
+/* Writes the next windows of these pulses, as many as one frame holds. Returns 0 also where a window has no samples,
  * or too many. */
 static size_t put_waves(uint8_t *dst, size_t cap, struct encode_cut *cut)
 {

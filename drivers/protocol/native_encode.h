@@ -20,9 +20,9 @@ size_t native_encode_emitter(uint8_t *dst, size_t cap, const struct native_emitt
 size_t native_encode_telemetry(uint8_t *dst, size_t cap, const struct native_telemetry *t, int64_t t_ns, int flags);
 size_t native_encode_event(uint8_t *dst, size_t cap, const struct native_event *e, int64_t t_ns, int flags);
 
-/* A block as one or more points frames of at most NATIVE_MAX_POINTS. After each of them come the frame of its
- * attributes, that of its colours, and those of its waveforms, where the block has some. Cuts lie between pulses, so
- * that a pulse's echoes stay in one frame. scan_t0_ns: device time of the scan's start. */
+/* A block as one or more points frames of at most NATIVE_MAX_POINTS. After each points frame come the frames of its
+ * attributes, its colours and its waveforms, where the block has some. Cuts lie between pulses, so that a pulse's
+ * echoes stay in one frame. scan_t0_ns: device time of the scan's start. */
 size_t native_encode_points(uint8_t *dst, size_t cap, const struct line_block *block, int64_t scan_t0_ns);
 size_t native_encode_line_end(uint8_t *dst, size_t cap, const struct line_end *end, int64_t scan_t0_ns);
 

@@ -67,7 +67,8 @@ static void give_notice(const struct native_parser *parser, const struct native_
 
 /* ---- bytes that belong to no item */
 
-/* Counts the frame that `bad` begins with. A LOCAL frame has no number in the sequence: it does not count as lost. */
+/* Counts the frame that `bad` begins with. A LOCAL frame has no number in the sequence: such a frame does not count as
+ * lost. */
 static void count_bad_payload(struct native_parser *parser)
 {
     parser->stats.bad_payload++;

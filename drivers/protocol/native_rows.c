@@ -4,7 +4,7 @@
 #include "core/bytes.h"
 #include "drivers/protocol/native.h"
 
-/* Its cost depends on the number of stores, so each row takes three wide ones. */
+/* The cost depends on the number of stores, so each row takes three wide ones. */
 uint32_t native_put_rows_plain(uint8_t *restrict dst, const struct line_block *block, uint32_t first, uint32_t n,
                                uint32_t dt0_ns)
 {

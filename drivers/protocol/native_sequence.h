@@ -55,8 +55,8 @@ struct native_sequence {
 /* A struct native_sequence begins as zeros: nothing has come yet. */
 
 /* Takes the next whole frame. NATIVE_NO_NOTICE: in order, or LOCAL. NATIVE_GAP: *n frames from *first on are missing
- * before it. NATIVE_RESTARTED: the sequence begins anew with it. NATIVE_REPEATED, NATIVE_LATE: it is to be dropped.
- * Except for a gap, *first is the frame's own number and *n is 1. */
+ * before this frame. NATIVE_RESTARTED: the sequence begins anew with this frame. NATIVE_REPEATED, NATIVE_LATE: the
+ * frame is to be dropped. Except for a gap, *first is the frame's own number and *n is 1. */
 enum native_notice_kind native_sequence_take(struct native_sequence *sequence, const struct native_header *header,
                                              uint32_t *first, uint32_t *n);
 

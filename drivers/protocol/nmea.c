@@ -105,7 +105,7 @@ size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
     return nmea_end(&s);
 }
 
-/* Single satellites are not modelled, so it lists the numbers from 1 on, 12 at most. */
+/* Single satellites are not modelled, so GSA lists the numbers from 1 on, 12 at most. */
 size_t nmea_encode_gsa(char *dst, size_t cap, const struct nmea_fix *fix)
 {
     struct sentence s = nmea_begin(dst, cap, fix, "GSA");

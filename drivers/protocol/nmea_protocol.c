@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The GNSS receiver on a link: after each fix its sentences (nmea.h), all of them as one unit. It takes no commands. */
+/* The GNSS receiver on a link: after each fix its sentences (nmea.h), all of them as one unit. The receiver takes no
+ * commands. */
 #include <stdlib.h>
 
 #include "drivers/protocol/protocol.h"

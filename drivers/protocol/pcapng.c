@@ -131,7 +131,7 @@ static int pcapng_fail(const struct pcapng_reader *reader, struct sh_err *err, c
 }
 
 /* if_tsresol: 10^-n s, or with the top bit 2^-n s. if_tsoffset: whole seconds more, from 1970 on. Times farther than
- * 292 years from it are INT64_MAX or INT64_MIN. */
+ * 292 years from 1970 are INT64_MAX or INT64_MIN. */
 static int64_t to_ns(uint64_t time, const struct pcapng_interface *interface)
 {
     const int n = interface->resolution & 0x7f;

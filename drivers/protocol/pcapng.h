@@ -3,9 +3,9 @@
  *
  * In and out: bytes of a file, in pieces of any size. Times are nanoseconds. Pure: no I/O, no clock, no allocation.
  *
- * It writes one section of little-endian blocks, interfaces with times in nanoseconds, and enhanced packets. It also
- * reads what tshark, editcap and mergecap make of these: simple packets and other resolutions; blocks of other kinds
- * are skipped. Big-endian sections are refused. */
+ * The module writes one section of little-endian blocks, interfaces with times in nanoseconds, and enhanced packets. It
+ * also reads what tshark, editcap and mergecap make of these: simple packets and other resolutions; blocks of other
+ * kinds are skipped. Big-endian sections are refused. */
 #ifndef DRIVERS_PROTOCOL_PCAPNG_H
 #define DRIVERS_PROTOCOL_PCAPNG_H
 

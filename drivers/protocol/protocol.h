@@ -80,8 +80,8 @@ enum protocol_count {
  * op but create and destroy. */
 struct protocol_host {
     void *ctx;
-    /* Queues one unit for the client, whole or not at all. 0; or 1: there was no room, it is lost. The owner
-     * counts that. */
+    /* Queues one unit for the client, whole or not at all. 0; or 1: there was no room, and the unit is lost. The owner
+     * counts lost units. */
     int (*send)(void *ctx, const void *unit, size_t len);
     /* Carries out one line of the native command set (COMMANDS.md), "HEAD:LINES 20" for example, as this
      * session, which then releases control. reply (cap PROTOCOL_REPLY; or NULL and 0: not looked at) gets the reply
@@ -92,23 +92,24 @@ struct protocol_host {
     int (*fix)(void *ctx, int64_t t_ns, struct nmea_fix *fix);
     /* Counts n. */
     void (*count)(void *ctx, enum protocol_count what, uint64_t n);
-    /* Ends the session once what was sent has gone out. A pty or a USB device has no way to end it: there nothing
-     * happens. */
+    /* Ends the session once what was sent has gone out. A pty or a USB device has no way to end a session: there
+     * nothing happens. */
     void (*hang_up)(void *ctx);
-    /* Device time at which the receiver's first fix at or after t_ns is known; INT64_MAX: it has none. A time that lies
-     * ahead may still change: asked again, the answer may be a later time. */
+    /* Device time at which the receiver's first fix at or after t_ns is known; INT64_MAX: the receiver has none. A time
+     * that lies ahead may still change: asked again, the answer may be a later time. */
     int64_t (*next_fix_ns)(void *ctx, int64_t t_ns);
     /* Returns the state of the receiver's pulses per second at a device time. *hour_ns is the head's time since the top
-     * of the hour at that time. Pulses set its fraction of a second, and sentences its minutes and seconds. Until they
-     * do, it counts from power-up. */
+     * of the hour at that time. Pulses set this time's fraction of a second, and sentences its minutes and seconds.
+     * Until they do, the time counts from power-up. */
     enum protocol_pps (*pps)(void *ctx, int64_t t_ns, int64_t *hour_ns);
     /* The date by the device's own clock (COMMANDS.md, TIME:SHIFt) at a device time, ns since 1970. Until somebody has
-     * set it, it is UTC, or the time since power-up. */
+     * set the clock, the date is UTC, or the time since power-up. */
     int64_t (*date_ns)(void *ctx, int64_t t_ns);
-    /* Stores this protocol's settings, which then outlast a power cycle. They replace those stored before, and each new
-     * session gets them (spec.stored). lines: printable ASCII with '\n' at each end, at most PROTOCOL_STORED bytes with
-     * the NUL; "": none. 0; or 1: the head stores none (spec.keeps is 0), or these are no such lines. May be NULL: it
-     * stores none. The command HEAD:STORe stores settings of the head itself, which native commands set. */
+    /* Stores this protocol's settings, which then outlast a power cycle. The new settings replace those stored before,
+     * and each new session gets them (spec.stored). lines: printable ASCII with '\n' at each end, at most
+     * PROTOCOL_STORED bytes with the NUL; "": none. 0; or 1: the head stores none (spec.keeps is 0), or these are no
+     * such lines. May be NULL: the head stores none. The command HEAD:STORe stores settings of the head itself, which
+     * native commands set. */
     int (*store)(void *ctx, const char *lines);
     /* Loss of optical power at the window, both ways together, dB. May be NULL: 0. */
     double (*window_loss_db)(void *ctx);
@@ -179,7 +180,7 @@ struct protocol_ops {
     void (*reseal)(uint8_t *unit, size_t len);
     /* Checks whether the protocol can speak for a head: SH_OK, or SH_EINPUT with what is not allowed, and what is. Kind
      * and number of beams of the emitter are allowed already (emitters, n_beams); beams are those of its payload.
-     * NULL: it can speak for each such head. Pure. */
+     * NULL: the protocol can speak for each such head. Pure. */
     int (*check_head)(const struct native_descriptor *descriptor, const struct native_emitter *emitter,
                       const uint8_t *beams, struct sh_err *err);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
@@ -188,11 +189,11 @@ struct protocol_ops {
     int (*create)(const struct protocol_spec *spec, void **protocol, struct sh_err *err);
     void (*destroy)(void *protocol);
 
-    /* The client is there. t_ns: device time of the tick from which on it gets frames. */
+    /* The client is there. t_ns: device time of the tick from which on the client gets frames. */
     void (*open)(void *protocol, int64_t t_ns);
     /* One whole native frame, checked, in the order of the stream. A client that joins late gets descriptor,
-     * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. May be NULL: it
-     * needs none. */
+     * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. May be NULL: the
+     * protocol needs none. */
     void (*frame)(void *protocol, const uint8_t *frame, size_t len);
     /* Frames are missing before the next one: the client, or the head, was too slow. May be NULL, as frame. */
     void (*gap)(void *protocol, uint32_t n_frames);
@@ -201,16 +202,16 @@ struct protocol_ops {
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size; from a link of datagrams each call has a whole one. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);
-    /* How many bytes input() can take now. Until it takes some, those of the client wait, in the end on the wire. Not
+    /* How many bytes input() can take now. Until it takes some, the client's bytes wait, in the end on the wire. Not
      * asked for datagrams. May be NULL: any number. */
     size_t (*takes)(const void *protocol);
     /* Whether units may still come for a client that sends nothing more: a stream that it asked for, or an answer that
-     * takes time. 0: its session ends. May be NULL: they come without being asked for. */
+     * takes time. 0: its session ends. May be NULL: units come without being asked for. */
     int (*owes)(const void *protocol);
     /* The client has gone. Something that it asked for may still be due, such as a reboot. May be NULL. */
     void (*gone)(void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
-     * each tick. It saves wake-ups, no more: time() is called for the other ticks, too. */
+     * each tick. next_ns saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);
 };
 

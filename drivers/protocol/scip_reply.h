@@ -3,7 +3,7 @@
  *
  *   echo LF  status(2) sum LF  [KEY:VALUE ; sum LF]...  [time(4 or 11) sum LF]  [to 64 characters, sum LF]...  LF
  *
- * The sum is 0x30 plus the low six bits of the sum of the line's bytes; that of a key line leaves out the
+ * The sum is 0x30 plus the low six bits of the sum of the line's bytes; the sum of a key line leaves out the
  * ';'. A value of n characters is 6 n bits, the most significant six first, each plus 0x30. Pure. */
 #ifndef DRIVERS_PROTOCOL_SCIP_REPLY_H
 #define DRIVERS_PROTOCOL_SCIP_REPLY_H

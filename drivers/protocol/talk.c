@@ -2,8 +2,8 @@
 /* The protocol `capture`: a device says again what it said in a capture (talk.h).
  *
  * A request that comes again gets the next run that the capture has for it, and the last one once there is no further
- * one. A run is what followed one request in the capture. Its messages come after the request with the same delays as
- * there. */
+ * one. A run is what followed one request in the capture. The run's messages come after the request with the same
+ * delays as in the capture. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,7 +73,7 @@ static void talk_begin(struct capture_session *s, int run, int request)
 }
 
 /* A request waits while no place is free. If the device speaks in turns, a request ends the answer to the one before.
- * So it also waits until that answer has begun. */
+ * So a request also waits until that answer has begun. */
 static int must_wait(const struct capture_session *s)
 {
     const int takes_turns = s->talk->kind->stops == NULL;

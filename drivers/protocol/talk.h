@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A talk: what a device answered to each request, and what it sent unasked, as a capture has it. The protocol `capture`
- * (talk.c) says it again to a client.
+ * (talk.c) says the same again to a client.
  *
  * A run is what followed one request: the answer, and the stream that the request began. All that belongs to no
  * request is the run of the connection. Times of messages count from their request, or from the connection's beginning.
  *
- * Constant once it is built (firmware_sim/replay/capture_talk.c does so). Pure. */
+ * A talk is constant once firmware_sim/replay/capture_talk.c has built it. Pure. */
 #ifndef DRIVERS_PROTOCOL_TALK_H
 #define DRIVERS_PROTOCOL_TALK_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tells apart the messages of a captured conversation (talk.h) in the protocols that it knows: CoLa, SCIP and lines. */
+/* Tells apart the messages of a captured conversation (talk.h) in the protocols that are known here: CoLa, SCIP and
+ * lines. */
 #include <stdio.h>
 #include <string.h>
 
@@ -67,7 +68,7 @@ static int cola_answers(const uint8_t *request, size_t request_len, const uint8_
     return 0;
 }
 
-/* Whether it is "sEN name 1" (on 1) or "sEN name 0" (on 0). */
+/* Whether the telegram is "sEN name 1" (on 1) or "sEN name 0" (on 0). */
 static int is_event(const struct telegram *t, int on)
 {
     const size_t n = words_len(t, 2);
@@ -82,7 +83,7 @@ static int begins(const struct telegram *t, const char *words)
     return words_len(t, 2) == n && memcmp(t->text, words, n) == 0;
 }
 
-/* "sEN name 1" begins the stream of "sSN name". LMCstartmeas, too, begins that of scans (COLA.md). */
+/* "sEN name 1" begins the stream of "sSN name". LMCstartmeas, too, begins the stream of scans (COLA.md). */
 static int cola_streams(const uint8_t *request, size_t request_len, const uint8_t *message, size_t len)
 {
     const struct telegram asked = cola_inside(request, request_len), said = cola_inside(message, len);
@@ -177,7 +178,7 @@ static int scip_answers(const uint8_t *request, size_t request_len, const uint8_
     return n != 0 && n == scip_line(message, len) && memcmp(request, message, n) == 0 && !is_scan(message, len);
 }
 
-/* Where the two digits stand that count scans; 0: it is no request for a stream. */
+/* Where the two digits stand that count scans; 0: the request begins no stream. */
 static size_t scip_count_at(const uint8_t *request, size_t len)
 {
     const size_t mark = len != 0 && request[0] == '%';

@@ -24,7 +24,7 @@ enum { AT_TIME = 1200, AT_MODE = 1204, AT_MODEL = 1205, ENTRY_LEN = 3, FLAG = 0x
 
 enum { VELODYNE_VLP16 = 0x22, VELODYNE_HI_RES = 0x24 }; /* VLP-16 and Puck LITE; Puck Hi-Res */
 
-/* Range of the table of reflectivities, 0.01 dB. A reflectance below it gives 0, one above it 255. */
+/* Range of the table of reflectivities, 0.01 dB. A reflectance below the table gives 0, one above the table 255. */
 enum { REFL_LEAST_CDB = -2302, REFL_MOST_CDB = 3080, N_REFL = REFL_MOST_CDB - REFL_LEAST_CDB + 1 };
 
 struct velodyne {
@@ -138,8 +138,8 @@ static void take_emitter(struct velodyne *v, const uint8_t *payload, size_t len)
     v->model = model;
 }
 
-/* Writes a point as range and reflectivity. Returns 1 if it is an echo whose range can't be written: it
- * rounds to 0, or needs more than 16 bits. */
+/* Writes a point as range and reflectivity. Returns 1 if it is an echo whose range can't be written: the range rounds
+ * to 0, or needs more than 16 bits. */
 static uint32_t put_entry(const struct velodyne *v, uint8_t *at, const struct native_point *p)
 {
     double units = p->echo == 0 ? 0.0 : p->a * v->range_units_per_count + 0.5;

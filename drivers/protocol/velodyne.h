@@ -2,7 +2,7 @@
 /* Velodyne VLP-16 as protocols: data packets, position packets, settings over HTTP. VELODYNE.md has the
  * layouts, their sources, and what the real device does and this one doesn't.
  *
- * Here is what the three share. Pure; any thread; real-time safe but for what HTTP asks of the device. */
+ * This header has what the three share. Pure; any thread; real-time safe but for what HTTP asks of the device. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_H
 #define DRIVERS_PROTOCOL_VELODYNE_H
 

@@ -95,8 +95,8 @@ static void put_settings(struct page *p)
         "\"net\":{\"addr\":\"\",\"mask\":\"\",\"gateway\":\"\",\"dhcp\":\"Off\",\"mac_addr\":\"02-00-00-00-00-00\"}}");
 }
 
-/* Counts of a converter, 4096 for 5 V. By the user manual (10.2.3.2) they mean the values in the comments, which
- * are within its ranges. None of them is modelled. */
+/* Counts of a converter, 4096 for 5 V. By the user manual (10.2.3.2) these counts mean the values in the comments,
+ * which are within the manual's ranges. None of them is modelled. */
 static void put_diag(struct page *p)
 {
     velodyne_pages_put(p, "{\"volt_temp\":{\"top\":{"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Documents of a VLP-16 over HTTP: JSON with the fields that known clients read. VELODYNE.md lists them. Values of
- * the head are read by native queries; fields that aren't modelled are constant. */
+/* Documents of a VLP-16 over HTTP: JSON with the fields that known clients read. VELODYNE.md lists the fields. Values
+ * of the head are read by native queries; fields that aren't modelled are constant. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_PAGES_H
 #define DRIVERS_PROTOCOL_VELODYNE_PAGES_H
 

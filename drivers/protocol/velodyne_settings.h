@@ -2,8 +2,8 @@
 /* The settings of a VLP-16 as its clients post them: forms go in, native commands to the device and a status
  * of HTTP come out. Also reads the present settings. VELODYNE.md has all keys.
  *
- * A form is checked as a whole before its first command. Then its commands are carried out in order; the first
- * one that the head refuses ends it. */
+ * A form is checked as a whole before its first command. Then its commands are carried out in order; the first command
+ * that the head refuses ends the form. */
 #ifndef DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
 #define DRIVERS_PROTOCOL_VELODYNE_SETTINGS_H
 

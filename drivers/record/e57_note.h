@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* The note before the points of each scan in an E57 file. It lets a repair complete a file whose recorder was killed
- * (e57_repair.c): it holds what the XML section would say about the scan, except what is counted from the points. It is
- * a binary section that the standard calls a blob, and the XML names it as the scan's `sh:begin`. Readers skip it.
+/* The note before the points of each scan in an E57 file. The note lets a repair complete a file whose recorder was
+ * killed (e57_repair.c): it holds what the XML section would say about the scan, except what is counted from the
+ * points. The note is a binary section that the standard calls a blob, and the XML names it as the scan's `sh:begin`.
+ * Readers skip it.
  *
  *   0   blob's header: type 0, zeros   8 bytes; length of the section   uint64
  *  16   "scanhead e57 1"   16 bytes
@@ -11,7 +12,7 @@
  *  64   pose: shift, m; rotation, row by row   12 x double
  * 160   identity   96 bytes; profile   32 bytes; each with zeros up to its end
  *
- * It lies in one page of the file, so that it is there as a whole or not at all. Pure. */
+ * The note lies in one page of the file, so that it is there as a whole or not at all. Pure. */
 #ifndef DRIVERS_RECORD_E57_NOTE_H
 #define DRIVERS_RECORD_E57_NOTE_H
 

@@ -27,7 +27,7 @@ int e57_page_is_right(const uint8_t page[E57_PAGE]); /* whether its CRC is right
 int e57_put(struct e57_pages *pages, const void *data, size_t len, struct sh_err *err);
 /* Fills the page at hand with zeros and flushes the file. */
 int e57_finish(struct e57_pages *pages, struct sh_err *err);
-/* Flushes, and puts the page at hand into the file as it is, filled up with zeros. It is written again when it is
+/* Flushes, and puts the page at hand into the file as it is, filled up with zeros. The page is written again when it is
  * full. */
 int e57_keep_page(struct e57_pages *pages, struct sh_err *err);
 /* Overwrites content. */

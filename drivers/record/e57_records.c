@@ -42,8 +42,8 @@ VEC_CLONES static int put_counts(const double *restrict p, double scale_m, int n
     return n_bad == 0;
 }
 
-/* Returns how many points come before the first one whose counts have no room; far_m is its place. It looks at one
- * point after the other; put_counts has found that there is such a point. */
+/* Returns how many points come before the first one whose counts have no room; far_m is that point's place. The loop
+ * looks at one point after the other; put_counts has found that there is such a point. */
 static int find_far(const struct run *run, double scale_m, int n, double far_m[3])
 {
     int i = 0;

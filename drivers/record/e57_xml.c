@@ -38,8 +38,8 @@ static void open_structure(FILE *out, const char *tag)
     fprintf(out, "<%s type=\"Structure\">\n", tag);
 }
 
-/* The guid is made from the scan's facts, so that the same stream gives the same file. It is a UUID of version 8 (RFC
- * 9562). */
+/* The guid is made from the scan's facts, so that the same stream gives the same file. The guid is a UUID of version 8
+ * (RFC 9562). */
 static void put_guid(FILE *out, const void *content, size_t len)
 {
     struct sha256_ctx sha256;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* .las: LAS 1.4, point data record format 6 (7 with colour) followed by the label; one record per echo. Where the head
- * sends waveforms it is format 9 (10), and packets of samples follow (las_waves.c). On request it is LAS 1.2 for older
- * readers: format 1 (3), five returns, no labels, scan angles, attributes or waveforms. The file itself describes its
- * numbers (las_header.c).
+ * sends waveforms the format is 9 (10), and packets of samples follow (las_waves.c). On request the file is LAS 1.2 for
+ * older readers: format 1 (3), five returns, no labels, scan angles, attributes or waveforms. The file itself describes
+ * its numbers (las_header.c).
  *
- * Coordinates are counts of the stream's own scale from the first scan's station. So those of the first scan
- * are the numbers of the stream. Those of other stations are rounded once, by half a count at most. Nothing
+ * Coordinates are counts of the stream's own scale from the first scan's station. So coordinates of the first scan are
+ * the numbers of the stream. Coordinates of other stations are rounded once, by half a count at most. Nothing
  * is clipped: a point too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a
  * scan crosses the antimeridian: all lie within 180 degrees of the first station. */
 #include <math.h>

@@ -48,7 +48,7 @@ VEC_CLONES void las_set_intensities(const double *restrict reflectance_db, int n
 
 enum { SCAN_ANGLE_NONE = UINT16_MAX };
 
-/* The formula for one point. It gives SCAN_ANGLE_NONE where the angle is NaN. */
+/* The formula for one point, which gives SCAN_ANGLE_NONE where the angle is NaN. */
 static uint16_t scan_angle(double x, double y, double z)
 {
     const float flat = sqrtf((float)(x * x + y * y)), up = atan2f(flat, (float)-z);

@@ -24,7 +24,7 @@ int las_set_counts(const double *at, int n, double offset, double scale, int32_t
 /* Sets 32768 + 100 times the reflectance; 0 where it is not modelled. */
 void las_set_intensities(const double *restrict reflectance_db, int n, uint16_t *restrict to);
 /* Sets the scan angle of each point in the head's frame: the angle from straight down, in steps of 0.006 degrees.
- * Returns how many points have none; theirs is 0. */
+ * Returns how many points have none; the angle is then 0. */
 uint64_t las_set_scan_angles(const double *x, const double *y, const double *z, int n, uint16_t *to);
 
 /* Writes n rows of las_point_len(). The track's labels, station and colours are those of the points. */

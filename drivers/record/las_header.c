@@ -130,7 +130,8 @@ static uint8_t *put_keys_vlr(uint8_t *to, int epsg, int geoid)
     return at;
 }
 
-/* Puts the descriptors of packets. Their room is always the same; unused room lies between them and the points. */
+/* Puts the descriptors of packets. The descriptors' room is always the same; unused room lies between descriptors and
+ * points. */
 static uint8_t *put_kinds(uint8_t *to, const struct las_waves *waves)
 {
     memset(to, 0, LAS_KINDS * LAS_KIND_LEN);
@@ -147,7 +148,7 @@ static uint8_t *put_kinds(uint8_t *to, const struct las_waves *waves)
     return to + LAS_KINDS * LAS_KIND_LEN;
 }
 
-/* Puts day of the year and year, in GPS time. That differs from UTC by some seconds, so a day may begin that much
+/* Puts day of the year and year, in GPS time. GPS time differs from UTC by some seconds, so a day may begin that much
  * early. */
 static void put_date(uint8_t *to, const struct las_facts *f)
 {

@@ -75,7 +75,7 @@ void las_count_record(struct las_facts *facts, const uint8_t *record);
 void las_put_counts(const struct las_facts *facts, uint8_t *header);
 
 /* Writes everything before the points. Returns its length, which depends only on the CRS, the kind of time, the
- * attributes and whether there are waveforms. Therefore it can be written again when the counts, or more
+ * attributes and whether there are waveforms. Therefore these bytes can be written again when the counts, or more
  * descriptors, are known. */
 size_t las_front(const struct las_facts *facts, uint8_t to[LAS_FRONT_MAX]);
 

@@ -99,7 +99,7 @@ static int count_places(struct las *las, int n, int *rc, struct sh_err *err)
 }
 
 /* Converts latitude and longitude to metres east and north of the pose, accurately enough for an angle. The pose's
- * shift is added to them, since the reverse of the pose subtracts it. */
+ * shift is added, since the reverse of the pose subtracts it. */
 static void make_level(const struct track *t, double *x, double *y, int n)
 {
     for (int i = 0; i < n; i++) {
@@ -169,7 +169,8 @@ static int put_packets(struct las *las, int n, struct sh_err *err)
 }
 
 /* The specification puts a packet's first sample at point + location * (dx, dy, dz), which is nearer to the head
- * than the point. So (dx, dy, dz) points from the target to the head. Programs that read LAS take it so (WAVES.md). */
+ * than the point. So (dx, dy, dz) points from the target to the head. Programs that read LAS take the vector so
+ * (WAVES.md). */
 static void set_wave(struct las *las, int i)
 {
     struct track *t = &las->base.track;

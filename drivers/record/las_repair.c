@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The repair of .las (repair.h): LAS 1.2 and 1.4 as las.c writes them. It counts points, returns and bounds again from
- * the records. */
+/* The repair of .las (repair.h): LAS 1.2 and 1.4 as las.c writes them. The repair counts points, returns and bounds
+ * again from the records. */
 #include <string.h>
 
 #include "core/bytes.h"

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* A LAS 1.4 file may have waveforms (ASPRS LAS 1.4 R15). Windows of samples go in, packets come out in a file of their
- * own, X.wdp beside X.las. Without --wdp they are copied to the end of X.las when all points are there.
+ * own, X.wdp beside X.las. Without --wdp the packets are copied to the end of X.las when all points are there.
  *
  * A packet has as many samples as its descriptor says, and there are at most 255 descriptors. The first 128 lengths of
- * windows each get a descriptor. Later lengths are rounded up. Their packets are filled up with samples without light,
- * which are counted. Samples have 8 bits, or 16 where the digitiser has more than 8. One thread. */
+ * windows each get a descriptor. Later lengths are rounded up. Packets of these lengths are filled up with samples
+ * without light, which are counted. Samples have 8 bits, or 16 where the digitiser has more than 8. One thread. */
 #ifndef DRIVERS_RECORD_LAS_WAVES_H
 #define DRIVERS_RECORD_LAS_WAVES_H
 
@@ -28,7 +28,7 @@ struct las_kind {
     double gain, offset;         /* signal in units of the detection threshold = offset + gain * count */
 };
 
-/* A point refers to its waveform by this; zeros: it has none. */
+/* A point refers to its waveform by this; zeros: the point has none. */
 struct las_packet {
     uint8_t kind; /* from 1 on */
     uint64_t at;  /* bytes from the beginning of the record of packets */

@@ -26,7 +26,7 @@ static int packets_open(struct las_packets *p, int is_part, struct sh_err *err)
     return rc;
 }
 
-/* A completed record says its length. One that is being written says 0. */
+/* A completed record says its length. A record that is being written says 0. */
 static int read_len(struct las_packets *p, struct sh_err *err)
 {
     uint8_t at[8];
@@ -75,7 +75,7 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
 }
 
 /* Checks where the header says that the packets are. Inside the file, their record begins where a point ends. The
- * header may also set neither bit, inside nor outside: a repair writes it so where there are no packets. */
+ * header may also set neither bit, inside nor outside: a repair writes the header so where there are no packets. */
 static int check_place(const struct repair *r, const uint8_t *header, struct sh_err *err)
 {
     const uint64_t begin = le_get64(header + LAS_WAVES_AT), front = le_get32(header + 96);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The waveforms of a .las are repaired with it (las_repair.c). Its packets are inside, or in a file of their own:
- * X.wdp.part of a recording that was not completed, else X.wdp. Whole packets are kept. A point whose packet did not
- * reach the disk keeps its place, and says that it has no waveform. Nothing is copied, since a full disk has no
+/* The waveforms of a .las are repaired with the file (las_repair.c). The packets are inside the file, or in a file of
+ * their own: X.wdp.part of a recording that was not completed, else X.wdp. Whole packets are kept. A point whose packet
+ * did not reach the disk keeps its place, and says that it has no waveform. Nothing is copied, since a full disk has no
  * room: packets that were not yet inside stay in X.wdp. */
 #ifndef DRIVERS_RECORD_LAS_WAVES_REPAIR_H
 #define DRIVERS_RECORD_LAS_WAVES_REPAIR_H
@@ -30,7 +30,7 @@ uint64_t las_packets_limit(const struct las_packets *packets, const struct repai
  * changed, 0 where nothing had to be, or a negative error. */
 int las_packets_repair(struct las_packets *packets, struct repair *repair, const struct repair_rows *points,
                        uint8_t *header, struct sh_err *err);
-/* Gives the .wdp its name; one without any packet is removed. */
+/* Gives the .wdp its name; a .wdp without any packet is removed. */
 int las_packets_settle(struct las_packets *packets, struct sh_err *err);
 void las_packets_free(struct las_packets *packets);
 

@@ -2,7 +2,7 @@
 /* Meshes of scans: .obj, .gltf, .glb and .fbx, and .ply with --mesh; points spread over the mesh: .ply with --sparse.
  *
  * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/studio/scan_mesh.h makes triangles of
- * it. A mesh is made when its scan is over, and the file when all scans are. All points are held until then, with
+ * the grid. A mesh is made when its scan is over, and the file when all scans are. All points are held until then, with
  * about 110 bytes each, and triangles with 12, two a point.
  *
  * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of
@@ -62,8 +62,8 @@ static int check_place(const char *path, int moves, const double place_m[3], dou
     return mesh_check_box(path, low, high, err);
 }
 
-/* Checks a scan by itself, as if every shot had an echo. Whether it fits after the earlier scans can't be known yet:
- * shots without echo take no room. So that is checked when the scan begins (check_size). */
+/* Checks a scan by itself, as if every shot had an echo. Whether the scan fits after the earlier scans can't be known
+ * yet: shots without echo take no room. So that is checked when the scan begins (check_size). */
 static int mesh_fits(const char *path, const struct recorder_options *options, const struct recorder_scan *first,
                      const struct recorder_scan *scan, struct sh_err *err)
 {

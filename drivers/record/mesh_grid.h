@@ -28,7 +28,7 @@ struct mesh_grid {
 /* SH_EFORMAT where a scan of this track has no grid, or the place of its head in the recording's frame is not known. */
 int mesh_grid_check(const struct track *track, struct sh_err *err);
 
-/* Empties it, for the scan and the sweep of the track's present batch; `first` is the number of points so far. */
+/* Empties the grid, for the scan and the sweep of the track's present batch; `first` is the number of points so far. */
 void mesh_grid_begin(struct mesh_grid *grid, const struct track *track, uint32_t first);
 /* Returns 1 if point i of the batch has a place in the grid. 0: its line or row went back, or another sweep began. */
 int mesh_grid_takes(const struct mesh_grid *grid, const struct track *track, int i);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Points spread evenly over the mesh of a recording. In: the mesh's points and triangles, part by part. Out: points.
- * Their figures are interpolated between the corners of their triangle; label and station are those of the corner with
- * the largest weight. */
+ * The points' figures are interpolated between the corners of their triangle; label and station are those of the corner
+ * with the largest weight. */
 #ifndef DRIVERS_RECORD_MESH_SPARSE_H
 #define DRIVERS_RECORD_MESH_SPARSE_H
 

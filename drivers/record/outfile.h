@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A file that appears whole or not at all (core/newfile.h). It is written as PATH.part through a buffer. After a
+/* A file that appears whole or not at all (core/newfile.h). The file is written as PATH.part through a buffer. After a
  * failure PATH.part may stay with what reached the disk, for a repair (repair.h). */
 #ifndef DRIVERS_RECORD_OUTFILE_H
 #define DRIVERS_RECORD_OUTFILE_H
@@ -21,8 +21,8 @@ struct outfile {
     int error;        /* errno of the first write that failed: something of the file may be missing; 0: none */
     uint64_t saved;   /* `written` when outfile_save was called last */
     /* 1: the bytes from DIRECT_FROM on are written past the system's cache (O_DIRECT), where the file system can do
-     * that. It saves copying, which is most of the cost of a long recording. But each write then waits for the disk, so
-     * only writers that may wait set it. Set after opening. */
+     * that. Such writing saves copying, which is most of the cost of a long recording. But each write then waits for
+     * the disk, so only writers that may wait set it. Set after opening. */
     int may_be_direct;
     int is_direct; /* 1: O_DIRECT is set at present; -1: the file system can't do that (direct.h) */
 };
@@ -50,8 +50,8 @@ void outfile_yield(struct outfile *file);
  * not renamed. OUTFILE_DROP: PATH.part is removed. Everything is freed in any case. */
 enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
-/* Checks that no earlier recording has left data in `part`, which is PATH.part of `path`. It is for files that a repair
- * can complete. SH_EINPUT: there are data; the text has both names. */
+/* Checks that no earlier recording has left data in `part`, which is PATH.part of `path`. The check is for files that a
+ * repair can complete. SH_EINPUT: there are data; the text has both names. */
 int outfile_check_left(const char *part, const char *path, struct sh_err *err);
 /* Warns that PATH.part keeps what reached the disk, where it does. */
 void outfile_say_left(const char *path, const struct sh_report *report);

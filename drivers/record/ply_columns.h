@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The header of a PLY recording: facts and names of surfaces go in, text comes out. It stands at the
- * beginning of the file and is known at the end, so its size is reserved first. */
+/* The header of a PLY recording: facts and names of surfaces go in, text comes out. The header stands at the beginning
+ * of the file and is known at the end, so its size is reserved first. */
 #ifndef DRIVERS_RECORD_PLY_COLUMNS_H
 #define DRIVERS_RECORD_PLY_COLUMNS_H
 

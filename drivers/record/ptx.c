@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* .ptx: one grid per scan, a column per line and a row per shot. Points are in the head's frame; the pose
  * takes them to the recording's coordinate frame (station_pose.h). A shot without echo is "0 0 0 0.5". So is a
- * place of the grid without a shot: lines may have been lost, and they differ by a pulse where the pulse rate is
+ * place of the grid without a shot: lines may have been lost, and lines differ by a pulse where the pulse rate is
  * no multiple of the line rate.
  *
  * The grid of a planar head has a column per turn and a row per step; the first row is the first step that is cast.
  * The grid of a sphere has a column per ring; the column of a pole has one shot. Beams and lists of directions have
  * no rows and columns: they are refused.
  *
- * With colours each text line of a point ends in red, green and blue, 0 to 255. They are 0 for a place without a point.
+ * With colours each text line of a point ends in red, green and blue, 0 to 255. Colours are 0 for a place without a
+ * point.
  *
  * A PTX grid has one point per shot: the first echo. Intensity is the reflectance as a fraction: 1 for a
  * white Lambertian target and for what is brighter, 0.5 where not modelled. Echoes without room in the

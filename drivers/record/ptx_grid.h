@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The shots of one scan, kept in a file beside the recording (PATH.grid) until the scan is over. A PTX grid begins with
- * its size, and all its columns have the same height, so it can be written only then. Memory holds one column.
+ * its size, and all its columns have the same height, so the grid can be written only then. Memory holds one column.
  *
  * A recorder that was killed leaves the file there, and a repair makes the grid from it (ptx_repair.c). The file has a
  * head, then cells; each has a checksum. A shot without echo has a cell only where the size of the grid depends on it.

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair of PTX files. Whole grids are in FILE.part as text. The grid of the scan that was not over is in FILE.grid
- * (ptx_grid.h). Its text is made now, as its recorder would have made it, and replaces any text of it that the recorder
- * had begun. FILE.grid is removed last, so that a repair that is killed can begin again.
+ * (ptx_grid.h). The grid's text is made now, as the recorder would have made it, and replaces any text of this grid
+ * that the recorder had begun. FILE.grid is removed last, so that a repair that is killed can begin again.
  *
  * Without a FILE.grid, for instance when FILE.part was copied alone, the points of the last grid are kept all the same:
  * its last column is filled up with shots without echo, and its header gets the number of columns that are there.

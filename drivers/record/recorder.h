@@ -55,8 +55,8 @@ struct recorder_options {
     double long_edge;     /* of meshes: leaves out triangles with an edge longer than so many mean edges; 0: none */
     double sparse_per_m2; /* > 0: .ply has points spread over the mesh, so many per square metre */
     uint64_t sparse_seed; /* of the random choice of these points */
-    /* At the end this report gets warnings of what the format had no room for. Its function stop can give up a file
-     * that is being completed, which may take long. May be NULL; must live until close. */
+    /* At the end this report gets warnings of what the format had no room for. The report's function stop can give up a
+     * file that is being completed, which may take long. May be NULL; must live until close. */
     const struct sh_report *report;
     /* Files of one recording share the limit of empty places. NULL: a file alone; else it must live until close. */
     struct recorder_padding *padding;
@@ -96,15 +96,15 @@ struct recorder_ops {
     int (*begin)(void *rec, struct sh_err *err);
     /* Takes each frame of the stream, in order. NULL: track_frame alone takes them. */
     int (*frame)(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-    /* All points have come: completes the file (counts in the header) and reports what it had no room for. */
+    /* All points have come: completes the file (counts in the header) and reports what the format had no room for. */
     int (*finish)(void *rec, struct sh_err *err);
     /* Called about once a second: writes what has come to the disk, so that a repair finds it there. NULL: flushing the
      * file is enough. */
     int (*save)(void *rec, struct sh_err *err);
     /* Frees what the recorder's own struct holds; also after begin has failed. */
     void (*release)(void *rec);
-    /* Makes a whole file of an incomplete one (repair.h). SH_EFORMAT: it is not of this format, or too short to tell.
-     * NULL: the format is written in one piece at its end, so there is nothing to keep. */
+    /* Makes a whole file of an incomplete one (repair.h). SH_EFORMAT: the file is not of this format, or too short to
+     * tell. NULL: the format is written in one piece at its end, so there is nothing to keep. */
     int (*repair)(struct repair *repair, struct sh_err *err);
 };
 
@@ -118,7 +118,7 @@ const struct recorder_ops *recorder_shape(const struct recorder_ops *ops, const 
  * beside it (".part") that is renamed at the end. Options are copied. */
 int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
                   struct recorder **rec, struct sh_err *err);
-/* Sets other limits for its colours; to be called before its first frame. */
+/* Sets other limits for the recorder's colours; to be called before its first frame. */
 void recorder_set_limits(struct recorder *rec, double low, double high);
 /* Takes each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
  * live until close. Whole scans may come from different handles: heads in one scene, whose labels mean the same. */

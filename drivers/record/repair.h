@@ -5,8 +5,8 @@
  * a shot), and with the header, the index or the end that the format needs. Nothing is invented: a figure that the
  * recorder would have learnt from later frames keeps its first value, or is counted again from the data.
  *
- * It works in place, since a full disk has no room for a copy. An interrupted repair can begin again: no byte that it
- * needs is overwritten before the file is whole. One thread. */
+ * The repair works in place, since a full disk has no room for a copy. An interrupted repair can begin again: no byte
+ * that it needs is overwritten before the file is whole. One thread. */
 #ifndef DRIVERS_RECORD_REPAIR_H
 #define DRIVERS_RECORD_REPAIR_H
 
@@ -29,7 +29,7 @@ struct repair {
     int was_whole;      /* there was nothing to repair, and nothing was changed */
 };
 
-/* The result of repair_file. That function takes the name FILE or FILE.part, as the user gives it. A repaired FILE.part
+/* The result of repair_file. repair_file takes the name FILE or FILE.part, as the user gives it. A repaired FILE.part
  * is renamed to FILE, unless FILE exists: nothing is replaced. A FILE without a FILE.part beside it is checked, and
  * repaired if it needs that. */
 struct repaired {
@@ -40,8 +40,8 @@ struct repaired {
     const char *unit;
     int was_whole;
 };
-/* SH_EINPUT: no such file, no such format; SH_ESTATE: it is still being written, or FILE is named and FILE.part exists,
- * too; SH_EFORMAT: it can't be repaired, and is unchanged. */
+/* SH_EINPUT: no such file, no such format; SH_ESTATE: the file is still being written, or FILE is named and FILE.part
+ * exists, too; SH_EFORMAT: the file can't be repaired, and is unchanged. */
 int repair_file(const char *path, const struct sh_report *report, struct repaired *repaired, struct sh_err *err);
 void repair_free(struct repaired *repaired);
 
@@ -77,7 +77,8 @@ int repair_lines(const struct repair *repair, uint64_t from, int (*fn)(void *ctx
 /* Checks that nothing follows `end` but a piece of a unit, of at most `most` bytes, and then zeros (after a power cut).
  * Else SH_EFORMAT: no kill and no full disk causes that damage. */
 int repair_check_rest(const struct repair *repair, uint64_t end, uint64_t most, struct sh_err *err);
-/* Puts a note at the end that the file may be incomplete. Where a full disk has no room for it, that is reported. */
+/* Puts a note at the end that the file may be incomplete. Where a full disk has no room for the note, that is
+ * reported. */
 void repair_append_note(const struct repair *repair, uint64_t end, const void *note, size_t len);
 /* SH_EFORMAT: there is damage at that byte, which no recorder leaves. */
 int repair_fail_damaged(const struct repair *repair, uint64_t at, struct sh_err *err);

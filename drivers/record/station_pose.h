@@ -2,11 +2,11 @@
 /* The head's pose in the frame that a recording's points are in: the stream's CRS (geo layout) or the scene frame
  * (polar layout).
  *
- * Some formats keep points in the scanner's frame beside a pose (PTX, E57). Their recorders write points and pose so
- * that the pose takes each point to its place in the CRS. In the geo layout the stream has points in the CRS, so these
- * recorders apply the inverse of the pose to them. In local coordinates and in ECEF the result is in the head's own
- * frame. In UTM and UPS the result also holds the grid's scale and curvature, since a rigid pose can't hold them. Pure;
- * any thread. */
+ * Some formats keep points in the scanner's frame beside a pose (PTX, E57). Recorders of these formats write points and
+ * pose so that the pose takes each point to its place in the CRS. In the geo layout the stream has points in the CRS,
+ * so these recorders apply the inverse of the pose to them. In local coordinates and in ECEF the result is in the
+ * head's own frame. In UTM and UPS the result also holds the grid's scale and curvature, since a rigid pose can't hold
+ * them. Pure; any thread. */
 #ifndef DRIVERS_RECORD_STATION_POSE_H
 #define DRIVERS_RECORD_STATION_POSE_H
 
@@ -19,7 +19,7 @@ struct station_pose {
     double rotation[9]; /* head's frame (SOCS) -> recording's frame, row by row; proper */
 };
 
-/* Shift and rotation are the anchor's. Where the head moves, they don't say where it is: see track.h. In
+/* Shift and rotation are the anchor's. Where the head moves, they don't say where the head is: see track.h. In
  * geodetic coordinates the shift is degrees, degrees, metres, and the axes are east, north, up. */
 void station_pose_of(const struct scanhead_info *info, struct station_pose *pose);
 
@@ -36,7 +36,8 @@ static inline void station_pose_forward(const struct station_pose *pose, double 
         p[i] = pose->shift_m[i] + turned[i];
 }
 void station_pose_reverse(const struct station_pose *pose, double p[3]);
-/* These do the same for n points in columns; the results are equal bit for bit. */
+/* station_pose_reverse_all and station_pose_forward_all do the same for n points in columns; the results are equal bit
+ * for bit. */
 void station_pose_reverse_all(const struct station_pose *restrict pose, int n, double *restrict x, double *restrict y,
                               double *restrict z);
 void station_pose_forward_all(const struct station_pose *restrict pose, int n, double *restrict x, double *restrict y,

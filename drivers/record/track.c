@@ -145,7 +145,7 @@ static uint64_t firing_at(const struct scanhead_emitter *e, uint64_t t_ns)
 }
 
 /* The end of a line says where the next one begins. Where that end was lost, the row is computed from the
- * times in the frame. This is right as long as the pulse rate is that of the descriptor. */
+ * times in the frame. The row is right as long as the pulse rate is that of the descriptor. */
 static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
 {
     if (t->state.have_next_line && t->state.next_line == frame->scan_line && t->state.next_line_pulse0 <= frame->pulse0)

@@ -4,14 +4,14 @@
  *
  * Each point of a moving head is placed by the pose at its own time. In the polar layout these points are in the scene
  * frame, and the scan's pose is the identity. In the geo layout they are in the CRS, as those of a standing head, and
- * the pose is the first anchor's. Points of the polar layout whose pose was lost are left out and counted. Those of the
- * geo layout need no pose.
+ * the pose is the first anchor's. Points of the polar layout whose pose was lost are left out and counted. Points of
+ * the geo layout need no pose.
  *
  * Where a recorder wants attributes or colours and the head sends them, points wait for the frames that follow theirs.
- * Where one of these was lost, the points come out with the next ones, or at the end. Their attributes are then NaN,
- * their colour is grey, and they are counted. Colours that the head does not send are computed here from the points.
- * Where a recorder wants waveforms and the head sends them, points wait until their line ends or other points come: no
- * frame of waveforms says that it is the last one.
+ * Where one of these frames was lost, the points come out with the next ones, or at the end. The points' attributes are
+ * then NaN, their colour is grey, and they are counted. Colours that the head does not send are computed here from the
+ * points. Where a recorder wants waveforms and the head sends them, points wait until their line ends or other points
+ * come: no frame of waveforms says that it is the last one.
  *
  * In a zeroed struct the owner sets path, ops and rec, and colour where it wants another one than the head's. One
  * thread per track. */
@@ -62,7 +62,7 @@ struct track_missing {
     uint64_t n_attributes_unheld;  /* echoes with attributes that the recorder has no place for */
     uint64_t n_without_colours;    /* echoes whose colour was lost */
     uint64_t n_waves_unheld;       /* windows of waveforms that the recorder has no place for */
-    /* These count for recorders that want waveforms. */
+    /* The next five count for recorders that want waveforms. */
     uint64_t n_waves_unplaced; /* windows whose points were lost, or which memory had no room for */
     uint64_t n_waves_alone;    /* windows without a point in them */
     uint64_t n_samples_lost;   /* samples that found no room in the head */
@@ -131,14 +131,14 @@ struct track {
 
 /* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
  * kind of heights, a head that begins or ceases to move or to send (wanted) attributes, colours or waveforms, a
- * station number above 65535. SH_EFORMAT also if its points lack the figure that the colours show. */
+ * station number above 65535. SH_EFORMAT also if the points lack the figure that the colours show. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* For recorders: leaves only points index[0..n-1] of the batch in it; the indices rise. */
 void track_pick(struct track *track, const uint16_t *index, int n);
 /* Leaves echoes out whose positions are infinite or NaN, as in a broken stream, and with no_empty shots without echo.
- * Both are counted. Returns how many of the n points of the batch are left. The track calls this before it gives points
- * out. A recorder that changes their coordinates calls it again. */
+ * Both kinds are counted. Returns how many of the n points of the batch are left. The track calls this before it gives
+ * points out. A recorder that changes coordinates calls it again. */
 int track_leave_out(struct track *track, int n);
 /* Writes the times of the n points in seconds, as t_ns / 1e9. */
 void track_seconds(const struct track *track, int n, double *to);

@@ -44,8 +44,8 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
     if (t->ops->points == NULL) return 0;
-    /* has_waves is set as a scan begins, for recorders that want waveforms. Where such a recorder lacks it, the
-     * beginning of the scan did not come, and its windows can't be placed. */
+    /* has_waves is set as a scan begins, for recorders that want waveforms. Where has_waves of such a recorder is 0,
+     * the beginning of the scan did not come, and the scan's windows can't be placed. */
     if (!t->has_waves) {
         *(t->ops->wants_waves ? &t->missing.n_waves_unplaced : &t->missing.n_waves_unheld) += frame->n_points;
         return 0;
@@ -89,9 +89,9 @@ static int find_head(const struct track *t, const struct scanhead_point *p, doub
     return 1;
 }
 
-/* In the geo layout a point has no range, but its window says how coordinates change along a metre of it. The range
+/* In the geo layout a point has no range, but its window says how coordinates change along a metre of range. The range
  * is the length of the way from the head to the point, projected onto the beam's direction. In some CRS a beam is
- * slightly curved. It then leaves that direction sideways, so the error of the range is of second order. NaN: the
+ * slightly curved. Such a beam leaves that direction sideways, so the error of the range is of second order. NaN: the
  * head's place is not known. */
 static double range_along(const struct track *t, const struct scanhead_point *p, const struct scanhead_wave *wave)
 {

@@ -2,10 +2,10 @@
 /* A .waves.csv has the waveforms of all pulses, also of those without an echo. Each window is a row.
  *
  * scan and station are as in .poses.csv; pulse is the pulse's number in the scan, and t_s its firing time since the
- * scan's start. Sample k of the n lies at range_m + k * step_m. Its signal, in units of the detection threshold, is
- * (count - baseline) * count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of length one in the
- * head's frame, in the geo layout the change of the CRS's coordinates along a metre of range. The last column has the
- * counts, with blanks between. */
+ * scan's start. Sample k of the n lies at range_m + k * step_m. The sample's signal, in units of the detection
+ * threshold, is (count - baseline) * count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of
+ * length one in the head's frame, in the geo layout the change of the CRS's coordinates along a metre of range. The
+ * last column has the counts, with blanks between. */
 #include <string.h>
 
 #include "core/bytes.h"

@@ -33,7 +33,7 @@ int socket_is_group(const struct sockaddr *address);
 int socket_open(const struct socket_place *place, int *fd, char *name, size_t len, struct sh_err *err);
 /* Does the same at a known address of any family. Returns a descriptor, or -1 with errno. */
 int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting);
-/* Listens again at the address of a listener whose socket is closed by now. It does not look up the name again, which
+/* Listens again at the address of a listener whose socket is closed by now. The name is not looked up again, since it
  * may lead to another address. Returns a descriptor, or -1 with errno. */
 struct socket_address {
     struct sockaddr_storage at;
@@ -51,24 +51,24 @@ int socket_error_code(int error);
 /* Returns a descriptor in reserve, which socket_accept closes for a moment when no other is left; -1: none is left. */
 int socket_reserve(void);
 /* Accepts a listener's next client. Returns 0: there is none. 1: *fd is its descriptor, which does not block, or -1 if
- * the process or the system had no descriptor left. Such a client is turned away, since it would wake the listener's
- * thread again and again otherwise. reserve: socket_reserve()'s; its owner closes it. from may be NULL. Listeners in
- * several threads take turns. */
+ * the process or the system had no descriptor left. A client without a descriptor is turned away, since it would wake
+ * the listener's thread again and again otherwise. reserve: socket_reserve()'s; its owner closes it. from may be NULL.
+ * Listeners in several threads take turns. */
 int socket_accept(int listener, int *reserve, int *fd, struct sockaddr_storage *from, socklen_t *len);
 
 /* Writes an address as "127.0.0.1:40123" or "[::1]:40123"; that of a Unix socket's client as "a local client". */
 void socket_address_text(const struct sockaddr *address, socklen_t len, char *text, size_t size);
 
 /* Sets up a connected TCP socket; others stay as they are. Small packets leave at once. A peer that has vanished
- * without a word ends the connection after about 25 s. With bytes under way to it, that takes until the
+ * without a word ends the connection after about 25 s. With bytes under way to the peer, the end takes until the
  * system gives up repeating them (Linux: some 15 minutes). */
 void socket_tune(int fd);
 /* After socket_tune, for a peer that always reads: the connection ends after about 25 s with bytes under way, too.
- * That also cuts off a peer that only pauses for so long. */
+ * This limit also cuts off a peer that only pauses for so long. */
 void socket_tune_impatient(int fd);
 
-/* These two move bytes of a connected socket, and never block or raise SIGPIPE. They return how many bytes; 0: none
- * now; SH_ECLOSED: end of stream, reset or any other failure. */
+/* socket_read and socket_write move bytes of a connected socket, and never block or raise SIGPIPE. They return how many
+ * bytes; 0: none now; SH_ECLOSED: end of stream, reset or any other failure. */
 ssize_t socket_read(int fd, void *buf, size_t len);
 ssize_t socket_write(int fd, const void *buf, size_t len);
 /* As socket_write, but when the peer has gone it returns 0 until all that the peer sent is read. So the last request of
@@ -77,7 +77,7 @@ ssize_t socket_write_heard(int fd, const void *buf, size_t len);
 /* Breaks a connected TCP socket: its peer sees a reset, and loses what it has not taken. The descriptor stays. */
 void socket_break(int fd);
 /* Reads and throws away what has come, so that closing the socket does not reset the connection. A peer that sends
- * faster than this reads is not waited for. */
+ * faster than socket_drain reads is not waited for. */
 void socket_drain(int fd);
 
 /* The state of a connected socket, from the events of poll(2). */

@@ -36,7 +36,7 @@ struct stamped_datagram {
 /* Takes the next datagram. Returns 1, 0 if there is none, or SH_EIO. A room of 65535 bytes holds any datagram. */
 int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, struct stamped_datagram *out,
                  struct sh_err *err);
-/* Returns how many the kernel threw away so far: it had no room, or their checksum was wrong. */
+/* Returns how many datagrams the kernel threw away so far: it had no room, or their checksum was wrong. */
 uint64_t stamped_dropped(const struct stamped_socket *socket);
 void stamped_close(struct stamped_socket *socket);
 

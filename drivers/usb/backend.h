@@ -2,8 +2,8 @@
 /* Back ends: the ways between a host and the device core (usb.h). Acts of a host go in, the core's answers
  * come out.
  *
- * One ops struct and one file each; backend.c has the list. A back end is driven by its owner's poll(2): it
- * has no threads, and nothing blocks. */
+ * Each back end has one ops struct and one file; backend.c has the list. A back end is driven by its owner's poll(2):
+ * it has no threads, and nothing blocks. */
 #ifndef DRIVERS_USB_BACKEND_H
 #define DRIVERS_USB_BACKEND_H
 
@@ -78,7 +78,7 @@ struct usb_backend_ops {
 const struct usb_backend_ops *usb_backend_ops_get(enum usb_backend_type type);
 
 /* backend_socket.c: opens a listening or (attach) connected socket, which does not block. The path of a Unix socket
- * whose process is gone is taken over. `what` names it in errors; name gets "127.0.0.1:3240" or the path. */
+ * whose process is gone is taken over. `what` names the socket in errors; name gets "127.0.0.1:3240" or the path. */
 int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, int *fd, char *name, size_t len,
                        struct sh_err *err);
 /* Returns the next client's descriptor, which does not block; -1: none. reserve: socket_reserve()'s. The owner hears of
@@ -86,8 +86,8 @@ int usb_backend_socket(const struct usb_backend_spec *spec, const char *what, in
 int usb_backend_accept(int listener, int *reserve, const struct usb_owner *owner);
 
 /* usb_backend_peer notes the address that a socket of usb_backend_socket is connected to. usb_backend_connect connects
- * to it again, without waiting or looking up names. It returns 0: *fd is connected. EINPROGRESS: once poll(2) finds *fd
- * writable, usb_backend_connect_error says how it went. Any other errno: *fd is -1. */
+ * to that address again, without waiting or looking up names. It returns 0: *fd is connected. EINPROGRESS: once poll(2)
+ * finds *fd writable, usb_backend_connect_error says how it went. Any other errno: *fd is -1. */
 struct socket_address; /* drivers/socket/socket.h */
 void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket_address *out);
 int usb_backend_connect(const struct socket_address *to, int *fd);

@@ -52,7 +52,7 @@ void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket
 }
 
 /* Whether nobody answers on the socket at that path, since its owner ended without removing it. A socket whose queue is
- * full has an owner; this does not wait for it. */
+ * full has an owner; is_left_behind does not wait for that owner. */
 static int is_left_behind(const char *path, const struct socket_address *at)
 {
     struct stat st;

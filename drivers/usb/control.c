@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Control requests: chapter 9, strictly. Requests that the specification leaves open stall.
  *
- * These are not supported, and stall, too: remote wake-up, latency tolerance messages, test modes (there is no
+ * These requests are not supported, and stall, too: remote wake-up, latency tolerance messages, test modes (there is no
  * transceiver to test), SET_DESCRIPTOR, SYNCH_FRAME (no isochronous endpoints). */
 
 #include "core/bytes.h"
@@ -138,8 +138,8 @@ static int get_interface_status(struct usb_device *device, const struct setup *s
     return put_status(data, 0);
 }
 
-/* Accepts FUNCTION_SUSPEND, which a host sends at super speed to the first interface of a function. It has no effect
- * here. */
+/* Accepts FUNCTION_SUSPEND, which a host sends at super speed to the first interface of a function. The request has no
+ * effect here. */
 static int set_interface_feature(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     (void)data;

@@ -4,8 +4,8 @@
  * Requests to our own interfaces come as events on ep0. The core hears of a configuration as if it had
  * answered the requests itself.
  *
- * A device that is only a port has no ep0 of ours: the kernel's f_acm is all of it. Then the state of the controller,
- * and the hang-up of the port, show what the host does. */
+ * A device that is only a port has no ep0 of ours: the kernel's f_acm is the whole device. For such a device the state
+ * of the controller, and the hang-up of the port, show what the host does. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/usb/functionfs.h>
@@ -142,8 +142,8 @@ static void functionfs_stall(struct functionfs *self, int in)
 }
 
 /* The kernel has put its own numbers in wIndex: interfaces count from 0, endpoints from 1 in the order of our
- * descriptors. This puts the model's numbers there. An unknown endpoint becomes endpoint 0, for which no function
- * answers. */
+ * descriptors. translate_index puts the model's numbers there. An unknown endpoint becomes endpoint 0, for which no
+ * function answers. */
 static void translate_index(const struct functionfs *self, struct usb_ctrlrequest *setup)
 {
     const unsigned index = le_get16(&setup->wIndex), recipient = setup->bRequestType & USB_RECIP_MASK;
@@ -177,7 +177,8 @@ static void functionfs_answer(struct functionfs *self, struct usb_ctrlrequest se
 static void take_state(struct functionfs *self, int hung_up)
 {
     char text[32];
-    /* Reading lets poll(2) wait for the next change. It comes first, so that no change between both reads is missed. */
+    /* Reading lets poll(2) wait for the next change. The reading comes first, so that no change between both reads is
+     * missed. */
     if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return;
     const int was = usb_device_configuration(self->device) != 0;
     const int is = gadget_is_configured(&self->gadget, was);
@@ -228,7 +229,7 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, con
     int going = owner->go_on(owner->ctx), any = 1;
     const int hung_up = fds[AT_TTY].fd == self->console.fd && (fds[AT_TTY].revents & POLLHUP) != 0;
     if (going && self->ep0 < 0 && (fds[AT_EP0].revents != 0 || hung_up)) take_state(self, hung_up);
-    /* Data on the endpoints came before the event on ep0. So they are taken first: a session is not closed before
+    /* Data on the endpoints came before the event on ep0. So the data are taken first: a session is not closed before
      * its last data are in. */
     for (int events = 0; going && any && events < MAX_EVENTS; events++) {
         int taken = 0;

@@ -14,7 +14,7 @@ enum { FFS_SLOTS = 8, FFS_SLOT_BYTES = 32768, FFS_MAX_PIPES = 8, FFS_MAX_FAILURE
 
 /* A slot is a buffer that goes back and forth between core and kernel. IN: it waits at the core as if a host
  * had asked for that much, is filled, and is written to the kernel. OUT: it is read from the kernel, and waits
- * at the core until the function has read it. On an endpoint that is down the kernel gives it back at once;
+ * at the core until the function has read it. On an endpoint that is down the kernel gives the buffer back at once;
  * then it is idle until the next configuration comes up. */
 enum ffs_slot_state { FFS_IDLE, FFS_AT_CORE, FFS_AT_KERNEL };
 
@@ -70,7 +70,7 @@ uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
 
 /* The console. The kernel's f_acm does not report DTR. So a session begins with the first bytes of the host,
  * and ends when the host has taken none of the waiting bytes for one or two seconds. Bytes that the tty then still
- * holds can't be taken back, and may end within a stream frame. The next reader gets them first. Then it gets an event
+ * holds can't be taken back, and may end within a stream frame. The next reader gets these bytes first, then an event
  * frame, from which on it reads frames and replies correctly. */
 struct ffs_console {
     struct usb_device *device;

@@ -63,7 +63,7 @@ static int started_at(long pid, unsigned long long *ticks)
     return -1;
 }
 
-/* Whether the process that made it is gone: there is none of that number, or a later one has got the number. */
+/* Whether the process that made the gadget is gone: there is none of that number, or a later one has got the number. */
 static int is_left_behind(const char *name)
 {
     long pid;

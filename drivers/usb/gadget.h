@@ -30,7 +30,7 @@ struct gadget {
  * be opened. */
 int gadget_create(struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id,
                   struct sh_err *err);
-/* Whether FunctionFS carries something of it. */
+/* Whether FunctionFS carries something of the gadget. */
 static inline int gadget_has_functionfs(const struct gadget *gadget)
 {
     return gadget->part.n_interfaces != 0;
@@ -42,15 +42,15 @@ int gadget_bind(struct gadget *gadget, const char *udc, struct sh_err *err);
 /* Opens state_fd, on which poll(2) reports POLLPRI when the controller's state has changed. For gadgets without
  * FunctionFS, once they are bound. */
 int gadget_watch_state(struct gadget *gadget, struct sh_err *err);
-/* Whether the host has configured it. before: the last answer, which still holds while the bus is suspended. */
+/* Whether the host has configured the gadget. before: the last answer, which still holds while the bus is suspended. */
 int gadget_is_configured(const struct gadget *gadget, int before);
 /* Returns "full", "high" or "super". */
 const char *gadget_rate_name(enum usb_rate rate);
-/* Whether its controller sees a host. */
+/* Whether the gadget's controller sees a host. */
 int gadget_is_on_bus(const struct gadget *gadget);
-/* Returns the rate of the bus it is on. */
+/* Returns the rate of the bus that the gadget is on. */
 enum usb_rate gadget_rate(const struct gadget *gadget);
-/* Checks whether the controller it is bound to is as fast as that. SH_EINPUT: it is not. */
+/* Checks whether the gadget's controller is as fast as `wanted`. SH_EINPUT: it is not. */
 int gadget_check_rate(const struct gadget *gadget, enum usb_rate wanted, struct sh_err *err);
 void gadget_unbind(struct gadget *gadget);
 /* Removes the gadget. To be called after ep0 and the endpoints are closed. */

@@ -3,8 +3,8 @@
  * end sessions; requests to a CDC-ACM port are answered.
  *
  * Native: both the console and the stream take commands and give replies and stream frames. Sessions end when their
- * interface goes away; personalities.h says what else ends them. The request that begins a stream session first ends
- * one that is open. */
+ * interface goes away; personalities.h says what else ends them. The request that begins a stream session first ends a
+ * session that is open. */
 #ifndef DRIVERS_USB_HEAD_DEVICE_H
 #define DRIVERS_USB_HEAD_DEVICE_H
 
@@ -31,7 +31,7 @@ struct scanhead_usb {
  * usb_device_free(head->device). */
 int scanhead_usb_create(const struct usb_personality *personality, const struct usb_identity *id,
                         struct scanhead_usb *head, struct sh_err *err);
-/* Does what follows from the host's transfers rather than from its requests: begins a session by data, sends the
+/* Does what follows from the host's transfers rather than from the host's requests: begins a session by data, sends the
  * notification of a port. To be called after each transfer. */
 void scanhead_usb_update(struct scanhead_usb *head);
 /* Returns a line that says what has cut sessions off, once for each time; NULL: nothing has. */

@@ -34,7 +34,8 @@ static void put_serial(struct usb_identity *id, const char *whose, unsigned plac
              digest[3]);
 }
 
-/* A socket name outside the file system: the kernel gives it to one process, and takes it back when that ends. */
+/* A socket name outside the file system: the kernel gives it to one process, and takes the name back when that process
+ * ends. */
 static int claim_name(const char *name, unsigned number, int *claim)
 {
     struct sockaddr_un at = {.sun_family = AF_UNIX};

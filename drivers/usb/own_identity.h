@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A head's own USB identity, where none is configured. It has a serial number, which is the same whenever the head
- * starts again. It also has a number among the USB heads that run on this machine, for the bus id of USB/IP.
+/* A head's own USB identity, where none is configured. The identity has a serial number, which is the same whenever the
+ * head starts again. It also has a number among the USB heads that run on this machine, for the bus id of USB/IP.
  *
  * The serial number is computed from the machine's id and from a text that names the head (`whose`). So it does not
  * depend on which other heads run. Where several of the same configuration run at a time, the second and later ones

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The USB device core: descriptors, control requests, endpoints and cancellation, with no transport in it.
  *
- * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from it.
+ * A device is data: a struct usb_model and what it points to. The core answers all of chapter 9 from the model.
  * Above the core stands the function (a link, or a test), which reads and writes endpoints and answers class
  * and vendor requests by hooks; below it stands a back end (usbip, usbredir, functionfs), which carries what
  * the host does:
@@ -13,14 +13,14 @@
  * A transfer is one request of the host's driver (a URB). An IN transfer waits until the function writes, an
  * OUT transfer until the function has read all of it, as a real bus does by NAK. So a function that does not
  * read holds the host back. A transfer belongs to the core from submit until the back end's complete() is
- * called with it. That happens exactly once, maybe within submit.
+ * called with it. This call happens exactly once, maybe within submit.
  *
  * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end with a
  * short packet, or with a zero-length packet where they are a whole number of packets. Where they filled the transfer
  * exactly, the zero-length packet ends the next transfer, unless more is written first. On an endpoint that has `units`
  * (model.h: the data of one write are a unit) that packet always comes before further data: at once if another transfer
  * waits, else with the next one that is submitted. A transfer whose rest is smaller than the next packet fails with
- * USB_OVERFLOW, as on a real bus. That packet stays with the function: nothing is lost.
+ * USB_OVERFLOW, as on a real bus. The packet that did not fit stays with the function: nothing is lost.
  *
  * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN
  * 1.2; Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.
@@ -84,7 +84,7 @@ void usb_device_free(struct usb_device *device);
 
 typedef void (*usb_complete)(void *ctx, struct usb_transfer *transfer);
 
-/* The host has the device: it is in the state default, at that rate. */
+/* The host has the device: the device is in the state default, at that rate. */
 void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_complete complete, void *ctx);
 /* The device is unplugged: transfers that are pending complete with USB_GONE. */
 void usb_device_detach(struct usb_device *device);
@@ -111,7 +111,7 @@ enum usb_end usb_device_end(const struct usb_device *device);
 /* Returns USB_CONFIGURATION, or 0 if the device is not configured. */
 int usb_device_configuration(const struct usb_device *device);
 
-/* Returns how often it was attached. */
+/* Returns how often the device was attached. */
 uint32_t usb_device_attaches(const struct usb_device *device);
 
 /* ---- injected faults */
@@ -124,20 +124,20 @@ void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int du
 /* Halts the endpoint, until the host clears the halt. 0: there is no such endpoint now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);
 /* IN: each of the next n transfers that carry more than a byte ends in a short packet, about half way; the rest goes
- * into the one after it. This holds until the interface ends. */
+ * into the transfer after it. The shortening holds until the interface ends. */
 void usb_device_shorten(struct usb_device *device, uint8_t endpoint, uint32_t n);
 /* Sets how long each control request takes. 0: it is answered at once. */
 void usb_device_set_slow(struct usb_device *device, double ms);
 /* This and the next four functions are for back ends, which keep the list `held` of requests that wait. Returns whether
  * another request has to wait. */
 int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held);
-/* Appends a request, with its id set. They are answered one after the other; each takes the time asked for. */
+/* Appends a request, with its id set. Requests are answered one after the other; each takes the time asked for. */
 void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request);
 /* Takes out the request of that id; NULL: there is none. */
 struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id);
 /* Takes out the first request if its time has come; NULL: it has not, or there is none. */
 struct usb_transfer *usb_take_due(struct usb_transfer **held);
-/* Returns when the first one is due; INT64_MAX: there is none. */
+/* Returns when the first request is due; INT64_MAX: there is none. */
 int64_t usb_due_ns(const struct usb_transfer *held);
 /* Makes the configuration descriptor claim n bytes more than it has, with back ends that ask the core for it. */
 void usb_device_lengthen(struct usb_device *device, uint32_t n);

@@ -115,7 +115,7 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
 }
 
 /* Returns a free place, or ends the connection that has been here longest without importing, and returns its place.
- * There always is one, since at most one host has imported. */
+ * Such a connection always exists, since at most one host has imported. */
 static struct usbip_conn *usbip_make_room(struct usbip *self)
 {
     struct usbip_conn *oldest = NULL;

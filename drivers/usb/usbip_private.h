@@ -104,13 +104,13 @@ struct usbip_urb {
 
 /* ---- usbip_queue.c */
 
-/* A new URB. NULL: too much is pending, or no memory. It counts as pending until it is queued or freed. */
+/* A new URB. NULL: too much is pending, or no memory. The URB counts as pending until it is queued or freed. */
 struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room);
 /* Frees an URB that was not queued. */
 void usbip_urb_free(struct usbip_conn *conn, struct usbip_urb *urb);
-/* Queues the URB as a reply of len bytes of wire. It is freed once it is sent. */
+/* Queues the URB as a reply of len bytes of wire. The URB is freed once it is sent. */
 void usbip_queue(struct usbip_conn *conn, struct usbip_urb *urb, uint32_t len);
-/* Queues a reply of len bytes without an URB, and returns these, all 0, to be filled in. NULL: the connection is
+/* Queues a reply of len bytes without an URB, and returns these bytes, all 0, to be filled in. NULL: the connection is
  * broken. */
 uint8_t *usbip_queue_plain(struct usbip_conn *conn, uint32_t len);
 void usbip_queue_clear(struct usbip_conn *conn);

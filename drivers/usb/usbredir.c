@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The usbredir back end: the device for a virtual machine (QEMU's usb-redir), over a Unix socket or TCP; no
- * root needed. It serves one guest at a time; one that has not sent its hello yet gives way to the next that comes.
- * libusbredirparser does the wire format, which spice/usbredir's usb-redirection-protocol.md describes; this
- * is its "usb-host" end.
+ * root needed. The back end serves one guest at a time; a guest that has not sent its hello yet gives way to the next
+ * that comes. libusbredirparser does the wire format, which spice/usbredir's usb-redirection-protocol.md describes;
+ * this file is the protocol's "usb-host" end.
  *
- * Where it connects instead of listening (attach), it connects again after the guest has hung up. */
+ * Where the back end connects instead of listening (attach), it connects again after the guest has hung up. */
 #include "drivers/usb/backend.h"
 
 #ifdef HAVE_USBREDIR

@@ -107,7 +107,7 @@ static const struct usb_endpoint_row *find_endpoint(const struct usbredir *self,
     return NULL;
 }
 
-/* Refuses a bulk packet to an endpoint of another type. One to an endpoint that is not there fails at the core. */
+/* Refuses a bulk packet to an endpoint of another type. A packet to an endpoint that is not there fails at the core. */
 static int refuse_bulk(struct usbredir *self, uint64_t id, struct usb_redir_bulk_packet_header *header)
 {
     const struct usb_endpoint_row *row = self->greeted ? find_endpoint(self, header->endpoint) : NULL;
@@ -187,7 +187,7 @@ static void on_stop_interrupt(void *priv, uint64_t id, struct usb_redir_stop_int
     usbredirparser_send_interrupt_receiving_status(self->parser, id, &status);
 }
 
-/* Cancels a packet that is under way. One that is answered already needs no second answer. */
+/* Cancels a packet that is under way. A packet that is answered already needs no second answer. */
 static void on_cancel(void *priv, uint64_t id)
 {
     struct usbredir *self = priv;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Echoes as HELIOS++ finds them, from its published description (L. Winiwarter et al., Virtual laser scanning with
  * HELIOS++, Remote Sensing of Environment 269, 2022): a sample that none within a window around it exceeds is an
- * echo, at the range of that sample. Its width is that of one Gaussian with an offset, a + b exp(-((x - c) / d)^2),
- * fitted to the samples. It shares nothing with the program: the fit is a plain Levenberg and Marquardt with numeric
- * derivatives. */
+ * echo, at the range of that sample. The echo's width is that of one Gaussian with an offset, a + b exp(-((x - c) /
+ * d)^2), fitted to the samples. The code shares nothing with the program: the fit is a plain Levenberg and Marquardt
+ * with numeric derivatives. */
 #ifndef TESTS_ACCURACY_OTHER_DECOMPOSITION_H
 #define TESTS_ACCURACY_OTHER_DECOMPOSITION_H
 

@@ -43,8 +43,8 @@ static void test_half(void **state)
     }
 }
 
-/* Each sub-ray stands for the same energy. The share of n within radius r is the Gaussian's, up to one ring. Their mean
- * rho^2 is 0.3435. */
+/* Each sub-ray stands for the same energy. The share of n within radius r is the Gaussian's, up to one ring. The
+ * sub-rays' mean rho^2 is 0.3435. */
 static void test_rings(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void test_end_of_a_plane(void **state)
     }
 }
 
-/* A wall stands at range_m straight ahead. Its normal is turned away by the incidence. */
+/* A wall stands at range_m straight ahead. The wall's normal is turned away by the incidence. */
 static struct scene *wall(double range_m, double incidence_rad)
 {
     const double s = sin(incidence_rad), c = cos(incidence_rad), half = 5.0 + 0.1 * range_m;

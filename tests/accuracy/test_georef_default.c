@@ -115,8 +115,8 @@ static void check_exact_only_at_pole(int i, enum scene_frame kind, const struct 
                  from_pole_m);
 }
 
-/* One in 250 is compared with definitions, without GeographicLib, where the scene frame allows it: from ECEF forward;
- * from UTM to degrees and by the projection back. */
+/* One point in 250 is compared with definitions, without GeographicLib, where the scene frame allows it: from ECEF
+ * forward; from UTM to degrees and by the projection back. */
 static double true_error_m(enum scene_frame kind, const struct georef_spec *spec, const struct georef *georef,
                            const struct station_points *p)
 {

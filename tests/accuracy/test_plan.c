@@ -272,8 +272,8 @@ static double threshold(const struct beam *beam)
     return low;
 }
 
-/* A step of more than the resolution gives two echoes where both sides have 1 %. That is a strip of known width, in a
- * view of known width. A single ray is wrong in all of it. The plan's figure is the strip's share plus 1.645 standard
+/* A step of more than the resolution gives two echoes where both sides have 1 %: a strip of known width, in a view of
+ * known width. A single ray is wrong in the whole strip. The plan's figure is the strip's share plus 1.645 standard
  * errors, an upper limit, and the sample scatters by one standard error. From 3 below the mean to 3 above that is -1.4
  * to 4.7 standard errors. The adaptive beam finds the strip. */
 static void test_figures(void **state)
@@ -310,9 +310,9 @@ static void test_figures(void **state)
 
 /* A step of 4 mm gives one echo, at the mean over both sides. If a share E of the energy lies beyond the edge, a
  * single ray is wrong by E steps, so the mean square is known. All pulses in the strip count as those that meet more
- * than one smooth surface, so the plan looks at each. Its figure is 3 standard errors above the mean square that it
- * finds, which scatters by one. So it is 0 to 6 of them above the true one. A plan that looked at one pulse in 32 would
- * be 17 above it. */
+ * than one smooth surface, so the plan looks at each. The plan's figure is 3 standard errors above the mean square that
+ * it finds, which scatters by one. So the figure is 0 to 6 standard errors above the true one. A plan that looked at
+ * one pulse in 32 would be 17 above it. */
 static void test_small_steps(void **state)
 {
     (void)state;

@@ -35,9 +35,9 @@ static const double RANGE_MAX_M = 1e4;
 
 /* The sight is made for more rays than are cast, so that small triangles are examined one by one, too. */
 static const double SIGHT_RAYS = 5e7;
-/* The share of rays in ordinary scans that a sight leaves to the BVH. Without a bound the BVH could do everything. It
- * was 0.00 % in the room, 0.06 % on the terrain and 0.18 % in the house. Each cell that an outline cuts may need the
- * BVH, and twice as many such cells should be noticed. */
+/* The share of rays in ordinary scans that a sight leaves to the BVH. Without a bound the BVH could do everything. The
+ * share was 0.00 % in the room, 0.06 % on the terrain and 0.18 % in the house. Each cell that an outline cuts may need
+ * the BVH, and twice as many such cells should be noticed. */
 static const double MOST_ASKED = 0.004;
 
 struct place {
@@ -46,7 +46,7 @@ struct place {
 };
 
 /* Easting and northing of ordinary and of extreme points of the grid: Berlin; the equator at a zone's edge; 84 degrees
- * north, high up; just south of the equator on the southern grid. They are multiples of nothing. */
+ * north, high up; just south of the equator on the southern grid. The coordinates are multiples of nothing. */
 static const struct place PLACE[] = {
     {"E 391431 N 5819712", {391431.123, 5819712.456, 34.567}},
     {"E 833978 N 12", {833978.557, 12.345, -3.2}},
@@ -348,8 +348,8 @@ static void test_terrain(void **state)
     }
 }
 
-/* A building as planners draw it: 31,235 triangles, thin layers, faces that overlap. It is seen from outside and from
- * within. */
+/* A building as planners draw it: 31,235 triangles, thin layers, faces that overlap. The building is seen from outside
+ * and from within. */
 static void test_house(void **state)
 {
     (void)state;

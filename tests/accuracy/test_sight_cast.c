@@ -144,7 +144,7 @@ static void movers_and_optics(struct seen_room *r, struct cast_setup *s, struct 
     movers(r, s, a);
 }
 
-/* A head that moves has no sight. One that is given is not asked. */
+/* A head that moves has no sight. A sight that is given is not asked. */
 static void moving(struct seen_room *r, struct cast_setup *s, struct asked *a)
 {
     (void)r;

@@ -195,7 +195,7 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
                1e3 * f[1].bias_m, 1e3 * f[2].bias_m, 1e9 * width_m / C_2, 1e9 * f[1].width_s, 1e9 * f[2].width_s,
                f[2].deviation);
         /* The closed form takes the footprint's spread as Gaussian, of sigma 0.414 w tan i: 0.975 w tan i full at half
-         * maximum. That of the disc's marginal exp(-2 x^2) erf(sqrt(2 - 2 x^2)) is 1.130. */
+         * maximum. The width of the disc's marginal exp(-2 x^2) erf(sqrt(2 - 2 x^2)) is 1.130. */
         if (spec->shape == WAVEFORM_GAUSSIAN)
             for (int d = 1; d < WAVE_DETECTORS; d++)
                 wave_between(f[d].width_s * C_2 / width_m, 0.99, 1.130 / 0.975 + 0.01);
@@ -306,9 +306,9 @@ static uint32_t others_echoes(const struct wave_echoes *w, struct other_echo *ec
     return other_decompose(y, window->n, 1.0, 4, 12, echo, WAVE_MOST);
 }
 
-/* Its ranges are samples with the largest count. Noise may make a neighbour larger where the top lies between both:
- * by the peak's curvature, 8 sigma of noise in a peak of 30 reach 0.1 samples beyond half of one. Centres and widths
- * of its fits differ from ours by the noise of the offset that it fits too. */
+/* The other decomposition's ranges are samples with the largest count. Noise may make a neighbour larger where the top
+ * lies between both: by the peak's curvature, 8 sigma of noise in a peak of 30 reach 0.1 samples beyond half of one.
+ * Centres and widths of its fits differ from ours by the noise of the offset that it fits too. */
 static void another_decomposition_agrees(void **state)
 {
     (void)state;

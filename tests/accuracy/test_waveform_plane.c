@@ -32,7 +32,7 @@ static double plane_range(const struct plane *plane, double x, double y)
     return (plane->range_m - d * tangent * x) / (1.0 - s * tangent * y) * sqrt(1.0 + s * s * (x * x + y * y));
 }
 
-/* The closed form neglects that the far side of the footprint is hit from further away, and more steeply. Both
+/* The closed form neglects that the far side of the footprint is hit from further away, and more steeply. Both effects
  * change the power of a sub-ray by its range: (R / r)^2 for the distance, and as much as R / r for the cosine. */
 static double plane_weight(const struct plane *plane, double range_m, int weighed)
 {
@@ -79,9 +79,9 @@ static struct waveform_return closed_form(const struct plane *plane)
                                     WAVEFORM_DISC};
 }
 
-/* The error of the closed form is below one count for sub-rays of equal power. It neglects only ranges of second
- * order in b = s tan i. Power by distance and cosine is 3 b at the rim at most, so the samples change by less than 3
- * b of themselves. */
+/* The error of the closed form is below one count for sub-rays of equal power. The closed form neglects only ranges of
+ * second order in b = s tan i. Power by distance and cosine is 3 b at the rim at most, so the samples change by less
+ * than 3 b of themselves. */
 static void planes_are_the_closed_form(void **state)
 {
     (void)state;
@@ -163,10 +163,10 @@ static double skewness(double h)
     return cube / n - 3.0 * mean * square / n + 2.0 * mean * mean * mean;
 }
 
-/* Both sides of a line as two returns. On a step that is hit head on they are exact: the reference has an error of half
- * a row of its sub-rays, 0.5 / sqrt(100,000). On a wedge a bell stands for half of a disc with the same energy, centre
- * and spread. Its third moment is 0, which counts times a sixth of the pulse's third derivative, 1.38 / sigma^3 at
- * most. */
+/* Both sides of a line as two returns. On a step that is hit head on the two returns are exact: the reference has an
+ * error of half a row of its sub-rays, 0.5 / sqrt(100,000). On a wedge a bell stands for half of a disc with the same
+ * energy, centre and spread. The bell's third moment is 0, which counts times a sixth of the pulse's third derivative,
+ * 1.38 / sigma^3 at most. */
 static void parts_are_nearly_exact(void **state)
 {
     (void)state;

@@ -124,8 +124,8 @@ static void spread_samples(const struct line_waves *waves, uint32_t pulse, uint3
 }
 
 /* A plane at 80 deg, 300 m away, is 0.6 m deep within a footprint, as long as the pulse. The closed form agrees with
- * 1,027 sub-rays to a count of 12 bits, RMS: 4 counts here. It neglects that the far side is hit more steeply, by 0.3
- * % at the rim. */
+ * 1,027 sub-rays to a count of 12 bits, RMS: 4 counts here. The closed form neglects that the far side is hit more
+ * steeply, by 0.3 % at the rim. */
 static void closed_form_agrees_with_sub_rays(void **state)
 {
     (void)state;
@@ -345,8 +345,8 @@ static void cut_footprints_have_two_echoes(void **state)
     close_waves(&w);
 }
 
-/* Noise of three times the level makes echoes all over a window of 40 m. Those within the head's ranges are sent, at
- * most max_echoes a pulse, the strongest. Those outside are counted. */
+/* Noise of three times the level makes echoes all over a window of 40 m. Echoes within the head's ranges are sent, at
+ * most max_echoes a pulse, the strongest. Echoes outside are counted. */
 static void check_echoes_of_noise(const struct cast_disturbance *disturbance)
 {
     static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 1, PULSES};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Clients of a head that is measured: processes that read its pty and tcp links, and do nothing with the bytes. Their
- * processor time is not the head's. */
+/* Clients of a head that is measured: processes that read its pty and tcp links, and do nothing with the bytes. The
+ * clients' processor time is not the head's. */
 #ifndef TESTS_BENCH_CLIENTS_H
 #define TESTS_BENCH_CLIENTS_H
 

@@ -119,7 +119,7 @@ static double distance2(const double a[3], const double b[3])
     return (a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2]);
 }
 
-/* Corners of an icosahedron that are neighbours make its faces. These are turned so that normals point outward. */
+/* Corners of an icosahedron that are neighbours make its faces. The faces are turned so that normals point outward. */
 static void add_icosahedron(struct builder *b, double radius_m)
 {
     const double g = 0.5 * (1.0 + sqrt(5.0)), scale = radius_m / sqrt(1.0 + g * g), near2 = 5.0 * scale * scale;

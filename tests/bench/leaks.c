@@ -3,10 +3,12 @@
  *
  * A ray leaks when it hits nothing, or when it reports the outer wall of nested meshes. It also leaks when it hits,
  * behind its target, a face from outside, because then it has left the mesh. A ray that hits the inside of the mesh
- * behind its target has passed an edge that it was aimed at. That is wrong, too, but no leak, and is counted apart.
+ * behind its target has passed an edge that it was aimed at. Such a ray is wrong, too, but no leak, and is counted
+ * apart.
  *
  * Every second batch is a moving head's. This head goes about the station, up to half as far as the nearest wall. The
- * rays of the other batches are looked up in a sight of the station, too. Each must equal the cast's, bit by bit. */
+ * rays of the other batches are looked up in a sight of the station, too. Each answer must equal the cast's, bit by
+ * bit. */
 #include <math.h>
 #include <stdio.h>
 #include <pthread.h>

@@ -129,7 +129,7 @@ static void aim(struct alone *a)
             a->d[k][i] = a->d[k][i - 1];
 }
 
-/* Returns the seconds for all rays. Those of a block lie in the cache when their time begins. */
+/* Returns the seconds for all rays. Rays of a block lie in the cache when their time begins. */
 static double alone_pass(void *ctx)
 {
     struct alone *a = ctx;

@@ -55,7 +55,7 @@ static double embree_rays_s(const struct bench_case *c, const struct bench_resul
     return begun == threads ? (double)c->rays->n * passes / s : 0.0;
 }
 
-/* Fills a configuration. Its head fires pulses in the directions of the bench's rays. frames: turns of the pan. */
+/* Fills a configuration. The head fires pulses in the directions of the bench's rays. frames: turns of the pan. */
 static void fill_config(struct config *cfg, const struct bench_case *c, uint32_t threads, uint32_t frames)
 {
     struct schedule_spec spec;

@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # This measures how late the pacing thread wakes up, beside cyclictest in turns: sh tests/bench/real_time.sh SCANHEAD
-# FOLDER. It runs five pairs. Both sleep up to absolute times, 1 ms apart, with the same priority. That is SCHED_FIFO 80
-# if both may have it, and otherwise none. It prints a table, the ratio of the medians of p99, and a verdict. The status
-# is 1 if the ratio is above 1.5.
+# FOLDER. It runs five pairs. Both programs sleep up to absolute times, 1 ms apart, with the same priority. The priority
+# is SCHED_FIFO 80 if both may have it, and otherwise none. The script prints a table, the ratio of the medians of p99,
+# and a verdict. The status is 1 if the ratio is above 1.5.
 #
 # RT_S: seconds of a turn (10). RT_PAIRS: pairs (5). RT_SETS: options for the head, as `--set head.prr_hz=1000`.
 set -eu
@@ -29,7 +29,7 @@ else
     policy="--policy=other" said="no priority"
 fi
 
-# A head scans a room. Its links have no clients, as only wake-ups and releases count.
+# A head scans a room. The head's links have no clients, as only wake-ups and releases count.
 cat >"$out/head.yaml" <<END
 head: {profile: $PWD/config/heads/any-rate.yaml, prr_hz: 300000, lines_hz: 100, pan_deg_s: 50, frames: 0}
 scene: {meshes: [{file: $PWD/config/scenes/glass_room.obj, up: z, scale: 1}]}
@@ -38,8 +38,8 @@ links: [{type: "null"}]
 loop: {ahead_ms: 2} # with this few ticks ahead, casters and the pacing thread are woken at each tick
 END
 
-# cyclic NUMBER: runs cyclictest and prints its p50, p99 and largest, in us. It tunes nothing that the head does not
-# (--default-system).
+# cyclic NUMBER: runs cyclictest and prints its p50, p99 and largest, in us. cyclictest tunes nothing that the head does
+# not (--default-system).
 cyclic() {
     # shellcheck disable=SC2086
     timeout $((seconds + 60)) cyclictest --default-system -m -q -t 1 -i 1000 -l $((seconds * 1000)) $policy -h 100000 \

@@ -70,8 +70,8 @@ size_t bench_stages_line(struct bench_stages *s, const struct cast_setup *setup,
     share(s, start, cast, STAGE_SCHEDULE, cycles); /* times of the pulses belong to the schedule */
     size_t len = native_encode_points(bytes, cap, block, 0);
     uint64_t encoded = bench_cycles();
-    /* The checksum, made within the encoder, is made once more by itself. Its time is taken from that of the
-     * encoder. */
+    /* The checksum, made within the encoder, is made once more by itself. The second checksum's time is taken from that
+     * of the encoder. */
     volatile uint32_t crc = crc32c(0, bytes + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN);
     (void)crc;
     uint64_t spent = bench_cycles() - encoded, encode = encoded - cast;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* This is for clang-tidy's analyzer alone, which reads one file at a time. It believes that a function of another file
- * may return anything, so that each failure might be none. Here it sees that these functions always return the code of
- * a failure.
+/* This is for clang-tidy's analyzer alone, which reads one file at a time. The analyzer believes that a function of
+ * another file may return anything, so that each failure might be none. In this header it sees that these functions
+ * always return the code of a failure.
  *
  * DEFINES_... says that the file that is looked at is the one that defines the function. IN_SCENE says that the file is
  * one of core/scene or core/import. */

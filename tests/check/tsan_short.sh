@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # This is the short form of `make check-tsan`, for `make test`. ThreadSanitizer watches one head with all kinds of links
-# and their clients, with faults on and knobs turned. It prints TAP. TSAN_HEAD names the program, which `make
+# and their clients, with faults on and knobs turned. The script prints TAP. TSAN_HEAD names the program, which `make
 # check-tsan-short` builds.
 set -u
 head=${TSAN_HEAD:-build/tsan_short/tsan_head}

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# There is a libFuzzer program for each input of the head. They need clang, and tests/fuzz/README.md says the rest.
+# There is a libFuzzer program for each input of the head. The programs need clang, and tests/fuzz/README.md says the
+# rest.
 #   make fuzz S=600           each for so many seconds, JOBS at a time; then a table
 #   make fuzz N=1000000       each for so many executions; with S as well: what comes first
 #   make fuzz F=config        that one alone

@@ -1,7 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # This is the short form of fuzzing, for `make test`. Each target runs its seeds and the inputs that were found before,
-# then new inputs made of them for some seconds. It prints TAP, one test a target.
+# then new inputs made of them for some seconds. The script prints TAP, one test a target.
 #
 #   FUZZ_BUILD=build/fuzz sh tests/fuzz/fuzz_short.sh [NAME...]      without names: all targets
 #

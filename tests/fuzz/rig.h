@@ -12,15 +12,15 @@
 
 #include "core/err.h"
 
-/* libFuzzer calls this with each input. It returns 0. */
+/* libFuzzer calls this function with each input. Returns 0. */
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* Returns a folder of this process below $TMPDIR, or /tmp. It is removed at exit, but stays after a crash. */
+/* Returns a folder of this process below $TMPDIR, or /tmp. The folder is removed at exit, but stays after a crash. */
 const char *fuzz_folder(void);
 
-/* Returns the path of a file with that ending (".ply") in the folder, which has just these bytes. They are in memory,
- * so writing them costs microseconds. The path is valid until the process ends, and the next call with the same ending
- * changes the file. There may be up to 8 endings. */
+/* Returns the path of a file with that ending (".ply") in the folder, which has just these bytes. The bytes are in
+ * memory, so writing them costs microseconds. The path is valid until the process ends, and the next call with the same
+ * ending changes the file. There may be up to 8 endings. */
 const char *fuzz_file(const char *ending, const uint8_t *data, size_t size);
 /* Writes a file of that name on the disk, for code that makes, renames or locks files. */
 const char *fuzz_disk_file(const char *name, const uint8_t *data, size_t size);

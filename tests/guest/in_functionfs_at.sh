@@ -39,7 +39,7 @@ if [ $speed = high ]; then # a reset is the same, but without a pause
 fi
 head_start "{type: usb, backend: functionfs, speed: $speed}" --set head.prr_hz=4000 --set loop.tick_hz=100
 wait_for 10 is_plugged
-# Without a configuration a head has nothing to do on its bus. It rests then, and is there again with the next
+# Without a configuration a head has nothing to do on its bus. The head rests then, and is there again with the next
 # configuration.
 cpu_ticks() {
     awk '{print $14 + $15}' /proc/$head_pid/stat

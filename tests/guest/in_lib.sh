@@ -46,9 +46,9 @@ check() {
     fi
 }
 
-# wait_for SECONDS COMMAND...: waits until the command succeeds, and returns 1 if it never did. It allows ten times as
-# long, because a guest shares its processor with other tests. Only a command that never succeeds takes that long. Each
-# look starts two processes, which are slow here, so it looks only ten times a second.
+# wait_for SECONDS COMMAND...: waits until the command succeeds, and returns 1 if it never did. wait_for allows ten
+# times as long, because a guest shares its processor with other tests. Only a command that never succeeds takes that
+# long. Each look starts two processes, which are slow here, so it looks only ten times a second.
 wait_for() {
     left=$(($1 * 100))
     shift

@@ -92,8 +92,8 @@ check_record() {
     check "$1: scanhead record usb" scanhead record usb --wait 1200 -o usb.ply --stats usb.json --quiet
     check "$1: the stream is the same as over TCP" test "$(sha256_of usb.json)" = "$tcp1" -a -n "$tcp1"
     # A tty has no flow control. An emulated processor can be too slow for a head as fast as it computes. Then the
-    # kernel's tty buffers (640 KiB) run over and bytes are gone. That happens with a million pulses, and never happened
-    # with a few thousand.
+    # kernel's tty buffers (640 KiB) run over and bytes are gone. The loss happens with a million pulses, and never
+    # happened with a few thousand.
     if ! records_only; then
         check "$1: scanhead record tty" scanhead record tty:/dev/ttyACM0 --wait 1200 -o tty.ply --stats tty.json --quiet
         check "$1: the stream of the tty is the same as over TCP" test "$(sha256_of tty.json)" = "$tcp2" -a -n "$tcp2"
@@ -130,7 +130,7 @@ goes_on() {
 # reset a bus or to find its head again. A scan of 34 s has ended before that.
 #
 # One recorder is killed in the middle of a scan. Another one loses its head and ends, and a third one was told to wait
-# for the head. This needs a head in real time, plug.sh and unplug.sh.
+# for the head. The check needs a head in real time, plug.sh and unplug.sh.
 check_cut_records() {
     scanhead record usb --wait 1200 --frames 0 -o cut.ply 2>killed.err &
     points_come killed.err
@@ -205,8 +205,8 @@ check_chapter9() {
     tap "$1" test_chapter9_transfers
 }
 
-# check_faults PREFIX YAML: checks how the kernel and the recorder take faults on request. YAML is the link. It needs
-# plug.sh.
+# check_faults PREFIX YAML: checks how the kernel and the recorder take faults on request. YAML is the link.
+# check_faults needs plug.sh.
 check_faults() {
     cat >/tmp/faults.yaml <<'END'
 faults:

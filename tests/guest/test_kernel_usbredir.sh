@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# This tests the head as a device of a virtual machine. Its process runs on the host, and usbredir connects the two. The
-# guest says when the process is to be killed and started again.
+# This tests the head as a device of a virtual machine. The head's process runs on the host, and usbredir connects the
+# two. The guest says when the process is to be killed and started again.
 . tests/guest/lib.sh
 guest_prepare
 guest_add_head

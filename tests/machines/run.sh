@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 # This runs the tests on other machines: sh tests/machines/run.sh BUILD MACHINE... (make machines)
 #
-# A machine is a script of this folder, MACHINE.sh. It is given the folder BUILD/machines/MACHINE, which is kept, so
-# that its root and its built files make the next run short. It leaves there
+# A machine is a script of this folder, MACHINE.sh. The script is given the folder BUILD/machines/MACHINE, which is
+# kept, so that its root and its built files make the next run short. The script leaves there
 #   tests.txt      what tests/run_tap.sh printed
 #   record.txt     what became of the short record, beside that of this machine
 #   built.txt      one line: how it was built, and how many warnings that gave; a file that is missing: it was not built

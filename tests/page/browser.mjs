@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This runs Chromium without a window, by the DevTools protocol over a pipe. So it ends with this program, however that
-// ends, and opens no port. Its profile is its own, and it finds no address but 127.0.0.1.
+// ends, and opens no port. The browser's profile is its own, and the browser finds no address but 127.0.0.1.
 import {spawn, spawnSync} from 'node:child_process';
 import {accessSync, constants, mkdirSync, writeFileSync} from 'node:fs';
 import {folder, forget, remember} from './work.mjs';
@@ -193,7 +193,8 @@ class Page {
     await this.mouse('mouseReleased', at);
   }
 
-  /** Clicks the element that a selector finds. It may have moved meanwhile. If the click hit no control, it clicks again. */
+  /** Clicks the element that a selector finds. The element may have moved meanwhile. If the click hit no control,
+   * click() clicks again. */
   async click(selector) {
     for (let tries = 1; ; tries++) {
       const at = await this.where(selector);

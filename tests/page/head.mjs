@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This runs the program under test: heads with their ready line, and recordings. Its TCP client shares nothing with the page.
+// This runs the program under test: heads with their ready line, and recordings. The TCP client here shares nothing
+// with the page.
 import {spawn, spawnSync} from 'node:child_process';
 import {createConnection} from 'node:net';
 import {forget, remember} from './work.mjs';

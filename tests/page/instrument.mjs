@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // These tests take the page as an instrument. They check colours, ages and the time line as they are drawn, the files
-// that it saves, control, keys, screen readers and small screens, and that nothing jumps. They read back the pixels of
-// the picture.
+// that the page saves, control, keys, screen readers and small screens, and that nothing jumps. They read back the
+// pixels of the picture.
 import {execFileSync} from 'node:child_process';
 import {existsSync, mkdirSync, readdirSync, readFileSync} from 'node:fs';
 import {tableOf} from '../../drivers/link/web/view_colours.js';
@@ -314,8 +314,8 @@ export async function testInstrument(browser) {
 }
 
 // The page's scale for heights and that of files (core/colour.h) have other colours between the ends, and the same hues
-// in the same order: blue, green, yellow, red. They are within 60 of the 240 degrees; the other way round they would be
-// 240 apart.
+// in the same order: blue, green, yellow, red. The hues are within 60 of the 240 degrees; the other way round they
+// would be 240 apart.
 function sameMeaning() {
   const [low, high] = [-0.5, 3.5], file = `${folder}/heights.ply`;
   run('record', CONFIG, '-o', file, '--quiet', '--set', 'output.colour=height', '--set', `output.colour_limits=[${low}, ${high}]`);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This makes a picture with 256 colours: a browser's PNG (8 bits a channel, not interlaced) becomes a smaller one, for
-// documents. It needs node 20.15 or later.
+// documents. The module needs node 20.15 or later.
 import zlib from 'node:zlib';
 
 function* chunks(png) {
@@ -10,7 +10,7 @@ function* chunks(png) {
   }
 }
 
-// Returns {width, height, size: bytes of a pixel, out: these}. It undoes the filter of each row (PNG specification,
+// Returns {width, height, size: bytes of a pixel, out: these}. Undoes the filter of each row (PNG specification,
 // 9.2).
 export function pixelsOf(png) {
   const all = [...chunks(png)], head = all[0].bytes, width = head.readUInt32BE(0), height = head.readUInt32BE(4);

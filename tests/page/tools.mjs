@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// It tests the tools of the picture on a head that has scanned: what they draw is read back from the screen.
+// This module tests the tools of the picture on a head that has scanned: what they draw is read back from the screen.
 import {readFileSync} from 'node:fs';
 import {pixelsOf} from './png8.mjs';
 import {choose} from './rig.mjs';

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # This prints each point of a LAS file with its waveform, as the ASPRS specification (LAS 1.4 R15) has them: point
-# formats 9 and 10, waveform packet descriptors, packets in the file or in a .wdp beside it. It doesn't depend on the
-# program that wrote the file.
+# formats 9 and 10, waveform packet descriptors, packets in the file or in a .wdp beside it. The script doesn't depend
+# on the program that wrote the file.
 #
 # Each point has a line: x y z, the descriptor's index; if that is not 0: x y z of the packet's first sample, the number
 # of samples, the time between them in ps, the sum of their values (offset + gain * sample), and the samples.

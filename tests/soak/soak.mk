@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # This runs every scenario of config/faults over each kind of link, with our own client. usb runs in an emulated machine
-# if there is one. A table comes at the end. It takes some ten minutes.
+# if there is one. A table comes at the end. The soak takes some ten minutes.
 SOAK_S ?= 30
 #? soak              long runs that are judged at their end
 soak: soak-scenarios soak-long
@@ -8,7 +8,7 @@ soak-scenarios: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@sh tests/soak/soak.sh $(SOAK_S) $(BUILD)
 
-# This records an hour of device time at 10 kHz, replays it at pace fast, and records it again. That takes half a
+# This records an hour of device time at 10 kHz, replays it at pace fast, and records it again. replay-hour takes half a
 # minute, and 1.8 GB in build/ meanwhile.
 REPLAY_S ?= 3600
 #? replay-hour       an hour of a recording, replayed
@@ -17,7 +17,7 @@ replay-hour: deps-build
 	@sh tests/soak/replay_hour.sh $(REPLAY_S) $(BUILD)
 
 # For ten minutes one head gives 2.2 million pulses a second on all links, beside a head of each maker. Clients come,
-# go, stall and misbehave, and faults strike. It is judged at the end. SOAK_LONG_S=3600 runs it for an hour.
+# go, stall and misbehave, and faults strike. The head is judged at the end. SOAK_LONG_S=3600 runs it for an hour.
 SOAK_LONG_S ?= 600
 soak-long: deps-build
 	$(call install_missing,python3)

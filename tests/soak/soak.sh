@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # This runs each scenario of config/faults over each kind of link, for $1 seconds: sh tests/soak/soak.sh SECONDS BUILD.
-# Two heads run at a time. Then it runs the same over usb, one by one, in a guest. A table follows at the end. The
-# status is 1 if a verdict is bad.
+# Two heads run at a time. Then the script runs the same over usb, one by one, in a guest. A table follows at the end.
+# The status is 1 if a verdict is bad.
 set -u
 [ $# -eq 2 ] || { echo "usage: $0 SECONDS BUILD" >&2; exit 2; }
 seconds=$1

@@ -39,7 +39,7 @@ void mesh_unweld(struct mesh *mesh);
 /* Writes a rotation about an axis that is parallel to nothing in the scenes. */
 void mesh_any_rotation(double rotation[9]);
 
-/* Makes the scene of it. It fails the running test where that is not possible. */
+/* Makes the scene of the mesh. Fails the running test where that is not possible. */
 struct scene *mesh_scene(const struct mesh *mesh);
 void mesh_free(struct mesh *mesh);
 

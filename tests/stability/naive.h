@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* This is the plain way to cast with Embree. The stability table shows it beside ours. It has one float mesh with
- * shared vertices, float rays, and the range as Embree gives it. */
+/* This is the plain way to cast with Embree. The stability table shows it beside ours. The plain way has one float mesh
+ * with shared vertices, float rays, and the range as Embree gives it. */
 #ifndef TESTS_STABILITY_NAIVE_H
 #define TESTS_STABILITY_NAIVE_H
 

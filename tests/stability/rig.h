@@ -34,7 +34,7 @@ struct rig_errors {
     uint64_t undecidable; /* would be wrong, but double precision can't tell; in no figure above */
 };
 
-/* Takes the scene over. It fails the running test where anything can't be made. */
+/* Takes the scene over. Fails the running test where anything can't be made. */
 void rig_open(struct rig *rig, struct scene *scene, const double station_m[3]);
 void rig_close(struct rig *rig);
 /* Makes another BVH of the same scene, for the same rays. */
@@ -52,8 +52,8 @@ void rig_look(struct rig *rig);
  * The running test fails where a bit differs. */
 void rig_cast(struct rig *rig);
 void rig_cast_naive(struct rig *rig, const double origin_m[3], int robust, unsigned packet);
-/* Returns the errors of the last cast. With `judge` it leaves out the rays that double precision can't decide. That is
- * for our cast; the naive method is counted in full. */
+/* Returns the errors of the last cast. With `judge` it leaves out the rays that double precision can't decide. `judge`
+ * is for our cast; the naive method is counted in full. */
 struct rig_errors rig_errors_of(const struct rig *rig, int judge);
 
 /* Casts both ways: with ours, and with float packets of 16 (robust) about naive_origin_m. Prints a row of the largest

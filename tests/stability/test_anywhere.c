@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Rays that begin anywhere: at the station, within the scene, on faces, at corners, and from a thousand to a million
  * times as far away as the scene is large, up to 1e7 m. Scenes are odd ones (odd_scenes.h), a third of them at UTM.
- * They are compared with the reference in long double. A ray also meets the same, to the bit, by itself, among others
- * from the same point, and among rays from elsewhere.
+ * The rays are compared with the reference in long double. A ray also meets the same, to the bit, by itself, among
+ * others from the same point, and among rays from elsewhere.
  *
  * ANYWHERE_SCENES: how many (default 300, THOROUGH=1: 1000). */
 #include <math.h>

@@ -175,7 +175,8 @@ static void test_large_coordinates(void **state)
 /* The rough hull's facets stand at up to 80 degrees to the ray. Ours: 16 x 2^-53 x R / cos i is 1e-10 m at 10 km, and
  * vertices about the station round by 2^-53 x 1.2 km before. So the micrometre holds throughout, at 10 km too. Naive:
  * floats at 1.2 km are wrong by 6e-5 m at any range, and by 5e-4 m at 10 km. The BVH's own frame is about the scene's
- * middle. That is the middle of the hull or, with a triangle beside the hull, more than 1.2 km from there. */
+ * middle. The scene's middle is the middle of the hull or, with a triangle beside the hull, more than 1.2 km from
+ * there. */
 static void range_row(double radius_m, double rough, int beside)
 {
     const double centre[3] = {1000.0, -700.0, 30.0};
@@ -256,7 +257,7 @@ static void aim_along_slope(struct rig *rig, double range_m)
     }
 }
 
-/* Returns the error against the plane's range by its formula. That is in long double from the same station and
+/* Returns the error against the plane's range by its formula. The formula is in long double from the same station and
  * direction that were cast. */
 static double slope_error_m(const struct rig *rig)
 {

@@ -349,7 +349,7 @@ static void test_far_from_anchor(void **state)
     assert_int_equal(geoframe_set_tangent(&frame, origin, &ANCHOR, 0.0, &err), SH_OK);
     assert_int_equal(geoframe_fill(&frame, origin, &spec, &err), SH_OK);
     assert_int_equal(georef_create(&spec, &at_anchor, &err), SH_OK);
-    /* From there no polynomial is taken. One that is asked for is refused, and so are counts of 1 um. */
+    /* From there no polynomial is taken. A polynomial that is asked for is refused, and so are counts of 1 um. */
     assert_int_equal(plan_georef(at_anchor, &need, &method, &planned, &err), SH_OK);
     assert_int_equal(method, GEOREF_EXACT);
     double naive_m = far_error_m(at_anchor, origin, &row, 1);

@@ -14,7 +14,7 @@ enum { PULSES = RIG_LINE_PULSES };
 static const double PANE_M = 0.004, WALL_M = 3.0;
 
 /* Both sides of a pane that the beam ahead meets at `away_m` under the incidence i, and a wall behind, all parallel.
- * They stand about a place on the UTM grid. */
+ * Pane and wall stand about a place on the UTM grid. */
 static struct scene *make_window(double away_m, double incidence_rad, const double at[3])
 {
     const double s = sin(incidence_rad), c = cos(incidence_rad), behind[3] = {0.0, PANE_M, PANE_M + WALL_M};

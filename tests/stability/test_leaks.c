@@ -29,9 +29,9 @@ enum { BATCH = 4096, THREADS = 2 };
 #define RAYS_PER_ROW ((uint64_t)thorough(280000, 70000))
 #endif
 
-/* A closed inner mesh with the station inside. Rays are aimed at its edges or vertices. One that leaks through it meets
- * nothing, or the outer mesh around it. The hits of the inner mesh lie within a ball, or a box, each widened by a part
- * in 10^9. A hit beyond it is a leak, which is exact and costs nothing. */
+/* A closed inner mesh with the station inside. Rays are aimed at its edges or vertices. A ray that leaks through it
+ * meets nothing, or the outer mesh around it. The hits of the inner mesh lie within a ball, or a box, each widened by a
+ * part in 10^9. A hit beyond it is a leak, which is exact and costs nothing. */
 struct cage {
     struct mesh mesh;
     uint32_t n_inner; /* triangles of the inner mesh: the first */

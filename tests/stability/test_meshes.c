@@ -168,8 +168,8 @@ static void test_fan(void **state)
 /* ---- seams */
 
 /* Halves of a screen that meet at x = 0 with 7 and 64 cells a side. Corners of one lie on edges of the other, as far as
- * doubles go. They miss them by up to 2^-53 of their coordinates, below the resolution of double precision at that
- * distance, so no ray may pass. */
+ * doubles go. The corners miss the edges by up to 2^-53 of their coordinates, below the resolution of double precision
+ * at that distance, so no ray may pass. */
 static void test_t_junctions(void **state)
 {
     (void)state;

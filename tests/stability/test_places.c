@@ -218,7 +218,7 @@ static void test_crossing(void **state)
     table_check();
 }
 
-/* The plate is seen from the front. Its back is so near behind that floats can't tell which comes first. */
+/* The plate is seen from the front. The plate's back is so near behind that floats can't tell which comes first. */
 static void test_thin_plate(void **state)
 {
     (void)state;

@@ -108,7 +108,7 @@ static void ground_around_costs_little(void **state)
     }
 }
 
-/* Ranges count from the BVH's origin. It is among the triangles, even where the file has other vertices. */
+/* Ranges count from the BVH's origin. The origin is among the triangles, even where the file has other vertices. */
 static void vertices_of_nothing_do_not_move_the_origin(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A visibility map of a station, as one would first write it: a face of a cube in cells, for each cell the triangles
- * that may be seen there, and rays decided by the sides of edges. It sees the wrong triangle in three ways. */
+ * that may be seen there, and rays decided by the sides of edges. Such a map sees the wrong triangle in three ways. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

@@ -37,7 +37,7 @@ static void aim_beside_edge(struct rig *rig, const double from[3], const double 
     }
 }
 
-/* Adds a wall far behind, in cells. It faces the station, which looks along y from the origin. */
+/* Adds a wall far behind, in cells. The wall faces the station, which looks along y from the origin. */
 static void add_wall(struct mesh *mesh, double y)
 {
     const double corner[3] = {-0.5 * y, y, -0.5 * y}, u[3] = {y, 0.0, 0.0}, v[3] = {0.0, 0.0, y};
@@ -81,8 +81,8 @@ static void row(struct mesh *mesh, uint16_t label, const double station_m[3], co
 
 static const double STATION_M[3] = {0.0, 0.0, 0.0};
 
-/* The bound of all rows is 0 wrong rays. Those do not count which pass an edge within 16 x 2^-53 of the distance of its
- * farther end. There the reference in long double may see the other side of the edge than any double arithmetic. */
+/* The bound of all rows is 0 wrong rays. Rays that pass an edge within 16 x 2^-53 of the distance of its farther end do
+ * not count. There the reference in long double may see the other side of the edge than any double arithmetic. */
 static void test_solids(void **state)
 {
     (void)state;
@@ -103,8 +103,8 @@ static void test_solids(void **state)
     table_check();
 }
 
-/* The head sees the top of a table from hardly above it. Its far edge stands at 89 degrees to the ray, and the wall is
- * 20 m behind. */
+/* The head sees the top of a table from hardly above it. The table's far edge stands at 89 degrees to the ray, and the
+ * wall is 20 m behind. */
 static void test_grazed_edge(void **state)
 {
     (void)state;

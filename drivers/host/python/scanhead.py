@@ -369,7 +369,7 @@ class _Bad:
 
 
 class Parser:
-    """Takes bytes as they come and gives frames and reply lines. It holds one frame of bytes at most. on_notice
+    """Takes bytes as they come and gives frames and reply lines. Holds one frame of bytes at most. on_notice
     gets a Notice of each thing that is wrong, before the item that follows it."""
 
     def __init__(self, on_notice: Optional[Callable[[Notice], None]] = None) -> None:
@@ -543,7 +543,7 @@ class Points:
 
 
 class Wave(NamedTuple):
-    """A window of samples of one pulse's waveform. All windows of a pulse have one grid; its sample 0 is taken when
+    """A window of samples of one pulse's waveform. All windows of a pulse have one grid, whose sample 0 is taken when
     the pulse fires.
 
     pulse: its number in the scan; t_ns since the scan's start. first: number of the first sample on the grid.

@@ -9,8 +9,8 @@ const FOLLOW_MS = 200, PATIENCE_MS = 1500;
 // Returns the row for the display's panel.
 export function ageRow(view) {
   let timer = 0, latest_s = NaN, since_ms = 0;
-  // Moves the limit on to the newest point. Before that it waits until most of the picture is drawn, for PATIENCE_MS at
-  // most.
+  // Moves the limit on to the newest point. Before that the limit waits until most of the picture is drawn, for
+  // PATIENCE_MS at most.
   const follow = () => {
     const {drawn, left} = view.state;
     const isSoon = left > 0.2 * drawn && performance.now() - since_ms < PATIENCE_MS;

@@ -3,8 +3,8 @@
 // oldest blocks are dropped.
 //
 // Positions are Float32, relative to `origin` (Float64, scene frame), which is the place of the first point. So a
-// cloud at UTM coordinates keeps 0.03 mm within 500 m of it, where Float32 of the coordinates themselves would have
-// 0.5 m.
+// cloud at UTM coordinates keeps 0.03 mm within 500 m of that place, where Float32 of the coordinates themselves would
+// have 0.5 m.
 //
 // In a closed block the first k points are spread evenly over the block, for any k: one point at random from each k-th
 // part of it. So a level of detail is a prefix of each block. Every k-th point would not do, since k may be the length
@@ -74,7 +74,7 @@ class Block {
       batch.pulse[batch.n - 1] - this.pulse0 < 2 ** 32;
   }
 
-  // Returns how many points of the batch it took, from `from` on.
+  // Returns how many points of the batch the block took, from `from` on.
   append(batch, from, origin) {
     const k = Math.min(batch.n - from, BLOCK - this.n);
     const {lo, hi, position, pulse, echo, pulse0} = this;
@@ -134,7 +134,7 @@ class Block {
     }
   }
 
-  // Returns the first and the last time of its points, which are looked for only when somebody asks.
+  // Returns the first and the last time of the block's points, which are looked for only when somebody asks.
   get span() {
     const {n, t} = this, s = this.#span;
     for (; s.n < n; s.n++) {
@@ -204,8 +204,8 @@ export class Cloud {
     for (const block of blocks) this.gone += block.n;
   }
 
-  /** A scan replaces the earlier scans of its station, which may be from another place. Call it before add(). It
-   * returns false for a batch of such an older scan, which comes late (`past`). */
+  /** A scan replaces the earlier scans of its station, which may be from another place. Call replace() before add().
+   * replace() returns false for a batch of such an older scan, which comes late (`past`). */
   replace({station, scan, past = false}) {
     const now = this.#scans.get(station);
     if (past && now !== undefined && scan < now) return false;

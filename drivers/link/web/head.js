@@ -78,8 +78,8 @@ export class Head extends EventTarget {
 
   // ---- commands
 
-  /** Returns a promise of the reply to one command line. It throws CommandError {number, text} for an ERR; its number
-   * is 0 if no reply came. */
+  /** Returns a promise of the reply to one command line. The promise is rejected with CommandError {number, text} for
+   * an ERR; its number is 0 if no reply came. */
   command(line, {timeout_s = TIMEOUT_S} = {}) {
     return this.#replies.ask(line, timeout_s);
   }
@@ -90,7 +90,7 @@ export class Head extends EventTarget {
     this.#wire.post({wavesOf: pulse, scan});
   }
 
-  /** Takes control and changes nothing else. It throws -203 where another session has it. */
+  /** Takes control and changes nothing else. Throws -203 where another session has control. */
   async takeControl() {
     await this.command('SYSTem:CONTrol:TAKE');
     await this.#askControl();

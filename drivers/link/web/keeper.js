@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This class keeps the frames of a connection as a recording (.shs): the frames as they came, one after the other. It
-// is pure, and runs in the worker that decodes.
+// This class keeps the frames of a connection as a recording (.shs): the frames as they came, one after the other. The
+// class is pure, and runs in the worker that decodes.
 import {LOCAL, REPEAT} from './native_parser.js';
 import {crc32c} from './crc32c.js';
 

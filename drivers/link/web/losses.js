@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This class counts the losses of a connection's scans, as COUNTS.md defines them. It also finds the end of a scan
-// whose SCAN_END was lost (LOSSES.md). It is pure.
+// whose SCAN_END was lost (LOSSES.md). The class is pure.
 import {STATES} from './native.js';
 
 const IN_SCAN = ['scanning', 'spin-down'];

@@ -76,7 +76,7 @@ const corner = (a, b, c) => {
 };
 
 // Each kind of measurement takes a number of points; 0: three or more, until the user picks the first or last one
-// again. Its figures are [name, unit, {value, error}]. The flatness has none here: flatnessOf() computes it.
+// again. The kind's figures are [name, unit, {value, error}]. The flatness has none here: flatnessOf() computes it.
 export const KINDS = {
   distance: {title: 'Distance', points: 2, figures: (p) => [
     ['Distance', 'm', figureOf((a, b) => length(sub(b, a)), p)],
@@ -215,9 +215,9 @@ export function flatnessOf(places, corners, origin, eye) {
 
 const NEIGHBOURS = 8;
 
-// A generator, whose last value is the mean distance of the points around a place. It follows from the area of the k
-// nearest points, which has (k - 1) points in the mean if they lie evenly at random. NaN: fewer than nine points
-// lie within 2 m, or the cloud was cleared.
+// A generator, whose last value is the mean distance of the points around a place. The distance follows from the area
+// of the k nearest points, which has (k - 1) points in the mean if they lie evenly at random. NaN: fewer than nine
+// points lie within 2 m, or the cloud was cleared.
 export function* spacingAround(cloud, place, first_m) {
   const {window, origin} = cloud;
   if (origin === null) return NaN;

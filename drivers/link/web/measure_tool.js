@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This tool measures between points that are picked in the picture or the panorama. A click takes the point nearest to
-// it; with keys, Enter takes the one in the middle of the picture.
+// it; with keys, Enter takes the point in the middle of the picture.
 import {grouped, make, numberOf, say} from './page.js';
 import {csvOf, figureText, flatnessOf, KINDS, largestOf, placeOf, pointsOnFace, spacingAround, withError} from './measure.js';
 import {download} from './picture.js';

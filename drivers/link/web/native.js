@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This module reads the native protocol, by PROTOCOL.md and its pages alone. A Parser turns bytes into frames; a
-// Decoder turns frames into values and batches of points in the scene frame. It is pure: it runs in a page, a worker
-// and node.
+// Decoder turns frames into values and batches of points in the scene frame. The module is pure: it runs in a page, a
+// worker and node.
 import {LOCAL, Parser, REPEAT} from './native_parser.js';
 import {readAnchor, readBeside, readDescriptor, readEmitter, readEvent, readLineEnd, readNames, readPoses,
   readTelemetry, refuse, Refused} from './native_fields.js';
@@ -22,8 +22,8 @@ export {POINTS};
 export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
 const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768, HAS_DEVIATIONS = 8;
 
-/** Turns frames into values. State that PROTOCOL.md calls void is forgotten. A frame that it tells readers to refuse is
- * counted, and otherwise ignored. Only callbacks may throw. */
+/** Turns frames into values. State that PROTOCOL.md calls void is forgotten. A frame that the protocol tells readers to
+ * refuse is counted, and otherwise ignored. Only callbacks may throw. */
 export class Decoder {
   /** Each callback may be left out: points(batch), descriptor(d), anchor(a), emitter(e), names(list), lineEnd(l),
    * telemetry(t), event(e), poses(list), refused(why, frame), restarted({}). Values of frames have the header's `t_ns`
@@ -226,7 +226,7 @@ export class Decoder {
   }
 
   // Returns the last points frame, if a frame of attributes or colours belongs to it: `after` is how many frames after
-  // it this one comes. null: the points frame was lost, or this one belongs to another.
+  // the points frame this one comes. null: the points frame was lost, or this one belongs to another.
   #besidePoints(frame, beside, after) {
     const l = this.last;
     const isOfIt = l !== null && frame.seq === (l.seq + after) >>> 0 && beside.pulse0_low === l.low &&

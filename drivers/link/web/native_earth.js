@@ -100,7 +100,7 @@ function utmGrid(lon0_deg, north0_m) {
       const tau = geographic(Math.sin(xi) / Math.hypot(Math.sinh(eta), Math.cos(xi)));
       return [Math.atan(tau) / RAD, lon0_deg + Math.atan2(Math.sinh(eta), Math.cos(xi)) / RAD];
     },
-    // It follows from a difference over 22 m, and is good to 1e-10 rad.
+    // The convergence follows from a difference over 22 m, and is good to 1e-10 rad.
     convergence(lat_deg, lon_deg) {
       const [e0, n0] = forward(lat_deg - 1e-4, lon_deg), [e1, n1] = forward(lat_deg + 1e-4, lon_deg);
       return Math.atan2(e0 - e1, n1 - n0);

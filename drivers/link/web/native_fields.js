@@ -126,7 +126,7 @@ export function readTelemetry(view) {
   return t;
 }
 
-// Names of an event's a, b and c, in this order. Those in _ns are BigInt, the others as `exact` returns them.
+// Names of an event's a, b and c, in this order. Values in _ns are BigInt, the others as `exact` returns them.
 const EVENTS = {
   1: ['STATE', 'state', 'before'],
   2: ['SCAN_START', 'scan', 'at_ns', 'gps_ns'],
@@ -157,7 +157,7 @@ export function readEvent(view) {
   return e;
 }
 
-/** Its `beams` are {elevation_udeg, azimuth_udeg, offset_ns (a Number)} in the order in which they fire. */
+/** The emitter's `beams` are {elevation_udeg, azimuth_udeg, offset_ns (a Number)} in the order in which they fire. */
 export function readEmitter(view) {
   const e = whole(emitter, view, 'an emitter');
   if (e.kind > 4 || e.sequence_ns_den === 0 || Math.abs(e.turn) !== 1) refuse('an emitter of an unknown kind');

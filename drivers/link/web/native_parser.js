@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module splits bytes into frames and reply lines, by PROTOCOL.md (*Frames*) and LOSSES.md (*Resynchronisation*).
-// It is pure: it needs no page and no network.
+// The module is pure: it needs no page and no network.
 import {crc32c} from './crc32c.js';
 import {Sequence} from './native_sequence.js';
 
@@ -31,7 +31,7 @@ class Frame {
 
 const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 
-/** Takes bytes as they come. It keeps those of a frame or line that is not whole yet: fewer than the
+/** A Parser takes bytes as they come. It keeps the bytes of a frame or line that is not whole yet: fewer than the
  * longest frame has, 64 KiB. */
 export class Parser {
   /** Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
@@ -52,7 +52,7 @@ export class Parser {
     this.last_t_ns = null; // of the last whole frame
   }
 
-  /** Takes a Uint8Array (or Buffer), of any size. It is read only within this call. */
+  /** Takes a Uint8Array (or Buffer), of any size. The array is read only within this call. */
   push(bytes) {
     this.stats.bytes += bytes.length;
     if (this.n === 0) {

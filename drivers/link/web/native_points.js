@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The records of a points frame become columns in the scene frame. This is the hot path: it makes no object and no
-// BigInt for a point.
+// The records of a points frame become columns in the scene frame. The module is the hot path: it makes no object and
+// no BigInt for a point.
 import {fitCubic, geodeticToEcef, toScene} from './native_earth.js';
 
 const TWO_PI = 6.283185307179586476925, PARTS = 256, HEAD = 40, RECORD = 20, NO_REFLECTANCE = -32768;
@@ -78,8 +78,7 @@ export function polarPlacer(descriptor, anchor) {
   const lineTurn = 1 / descriptor.mirror_counts_per_turn, panTurn = 1 / descriptor.pan_counts_per_turn;
   const turned = !(anchor.moving & 1);
   // These compute sin and cos of a part of a turn: whole 1/256 turns by the table, the rest by a series, whose next
-  // terms are below 2^-56. They are the same operations in the same order as libscanhead's
-  // (drivers/host/decode_points.c).
+  // terms are below 2^-56. The operations and their order are those of libscanhead (drivers/host/decode_points.c).
   return (c, view, n, pulse0, t0_ns) => {
     const {x, y, z, range} = c;
     let to = c.n, pulse = pulse0 - 1, atStart = true;
@@ -115,7 +114,7 @@ export function polarPlacer(descriptor, anchor) {
 }
 
 /** Does the same for a geo stream. The range is the distance from the anchor, in the CRS or, if that is geodetic,
- * straight through space. It is NaN where the head moves, since the anchor is not its place. */
+ * straight through space. The range is NaN where the head moves, since the anchor is not the head's place. */
 export function geoPlacer(descriptor, anchor) {
   const {at: exactAt, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;
   let place = isFlat ? placeFlat(exactAt, anchor) : isGeodetic ? placeExactly(exactAt) : null;
@@ -163,7 +162,7 @@ function placeExactly(exactAt) {
 }
 
 // For coordinates of a projection, such as UTM, a polynomial of order 3 takes the place of the exact formula within the
-// head's reach d. Its error is about d^4 / R^3 with the Earth's radius R: 0.1 um at 2 km.
+// head's reach d. The polynomial's error is about d^4 / R^3 with the Earth's radius R: 0.1 um at 2 km.
 function placeByCubic(exactAt, anchor, descriptor) {
   const reach_m = Math.min(Math.max(1.1 * descriptor.range_max_m, 10), 20000), [ax, ay, az] = anchor.anchor;
   const k = fitCubic((u, v, w) => exactAt([ax + reach_m * u, ay + reach_m * v, az + reach_m * w]));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Poses of a head that moves: points of the polar layout go from its frame to the scene by the pose of their time
-// (ANCHOR.md, *Between two poses*).
+// Poses of a head that moves: points of the polar layout go from the head's frame to the scene by the pose of their
+// time (ANCHOR.md, *Between two poses*).
 
 const KEEP = 8192; // some seconds, and more than two of the longest frames
 
@@ -53,7 +53,7 @@ export class Poses {
   }
 
   /** Moves points from..c.n of the columns from the head's frame to the scene. `times` gives the ns of each since the
-   * scan's start. Points without a pose become NaN; it returns how many. */
+   * scan's start. Points without a pose become NaN; place() returns how many. */
   place(c, from, times) {
     let now = null, missing = 0;
     for (let i = from; i < c.n; i++) {

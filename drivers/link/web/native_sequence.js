@@ -25,8 +25,8 @@ export class Sequence {
   n = 1;
 
   /** Returns '', or a notice about the frame: 'gap': `n` frames are missing from number `first` on; 'restarted':
-   * another sequence begins; 'repeated' or 'late': it is to be dropped. Except for a gap, `first` is the frame's own
-   * number. */
+   * another sequence begins; 'repeated' or 'late': the frame is to be dropped. Except for a gap, `first` is the frame's
+   * own number. */
   take(frame) {
     const {seq} = frame;
     this.first = seq;
@@ -79,7 +79,8 @@ export class Sequence {
     return false;
   }
 
-  // Returns whether LATE_RUN late frames came in a row. They are another sequence then: its numbers all lie in gaps.
+  // Returns whether LATE_RUN late frames came in a row. Such frames are another sequence, whose numbers all lie in
+  // gaps.
   #isRun(seq) {
     this.#lateRun = this.#lateRun > 0 && seq === (this.#lastLate + 1) >>> 0 ? this.#lateRun + 1 : 1;
     this.#lastLate = seq;

@@ -65,7 +65,7 @@ export class Waves {
 
   /** Returns the windows of a pulse of the last scan, or of `scan`, in order of range: [{rangeM0, stepM, samples:
    * Float32Array in units of the detection threshold, without the baseline}]. The list is empty if the head kept none,
-   * or they are no longer here. */
+   * or the windows are no longer here. */
   of(pulse, scan = this.#scan) {
     const found = [], frames = scan === this.#scan ? this.#frames : [];
     let low = Math.min(this.#begin, frames.length), high = frames.length; // the first frame that ends with this pulse or later

@@ -154,7 +154,7 @@ export class Panorama {
     return hasBoth(this.width, row, this.height) ? pixel - this.width : null;
   }
 
-  // Returns {block, i} of the point of a pixel, or null. It is null, too, once the block was closed
+  // Returns {block, i} of the point of a pixel, or null. The answer is null, too, once the block was closed
   // or the cloud was cleared: the panorama has to be made again then.
   pointAt(x, y) {
     if (this.n === 0 || this.cloud.origin !== this.#origin || x < 0 || y < 0 || x >= this.width || y >= this.height) return null;
@@ -189,7 +189,7 @@ export class Panorama {
     return {pixels, limits};
   }
 
-  // Returns whether points came or went since it was made, or others are shown now.
+  // Returns whether points came or went since the panorama was made, or others are shown now.
   isOld(cloud, section) {
     if (cloud !== this.cloud || cloud.origin !== this.#origin) return true;
     const cut = section?.relativeTo(cloud.origin) ?? null;

@@ -138,7 +138,7 @@ export class PanoramaTool {
   // Returns whether the picture shows other points now.
   get isOld() { return this.panorama.isOld(this.#view.cloud, this.#view.camera.section); }
 
-  // Returns the figures of the point of a pixel. null: it has none, or the picture shows another cloud now.
+  // Returns the figures of the point of a pixel. null: the pixel has none, or the picture shows another cloud now.
   pointAt([x, y]) {
     const {panorama} = this;
     const found = panorama?.cloud === this.#view.cloud ? panorama.pointAt(x, y) : null;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This class gets the points from before this page came, or while it was away: the head stores the last ones, and
-// gives them in pieces (GET /past, firmware_sim/app/studio/watch/README.md). They are frames of the stream with their
-// own numbers. So each points frame is taken once, either from /past or from the connection.
+// gives them in pieces (GET /past, firmware_sim/app/studio/watch/README.md). The pieces hold frames of the stream with
+// their own numbers. So each points frame is taken once, either from /past or from the connection.
 //
 // A live frame that can't be placed yet is left to /past. Frames of /past are left out if this connection brings them,
 // or an earlier connection with the same run of the head brought them.

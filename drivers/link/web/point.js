@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This panel shows the figures of the point under the pointer. It lies over the picture, and only while there is a
-// point, so that nothing else moves.
+// This panel shows the figures of the point under the pointer. The panel lies over the picture, and only while there is
+// a point, so that nothing else moves.
 import {byId, grouped, make, metres, say, NONE} from './page.js';
 
 const CELLS = [['place', 'x, y, z', 'wide'], ['deviation', 'Deviation'], ['range', 'Range'], ['reflectance', 'Reflectance'],

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-// This module asks a head what stations would see from other places, and reads its answers. Their formats stand in
-// firmware_sim/app/studio/preview/README.md. Reading is pure.
+// This module asks a head what stations would see from other places, and reads its answers. The answers' formats stand
+// in firmware_sim/app/studio/preview/README.md. Reading is pure.
 
 import {isWithin} from './section.js';
 
 const AGAIN_MS = 15, AGAIN_MOST_MS = 200; // an answer is asked for again, ever less often
 
-// Returns the bytes of an answer, once the head has it. It throws an Error with the head's words, or once `signal` aborts.
+// Returns the bytes of an answer, once the head has it. Throws an Error with the head's words, or once `signal` aborts.
 export async function ask(path, signal) {
   for (let wait_ms = AGAIN_MS; ; wait_ms = Math.min(AGAIN_MOST_MS, 1.5 * wait_ms)) {
     const answer = await fetch(path, {cache: 'no-store', signal});
@@ -106,7 +106,7 @@ function middlesOf({n, pieces, cell, corners}) {
   return middles.map((sum, k) => sum / parts[Math.floor(k / 3)]);
 }
 
-// Returns {seen_m2, all_m2} of the cells that have their middles in a section. Those that can't be seen don't count.
+// Returns {seen_m2, all_m2} of the cells that have their middles in a section. Cells that can't be seen don't count.
 export function seenWithin(cells, counts, reach, section) {
   cells.middles ??= middlesOf(cells);
   const box = section.relativeTo(cells.origin);

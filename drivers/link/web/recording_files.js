@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Reads a recording from the link: clouds in columns, meshes with sorted triangles. It is pure except for fetch.
+// Reads a recording from the link: clouds in columns, meshes with sorted triangles. The module is pure except for
+// fetch.
 
 const KINDS = {1: Uint8Array, 2: Uint16Array, 3: Uint32Array, 4: Float32Array};
 const POINTS_AT_A_TIME = 200000, TRIANGLES_AT_A_TIME = 1 << 20;

@@ -42,7 +42,8 @@ export class Section {
     return {middle: sub(this.middle, origin), half: this.limits, turn: [right[0], -right[1]]};
   }
 
-  // Returns whether a box relative to the origin may have a part in the section; it is never false for a box that has.
+  // Returns whether a box relative to the origin may have a part in the section; the answer is never false for a box
+  // that has one.
   meets(lo, hi, origin) {
     const {middle} = this.relativeTo(origin);
     const limits = this.limits;
@@ -68,7 +69,7 @@ export class Section {
     return Array.from({length: 8}, (_, i) => axes.reduce((p, axis, k) => add(p, axis, (i >> k & 1 ? 1 : -1) * this.half[k]), this.middle));
   }
 
-  // Returns the handles: [{id, at, along}]. A face moves along its direction; the others move on the ground plan.
+  // Returns the handles: [{id, at, along}]. A face moves along its direction; other handles move on the ground plan.
   get handles() {
     const axes = this.axes;
     const faces = FACES.filter(([, axis]) => this.kind === 'box' || axis === 2).map(([id, axis, sign]) =>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This tool looks into a house, by a section box, or by a cut between two heights. Its handles are sliders on the
-// picture, for pointer, touch and keys. The section stays after the tool is left, until it is switched off.
+// This tool looks into a house, by a section box, or by a cut between two heights. The tool's handles are sliders on
+// the picture, for pointer, touch and keys. The section stays after the tool is left, until it is switched off.
 import {byId, make, numberOf, say} from './page.js';
 import {alongLine, Section} from './section.js';
 import {arrowStep, degrees, headingTo, onPlane, sub} from './view_camera.js';

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This script sets the theme before anything is drawn, so that a dark page does not begin with a light flash. It is no
-// module, since modules run after the first picture of a page. session.js takes over from there.
+// This script sets the theme before anything is drawn, so that a dark page does not begin with a light flash. The
+// script is no module, since modules run after the first picture of a page. session.js takes over from there.
 (() => {
   let theme = null;
   try {

@@ -5,8 +5,8 @@
 
 import {ask, batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf} from './previews.js';
 
-// Points are shown with the angular step of the station. The cells that it sees are found with these finer steps: the
-// first at once, the second once the station rests. Surfaces at grazing incidence need the second.
+// Points are shown with the angular step of the station. The cells that the station sees are found with these finer
+// steps: the first at once, the second once the station rests. Surfaces at grazing incidence need the second.
 const COVER_STEPS_DEG = [0.5, 0.25];
 const REST_MS = 300; // a station must rest for this time before the second step
 const COVER_MS = 500; // while a station is dragged, its cells are asked for at most once in this time
@@ -21,7 +21,7 @@ const pick = (from, keys) => Object.fromEntries(keys.map((key) => [key, from[key
 const round = (value) => (typeof value === 'number' ? Math.round(value * 1e4) / 1e4 : value);
 const turned = (deg) => ((deg + 180) % 360 + 360) % 360 - 180;
 
-// It sends `change` whenever something is to be shown again, and `seen` once what the stations see has changed.
+// A Trial sends `change` whenever something is to be shown again, and `seen` once what the stations see has changed.
 export class Trial extends EventTarget {
   stations = [];
   cells = null; // null: not there yet, or there are none

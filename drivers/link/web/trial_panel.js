@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This part of the stations' panel is for trying places. It has stations that are moved, added and set in this page
-// alone, the surface that they see together, and the best next place. It takes the place of the list of stations while
-// it is open.
+// alone, the surface that they see together, and the best next place. The part takes the place of the list of stations
+// while it is open.
 
 import {bodyOf, grouped, kept, make, markField, numberOf, percent, placeText, say} from './page.js';
 import {why} from './session.js';
@@ -338,7 +338,7 @@ export class TrialPanel {
     this.text.select();
   }
 
-  // Sends the tried places to the head. Its stations then stand there for everybody.
+  // Sends the tried places to the head. The head's stations then stand there for everybody.
   async #apply() {
     this.#isApplying = true;
     this.#allow();

@@ -110,7 +110,7 @@ export class TargetList {
     this.show();
   }
 
-  // Shows which stations see them now.
+  // Shows which stations see the targets now.
   show() {
     const {stations} = this.#trial;
     const sights = this.#targets.map(({cell}) => seenBy(stations, cell));

@@ -113,7 +113,7 @@ export class View extends EventTarget {
     this.#fitUntouched();
   }
 
-  // It takes {origin, positions, triangles, drawTriangles} or null.
+  // Takes {origin, positions, triangles, drawTriangles} or null.
   setMesh(mesh) {
     this.#solids.setMesh(mesh);
     this.#fitUntouched();
@@ -189,7 +189,8 @@ export class View extends EventTarget {
 
   select(number) { this.stations.select(number); }
 
-  // Looks from a station's head; the station is a number, or as setStations() has it. Without one it is the first.
+  // Looks from a station's head; the station is a number, or as setStations() has it. Without a station, the first one
+  // is taken.
   lookFrom(station = this.stations.list[0]) {
     const s = typeof station === 'object' && station !== null ? station : this.stations.get(Number(station));
     if (!s) return;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-// The camera has the place and direction of the eye, and converts between scene and screen. It is pure; lengths are in
-// metres, angles in radians, in the scene frame (x east, y north, z up) in doubles. Screen places are CSS pixels from
-// the top left corner.
+// The camera has the place and direction of the eye, and converts between scene and screen. The module is pure; lengths
+// are in metres, angles in radians, in the scene frame (x east, y north, z up) in doubles. Screen places are CSS pixels
+// from the top left corner.
 //
 // Depth is logarithmic: from NEAR_M to FAR_M each doubling of the distance has the same share of the 24 bits, so two
 // points 1.2 um apart at 1 m, or 1.2 mm at 1 km, have different depths. Shaders and test have the same formula.
 //
-// A flat (orthographic) view has the scale that a perspective one has at the target. It has neither a near nor a far
-// end: places behind its eye are drawn, too (flatDepthOf).
+// A flat (orthographic) view has the scale that a perspective one has at the target. A flat view has neither a near nor
+// a far end: places behind its eye are drawn, too (flatDepthOf).
 
 export const NEAR_M = 1e-3;
 export const FAR_M = 1e6;
@@ -66,7 +66,7 @@ export class Camera {
   // Returns the pixels of one metre at the distance of one metre.
   get focal() { return 0.5 * Math.min(this.width, this.height) / Math.tan(0.5 * this.fov); }
 
-  // Its rows are right, up and forward.
+  // The matrix's rows are right, up and forward.
   get rotation() { return [this.right, this.up, this.forward]; }
 
   // Returns {x, y, w}: focal / w is the pixels of a metre there. w is the distance along the line of sight, which is at
@@ -163,8 +163,8 @@ export class Camera {
     this.target = add(eye, this.forward, this.distance);
   }
 
-  // Returns whether any part of a box is in sight; lo and hi are relative to origin. It may be true for a box out of
-  // sight, but never false for one in sight.
+  // Returns whether any part of a box is in sight; lo and hi are relative to origin. The answer may be true for a box
+  // out of sight, but never false for one in sight.
   sees(lo, hi, origin) {
     const eye = sub(this.eye, origin);
     const [right, up, forward] = this.rotation;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// This module has the colours of points: each mode with its values, ramp, limits and legend. It is pure.
+// This module has the colours of points: each mode with its values, ramp, limits and legend. The module is pure.
 //
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
 // `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
@@ -95,7 +95,7 @@ export function sampleOf(cloud, mode, most = 20000) {
 }
 
 // Returns limits that leave out a share of the values at each end, a little wider, so that single far points don't use
-// up all colours. They are at least `least` apart; null without values.
+// up all colours. The limits are at least `least` apart; null without values.
 export function robustLimits(values, least = 0, share = 0.01) {
   if (values.length === 0) return null;
   const sorted = Float64Array.from(values).sort();

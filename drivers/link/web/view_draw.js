@@ -30,8 +30,8 @@ export class Budget {
   }
 }
 
-// Returns for each part how many of its elements are to be in the picture after `more` further points were drawn. It is
-// the same share of each part. The function is pure.
+// Returns for each part how many of its elements are to be in the picture after `more` further points were drawn. The
+// share is the same in each part. The function is pure.
 export function shares(parts, more) {
   let all = 0, done = 0;
   for (const part of parts) {
@@ -60,7 +60,7 @@ export function restShares(parts, more) {
 
 // There are three targets: one with the picture that is shown, one that is drawn into (the same, or one that replaces
 // it once it has enough points), and one for the page, into which the shown picture is drawn with its shading. Targets
-// of a moving view may be smaller. The one for the page is put onto the canvas only once the GPU has finished it: a
+// of a moving view may be smaller. The page's target is put onto the canvas only once the GPU has finished it: a
 // browser that composes in software waits for the canvas, and the page waits, too.
 export class Painter {
   moving = new Budget(MOVE_MS, 150_000);
@@ -139,7 +139,7 @@ export class Painter {
     return did;
   }
 
-  // Call it after a step's last command. Once the GPU has done the step, busy() calls then(ms).
+  // Call fence() after a step's last command. Once the GPU has done the step, busy() calls then(ms).
   fence(then) {
     const gl = this.#gl;
     this.#fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -148,7 +148,7 @@ export class Painter {
     this.#then = then;
   }
 
-  // Returns whether the GPU still does the last step. Call it between tasks of the page.
+  // Returns whether the GPU still does the last step. Call busy() between tasks of the page.
   busy() {
     const gl = this.#gl;
     if (this.#fence === null) return false;

@@ -233,8 +233,8 @@ export class Programs {
     return this.#made.get(key);
   }
 
-  // Makes a program of this kind current, and returns it. It draws with this camera. Positions of the things that it
-  // draws are relative to `origin`.
+  // Makes a program of this kind current, and returns it. The program draws with this camera. Positions of the things
+  // that it draws are relative to `origin`.
   use(kind, camera, origin, section = camera.section) {
     const gl = this.#gl;
     const program = this.#of(kind, [camera.flat && 'FLAT', section && 'CUT'].filter(Boolean));
@@ -293,7 +293,7 @@ export class Target {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
-  // Puts it onto the canvas, which has so many pixels.
+  // Puts the picture onto the canvas, which has so many pixels.
   toPage(width, height) {
     const {gl} = this;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.buffer);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This class finds limits of the colours and of the view from the cloud's points. They change rarely, so that nothing
-// flickers: each time the cloud has twice the points, and then only if the new points lie far outside.
+// This class finds limits of the colours and of the view from the cloud's points. The limits change rarely, so that
+// nothing flickers: each time the cloud has twice the points, and then only if the new points lie far outside.
 
 import {MODES, legendOf, robustLimits, sampleOf, widened} from './view_colours.js';
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-// This module makes meshes as arrays: the coarse scene from its bytes, its edges, and the shapes of a station. It is
-// pure.
+// This module makes meshes as arrays: the coarse scene from its bytes, its edges, and the shapes of a station. The
+// module is pure.
 
 const MAGIC = 0x43534853; // "SHSC"
 
-// Returns {origin, positions, triangles} of the bytes of /scene. It throws an Error that says what is wrong with them.
+// Returns {origin, positions, triangles} of the bytes of /scene. Throws an Error that says what is wrong with the
+// bytes.
 export function parseScene(buffer) {
   const view = ArrayBuffer.isView(buffer) ? new DataView(buffer.buffer, buffer.byteOffset, buffer.byteLength) : new DataView(buffer);
   if (view.byteLength < 40) throw new Error(`scene of ${view.byteLength} bytes: its header has 40`);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// The overlay has the scale bar, axes with north, stations' names and handles, and the point under the pointer. It is
-// a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's colour.
+// The overlay has the scale bar, axes with north, stations' names and handles, and the point under the pointer. The
+// overlay is a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's
+// colour.
 
 import {degrees, roundBelow} from './view_camera.js';
 import {inScene} from './view_stations.js';

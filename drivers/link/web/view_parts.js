@@ -148,7 +148,7 @@ export class Points {
     this.#table = tableTexture(this.gl, tableOf(mode, scale));
   }
 
-  // Takes over the blocks of the cloud. It returns true if drawn blocks are gone.
+  // Takes over the blocks of the cloud. Returns true if drawn blocks are gone.
   follow() {
     let gone = false;
     const {blocks} = this.cloud;
@@ -200,8 +200,8 @@ export class Points {
   }
 }
 
-// Makes the mesh program current. Its uniforms have the defaults that are listed here. With `section: null`, the
-// camera's section does not cut the mesh.
+// Makes the mesh program current. The program's uniforms have the defaults that are listed here. With `section: null`,
+// the camera's section does not cut the mesh.
 export function useMesh(gl, programs, camera, origin, {colour, edge = 0, push = 1, faint = 1, flat = false, behind = null,
   shift = [0, 0, 0], heading = 0, section}) {
   const program = programs.use('mesh', camera, origin, section);
@@ -219,8 +219,8 @@ export function useMesh(gl, programs, camera, origin, {colour, edge = 0, push = 
   gl.activeTexture(gl.TEXTURE0);
 }
 
-// This is a mesh on the GPU: {origin (scene frame), positions Float32 relative to it, triangles Uint32, lines Uint32
-// or none}
+// This is a mesh on the GPU: {origin (scene frame), positions Float32 relative to origin, triangles Uint32, lines
+// Uint32 or none}
 export class Mesh {
   weight = 2;
   drawn = 0;

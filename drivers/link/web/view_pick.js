@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module finds the point under the pointer: the nearest one on the screen, where points near the eye win over
-// those behind them. It is pure.
+// points behind them. The module is pure.
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 
@@ -12,8 +12,8 @@ import {isWithin} from './section.js';
 const PIXELS_PER_DEPTH = 4 / Math.log(1.1);
 
 // Returns whether a box may reach into the cone around a ray. The cone's radius is beside_m at its begin, and grows by
-// `slope` per length. The test takes the sphere around the box, so it may be true for a box outside the cone. The box
-// and the ray's begin have one origin.
+// `slope` per length. The test takes the sphere around the box, so the answer may be true for a box outside the cone.
+// The box and the ray's begin have one origin.
 function meets(block, eye, forward, slope, beside_m) {
   const c = [0, 1, 2].map((a) => 0.5 * (block.lo[a] + block.hi[a]) - eye[a]);
   const r = 0.5 * Math.hypot(...[0, 1, 2].map((a) => block.hi[a] - block.lo[a]));
@@ -24,10 +24,10 @@ function meets(block, eye, forward, slope, beside_m) {
   return across <= r * Math.hypot(1, slope) + Math.max(0, along) * slope + beside_m;
 }
 
-// Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null. It is null,
-// too, if the cloud was cleared meanwhile: places in its blocks would be relative to another origin.
-// limit is the number of points of each block that it tests. The rays of a flat view are parallel: there w may be less
-// than 0, and a depth of a tenth of the target's distance counts as much as a tenth in a view with perspective.
+// Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null. The value
+// is null, too, if the cloud was cleared meanwhile: places in its blocks would be relative to another origin.
+// limit is the number of points of each block that search() tests. The rays of a flat view are parallel: there w may be
+// less than 0, and a depth of a tenth of the target's distance counts as much as a tenth in a view with perspective.
 export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   const {origin} = cloud, {flat, distance} = camera;
   if (origin === null) return null;
@@ -70,8 +70,9 @@ export function nearest(cloud, camera, x, y, radius_px, limit) {
   }
 }
 
-// Returns the place that a gesture keeps at (x, y). It is as far away as the point found there, or else as the target.
-// The search looks at the first 4096 points of each block: in a closed block these are spread evenly (cloud.js).
+// Returns the place that a gesture keeps at (x, y). The place is as far away as the point found there, or else as the
+// target. The search looks at the first 4096 points of each block: in a closed block these are spread evenly
+// (cloud.js).
 export function grip(cloud, camera, x, y) {
   const found = nearest(cloud, camera, x, y, 14, 4096);
   return camera.at(x, y, found ? found.w : camera.distance);
@@ -80,8 +81,8 @@ export function grip(cloud, camera, x, y) {
 // Searches in slices, so that the page goes on. The function returned stops it.
 export const searchSlowly = (cloud, camera, x, y, radius_px, then) => runSlowly(search(cloud, camera, x, y, radius_px), then);
 
-// Takes the steps of a generator in slices of a few milliseconds. The callback gets its result; the function returned
-// stops it.
+// Takes the steps of a generator in slices of a few milliseconds. The callback gets the generator's result; the
+// function returned stops it.
 export function runSlowly(steps, then, slice_ms = 6) {
   let timer = 0;
   const slice = () => {

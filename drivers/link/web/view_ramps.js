@@ -2,8 +2,8 @@
 // This module has the colour scales: a figure's place between its limits, 0 to 1, becomes a colour. The module is pure.
 //
 // Low and high mean the same on every scale, and the same as in files (core/colour.h): low is blue or dark, high is red
-// or bright. `even` and `blue` are computed in OKLab (Ottosson 2020), whose lightness is that of the eye. It rises
-// evenly from end to end, so people who don't tell red from green see every step, and so does a grey print.
+// or bright. `even` and `blue` are computed in OKLab (Ottosson 2020), whose lightness is that of the eye. The lightness
+// rises evenly from end to end, so people who don't tell red from green see every step, and so does a grey print.
 
 // The stops are evenly spaced. On `spectrum` the hue says the figure, in the order of the files' colours.
 const STOPS = {
@@ -27,7 +27,7 @@ export const SCALES = [['usual', 'Usual'], ['even', 'Violet to yellow'], ['blue'
 
 export const parse = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 
-// Converts OKLab to linear light of sRGB, and that to its bytes (IEC 61966-2-1).
+// Converts OKLab to linear light of sRGB, and that light to sRGB's bytes (IEC 61966-2-1).
 function fromOklab(L, a, b) {
   const [l, m, s] = [L + 0.3963377774 * a + 0.2158037573 * b, L - 0.1055613458 * a - 0.0638541728 * b,
     L - 0.0894841775 * a - 1.291485548 * b].map((v) => v ** 3);

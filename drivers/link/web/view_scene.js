@@ -43,7 +43,7 @@ export class Solids {
     this.cellsPart.show(seen);
   }
 
-  // It takes the bytes of /scene; null: there is none.
+  // Takes the bytes of /scene; null: there is none.
   setScene(bytes) {
     this.scene = bytes === null || bytes === undefined ? null : parseScene(bytes);
     if (this.scene) this.scene.lines = featureEdges(this.scene.positions, this.scene.triangles);
@@ -51,7 +51,7 @@ export class Solids {
     this.sceneMesh = this.scene && new Mesh(this.gl, this.programs, this.scene);
   }
 
-  // It takes {origin, positions, triangles, drawTriangles}; the same arrays again with another drawTriangles take no
+  // Takes {origin, positions, triangles, drawTriangles}; the same arrays again with another drawTriangles take no
   // time.
   setMesh(mesh) {
     const same = mesh && this.mesh && mesh.triangles === this.mesh.triangles && mesh.positions === this.mesh.positions;
@@ -106,7 +106,7 @@ export class Solids {
     gl.disable(gl.BLEND);
   }
 
-  // It draws only the nearest of its faces, then its edges.
+  // Draws only the nearest of the coarse scene's faces, then the scene's edges.
   #glass(camera, colours, behind, plain) {
     const {gl, sceneMesh: mesh} = this;
     const face = {colour: [...colours.scene, 0.07], edge: 0.25, push: 1.002, faint: 0, behind};

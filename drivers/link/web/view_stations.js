@@ -9,7 +9,7 @@ import {toSegment} from './view_pick.js';
 const GRAB_PX = 18;
 const KEYS_END_MS = 700; // after so long without a key the station is let go
 
-// Returns the directions right, forward and up of a head. It is turned by its heading, then pitch, then roll.
+// Returns the directions right, forward and up of a head. The head is turned by its heading, then pitch, then roll.
 export function headAxes({heading_deg, pitch_deg, roll_deg}) {
   const [h, p, r] = [heading_deg, pitch_deg, roll_deg].map((deg) => radians(deg ?? 0));
   return [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(([x, y, z]) => {
@@ -74,14 +74,15 @@ export class Stations {
     this.select(this.list[at < 0 ? 0 : (at + step + this.list.length) % this.list.length].number);
   }
 
-  // Returns the place where it is drawn, moved or not.
+  // Returns the place where the station is drawn, moved or not.
   placeOf(station) {
     const m = this.moved?.number === station.number ? this.moved : null;
     return m ? {at: [m.x, m.y, m.z], heading_deg: m.heading_deg, ghost: true} :
       {at: [station.x_m, station.y_m, station.z_m], heading_deg: station.heading_deg, ghost: false};
   }
 
-  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: it is out of sight.
+  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: the station is out of
+  // sight.
   ring(camera, station) {
     const {at, heading_deg} = this.placeOf(station);
     const {w} = camera.project(at);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// This part of the point's panel shows the waveform of its pulse: samples over range, with its echoes marked. It is
-// there only where the stream has waveforms, and asks for one pulse at a time.
+// This part of the point's panel shows the waveform of its pulse: samples over range, with its echoes marked. The part
+// is there only where the stream has waveforms, and asks for one pulse at a time.
 import {make, makeSvg, say, short} from './page.js';
 
 const HAS_WAVEFORMS = 4; // of a descriptor's content
@@ -42,7 +42,7 @@ export class WavePlot {
   #title = make('p', {class: 'note'});
   #box = make('div', {class: 'wave-box', hidden: true}, this.#title, this.#svg);
 
-  // It stands in `parent`, at its end.
+  // The waveform stands in `parent`, at the parent's end.
   constructor(head, view, parent) {
     this.#cloud = view.cloud;
     parent.append(this.#box);

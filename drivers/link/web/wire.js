@@ -58,7 +58,7 @@ export class Wire {
 
   #fresh() {
     const hand = (name) => (value) => this.#add(name, value);
-    // It adds `shots`, the pulses received so far.
+    // handCounted adds `shots`, the pulses received so far.
     const handCounted = (name) => (value) => this.#add(name, Object.assign(value, {shots: this.decoder.stats.shots}));
     this.decoder = new Decoder({points: (batch) => this.#addPoints(batch), descriptor: handCounted('descriptor'),
       anchor: hand('anchor'), emitter: hand('emitter'), names: hand('names'), lineEnd: hand('line-end'),

@@ -822,7 +822,7 @@ local function put_geo(item, wanted, m, tvb, at, a, b, c)
 end
 
 -- The line angle lies within half a turn of the middle of the line. If the emitter is of another kind than `line`
--- (m.emitter), it is an elevation, within half a turn of zero.
+-- (m.emitter), the angle is an elevation, within half a turn of zero.
 local function angles_of(m, b, c)
   local d = m.descriptor
   local mirror, pan = b / d.mirror_counts, c / d.pan_counts
