@@ -45,8 +45,8 @@ static void corner_of(const struct bvh *bvh, const struct bvh_leaf *leaf, int k,
         v[j] = bvh->origin_m[j] + (double)leaf->base_m[j] + (double)leaf->corner_m[j][k];
 }
 
-/* Each corner of the triangle is one of the leaf. They differ by rounding alone: of the leaf's size to float, and of
- * coordinates in double, which are up to 5e6 m here. Planes are those of the triangles, bit by bit. */
+/* Each corner of the triangle is one of the leaf's. The two corners differ by rounding alone: of the leaf's size to
+ * float, and of coordinates in double, which are up to 5e6 m here. Planes are those of the triangles, bit by bit. */
 static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, int which)
 {
     static const int of[2][3] = {{0, 1, 2}, {1, 3, 2}};
@@ -138,7 +138,8 @@ static int stop_later(void *ctx)
     return ++*(unsigned *)ctx > 1;
 }
 
-/* Triangles are paired before there is memory for leaves. That takes most of the time, so it asks whether to stop. */
+/* Triangles are paired before there is memory for leaves. Pairing takes most of the time, so it asks whether to
+ * stop. */
 static void test_pairing_stops(void **state)
 {
     (void)state;
