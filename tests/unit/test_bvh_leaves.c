@@ -66,8 +66,8 @@ static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, in
     assert_memory_equal(&plane, &leaf->plane[which], sizeof plane);
 }
 
-/* The size is at least each edge and each distance from the base. It is larger by at most 1/64, by the rounding to
- * float, and by 2^-16 of the distance from the origin. */
+/* The size is at least each edge and each distance from the base. The size is larger by at most 1/64, by the rounding
+ * to float, and by 2^-16 of the distance from the origin. */
 static void check_size(const struct bvh *bvh, const struct bvh_leaf *leaf)
 {
     double v[5][3], far_m, edge_m = 0.0, least_m = 0.0;

@@ -105,7 +105,7 @@ static void test_many_columns(void **state)
     expect("y z\n1 2 3\n", 10, 1, one, 1);
 }
 
-/* One line that is no point may be a title. More are reported, with the first one's number. */
+/* One line that is no point may be a title. More such lines are reported, with the first one's number. */
 static void test_lines_left_out(void **state)
 {
     (void)state;

@@ -20,7 +20,7 @@ enum { MAX_DEPTH = 8, MAX_ELEMENTS = 160 };
 static char got[MAX_ELEMENTS][1700];
 static int n_got;
 
-/* A guid has the form of a UUID of version 8, variant 10 (RFC 9562), in braces. Here {} takes its place. */
+/* A guid has the form of a UUID of version 8, variant 10 (RFC 9562), in braces. The text {} takes the guid's place. */
 static void hide_guid(char *text)
 {
     static const char form[] = "{xxxxxxxx-xxxx-8xxx-vxxx-xxxxxxxxxxxx}";

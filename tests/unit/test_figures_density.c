@@ -89,8 +89,8 @@ static void cells_of_few_points(void **state)
     scene_free(scene);
 }
 
-/* Three squares of 4 m face x, y and z. The squares' common corner is at 10.5, 20.25, 30.75 m, and cells begin there.
- * Each square's cells have a metre's square, or 1.25 of it where the square is tilted by 3 to 4. */
+/* Three squares of 4 m face x, y and z; then two rectangles are turned about z by 3 to 4. The faces' common corner is
+ * at 10.5, 20.25, 30.75 m, and cells begin there. A cell has a metre's square, or 1.25 of it on a turned face. */
 static void cells_begin_at_the_scene_s_corner(void **state)
 {
     (void)state;

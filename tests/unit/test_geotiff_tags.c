@@ -232,7 +232,7 @@ static void numbers_of_metadata(void **state)
     }
 }
 
-/* The value of no data is a number, else there is none. Its text has up to 63 characters. */
+/* The value of no data is a number, else there is none. The value's text has up to 63 characters. */
 static void no_data_values(void **state)
 {
     (void)state;

@@ -132,7 +132,7 @@ static void test_command_refused(void **state)
     assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
     assert_non_null(strstr(scanhead_error(sh), "TIME?"));
     assert_int_equal(recv(head, back, sizeof back, 0), 6);
-    /* The reply of the command before comes after the next one was given, and does not count for the next. */
+    /* The earlier command's reply comes after the next one was given, and does not count for the next. */
     struct script s = {
         .fd = head, .expect = "HEAD:PRR?", .identity = "999\r\nMaker,Model,SN1,1.0\r\n", .reply = "12345678\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);

@@ -152,7 +152,8 @@ static void send_control(struct guest *g, uint64_t id)
     usbredirparser_send_control_packet(g->parser, id, &h, NULL, 0);
 }
 
-/* As many as 256 requests wait. One more ends the connection, since no virtual machine sends so many at once. */
+/* As many as 256 requests wait. One request more ends the connection, since no virtual machine sends so many at
+ * once. */
 static void test_most_slow(void **state)
 {
     enum { MOST = 256 };

@@ -258,7 +258,7 @@ static void test_short_not_ok(void **state)
 }
 
 /* Requested bytes that were not received count up to 64 MiB (drivers/usb/usbip_private.h), the last one as well. One
- * more cuts the client off. */
+ * byte more cuts the client off. */
 static void test_bytes_pending(void **state)
 {
     (void)state;

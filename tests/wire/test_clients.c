@@ -41,8 +41,8 @@ static void expect_points(struct scanhead *sh, int n)
     }
 }
 
-/* The frames that a killed client did not read from a terminal may come first. They are older than the head's answer to
- * us. */
+/* The frames that a killed client did not read from a terminal may come first. The frames are older than the head's
+ * answer to us. */
 static void pass_frames_before(struct scanhead *sh, int64_t t_ns)
 {
     struct scanhead_frame frame;
