@@ -23,7 +23,7 @@ struct beam_ref {
 void beam_ref_pulse(struct caster *caster, const struct bvh *bvh, const struct beam *beam, const double station_m[3],
                     const double dir[3], double range_max_m, struct beam_ref *out);
 
-/* Returns the mean range over the footprint on the plane n . p = d, seen from the origin. It follows from the
+/* Returns the mean range over the footprint on the plane n . p = d, seen from the origin. The value follows from the
  * definition: sub-rays are straight lines of the hyperboloid, and their weights are their Gaussian. The integral is
  * Simpson's rule over t = rho^2, with equal steps over phi. */
 double beam_ref_plane_mean(const struct beam *beam, const double dir[3], const double n[3], double d);

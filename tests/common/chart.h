@@ -10,8 +10,8 @@
 #include "core/texture.h"
 
 enum { CHART_WIDE = 11, CHART_HIGH = 7 };
-/* Texture coordinates at the board's corners at -2, -2 and 2, 2 m. They go more than a turn beyond the image on each
- * side, and are in no simple ratio to it. */
+/* Texture coordinates at the board's corners at -2, -2 and 2, 2 m. The coordinates go more than a turn beyond the image
+ * on each side, and are in no simple ratio to its size. */
 #define CHART_U0 -1.4
 #define CHART_U1 2.3
 #define CHART_V0 -1.2
@@ -24,7 +24,7 @@ extern const uint8_t chart_bare[3], chart_red[3]; /* the board's own colour; tha
 /* Makes a folder with chart.png, .bmp, .tga and .jpg, or removes it. */
 int chart_make_folder(void **state);
 int chart_remove_folder(void **state);
-/* Returns the path of a file in it, which is good until the call after the next. */
+/* Returns the path of a file in that folder, which is good until the call after the next. */
 const char *chart_path(const char *name);
 void chart_write_text(const char *name, const char *text);
 
@@ -39,8 +39,8 @@ struct scene *chart_load_board(const char *image, const char *options, double y_
 
 /* Writes the texel's column and row at u, v. Returns 0 beyond a decal. */
 int chart_texel_of(double u, double v, const enum texture_wrap wrap[2], int *column, int *row);
-/* Returns whether x lies near a border between texels, n on a side. There a mesh, whose coordinates are floats, may
- * fall on either side. */
+/* Returns whether x lies near a border between texels, n on a side. Near a border a mesh, whose coordinates are floats,
+ * may fall on either side. */
 int chart_is_near(double x, int n);
 
 #endif

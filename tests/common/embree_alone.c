@@ -168,7 +168,7 @@ PACKET_FUNCTIONS(4)
 PACKET_FUNCTIONS(8)
 PACKET_FUNCTIONS(16)
 
-/* One ray at a time only serves for comparison, so it always reads from the arrays. */
+/* A pass of one ray at a time only serves for comparison, so it always reads from the arrays. */
 static void pass_1(const struct embree_alone *e, uint32_t first, uint32_t n)
 {
     CONTEXT(context);

@@ -6,8 +6,8 @@
 #include "core/scene.h"
 
 /* Makes about n_triangles: a height field on side_m x side_m about centre_m, rough by rough_m, a second one as ceiling
- * at 0.3 side_m, and walls between them. It is closed without a crack. Heights are hashed from the seed, so the same
- * call gives the same scene. The ground stays within +/- 0.6 rough_m of 0. */
+ * at 0.3 side_m, and walls between them. The scene is closed without a crack. Heights are hashed from the seed, so the
+ * same call gives the same scene. The ground stays within +/- 0.6 rough_m of 0. */
 int generate_terrain(uint32_t n_triangles, double side_m, double rough_m, const double centre_m[2], uint64_t seed,
                      struct scene **out, struct sh_err *err);
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* WGS 84 in long double, from definitions. It shares nothing with GeographicLib, and our positions are compared with
- * it.
+/* WGS 84 in long double, from definitions. The code shares nothing with GeographicLib, and is the reference for our
+ * positions.
  *
  * Ellipsoid: NIMA TR8350.2. Transverse Mercator: the Gauss-Krueger projection is the analytic function that equals the
- * meridian's arc on the central meridian. It is evaluated at the complex isometric latitude (psi + i lambda): a fixed
- * point gives the complex latitude, and Gauss-Legendre quadrature the arc. Polar stereographic: its closed form. A
- * point takes about 20 us. */
+ * meridian's arc on the central meridian. The function is evaluated at the complex isometric latitude
+ * (psi + i lambda): a fixed point gives the complex latitude, and Gauss-Legendre quadrature the arc. Polar
+ * stereographic: its closed form. A point takes about 20 us. */
 #ifndef TESTS_COMMON_GEODESY_H
 #define TESTS_COMMON_GEODESY_H
 

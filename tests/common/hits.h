@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Exact hits of rays that begin at one point. Their directions are three arrays. */
+/* Exact hits of rays that begin at one point. The rays' directions are three arrays. */
 #ifndef TESTS_COMMON_HITS_H
 #define TESTS_COMMON_HITS_H
 

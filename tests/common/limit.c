@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* This is a limit for each test program. It ends a program that waits for ever, and prints where that waits. It is
- * linked with every test program.
+/* This is a limit for each test program. It ends a program that waits for ever, and prints where the program waits.
+ * This file is linked with every test program.
  *
  * The limit is TEST_LIMIT_S seconds, else DEFAULT_S; 0 sets none. run_tap.sh sets the variable to its own limit. The
  * limit only catches a hang, and no result depends on it. If more processes want to run than there are processors,
- * it is longer by that ratio. The main thread gets the signal of a timer. It prints the running test as failed and
- * where each thread is, and ends the program with status 124, as timeout(1) does. A SIGALRM of a test's own alarm()
- * does the same at once. */
+ * the limit is longer by that ratio. The main thread gets the signal of a timer. The thread prints the running test as
+ * failed and where each thread is, and ends the program with status 124, as timeout(1) does. A SIGALRM of a test's own
+ * alarm() does the same at once. */
 #include <errno.h>
 #include <execinfo.h>
 #include <fcntl.h>

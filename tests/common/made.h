@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests make scenes of arrays, and cast rays into them. One that can't be made is a failure of the test. */
+/* Tests make scenes of arrays, and cast rays into them. A scene that can't be made is a failure of the test. */
 #ifndef TESTS_COMMON_MADE_H
 #define TESTS_COMMON_MADE_H
 

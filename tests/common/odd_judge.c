@@ -6,9 +6,9 @@
 
 #include "core/vec3.h"
 
-/* Returns how wrong the place may be where the ray meets the plane of a triangle. It is 8 * 2^-53 times the sum of the
- * farthest corner's distance and the scene's diagonal. A thin triangle makes it larger, and so does a small angle
- * between ray and plane: it is divided by the sine of that angle. */
+/* Returns how wrong the place may be where the ray meets the plane of a triangle. The error is 8 * 2^-53 times the sum
+ * of the farthest corner's distance and the scene's diagonal. A thin triangle makes the error larger, and so does a
+ * small angle between ray and plane, by whose sine the error is divided. */
 static double blur_m(const struct scene *scene, uint32_t triangle, const double at_m[3], const double dir[3])
 {
     double v[3][3], e1[3], e2[3], n[3], far_m = 0.0;

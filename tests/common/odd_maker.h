@@ -24,7 +24,7 @@ double odd_decades(struct odd_maker *m, double lo, double hi);
 int odd_pick(struct odd_maker *m, int n);
 double odd_sign(struct odd_maker *m);
 void odd_direction(struct odd_maker *m, double d[3]);
-/* Draws three axes at right angles. One time in three they are those of the frame, in any order. */
+/* Draws three axes at right angles. One time in three the axes are the frame's own, in any order. */
 void odd_axes(struct odd_maker *m);
 /* ---- and triangles */
 void odd_point(const struct odd_maker *m, double x, double y, double z, double p[3]);

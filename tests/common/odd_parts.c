@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Parts of odd scenes. Their coordinates are in units of the part's size, about its centre. */
+/* Parts of odd scenes. Coordinates are in units of a part's size, about the part's centre. */
 #include "tests/common/odd_maker.h"
 
 #include <math.h>
@@ -42,8 +42,8 @@ static void add_random(struct odd_maker *m)
     }
 }
 
-/* One face, and others above it by next to nothing or nothing at all. They have the same corners, or are shifted in the
- * plane. */
+/* A face, and others above or below it by next to nothing or nothing at all. The others have the same corners, or are
+ * shifted or scaled in the plane. */
 static void add_stack(struct odd_maker *m)
 {
     double x[3], y[3];
@@ -81,7 +81,7 @@ static void add_sheets(struct odd_maker *m)
     }
 }
 
-/* Blades about one corner, level or raised by a little or a lot. They are closed or open. */
+/* Blades about one corner, level or raised by a little or a lot. The fan is closed or open. */
 static void add_fan(struct odd_maker *m)
 {
     int n = 3 + odd_pick(m, 10);

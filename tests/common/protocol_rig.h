@@ -52,7 +52,8 @@ struct protocol_rig {
 /* RTK fixed at 2026-01-02 03:04:05, 33.8567844 degrees south and 151.2152967 east; all else has a value, too. */
 extern const struct nmea_fix protocol_rig_fix;
 
-/* `model` is the profile's. The rig is large: allocate it, or make it static. It asserts that the protocol opens. */
+/* `model` is the profile's. The rig is large: allocate it, or make it static. The call asserts that the protocol
+ * opens. */
 void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char *maker, const char *model);
 void protocol_rig_close(struct protocol_rig *rig);
 /* Forgets all bytes and calls so far. */
@@ -93,8 +94,8 @@ void protocol_rig_part(struct protocol_rig *rig, uint32_t line, uint32_t from, u
                        const struct protocol_rig_shot *shot);
 /* Feeds a turn's line end. Returns the device time of the turn's end. */
 int64_t protocol_rig_turn_end(struct protocol_rig *rig, uint32_t line, uint32_t status);
-/* Feeds a whole turn: shots of the steps first..last, in frames of `part` pulses, and the line end. Then it calls
- * time() with the turn's end. */
+/* Feeds a whole turn: shots of the steps first..last, in frames of `part` pulses, and the line end. At last time() is
+ * called with the turn's end. */
 void protocol_rig_turn(struct protocol_rig *rig, uint32_t line, const struct protocol_rig_shot *shot, uint32_t part);
 
 #endif

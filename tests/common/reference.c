@@ -60,8 +60,8 @@ static void look(const struct reference *r, uint32_t triangle, const double orig
         view->side[i] = side_of(view->corner[i], view->corner[(i + 1) % 3], dir);
 }
 
-/* Returns whether the ray surely misses, in double with a margin of twice its rounding. This saves nearly all of the
- * long double work. */
+/* Returns whether the ray surely misses, in double with a margin of twice its rounding. This test saves nearly all of
+ * the long double work. */
 static int surely_misses(const struct reference *r, uint32_t triangle, const double origin[3], const double dir[3])
 {
     double v[3][3], side[3], size = 0.0;

@@ -6,8 +6,8 @@
  * 2^-61 of the corner's distance, 500 times finer than double precision can tell.
  *
  * A uniform grid finds the triangles near the ray. Cells hold every triangle whose bounds, widened by a millionth of a
- * cell, touch them. That covers the rounding of the walk through the cells. reference_brute tries all triangles, for
- * small scenes and to check the grid. */
+ * cell, touch them. The widening covers the rounding of the walk through the cells. reference_brute tries all
+ * triangles, for small scenes and to check the grid. */
 #ifndef TESTS_COMMON_REFERENCE_H
 #define TESTS_COMMON_REFERENCE_H
 
@@ -30,8 +30,8 @@ void reference_free(struct reference *reference);
 struct reference_hit reference_cast(const struct reference *reference, const double origin_m[3], const double dir[3]);
 struct reference_hit reference_brute(const struct reference *reference, const double origin_m[3], const double dir[3]);
 
-/* Returns the metres between a measured range (NaN: nothing met) and the true one. It is infinite where only one of
- * them met something. */
+/* Returns the metres between a measured range (NaN: nothing met) and the true one. The error is infinite where only one
+ * of the two met something. */
 double reference_error(const struct reference_hit *truth, double range_m);
 
 /* For a wrong range, returns whether the ray passes some edge so closely that double precision can't tell on which

@@ -34,7 +34,7 @@ static double height(double x, double y, double side_m, double rough_m, uint64_t
     return rough_m * (0.35 * h + 0.1 * unit(key, i));
 }
 
-/* A sheet of cells x cells quads. Its border is flat, so that walls can stand on it. */
+/* A sheet of cells x cells quads. The sheet's border is flat, so that walls can stand on it. */
 static void add_sheet(struct builder *b, uint32_t cells, double side_m, double rough_m, double lift_m,
                       const double c[2], uint64_t key)
 {
@@ -58,7 +58,7 @@ static void add_sheet(struct builder *b, uint32_t cells, double side_m, double r
         }
 }
 
-/* Four walls from the lower sheet's border to the upper one's, vertex by vertex. They close without a crack. */
+/* Four walls from the lower sheet's border to the upper one's, vertex by vertex. The walls close without a crack. */
 static void add_walls(struct builder *b, uint32_t cells)
 {
     uint32_t row = cells + 1, up = row * row;

@@ -41,9 +41,9 @@ void wave_between(double got, double least, double most);
 
 /* Returns sigma of a Gaussian by its full width at half maximum. */
 double wave_sigma(double width);
-/* Returns the least deviation (Cramer and Rao) of the range of a Gaussian echo in white noise. Its peak and sigma
- * have no part in it: their derivatives are even, and that of the place is odd. The sum of (A (t - t0) / s^2 g)^2
- * over samples dt apart is A^2 sqrt(pi) / (2 s dt). */
+/* Returns the least deviation (Cramer and Rao) of the range of a Gaussian echo in white noise. The echo's peak and
+ * sigma have no part in the deviation: their derivatives are even, and the place's is odd. The sum of
+ * (A (t - t0) / s^2 g)^2 over samples dt apart is A^2 sqrt(pi) / (2 s dt). */
 double wave_least_sigma_m(double peak, double noise, double sigma_s, double sample_s);
 
 #endif

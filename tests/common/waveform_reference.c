@@ -156,7 +156,7 @@ static struct waveform_return part_of(const struct beam *beam, double h, double 
                                     slope_m * sqrt(along / energy - centre * centre), WAVEFORM_BELL};
 }
 
-/* Its mean range is FAR (1 + b^2 E x^2), E x^2 = 0.1715. */
+/* The plane's mean range is FAR (1 + b^2 E x^2), E x^2 = 0.1715. */
 static struct waveform_return plane_of(double b)
 {
     return (struct waveform_return){WAVEREF_FAR_M * (1.0 + 0.1715 * b * b), 1.0, WAVEREF_FAR_M * b, WAVEFORM_DISC};

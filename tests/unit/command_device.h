@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of commands: a device, and lines to it. Its limits are round, so that expected values can be worked out by
- * hand. */
+/* For tests of commands: a device, and lines to it. The device's limits are round, so that expected values can be
+ * worked out by hand. */
 #ifndef TESTS_UNIT_COMMAND_DEVICE_H
 #define TESTS_UNIT_COMMAND_DEVICE_H
 

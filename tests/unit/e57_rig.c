@@ -7,7 +7,7 @@ static uint8_t *content; /* without the CRCs */
 static size_t content_len, physical_len;
 char *e57rig_xml;
 
-/* It goes bit by bit, so that it shares nothing with the project's CRC: polynomial 0x1edc6f41, reflected. */
+/* This CRC goes bit by bit, so that it shares nothing with the project's CRC: polynomial 0x1edc6f41, reflected. */
 static uint32_t crc_bitwise(const uint8_t *p, size_t n)
 {
     uint32_t crc = 0xffffffff;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A small reader of E57 files: pages, sections, packets and bit streams of ASTM E2807. It shares nothing with the
- * project's writer, and holds one file at a time. */
+/* A small reader of E57 files: pages, sections, packets and bit streams of ASTM E2807. The reader shares nothing with
+ * the project's writer, and holds one file at a time. */
 #ifndef TESTS_UNIT_E57_RIG_H
 #define TESTS_UNIT_E57_RIG_H
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A scripted bus in place of libusb's. Its functions, defined here, come before the library's when a test program is
- * linked. It has one thread, and no time of its own: scripted steps happen when events are handled. When nothing is
- * scripted, `idle` is called, where the test may plug and unplug. Errors that the library does not forgive end the
+/* A scripted bus in place of libusb's. The functions defined here come before the library's when a test program is
+ * linked. The bus has one thread, and no time of its own: scripted steps happen when events are handled. When nothing
+ * is scripted, `idle` is called, where the test may plug and unplug. Errors that the library does not forgive end the
  * test: a transfer that is freed or submitted while it is under way, and anything left behind. */
 #ifndef TESTS_UNIT_FAKE_LIBUSB_H
 #define TESTS_UNIT_FAKE_LIBUSB_H

@@ -22,10 +22,10 @@ void gltf_quad(void);
 #define GLTF_QUAD_MESH \
     "{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":1},\"indices\":2,\"material\":0}]}"
 
-/* Writes a .glb whose JSON is asset, buffer views, buffers and `rest`. Its path is good until the next call. */
+/* Writes a .glb whose JSON is asset, buffer views, buffers and `rest`. The file's path is good until the next call. */
 const char *gltf_write(const char *name, const char *rest);
 
-/* Loads it with its textures, including their holes. */
+/* Writes such a file and loads it with its textures, including their holes. */
 struct scene *gltf_load(const char *rest);
 
 /* Loading has to fail with a line that holds `expected`. */

@@ -18,7 +18,8 @@ struct hostile_model {
 int hostile_models_open(void);
 void hostile_models_close(void);
 
-/* Returns a model by number. Its format is number % HOSTILE_FORMATS, and the models of a format come in turn. */
+/* Returns a model by number. The model's format is number % HOSTILE_FORMATS, and the models of a format come in
+ * turn. */
 const struct hostile_model *hostile_model(uint64_t number);
 const char *hostile_format(int format);
 

@@ -5,8 +5,8 @@
 
 #include "tests/unit/recorder_rig.h"
 
-/* Records the rig's stream. After each frame, once the recorder has saved its bytes, `seen` is called. Then the file is
- * completed as path. */
+/* Records the rig's stream. After each frame, once the recorder has saved its bytes, `seen` is called. After the last
+ * frame the file is completed as path. */
 void killed_rig_record(const char *path, struct recorder_options options, void (*seen)(const char *path));
 
 /* Writes these bytes to path. */

@@ -3,7 +3,8 @@
  * their caller. A filter of the kernel's (seccomp) shows every system call of the thread but those that it needs: to
  * sleep by the clock, to read it, the futexes of semaphores, and wake-ups, which are 8 bytes to an eventfd.
  *
- * The thread is armed by its first sleep by the clock, as no other thread sleeps so. It stays armed until it ends. */
+ * The thread is armed by its first sleep by the clock, as no other thread sleeps so. The armed thread stays so until it
+ * ends. */
 #ifndef TESTS_UNIT_PACING_RIG_H
 #define TESTS_UNIT_PACING_RIG_H
 

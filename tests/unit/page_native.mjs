@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // The page's decoder (drivers/link/web/native.js): samples of SAMPLES.md value by value, damage, and recordings beside
-// the client in Python. It prints TAP on standard output.
+// the client in Python. This file prints TAP on standard output.
 //
 //     node page_native.mjs FOLDER    FOLDER: with polar.shs, utm.shs, ... and the points that Python makes of each
 import fs from 'node:fs';

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // The points from before a page came (drivers/link/web/past.js). Each points frame is shown once, whichever way it
-// comes, and whatever the page's connections did meanwhile. It prints TAP on standard output. The stream is made here,
-// with a keeper of it that answers as the head's does.
+// comes, and whatever the page's connections did meanwhile. This file prints TAP on standard output. The stream is made
+// here, with a keeper of it that answers as the head's does.
 import {crc32c, LOCAL, Parser, REPEAT} from '../../drivers/link/web/native.js';
 import {Cloud} from '../../drivers/link/web/cloud.js';
 import {Head} from '../../drivers/link/web/head.js';

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// It tests the pure parts of the page's picture (drivers/link/web): the stored points and their order, the camera,
-// colours and limits, picking, dragging, levels of detail, the scene's bytes. It prints TAP on standard output.
+// This file tests the pure parts of the page's picture (drivers/link/web): the stored points and their order, the
+// camera, colours and limits, picking, dragging, levels of detail, the scene's bytes. It prints TAP on standard output.
 import {Cloud, BLOCK, evenOrder, nearestTo, pointOf} from '../../drivers/link/web/cloud.js';
 import {FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
@@ -64,8 +64,8 @@ test('a prefix of a block is spread evenly: one point of each stretch', () => {
     const met = new Set([...stretches].map((i) => Math.floor(i * k / BLOCK)));
     same(met.size, k, `stretches of ${BLOCK / k}`);
   }
-  // Every 512th point of lines with 512 points is one column. Here the places within lines are random: of 128 points in
-  // 512 places, 512 (1 - (1 - 1/512)^128) = 113.3 differ, sigma 3.4 (occupancy): above 95 by five sigma.
+  // Every 512th point of lines with 512 points is one column. The places of evenOrder within lines are random: of 128
+  // points in 512 places, 512 (1 - (1 - 1/512)^128) = 113.3 differ, sigma 3.4 (occupancy): above 95 by five sigma.
   const columns = new Set([...evenOrder(BLOCK).slice(0, 128)].map((i) => i % 512));
   same(columns.size > 95, true, `${columns.size} columns`);
   same(new Set(evenOrder(1000)).size, 1000, 'a part of a block');

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-// It has what the tests of the page's pure parts share: comparing, samples of the protocol, points, a camera.
+// This file has what the tests of the page's pure parts share: comparing, samples of the protocol, points, a camera.
 import {readFileSync} from 'node:fs';
 import {Camera} from '../../drivers/link/web/view_camera.js';
 

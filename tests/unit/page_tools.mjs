@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// It tests the pure parts of the tools of the page's picture (drivers/link/web): flat views, sections, measuring with
-// its expected errors, panoramas. It prints TAP on standard output.
+// This file tests the pure parts of the tools of the page's picture (drivers/link/web): flat views, sections, measuring
+// with its expected errors, panoramas. It prints TAP on standard output.
 import {Cloud, pointOf} from '../../drivers/link/web/cloud.js';
 import {flatDepthOf, onPlane, radians} from '../../drivers/link/web/view_camera.js';
 import {nearest, search} from '../../drivers/link/web/view_pick.js';

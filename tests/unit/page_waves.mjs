@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// Waveforms in the page (drivers/link/web/native_waves.js), from the frame of SAMPLES.md. It prints TAP on standard
-// output.
+// Waveforms in the page (drivers/link/web/native_waves.js), from the frame of SAMPLES.md. This file prints TAP on
+// standard output.
 import {Decoder, Parser} from '../../drivers/link/web/native.js';
 import {Waves} from '../../drivers/link/web/native_waves.js';
 import {Wire} from '../../drivers/link/web/wire.js';

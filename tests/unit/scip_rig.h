@@ -20,8 +20,8 @@ enum { SCIP_STEPS = 1500 };
 extern struct protocol_rig rig;
 extern struct protocol_rig_shot shot[SCIP_STEPS]; /* of the steps first..last */
 
-/* Opens a session of that model, and closes the one before. Its head is described: 0.02 to 5.6 m for URG-04LX, 0.1 to
- * 30 m else. */
+/* Opens a session of that model, and closes the one before. The model's head is described: 0.02 to 5.6 m for URG-04LX,
+ * 0.1 to 30 m else. */
 void scip_open(const char *model);
 /* Does the same with a chosen head. */
 void scip_open_head(const char *model, uint32_t steps, int first, int last, int front, int turn, uint32_t lines_hz);

@@ -220,7 +220,8 @@ static void jobs_are_done_once(void **state)
     the_whole_manifest_is_right();
 }
 
-/* A file that is too short is found by its size, one that is changed by its sum. Its job alone is done again. */
+/* A file that is too short is found by its size, a changed file by its checksum, and a missing one as well. Only the
+ * jobs of such files are done again. */
 static void a_changed_file_is_made_again(void **state)
 {
     (void)state;

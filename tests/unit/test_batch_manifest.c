@@ -57,7 +57,7 @@ static struct batch_entry an_entry(uint32_t job, struct batch_file file[2])
     struct batch_entry entry = {.job = job, .pulses = INT64_MAX, .points = 17, .seconds = 1.25, .n_files = 2};
     file[0] = (struct batch_file){.name = "0001_a.ply", .bytes = 1234};
     file[1] = (struct batch_file){.name = "0001_a.las", .bytes = 0};
-    /* They differ, so that exchanged ones show. */
+    /* The sums differ, so that exchanged ones show. */
     char *const sums[] = {file[0].sha,       file[1].sha,   entry.stream_sha, entry.made.configuration,
                           entry.made.inputs, entry.made.job};
     for (size_t i = 0; i < sizeof sums / sizeof sums[0]; i++) {

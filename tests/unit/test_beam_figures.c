@@ -205,8 +205,8 @@ static void axes_across_a_direction(void **state)
     }
 }
 
-/* Ring k has 6 k places at equal angles, those of odd rings turned by half a step. It lies where half of the energy of
- * its annulus is inside. What the places don't spread, `rest` adds. Places are floats. */
+/* Ring k has 6 k places at equal angles, those of odd rings turned by half a step. The ring lies where half of the
+ * energy of its annulus is inside. `rest` adds the spread that the places lack. Places are floats. */
 static void rings_of_sub_rays(void **state)
 {
     (void)state;

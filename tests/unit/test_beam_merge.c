@@ -32,8 +32,9 @@ static void merge(struct beam_return *r, uint32_t n)
     assert_true(left_out == 0);
 }
 
-/* Ten equal returns within the resolution: two of the nearer surface, eight of the other. They are one echo, at the
- * mean. Its surface is the one that returns most, though none of its returns is stronger. The order does not matter. */
+/* Ten equal returns within the resolution: two of the nearer surface, eight of the other. The returns are one echo, at
+ * the mean. The echo's surface is the one that returns most, though none of that surface's returns is stronger. The
+ * order does not matter. */
 static void test_surface_of_many_returns(void **state)
 {
     (void)state;

@@ -63,9 +63,9 @@ static void edges_cancel_in_any_parts(void **state)
 }
 
 /* A face that is missing leaves about its area open, wherever it lies and however it is turned. The estimate takes the
- * curl of a field as |k|. Its square is |k|^2 times the squares of two sines: of the phase, in the mean 1/2, and of the
- * angle between w and k, in the mean 2/3. So the RMS over many faces is 0.58 of the area; eight fields and 400 faces
- * scatter it by some percent. */
+ * curl of a field as |k|. The curl's square is |k|^2 times the squares of two sines: of the phase, in the mean 1/2, and
+ * of the angle between w and k, in the mean 2/3. So the RMS over many faces is 0.58 of the area; eight fields and 400
+ * faces scatter it by some percent. */
 static void a_missing_face_is_open(void **state)
 {
     (void)state;

@@ -41,7 +41,7 @@ static void test_infinite(void **state)
     }
 }
 
-/* It is finite at first, and the pose takes it beyond. */
+/* The point is finite at first, and the pose makes it infinite. */
 static void test_infinite_by_pose(void **state)
 {
     (void)state;

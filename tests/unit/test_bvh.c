@@ -107,9 +107,9 @@ static struct scene *small_and_large(const struct sheets *s, double gap_m, int l
     return scene_of((const double(*)[3])v, 6, order[large_first], 2, label[large_first]);
 }
 
-/* A small sheet is just before a large one, or behind it. Float would misjudge the large one. It is seen at a slant by
- * micrometres, where it is rounded hundreds of kilometres away by millimetres, and so by more than the small one. All
- * rays meet the nearer one, whichever stands first in the mesh. */
+/* A small sheet is just before a large one, or behind it. Float would misjudge the large one. The large one's corners,
+ * hundreds of kilometres away, are rounded by millimetres. Seen at a slant, that sheet is off by micrometres here, and
+ * so by more than the small one. All rays meet the nearer one, whichever stands first in the mesh. */
 static void a_small_sheet_at_a_large_one(void **state)
 {
     (void)state;
@@ -129,8 +129,8 @@ static void a_small_sheet_at_a_large_one(void **state)
     bvh_work_free(work);
 }
 
-/* A ray does not meet a surface that it begins on, within half a micrometre, whichever way it goes. It meets one that
- * is twice as far, and those behind. Sheets are at y = 9 and 10. */
+/* A ray does not meet a surface that it begins on, within half a micrometre, whichever way it goes. The ray meets a
+ * surface that is twice as far, and surfaces behind it. Sheets are at y = 9 and 10. */
 static void what_a_ray_begins_on_is_not_met(void **state)
 {
     (void)state;
@@ -196,8 +196,9 @@ static void any_axes(uint64_t *random, double u[3], double v[3])
     beam_axes(d, u, v);
 }
 
-/* Rays within the plane of a sheet, as far as double precision shows, do not meet it. They would meet surfaces on its
- * edges, and there are none here. The plane has all directions, as float then has it at a small angle. */
+/* Rays within the plane of a sheet, as far as double precision shows, do not meet it. The rays would meet surfaces on
+ * the sheet's edges, and there are none here. The plane is turned in all directions, as float then has it at a small
+ * angle to the rays. */
 static void a_sheet_along_the_ray_is_not_met(void **state)
 {
     (void)state;
@@ -282,7 +283,7 @@ static void both_triangles_of_an_edge_agree(void **state)
     }
 }
 
-/* Plates stand one behind the other. They pass the ray at 1.4 cm while their boxes hold it. A wall is behind. */
+/* Plates stand one behind the other. The plates pass the ray at 1.4 cm while their boxes hold it. A wall is behind. */
 enum { PLATES = 100 };
 
 static struct scene *plates(void)

@@ -77,8 +77,8 @@ static void the_first_is_met(void **state)
 
 enum { STACK = 64, STACKS = 60 };
 
-/* Stacks faces that are apart by a twelfth or less of the distance that counts as the same. They are in a random order,
- * or each one is before or behind the last. */
+/* Stacks faces that are apart by a twelfth or less of the distance that counts as the same. The faces are in a random
+ * order, or each one is before or behind the last. */
 static void stack_up(uint64_t *random, double vertex[3 * STACK][3], uint32_t face[STACK][3])
 {
     const double far_m = 1.0 + 49.0 * case_unit(random), step_m = far_m * 1e-12 / (12.0 + 40.0 * case_unit(random));

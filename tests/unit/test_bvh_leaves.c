@@ -45,8 +45,8 @@ static void corner_of(const struct bvh *bvh, const struct bvh_leaf *leaf, int k,
         v[j] = bvh->origin_m[j] + (double)leaf->base_m[j] + (double)leaf->corner_m[j][k];
 }
 
-/* Each corner of the triangle is one of the leaf. They differ by rounding alone: of the leaf's size to float, and of
- * coordinates in double, which are up to 5e6 m here. Planes are those of the triangles, bit by bit. */
+/* Each corner of the triangle is one of the leaf's. The two corners differ by rounding alone: of the leaf's size to
+ * float, and of coordinates in double, which are up to 5e6 m here. Planes are those of the triangles, bit by bit. */
 static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, int which)
 {
     static const int of[2][3] = {{0, 1, 2}, {1, 3, 2}};
@@ -66,8 +66,8 @@ static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, in
     assert_memory_equal(&plane, &leaf->plane[which], sizeof plane);
 }
 
-/* The size is at least each edge and each distance from the base. It is larger by at most 1/64, by the rounding to
- * float, and by 2^-16 of the distance from the origin. */
+/* The size is at least each edge and each distance from the base. The size is larger by at most 1/64, by the rounding
+ * to float, and by 2^-16 of the distance from the origin. */
 static void check_size(const struct bvh *bvh, const struct bvh_leaf *leaf)
 {
     double v[5][3], far_m, edge_m = 0.0, least_m = 0.0;
@@ -138,7 +138,8 @@ static int stop_later(void *ctx)
     return ++*(unsigned *)ctx > 1;
 }
 
-/* Triangles are paired before there is memory for leaves. That takes most of the time, so it asks whether to stop. */
+/* Triangles are paired before there is memory for leaves. Pairing takes most of the time, so it asks whether to
+ * stop. */
 static void test_pairing_stops(void **state)
 {
     (void)state;

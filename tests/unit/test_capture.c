@@ -67,8 +67,8 @@ static void test_loop_and_unknown(void **state)
     const struct talk_options again = {.unknown = TALK_ERROR, .loop = 1}, close = {.unknown = TALK_CLOSE};
     make_cola();
     client_open(&c, &m, 0, &again);
-    /* Its mean period is 10 ms: after 3 at 30 ms, 1 comes at 40 ms. The one odd event has no period, and is not
-     * repeated. */
+    /* The events S have a mean period of 10 ms: after 3 at 30 ms, 1 comes at 40 ms. The one odd event has no period,
+     * and is not repeated. */
     assert_string_equal(client_ask(&c, "\x02sEN S 1\x03", 52),
                         "2:\x02sEA S 1\x03|10:\x02sSN S 1\x03|15:\x02sSN Odd 7\x03|20:\x02sSN S 2\x03|30:\x02sSN S "
                         "3\x03|40:\x02sSN S 1\x03|50:\x02sSN S 2\x03|");

@@ -248,7 +248,7 @@ static void test_swapped_beginning(void **state)
 }
 
 /* Packets were cut off as they were captured, the first and the last one of the answer, one down to its headers, after
- * one that was lost. One of them came again as a whole. Each byte that is missing counts once. */
+ * one that was lost. One of the cut packets came again as a whole. Each byte that is missing counts once. */
 static void test_cut_packets(void **state)
 {
     (void)state;

@@ -175,7 +175,7 @@ static void expect_same_bytes(struct cast_rig *rig)
     }
 }
 
-/* The pose depends on the pulse's time alone. It does not depend on how runs are cut, on ray packets, or on earlier
+/* The pose depends on the pulse's time alone, and not on how runs are cut, on ray packets, or on earlier
  * casts. */
 static void test_same_bytes(void **state)
 {
@@ -212,7 +212,7 @@ static void test_geo(void **state)
     cast_rig_close(rig);
 }
 
-/* A wall moves away from a head that moves along. Its range is worked out by hand. */
+/* A wall moves away from a head that moves along. The wall's range is worked out by hand. */
 static void test_moving_body(void **state)
 {
     (void)state;

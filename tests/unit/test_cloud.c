@@ -154,7 +154,7 @@ static void what_is_missing_is_told_apart(void **state)
     cloud_free(&c);
 }
 
-/* They are read only where they are asked for. A second column of a name doesn't count. */
+/* Columns are read only where they are asked for. A second column of a name doesn't count. */
 static void columns_are_read_where_asked_for(void **state)
 {
     (void)state;

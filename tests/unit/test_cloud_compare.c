@@ -296,7 +296,7 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* They are compared with sorting, over all magnitudes of a double. */
+/* Percentiles are compared with those of the sorted values, over all magnitudes of a double. */
 static void percentiles_are_nearest_ranks(void **state)
 {
     (void)state;

@@ -148,7 +148,7 @@ static void labels_are_found_behind_each_type(void **state)
     }
 }
 
-/* A label of another type is none. One that begins within the record and ends beyond it isn't there. */
+/* A label of another type is no label. A label that begins within the record and ends beyond it isn't there. */
 static void what_is_no_label(void **state)
 {
     (void)state;

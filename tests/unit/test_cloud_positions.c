@@ -105,7 +105,7 @@ static void test_many_columns(void **state)
     expect("y z\n1 2 3\n", 10, 1, one, 1);
 }
 
-/* One line that is no point may be a title. More are reported, with the first one's number. */
+/* One line that is no point may be a title. More such lines are reported, with the first one's number. */
 static void test_lines_left_out(void **state)
 {
     (void)state;
@@ -180,8 +180,8 @@ static void test_pcd_compressed(void **state)
     expect_error(text, len + sizeof back, "damaged");
 }
 
-/* The longest run of literals has 32 bytes, and a control of 32 is the shortest copy, of three. Here three points have
- * 36 bytes: 32 literals, one more, and the three before the last. Copies begin up to 8192 bytes back. */
+/* The longest run of literals has 32 bytes, and a control of 32 is the shortest copy, of three. The three points of
+ * this test have 36 bytes: 32 literals, one more, and the three before the last. Copies begin up to 8192 bytes back. */
 static void test_pcd_runs(void **state)
 {
     (void)state;

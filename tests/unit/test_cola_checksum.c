@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa: LMDscandata whose values are changed on request, with a right check byte. It is read by the public layout alone
- * (cola_rig). */
+/* CoLa: LMDscandata whose values are changed on request, with a right check byte. The telegram is read by the public
+ * layout alone (cola_rig). */
 #include "tests/unit/cola_rig.h"
 #include "tests/unit/checksum_rig.h"
 

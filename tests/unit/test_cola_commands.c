@@ -22,7 +22,7 @@ static void sick_tim_starts(void **state)
     assert_int_equal(cola.count[PROTOCOL_WRONG], 0);
 }
 
-/* It does so for a recording: only the session begins anew. */
+/* A recording refuses a reboot: only the session begins anew. */
 static void a_reboot_that_is_refused_ends_the_session(void **state)
 {
     (void)state;

@@ -49,7 +49,7 @@ static void expect_set(const char *first, const char *second, const char *third)
     assert_true(n == 3 || wanted[n] == NULL);
 }
 
-/* It reports its settings before a scan has shown them. */
+/* The head reports its settings before a scan has shown them. */
 static void a_resting_head_says_how_it_is_set(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The contents of CoLa's LMDscandata against the ranges, times and angles that went in. They are read back by the
- * public layout alone (cola_rig). */
+/* The contents of CoLa's LMDscandata against the ranges, times and angles that went in. The contents are read back by
+ * the public layout alone (cola_rig). */
 #include <math.h>
 
 #include "drivers/protocol/native_encode.h"
@@ -256,7 +256,8 @@ static void give_poses(double x0_m, double x1_m, int64_t t0_ns, int64_t t1_ns)
     cola.ops->frame(cola.protocol, frame, native_encode_poses(frame, sizeof frame, pose, 2, cola.scan_t0_ns, 0));
 }
 
-/* The encoder is a vehicle's: its way and its speed. Here it goes at 2 m/s, then back at 1 m/s, and the way grows. */
+/* The encoder is a vehicle's: its way and its speed. The vehicle goes at 2 m/s, then back at 1 m/s, and the way
+ * grows. */
 static void the_encoder_counts_the_way(void **state)
 {
     (void)state;
@@ -344,7 +345,7 @@ static void the_longest_telegram_has_room(void **state)
     protocol_rig_turn(&cola, 0, shots, 500);
     cola_read_lmd(0, &lmd); /* the rig has checked it against max_unit */
     assert_true(cola.len > 60000 && cola.len <= 65535);
-    /* One beam more is more than the module takes. It says so, and nothing is sent. */
+    /* One beam more is more than the module takes. The module says so, and nothing is sent. */
     cola.emitter.last_step = 3000;
     protocol_rig_describe(&cola, 0);
     protocol_rig_clear(&cola);

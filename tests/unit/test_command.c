@@ -225,7 +225,7 @@ static void a_place_is_read_and_said(void **ctx)
     expect(&dev, "SITE:POSE? 1", "1,2,3,0,0,0");
 }
 
-/* The owner of a fault knows its meaning (test_fault_config.c). These are the lines, as command_device.c answers
+/* The owner of a fault knows its meaning (test_fault_config.c). This test has the lines, as command_device.c answers
  * them. */
 static void faults_are_added_listed_counted_and_cleared(void **ctx)
 {
@@ -273,7 +273,7 @@ static void faults_are_added_listed_counted_and_cleared(void **ctx)
     expect_error(&dev, 1, "FAUL:CLE 1", CMD_E_SETTINGS, "");
 }
 
-/* TIME:SERVer and TIME:SHIFt. Both are open to sessions without control, as a scanner's clients have none. */
+/* TIME:SERVer and TIME:SHIFt. Both commands are open to sessions without control, as a scanner's clients have none. */
 static void a_time_server_is_set_and_read(void **ctx)
 {
     (void)ctx;

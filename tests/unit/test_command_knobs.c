@@ -157,7 +157,7 @@ static void what_def_answers_can_be_set(void **ctx)
     expect(&dev, "SCAN:STEP 0.12", "0.12");
     assert_true(dev.settings.pan_udeg_s == 12 * MICRO);
     expect_error(&dev, 1, "SCAN:STEP 0.59", CMD_E_SETTINGS, "allowed 0.0012 to 0.268328156 as HEAD:PRR is 300000");
-    /* It is not allowed where the lines of power-up give another step: 360 * 100 / 1000 deg. */
+    /* The default is not allowed where the lines of power-up give another step: 360 * 100 / 1000 deg. */
     expect(&dev, "HEAD:PRR 1000", "OK");
     expect(&dev, "SCAN:STEP:LINE? DEF", "0.12");
     expect_error(&dev, 1, "SCAN:STEP:LINE 0.12", CMD_E_SETTINGS, "allowed 0.36 to 360 as HEAD:PRR is 1000");

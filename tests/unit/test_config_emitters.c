@@ -85,7 +85,7 @@ static void tables_that_do_not_fit_are_refused(void **state)
         check_wrong(&wrong[i]);
 }
 
-/* Such a head can't have these settings. The line is the configuration's. */
+/* A head of the row's profile can't have the row's settings. The error's line is the configuration's. */
 static void settings_that_do_not_fit_are_refused(void **state)
 {
     (void)state;

@@ -201,7 +201,8 @@ static void check_l(const double station_m[3], const struct cover_sweep *far, in
     const struct view view = check_cells(c, station_m, sees);
     sums_of(c, &sums);
     assert_near("area", sums.area_m2, L_M2, 1e-11);
-    /* More or less of the cut cells is visible. They lie within a cell's width, 2.5 cell_m across, of the line. */
+    /* More or less of the cut cells is visible. The cut cells lie within a cell's width, 2.5 cell_m across, of the
+     * line. */
     print_message("%.3f m2 seen, %.3f m2 visible, %.3f m2 in cells that the shadow's line cuts, %.3f m2 perhaps "
                   "between the points\n",
                   view.seen_m2, L_M2 - hidden_m2, view.cut_m2, view.coarse_m2);

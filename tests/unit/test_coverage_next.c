@@ -20,7 +20,7 @@ static uint32_t find_places(const struct cover *c, double step_m, double height_
     return n;
 }
 
-/* The L on a grid of 0.5 m: x, y = 0.25, 0.75, ... Those 0.25 m from a wall are too near. The right leg keeps 10 by 2:
+/* The L on a grid of 0.5 m: x, y = 0.25, 0.75, ... Places 0.25 m from a wall are too near. The right leg keeps 10 by 2:
  * x from 0.75 to 5.25 and y = 0.75, 1.25. The row y = 1.75 has the three with x < 2. The upper leg has 2 by 5: x =
  * 0.75, 1.25 and y from 2.25 to 4.25. */
 static void test_places(void **state)
@@ -245,8 +245,8 @@ static void test_every_direction(void **state)
     cover_close(c);
 }
 
-/* A ray stands for range^2 sr / cosine, and the cosine is at least 0.02. It counts within the range of the head, both
- * ends included. From outside, walls are met from behind. */
+/* A ray stands for range^2 sr / cosine, and the cosine is at least 0.02. The ray counts within the range of the head,
+ * both ends included. From outside, walls are met from behind. */
 static void test_one_ray(void **state)
 {
     (void)state;

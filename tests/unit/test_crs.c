@@ -22,7 +22,8 @@ static struct crs_place located(const char *name, double easting_m, double north
     return place;
 }
 
-/* They are two libraries of the same projection; 1e-9 degrees are 0.1 mm. WGS 84 / UTM involves no other datum. */
+/* PROJ and GeographicLib are two libraries of the same projection; 1e-9 degrees are 0.1 mm. WGS 84 / UTM involves no
+ * other datum. */
 static void utm_is_that_of_geographiclib(void **state)
 {
     (void)state;

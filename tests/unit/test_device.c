@@ -157,7 +157,7 @@ static void frames_are_counted_with_the_one_that_runs(void **state)
     }
 }
 
-/* A reader that joins a head at rest gets descriptor and anchor within a second, too. They begin nothing. */
+/* A reader that joins a head at rest gets descriptor and anchor within a second, too. The two frames begin no scan. */
 static void a_head_at_rest_describes_itself_each_second(void **state)
 {
     (void)state;

@@ -173,7 +173,8 @@ static void an_added_fault_counts_from_its_command(void **state)
     rig_close(rig);
 }
 
-/* The list changes while one strikes. It goes on, and its mirror stands where it stood. */
+/* The list of faults changes while one of them strikes. The striking fault goes on, and the mirror stands where it
+ * stood. */
 static void another_fault_leaves_it_as_it_is(void **state)
 {
     (void)state;

@@ -105,7 +105,8 @@ static void expect_error(struct rig *rig, int number, const char *text)
         fail_msg("%s, not %s%s", error, start, text);
 }
 
-/* A client goes. It is an error where it had control, or while a scan is on, and half a line is one by itself. */
+/* A client goes. The client's going is an error where it had control, or while a scan is on. Half a line is an
+ * error by itself. */
 static void a_client_that_goes_is_an_error_where_it_is_missed(void **state)
 {
     (void)state;

@@ -63,7 +63,7 @@ static void events_keep_their_order(void **state)
     assert_int_equal(work.n_events, 3);
 }
 
-/* An event that finds no room is counted. That is said once there is some. */
+/* An event that finds no room is counted. The count is reported once there is room. */
 static void events_without_room_are_said(void **state)
 {
     (void)state;
@@ -187,8 +187,8 @@ static void each_loss_has_an_event_and_each_episode_an_error(void **state)
     assert_true(counters.lost_pulses == 65 && counters.lost_ticks == 5);
 }
 
-/* The tick with the event is lost as well. Its losses are said again with the new ones, and its other events go before
- * those that wait. */
+/* The tick with the event is lost as well. The tick's losses are reported again with the new ones, and its other events
+ * go before those that wait. */
 static void a_lost_tick_gives_its_events_back(void **state)
 {
     (void)state;

@@ -38,7 +38,7 @@ static void tell_refused(struct rig *rig, const char *line, const char *why)
     if (strstr(result.reply, why) == NULL) fail_msg("%s: %s", line, result.reply);
 }
 
-/* Two at once add up. One whose window is over has no effect. */
+/* Two slow boots at once add up. A slow boot whose window has not begun has no effect. */
 static void boots_slowly(void **state)
 {
     (void)state;
@@ -176,8 +176,8 @@ static void loses_power(void **state)
     rig_close(rig);
 }
 
-/* It strikes at a pulse, once: the scan that --start begins again is not cut. A slow boot that power cuts short is
- * over. */
+/* The fault strikes at a pulse, once: the scan that --start begins again is not cut. A slow boot that power cuts short
+ * is over. */
 static void loses_power_at_a_pulse(void **state)
 {
     (void)state;
@@ -192,8 +192,8 @@ static void loses_power_at_a_pulse(void **state)
         fired = rig->work.scanning ? rig->work.pulse_end : fired;
         assert_true(rig_claim(rig));
     }
-    /* It strikes at the first tick that begins with the pulse or later. A tick has 300 of them, cut at packets of
-     * 16. */
+    /* The fault strikes at the first tick that begins with the pulse or later. A tick has 300 of them, cut at packets
+     * of 16. */
     assert_true(fired >= 12345 && fired < 12345 + 300 + 16);
     next_state(rig, "boot");
     assert_int_equal(next_state(rig, "off"), 1000);
@@ -291,8 +291,8 @@ static void tells_a_wrong_time(void **state)
     rig_close(rig);
 }
 
-/* It is right to the nanosecond, within a tick: the second that begins with the fault is lost, and the one at its end
- * is reported. */
+/* The fault's window is right to the nanosecond, within a tick. The second that begins with the fault is lost, and the
+ * one at its end is reported. */
 static void loses_pps_up_to_the_end(void **state)
 {
     (void)state;

@@ -141,7 +141,8 @@ static int last_line_end(struct rig *rig, struct line_end *end)
 
 /* The encoders then have the axes' angles, though no pulse was fired at the new rate: 1.6 MHz is 100 whole packets a
  * tick, so none was left over. Three facets and a gain of two are 240 degrees a line of 10 ms, from -40 on. The pan
- * turns 180 degrees a second. They may be read at the last pulse or at the next one: 0.015 degrees of the mirror. */
+ * turns 180 degrees a second. The encoders may be read at the last pulse or at the next one: 0.015 degrees of the
+ * mirror. */
 static void a_stop_right_after_a_change_has_its_angles(void **state)
 {
     (void)state;

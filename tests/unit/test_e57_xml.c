@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The XML section of E57 files, element by element, against the elements of ASTM E2807 that a file of ours has. A small
- * reader of this test takes the text apart. It fails where tags are not in pairs. */
+ * reader of this test takes the text apart. The reader fails where tags are not in pairs. */
 #include <ctype.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -20,7 +20,7 @@ enum { MAX_DEPTH = 8, MAX_ELEMENTS = 160 };
 static char got[MAX_ELEMENTS][1700];
 static int n_got;
 
-/* A guid has the form of a UUID of version 8, variant 10 (RFC 9562), in braces. Its digits become zeros. */
+/* A guid has the form of a UUID of version 8, variant 10 (RFC 9562), in braces. The text {} takes the guid's place. */
 static void hide_guid(char *text)
 {
     static const char form[] = "{xxxxxxxx-xxxx-8xxx-vxxx-xxxxxxxxxxxx}";

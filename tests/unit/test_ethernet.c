@@ -31,7 +31,7 @@ static uint32_t be32(const uint8_t *at)
     return be16(at) << 16 | be16(at + 2);
 }
 
-/* One's complement addition, byte by byte. It gives 0xffff for a block with its right checksum in it. */
+/* One's complement addition, byte by byte. The sum is 0xffff for a block with its right checksum in it. */
 static uint32_t add_bytes(uint32_t sum, const uint8_t *at, size_t len)
 {
     for (size_t i = 0; i < len; i++) {
@@ -100,7 +100,7 @@ static void test_datagrams(void **state)
     check_udp(&SIX, &SIX_GROUP, data, sizeof data);
 }
 
-/* The sum 0 is sent as 0xffff, as 0 means that there is none. One of all payloads of two bytes has it. */
+/* The sum 0 is sent as 0xffff, as 0 means that there is none. Just one of all payloads of two bytes has this sum. */
 static void test_sum_of_zero(void **state)
 {
     (void)state;

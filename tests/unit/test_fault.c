@@ -347,7 +347,7 @@ static void items_are_found_by_their_number(void **state)
     assert_null(fault_find(item, 0, sizeof *item, 5));
 }
 
-/* A fault that is taken out is forgotten. Those that stay keep their counts, wherever they are in the list. */
+/* A fault that is taken out is forgotten. Faults that stay keep their counts, wherever they are in the list. */
 static void a_tally_keeps_what_is_in_the_list(void **state)
 {
     (void)state;

@@ -307,7 +307,8 @@ static void what_was_begun_without_the_wire_goes_first_as_it_is(void **state)
     assert_memory_equal(rig.out + 4, rig.item[1].bytes, rig.item[1].len);
 }
 
-/* Two clients of a link come to the frame of an unplugging, which ends both sessions. It is carried out once. */
+/* Two clients of a link come to the frame of an unplugging, which ends both sessions. The unplugging is carried out
+ * once. */
 static void an_act_that_is_not_carried_out_does_not_count(void **state)
 {
     (void)state;

@@ -31,7 +31,7 @@ static void a_reply_that_is_dropped_is_missing(void **state)
     assert_true(rig.n_notes == 1 && rig.note[0].number == 2 && rig.note[0].of == FAULT_OF_REPLIES);
 }
 
-/* Its end is in device time that is still to come: the tick at which the command took effect. */
+/* The fault's end is in device time that is still to come: the tick at which the command took effect. */
 static void a_fault_that_was_taken_out_changes_no_reply(void **state)
 {
     (void)state;
@@ -66,7 +66,7 @@ static void frames_overtake_a_late_reply_and_replies_do_not(void **state)
     assert_int_equal(rig_take(0), 1);
 }
 
-/* It always differs from the right one. */
+/* The wrong reply always differs from the right one. */
 static void a_wrong_reply_is_wrong(void **state)
 {
     (void)state;

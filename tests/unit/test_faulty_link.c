@@ -260,7 +260,7 @@ static void an_unplugged_link_comes_back(void **state)
     close_it(f);
 }
 
-/* It does not count, and the session goes on. */
+/* A failed act does not count, and the session goes on. */
 static void an_act_that_fails_is_told(void **state)
 {
     (void)state;
@@ -283,7 +283,7 @@ static void an_act_that_fails_is_told(void **state)
     close_it(f);
 }
 
-/* The same fault in another session is the same pull of the one cable. Both ends are in the truth. */
+/* The same fault in another session is the same pull of the one cable. The pull's begin and end are in the truth. */
 static void a_cable_is_pulled_once(void **state)
 {
     (void)state;

@@ -274,7 +274,8 @@ static void times_go_by_station_and_scan(void **state)
     assert_true(t[1].points == 1 && t[1].scans == 1 && t[1].span_s == 0.0 && t[1].gaps == 0);
 }
 
-/* A gap that is as long as allowed is none. Each station has its own. One without points has no times. */
+/* A gap that is as long as allowed is none. Each station has its own allowed gap. A station without points has no
+ * times. */
 static void gaps_are_longer_than_allowed(void **state)
 {
     (void)state;

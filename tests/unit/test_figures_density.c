@@ -89,8 +89,8 @@ static void cells_of_few_points(void **state)
     scene_free(scene);
 }
 
-/* Three squares of 4 m face x, y and z. Their corner is at 10.5, 20.25, 30.75 m, and cells begin there. Each one's cells
- * have a metre's square, or 1.25 of it where the square is tilted by 3 to 4. */
+/* Three squares of 4 m face x, y and z; then two rectangles are turned about z by 3 to 4. The faces' common corner is
+ * at 10.5, 20.25, 30.75 m, and cells begin there. A cell has a metre's square, or 1.25 of it on a turned face. */
 static void cells_begin_at_the_scene_s_corner(void **state)
 {
     (void)state;
@@ -163,7 +163,7 @@ static void cells_are_not_too_many(void **state)
     scene_free(scene);
 }
 
-/* 10000 cells are more than a table begins with. They have 1, 2 or 3 points, and come back by that. */
+/* 10000 cells are more than a table begins with. The cells have 1, 2 or 3 points, and come back by that number. */
 static void many_cells_are_all_kept(void **state)
 {
     (void)state;
@@ -188,7 +188,7 @@ static void many_cells_are_all_kept(void **state)
     scene_free(scene);
 }
 
-/* Points without a triangle, and those that are far, take no part. A cell's range is the mean of its points' ranges. One
+/* Points without a triangle, and far points, take no part. A cell's range is the mean of its points' ranges. A range
  * that is not known is in no part of the ranges. */
 static void ranges_of_cells(void **state)
 {

@@ -99,7 +99,7 @@ static void handle(struct rig *rig)
     assert_int_equal(rig->ops->handle(rig->ffs, fds, n, &owner), SH_OK);
 }
 
-/* Runs until it has nothing to do. Then poll(2) waits, and the processor rests. */
+/* Runs until there is nothing to do. From then on poll(2) waits, and the processor rests. */
 static void settle(struct rig *rig)
 {
     for (int calls = 0; calls < 1000; calls++) {

@@ -68,7 +68,7 @@ static int open_port(void **state)
     return open_port_of(state, SOCK_STREAM);
 }
 
-/* A socket of TCP counts what waits in bytes, as a tty does. Its host takes some KiB, and then no more. */
+/* A socket of TCP counts what waits in bytes, as a tty does. The host takes some KiB, and then no more. */
 static int open_port_of_bytes(void **state)
 {
     const int least = 1, much = 1 << 17;
@@ -87,7 +87,7 @@ static int open_port_of_bytes(void **state)
     return open_port_on(state, pair);
 }
 
-/* Here each write is a packet of its own, as it is a request of its own in the kernel's tty. */
+/* On this port each write is a packet of its own, as it is a request of its own in the kernel's tty. */
 static int open_port_of_packets(void **state)
 {
     return open_port_of(state, SOCK_SEQPACKET);
@@ -201,9 +201,9 @@ static void a_slow_client_keeps_its_session(void **state)
     assert_int_equal(client_reads(port, bytes, sizeof bytes), 3); /* nothing else goes before it */
 }
 
-/* A client stops reading while the head goes on writing. Its port counts as closed all the same: what it takes counts, and
- * not what waits. TURNS: what it has already got may be acknowledged between two seconds here, which is no more than
- * once for each of its last two packets. */
+/* A client stops reading while the head goes on writing. The client's port counts as closed all the same: what it takes
+ * counts, and not what waits. TURNS: what it has already got may be acknowledged between two seconds here, which is no
+ * more than once for each of its last two packets. */
 static void writing_is_not_taking(void **state)
 {
     enum { FULL = 65536, TURNS = 6 };

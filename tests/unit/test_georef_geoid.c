@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Heights above a geoid, by a file that the test makes. Its surface rises by a metre a degree of latitude, which the
- * cubic interpolation of GeographicLib reproduces but for rounding. */
+/* Heights above a geoid, by a file that the test makes. The geoid's surface rises by a metre a degree of latitude,
+ * which the cubic interpolation of GeographicLib reproduces but for rounding. */
 #include <stdlib.h>
 #include <unistd.h>
 
@@ -80,7 +80,7 @@ static void test_heights(void **state)
             georef_reverse(above, got, back);
             expect_point(back, d[0], d[1], d[2], TOL_M);
         }
-        /* It is interpolated for each point, so there is no polynomial. */
+        /* The geoid is interpolated for each point, so there is no polynomial. */
         assert_int_equal(georef_set_method(above, GEOREF_ORDER2, &err), SH_EINPUT);
         assert_non_null(strstr(err.text, "geoid"));
         georef_free(above);

@@ -53,7 +53,7 @@ static void test_convergence(void **state)
     expect_near(convergence_rad, sphere, 0.01 * sphere);
     double x_m = 2 * PI / 180 * cos(50 * PI / 180) * 6.38e6;
     expect_near(scale, 0.9996 * (1 + x_m * x_m / 2 / 6.38e6 / 6.38e6), 1e-6);
-    /* It is that of the map: true north goes to the west of the grid's. */
+    /* The convergence is that of the map: true north goes to the west of the grid's. */
     double d[3];
     forward_one(georef, (const double[3]){0, 1, 0}, d);
     expect_near(atan2(d[0], d[1]), -convergence_rad, 1e-8);

@@ -232,7 +232,7 @@ static void numbers_of_metadata(void **state)
     }
 }
 
-/* The value of no data is a number, else there is none. Its text has up to 63 characters. */
+/* The value of no data is a number, else there is none. The value's text has up to 63 characters. */
 static void no_data_values(void **state)
 {
     (void)state;
@@ -325,7 +325,7 @@ static void bounds_of_turned_cells(void **state)
 }
 
 /* A ModelTransformation counts before the other two. Its third row is not used, and each of its numbers but a factor of
- * 1 is reported. Of less than three rows there is nothing to report. */
+ * 1 is reported. With less than three rows there is nothing to report. */
 static void rows_of_a_transformation(void **state)
 {
     (void)state;

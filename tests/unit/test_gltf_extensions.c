@@ -29,7 +29,7 @@ static void required_and_unknown(void **state)
     scene_free(s);
 }
 
-/* They do not change a laser's view: lights, gloss, metadata. */
+/* Lights, gloss and metadata do not change a laser's view. */
 static void required_and_harmless(void **state)
 {
     (void)state;

@@ -102,7 +102,7 @@ static void opacities_of_holes(void **state)
     }
 }
 
-/* Both directions repeat by themselves; without a number they repeat as they are. */
+/* Each direction has its own way to repeat. A direction without a number repeats the image as it is. */
 static void images_repeat(void **state)
 {
     (void)state;

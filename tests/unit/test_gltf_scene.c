@@ -73,8 +73,8 @@ static void the_tree_is_in_double(void **state)
                low, high, 0.0);
 }
 
-/* Positions are floats. One of 2 m is rounded by up to 2 * 2^-24 m, and a scale makes that larger: 100,000 makes it
- * 0.0119 m, and 10,000 0.00119 m. The tolerance is 0.001 m, so both are refused; a scale of 1,000 is not. */
+/* Positions are floats. A position of 2 m is rounded by up to 2 * 2^-24 m. A scale makes the error larger: 100,000
+ * makes it 0.0119 m, and 10,000 0.00119 m. The tolerance is 0.001 m, so both are refused; a scale of 1,000 is not. */
 static void a_coarse_mesh_is_refused(void **state)
 {
     (void)state;
@@ -219,8 +219,9 @@ static void hidden_nodes_are_left_out(void **state)
 
 /* ---- poses */
 
-/* The quad has two joints. Its left corners are on one at x = 10, half as large. Its right corners are on another in a
- * second set, which stands where it was bound. The mesh's own node is far away, and moves nothing. */
+/* The quad has two joints. The quad's left corners are on one at x = 10, half as large. Its right corners are on
+ * another joint in a second set, which stands where it was bound. The mesh's own node is far away, and moves
+ * nothing. */
 static void skins_in_their_default_pose(void **state)
 {
     (void)state;

@@ -283,8 +283,8 @@ static void speed_and_course_are_those_of_the_way(void **state)
     close_receiver(&r);
 }
 
-/* Position packets of a VLP-16 and its settings need no place. Their sentence says V, and not 0 degrees north and
- * east. */
+/* Position packets of a VLP-16 and its settings need no place. The packets' sentence says V, and not 0 degrees north
+ * and east. */
 static void without_a_place_no_fix_is_valid(void **state)
 {
     (void)state;

@@ -193,7 +193,7 @@ static void changes(void **state)
     assert_true(n == e.n && n > 6);
 }
 
-/* One clock reaches a full second as it begins to stand, and one would run backwards. */
+/* The clock reaches a full second as it begins to stand. Later it would run backwards. */
 static void stands_on_a_second(void **state)
 {
     (void)state;

@@ -81,7 +81,7 @@ static void begins_and_ends_at_its_times(void **state)
     fault_board_free(rig.board);
 }
 
-/* They strike pulses 15 to 34 of each scan, ten in a tick. The note names the first hit pulse. */
+/* The fault strikes pulses 15 to 34 of each scan, ten in a tick. The note names the first hit pulse. */
 static void strikes_each_scan_at_its_pulses(void **state)
 {
     (void)state;

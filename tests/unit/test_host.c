@@ -266,7 +266,7 @@ static void test_gps_time(void **state)
     assert_int_equal(f.event, SCANHEAD_EV_PPS);
     assert_int_equal(scanhead_gps_time(sh, 1250000001, &t_s), 0);
     assert_true(fabs(t_s - 5.000000001) < 1e-15);
-    /* The start of this scan was not seen. Its points give its time, here 500 ns after power-up. */
+    /* The start of this scan was not seen. The scan's points give its time, here 500 ns after power-up. */
     put_points(head, 3, 0);
     expect_frame(sh, SCANHEAD_POINTS, &f);
     assert_int_equal(scanhead_gps_time(sh, 7000000000 - 500, &t_s), 0);

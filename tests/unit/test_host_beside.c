@@ -11,7 +11,7 @@ enum { N = 3001, VALUES = 65536 };
 static int16_t amplitude_cdb[N];
 static uint16_t width_cns[N], deviation_1000[N];
 static uint8_t rgb[N][3];
-/* One more than is asked for: it stays 0. */
+/* The last element is one more than is asked for, and stays 0. */
 static struct scanhead_attribute attribute[N + 1];
 static struct scanhead_colour colour[N + 1];
 static double deviation[N + 1];

@@ -160,7 +160,8 @@ static void test_wait(void **state)
     close_head(sh);
 }
 
-/* A head was just plugged in, and udev has not given the permission yet. It is tried again without another event. */
+/* A head was just plugged in, and udev has not given the permission yet. The head is tried again without another
+ * event. */
 static void permit(void)
 {
     bus.device[0].present = 1;

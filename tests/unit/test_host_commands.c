@@ -132,7 +132,7 @@ static void test_command_refused(void **state)
     assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
     assert_non_null(strstr(scanhead_error(sh), "TIME?"));
     assert_int_equal(recv(head, back, sizeof back, 0), 6);
-    /* Its reply comes after the next command was given, and does not count for that one. */
+    /* The earlier command's reply comes after the next one was given, and does not count for the next. */
     struct script s = {
         .fd = head, .expect = "HEAD:PRR?", .identity = "999\r\nMaker,Model,SN1,1.0\r\n", .reply = "12345678\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
@@ -202,7 +202,7 @@ static void test_pty(void **state)
     struct scanhead *sh;
     struct scanhead_frame f;
     assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
-    /* These are bytes that a terminal in its usual mode would change: ^C ^D CR ^S ^V DEL. */
+    /* The text has bytes that a terminal in its usual mode would change: ^C ^D CR ^S ^V DEL. */
     struct native_event e = {.code = 1, .text = "\x03\x04\r\n\x11\x13\x16\x7f"};
     put_all(master, out, native_encode_event(out, sizeof out, &e, 1, 0));
     expect_frame(sh, SCANHEAD_EVENT, &f);

@@ -152,7 +152,7 @@ static void test_late_reply(void **state)
     assert_int_equal(n_noticed, 2);
     expect_notice(1, SCANHEAD_NOTICE_LATE_REPLY, 4 + EVENT + IDENTITY + 2, 0, 2);
     assert_int_equal(noticed_stats.late_replies, 2);
-    /* Both have come, so this one was not asked for. */
+    /* Both replies have come, so this line was not asked for. */
     put_all(head, "5\r\n", 3);
     assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ETIMEOUT);
     assert_int_equal(n_noticed, 3);

@@ -129,7 +129,8 @@ static void test_reattach(void **state)
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_int_equal(n_noticed, 4);
     expect_notice(3, SCANHEAD_NOTICE_GAP, EVENT + EVENT / 2, 101, 2);
-    /* It is left while frames are on their way. They come first, and the head that has started again after them. */
+    /* The connection is left while frames are on their way. The frames come first, and the restarted head's after
+     * them. */
     put_numbered(head, 104);
     assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     uint8_t rest[3 * EVENT];

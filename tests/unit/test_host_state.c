@@ -174,8 +174,8 @@ static void test_rings(void **state)
     scanhead_close(sh);
 }
 
-/* Losses that the head tells. Both events count the same lost pulses. A reader's count begins anew with a new
- * connection. */
+/* Losses that the head reports. The events OVERRUN and SCAN_END count the same lost pulses. A reader's count begins
+ * anew with a new connection. */
 static void test_losses(void **state)
 {
     (void)state;
@@ -204,7 +204,7 @@ static void test_losses(void **state)
     scanhead_close(sh);
 }
 
-/* An anchor with a limit holds for points before it. Those of the rig are 1 ms after the scan's start. */
+/* An anchor with a limit holds for points before it. The rig's points are 1 ms after the scan's start. */
 static void test_anchor_ends(void **state)
 {
     (void)state;

@@ -109,8 +109,8 @@ static void test_errors_without_end(void **state)
     expect_lost(sh);
 }
 
-/* Another program resets the bus. The kernel ends all transfers as if the device had gone, but it still answers. That
- * is not an unplugging: earlier frames are there, and a new session goes on with the same head. */
+/* Another program resets the bus. The kernel ends all transfers as if the device had gone, but it still answers. A
+ * reset is not an unplugging: earlier frames are there, and a new session goes on with the same head. */
 static void bus_resets(enum libusb_transfer_status status)
 {
     struct scanhead_frame frame;
@@ -185,7 +185,7 @@ static void ask(struct scanhead *sh)
     ask_after(sh, "");
 }
 
-/* The write fails after it was submitted. That command gets no reply, and the next one is sent. */
+/* The write fails after it was submitted. The written command gets no reply, and the next one is sent. */
 static void test_write_fails(void **state)
 {
     static const enum libusb_transfer_status failures[] = {LIBUSB_TRANSFER_ERROR, LIBUSB_TRANSFER_STALL};

@@ -139,7 +139,7 @@ static void test_geo(void **state)
     scanhead_close(sh);
 }
 
-/* Windows of many samples take several frames. One that is lost doesn't matter to the others; lost points do, also
+/* Windows of many samples take several frames. A lost frame doesn't matter to the others; lost points do, also
  * where the same pulses came before them. */
 static void test_lost(void **state)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Broken files of the formats that Assimp reads. Small models have bytes changed, lines deleted or doubled, numbers
- * made huge, records of another type, or are cut off. Each either gives a scene or one line that names the error. This
- * process neither dies nor hangs, whatever happens to Assimp's.
+ * made huge, records of another type, or are cut off. Each file either gives a scene or one line that names the error.
+ * This process neither dies nor hangs, whatever happens to Assimp's.
  *
  * HOSTILE_EVERY: only every so many of the 600 files are tried (default 1, with sanitizers 10; make test-hostile:
  * 1). */
@@ -116,7 +116,7 @@ static bool is_in(char c, const char *set)
     return c != '\0' && strchr(set, c) != NULL;
 }
 
-/* Finds the next run of characters of a set, from some place on. It has 0 bytes where there is none. */
+/* Finds the next run of characters of a set, from some place on. The run has 0 bytes where there is none. */
 static size_t find_run(const struct file *f, struct draw *d, const char *set, size_t *at)
 {
     size_t from = below(d, f->n), len = 0;

@@ -144,7 +144,7 @@ static void refused(const char *says)
     ifc_bodies_free(&bodies);
 }
 
-/* It may end nowhere but at its end, and nothing may follow. */
+/* A result may end nowhere but at its own end, and nothing may follow. */
 static void results_that_are_cut(void **state)
 {
     (void)state;

@@ -63,8 +63,8 @@ static void measure(size_t product, double *area, double *volume)
 }
 
 /* A regular polygon of n sides within a circle has sin(2 x) / (2 x) of its area, for x = pi / n: 2 x^2 / 3 less. A
- * sphere is divided in two directions. Its meridian lies x^2 R / 3 outside of its chords on average, which is x^2 of
- * the volume. Together that is 2.5 times as much. */
+ * sphere is divided in two directions. The sphere's meridian lies x^2 R / 3 outside of its chords on average, which is
+ * x^2 of the volume. Together that is 2.5 times as much. */
 static double facets_share(double circle_m, int sides)
 {
     if (circle_m == 0.0) return 1e-6;
@@ -92,7 +92,8 @@ static void shapes_have_their_area_and_volume(void **state)
     (void)state;
     needs_readers();
     check_shapes(1, 23);
-    /* web-ifc makes its corners sharp, 4.8 % too much. Both are closed, and it is named. */
+    /* web-ifc makes the rounded body's corners sharp, 4.8 % too much. Both readers' bodies are closed, and the product
+     * is named. */
     if (strstr(warnings, "'rounded' guid_of_product__00027") == NULL) fail_msg("%s", warnings);
     /* ifc-lite has no cones */
     if (strstr(warnings, "'cone'") == NULL) fail_msg("%s", warnings);

@@ -202,8 +202,8 @@ static void a_map_conversion(void **state)
     } good[] = {
         /* The system gives its unit. */
         {"2000.5,1000.25,30.,0.,1.,0.001", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},
-        /* It doesn't: Scale leads from millimetres to metres, or to the model's own millimetres. A grid's own scale of
-         * 0.9996 changes nothing. */
+        /* The system gives no unit: Scale leads from millimetres to metres, or to the model's own millimetres. A grid's
+         * own scale of 0.9996 changes nothing. */
         {"2000.5,1000.25,30.,$,$,0.001", "'EPSG:2056',$,$,$,$,$,$", 2000.5, 0.0},
         {"2000.5,1000.25,30.,1.,-1.,0.0009996", "'EPSG:2056',$,$,$,$,$,$", 2000.5, -M_PI / 4},
         {"2000.5,1000.25,30.,0.,1.,0.0009996", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},
@@ -222,7 +222,7 @@ static void a_map_conversion(void **state)
     }
     assert_loads(load_map("1.,2.,$,1.,0.,0.001", "'EPSG:2056',$,$,$,$,$,$"));
     assert_true(isnan(site.map.height_m));
-    /* It needs no site. */
+    /* A map conversion needs no place of the site. */
     assert_loads(load_edited("(52,31,30,500000),(13,24,0),34500.,$,$);",
                              "$,$,$,$,$);\n#20= IFCMAPCONVERSION(#5,#21,1.,2.,3.,$,$,0.001);\n"
                              "#21= IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,$);"));

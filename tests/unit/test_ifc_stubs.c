@@ -190,8 +190,8 @@ static void facets_of_ifc_lite_are_said(void **state)
     }
 }
 
-/* web-ifc never ends by itself on some broken files. It is ended 10 s after the other reader has ended, or with the
- * limit. */
+/* web-ifc never ends by itself on some broken files. web-ifc is ended 10 s after the other reader has ended, or with
+ * the limit. */
 static void reader_that_hangs_is_ended(void **state)
 {
     (void)state;
@@ -212,7 +212,7 @@ static void reader_that_hangs_is_ended(void **state)
     if (strstr(err.text, "did not read it within 1 s") == NULL) fail_msg("%s", err.text);
 }
 
-/* Then Assimp reads it. Its mistakes are errors, unless it was asked for. */
+/* Without node Assimp reads the file. Assimp's mistakes are errors, unless Assimp was asked for. */
 static void without_node_assimp_reads(void **state)
 {
     (void)state;

@@ -142,7 +142,7 @@ static void warnings_are_counted(void **state)
     assert_string_equal(warnings, "many.dae: a reader gave 1003 warnings; the first 1000 are shown");
 }
 
-/* A program may be started so. Then there is no status of the child, and its output counts. */
+/* A program may be started with SIGCHLD ignored. The child then has no status, and its output counts. */
 static void signal_of_children_may_be_ignored(void **state)
 {
     (void)state;

@@ -36,7 +36,8 @@ static size_t make_png(uint8_t *png, size_t room)
     return size;
 }
 
-/* Writes a square of two triangles. Its second set of coordinates has the image, the first is all in one point. */
+/* Writes a square of two triangles. The square's second set of coordinates has the image, the first is all in one
+ * point. */
 static void write_gltf(const char *material, const char *lay)
 {
     static const float p[4][3] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, zero[4][2];

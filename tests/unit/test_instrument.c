@@ -96,7 +96,7 @@ static void tilts_follow_spherical_trigonometry(void **state)
     }
 }
 
-/* Both are applied: the beam on its cone about the mirror's axis (x), then all of it turned about y, with lengths
+/* Both tilts are applied: the beam on its cone about the mirror's axis (x), then all of it turned about y, with lengths
  * kept. */
 static void tilts_add_up(void **state)
 {
@@ -234,7 +234,7 @@ static void angle_noise_is_the_beams(void **state)
 }
 
 /* Through the caster: the range of each beam is that of its own way through the room, in both layouts and with the head
- * moving. Its angles are the encoders'. Counts are 10 um. */
+ * moving. A shot's angles are the encoders'. Counts are 10 um. */
 static void the_caster_sends_beams_where_they_go(void **state)
 {
     (void)state;

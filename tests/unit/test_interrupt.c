@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Signals of the command line. One asks for an end in good order, and so do two at once; more ask for an end at
+/* Signals of the command line. One signal asks for an end in good order, and so do two at once; more ask for an end at
  * once. */
 #include <setjmp.h>
 #include <signal.h>

@@ -126,7 +126,7 @@ static void test_records(void **state)
     assert_int_equal(rig_uint(p + 3 * POINT + 18, 2), 15000);
 }
 
-/* A second station counts from the first one's anchor. One beyond the reach of 32 bits is refused. */
+/* A second station counts from the first one's anchor. A station beyond the reach of 32 bits is refused. */
 static void test_stations(void **state)
 {
     (void)state;
@@ -150,7 +150,8 @@ static void test_stations(void **state)
     assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, 1, &err), SH_EFORMAT);
     assert_non_null(strstr(err.text, "station 2"));
     assert_non_null(strstr(err.text, "output.scale_m"));
-    /* It is kept all the same: the file holds the points so far, with two of the second station, 3 m nearer. */
+    /* The recording is kept all the same: the file holds the points so far, with two of the second station, 3 m
+     * nearer. */
     assert_int_equal(rig_record(rig_path("a.las"), (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err), SH_EFORMAT);
     free(las);
     las = rig_take("a.las", &las_len);

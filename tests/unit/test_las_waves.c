@@ -269,7 +269,7 @@ static void test_utm(void **state)
     check_geo(&a, (double[]){0.6 * 0.9996, 0.8 * 0.9996, 0}, (double[]){1e-3, 1e-3, 1e-3});
 }
 
-/* These are about the degrees of a metre at 45 north. */
+/* The divisors are about the metres of a degree at 45 north. */
 static void test_geodetic(void **state)
 {
     (void)state;

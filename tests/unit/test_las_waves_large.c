@@ -36,8 +36,9 @@ static void test_large(void **state)
     assert_int_equal(access(rig_path("a.wdp.part"), F_OK), -1);
 }
 
-/* The first 128 lengths have kinds of their own. Those after them are rounded up to four an octave, so the kinds of all
- * lengths up to 600 are 128 and 160, 192, 224, 256, 320, 384, 448, 512, 640. Samples without light fill the rest. */
+/* The first 128 lengths have kinds of their own. Lengths after them are rounded up to four an octave. The kinds of all
+ * lengths up to 600 are thus 128 and 160, 192, 224, 256, 320, 384, 448, 512, 640. Samples without light fill the
+ * rest. */
 static void test_kinds(void **state)
 {
     (void)state;

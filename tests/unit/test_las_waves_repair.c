@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A kill or a full disk leaves a LAS file with waveforms cut anywhere. Its repair keeps whole points and whole
- * packets. Points without theirs say so. */
+/* A kill or a full disk leaves a LAS file with waveforms cut anywhere. The repair keeps whole points and whole packets.
+ * Points without their packets say so. */
 #include <sys/stat.h>
 
 #include "tests/unit/repair_rig.h"

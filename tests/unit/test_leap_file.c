@@ -10,7 +10,7 @@
 
 static char list[4096]; /* the file's text; empty: the system's own */
 
-/* It takes the place of the C library's. */
+/* This fopen takes the place of the C library's. */
 FILE *fopen(const char *path, const char *mode)
 {
     FILE *(*next)(const char *, const char *) = NULL;

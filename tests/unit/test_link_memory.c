@@ -28,7 +28,7 @@ static struct bench open_memory(struct link_memory *memory)
     return bench;
 }
 
-/* The client gets the owner's own bytes. They count as written once the client has let the owner work again. */
+/* The client gets the owner's own bytes. The bytes count as written once the client has let the owner work again. */
 static void a_write_is_read_where_it_lies(void **state)
 {
     (void)state;
@@ -53,7 +53,7 @@ static void a_write_is_read_where_it_lies(void **state)
     bench_close(&bench);
 }
 
-/* Bytes that are lent count as written at once, while there is room. They come in order, before a write. */
+/* Bytes that are lent count as written at once, while there is room. Lent bytes come in order, before a write. */
 static void pieces_come_in_their_order(void **state)
 {
     (void)state;

@@ -269,7 +269,8 @@ static void test_cut_off_unwatched(void **state)
     bench_close(&bench);
 }
 
-/* The system has no other terminal for a client that is to be cut off. It keeps its own, and its session. */
+/* The system has no other terminal for a client that is to be cut off. The client keeps its own terminal, and its
+ * session. */
 static void test_cut_off_without_another_terminal(void **state)
 {
     (void)state;

@@ -74,8 +74,8 @@ static void check(const struct link_spec *spec, int impatient)
     bench_close(&bench);
 }
 
-/* One after the other finds no descriptor. Each is turned away and reported, and none is left to wake the link
- * again. */
+/* One client after the other finds no descriptor. Each client is turned away and reported, and none is left to wake the
+ * link again. */
 static void starve(const struct link_spec *spec)
 {
     enum { CLIENTS = 5, HOGS = 64 };

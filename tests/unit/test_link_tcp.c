@@ -51,7 +51,7 @@ static void test_tcp_endings(void **state)
     struct link_spec spec = {.type = LINK_TCP, .max_sessions = 1};
     struct bench bench = bench_open(&spec);
     char byte;
-    /* It is half closed, with a byte still to read. */
+    /* The connection is half closed, with a byte still to read. */
     int fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     assert_int_equal(write(fd, "q", 1), 1);
@@ -80,12 +80,12 @@ static void test_tcp_endings(void **state)
     bench_expect(&bench, LINK_CLOSED, 0);
     bench_expect(&bench, LINK_OPENED, 0);
     exchange(&bench, 0, fd);
-    /* It is closed, which shows by the first byte that is written to it. */
+    /* The connection is closed, which shows by the first byte that is written to it. */
     close(fd);
     bench_expect(&bench, LINK_SHUT, 0);
     assert_int_equal(bench.ops->write(bench.link, 0, "x", 1), 1);
     bench_expect(&bench, LINK_CLOSED, 0);
-    /* It is reset, while frames are on their way. */
+    /* The connection is reset, while frames are on their way. */
     fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     bench_fill(&bench, 0);
@@ -93,7 +93,7 @@ static void test_tcp_endings(void **state)
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
     close(fd);
     bench_expect(&bench, LINK_CLOSED, 1);
-    /* write notices it before poll does. */
+    /* write notices a reset before poll does. */
     fd = dial(bench_port(&bench));
     bench_expect(&bench, LINK_OPENED, 0);
     setsockopt(fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);

@@ -189,8 +189,8 @@ static void expect_from(int fd, const char *address, int port, int ttl)
     assert_int_equal(had, ttl);
 }
 
-/* Two heads on one machine send from a port that their receiver has, too. It tells them apart by address, and gets all
- * their datagrams. None of them, and none of others', come back to the heads. */
+/* Two heads on one machine send from a port that their receiver has, too. The receiver tells the heads apart by
+ * address, and gets all their datagrams. No datagrams, theirs or others', come back to the heads. */
 static void sources_share_their_port(void **state)
 {
     (void)state;
@@ -227,8 +227,8 @@ static void sources_share_their_port(void **state)
     close(fd);
 }
 
-/* Another program has the port for itself. That is reported once where the port was not asked for; else the link is
- * refused. The place of its receiver is no source. */
+/* Another program has the port for itself. The taken port is reported once where it was not asked for; else the link is
+ * refused. The receiver's own place is no source. */
 static void a_source_port_that_is_taken(void **state)
 {
     (void)state;

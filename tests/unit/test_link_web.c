@@ -153,7 +153,7 @@ static void test_refused_names(void **state)
     bench_close(&bench);
 }
 
-/* The descriptors run out before a request is whole. Its client gets the reason, and is reported. */
+/* The descriptors run out before a request is whole. The request's client gets the reason, and is reported. */
 static void test_descriptors_run_out(void **state)
 {
     (void)state;
@@ -259,7 +259,7 @@ static void test_session(void **state)
     bench_close(&bench);
 }
 
-/* The client runs in a thread of its own. It takes all until the link says goodbye, and answers that. */
+/* The client runs in a thread of its own. The client takes all until the link says goodbye, and answers the goodbye. */
 struct taker {
     int fd;
     uint8_t bytes[300000];
@@ -276,7 +276,7 @@ static void *take_all(void *ctx)
     return NULL;
 }
 
-/* Bytes that were written before the end arrive whole. Then the reason for the end comes. */
+/* Bytes that were written before the end arrive whole. After them the reason for the end comes. */
 static void test_goodbye(void **state)
 {
     (void)state;

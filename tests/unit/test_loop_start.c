@@ -16,7 +16,7 @@
 
 static int n_created, refused; /* threads since the start, and the one that the system refuses, from 1 on; 0: none */
 
-/* It takes the place of the C library's. */
+/* This pthread_create takes the place of the C library's. */
 int pthread_create(pthread_t *thread, const pthread_attr_t *attr, void *(*begin)(void *), void *arg)
 {
     int (*next)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *) = NULL;

@@ -46,8 +46,8 @@ static uint32_t check_labels(const struct map_label *label, uint32_t n, const do
     return placed;
 }
 
-/* A thin line leads to each label that is more than 22.5 pixels away from its station. It begins 14 pixels from the
- * station, beyond its mark, and ends where the label is nearest. */
+/* A thin line leads to each label that is more than 22.5 pixels away from its station. The line begins 14 pixels from
+ * the station, beyond its mark, and ends where the label is nearest. */
 static void check_lines(const struct map *map, const struct map_label *label, uint32_t n, const double (*place_px)[2])
 {
     struct sh_err err = {0, ""};
@@ -165,8 +165,8 @@ static void test_borders(void **state)
     }
 }
 
-/* The first place is to the right. There the tick of a station that looks east would be covered, so its name is to the
- * left. Without a tick, or with one that looks elsewhere, it stays to the right. */
+/* The first place is to the right. A name there would cover the tick of a station that looks east, so that name is to
+ * the left. Without a tick, or with one that looks elsewhere, the name stays to the right. */
 static void test_ticks(void **state)
 {
     (void)state;

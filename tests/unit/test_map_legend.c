@@ -92,7 +92,8 @@ static void few_strays_change_no_hues(void **state)
     }
 }
 
-/* The bar is the longest of 1, 2, 5 x 10^n metres in 240 pixels. Its label has the unit and the digits that it needs. */
+/* The bar is the longest of 1, 2, 5 x 10^n metres in 240 pixels. The bar's label has the unit and the digits that it
+ * needs. */
 static void scale_says_its_length(void **state)
 {
     (void)state;

@@ -9,8 +9,8 @@
 #include "core/studio/picture.h"
 #include "tests/unit/scene_files.h"
 
-/* A sheet of four triangles in two parts. Its coordinates all differ, so that a swapped axis shows. They are multiples
- * of 1/64, which float holds exactly. */
+/* A sheet of four triangles in two parts. The sheet's coordinates all differ, so that a swapped axis shows. They are
+ * multiples of 1/64, which float holds exactly. */
 enum { N_VERTICES = 7, N_FACES = 4 };
 static const double xyz[N_VERTICES][3] = {{1, 2, 3},       {2.5, 2.125, 3.25}, {2.75, 4, 3.5}, {1.25, 4.5, 3.75},
                                           {-7, 0.5, 1.75}, {-6, 0.75, 2},      {-6.5, 2, 9}};
@@ -214,7 +214,8 @@ static void points_alone(void **state)
     assert_true(mesh_takes_points("x.ply") && mesh_takes_points("x.obj") && !mesh_takes_points("x.fbx"));
 }
 
-/* A long file is written past the system's cache, in whole buffers. Its end holds the vertices as they were given. */
+/* A long file is written past the system's cache, in whole buffers. The file's end holds the vertices as they were
+ * given. */
 static void long_file(void **state)
 {
     enum { MANY = 700000, ROW = 24, AT_ONCE = 1000 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of attributes and of colours, byte by byte. They are sent after their points, cut with them, and refused where
- * they are wrong. */
+/* Frames of attributes and of colours, byte by byte. The frames are sent after their points, cut with them, and refused
+ * where they are wrong. */
 #include "tests/unit/native_rig.h"
 
 enum { MOST = 2 * NATIVE_MAX_POINTS + 100 };
@@ -129,7 +129,7 @@ static void test_attributes(void **state)
     check_refused(&attributes, &block, POINTS_LEN);
 }
 
-/* They come after their points' attributes. */
+/* Colours come after their points' attributes. */
 static void test_colours(void **state)
 {
     (void)state;

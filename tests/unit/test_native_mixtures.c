@@ -100,7 +100,7 @@ static void put_cut(int frame)
     put(frame, len < NATIVE_HEADER_LEN ? NOISE : CUT_IN_PAYLOAD, frame_bytes[frame], len);
 }
 
-/* Frames on their way, each with a time to go. They wait longer than their turn: the copies and the delayed. */
+/* Frames on their way, each with a time to go. The waiting frames are the copies and the delayed ones. */
 static struct {
     int frame, left;
 } waiting[2 * N_FRAMES];

@@ -121,7 +121,8 @@ static void test_long_gaps(void **state)
     expect(0, NATIVE_NO_NOTICE, 0, 1);
     expect(NATIVE_GAP_MOST + 1, NATIVE_GAP, 1, NATIVE_GAP_MOST);
     expect(1, NATIVE_LATE, 1, 1);
-    /* It is too long to wait for. A number within it begins another sequence, and none of its frames is dropped. */
+    /* The gap is too long to wait for. A number within it begins another sequence, and none of its frames is
+     * dropped. */
     expect(2 * NATIVE_GAP_MOST + 3, NATIVE_GAP, NATIVE_GAP_MOST + 2, NATIVE_GAP_MOST + 1);
     for (uint32_t seq = NATIVE_GAP_MOST + 5; seq < NATIVE_GAP_MOST + 400; seq++)
         expect(seq, seq == NATIVE_GAP_MOST + 5 ? NATIVE_RESTARTED : NATIVE_NO_NOTICE, seq, 1);
@@ -132,7 +133,7 @@ static void test_long_gaps(void **state)
     expect(1, NATIVE_RESTARTED, 1, 1);
 }
 
-/* A head started again, and its numbers were all missing. It is dropped only for a while. */
+/* A head started again, and its numbers were all missing. The head's frames are dropped only for a while. */
 static void test_late_run(void **state)
 {
     (void)state;
@@ -157,7 +158,7 @@ static void test_late_run(void **state)
 static void test_resumed(void **state)
 {
     (void)state;
-    /* It is the same head. Missed frames are a gap, and a frame of an older gap may still come. */
+    /* The head is the same as before. Missed frames are a gap, and a frame of an older gap may still come. */
     memset(&sequence, 0, sizeof sequence);
     expect(5, NATIVE_NO_NOTICE, 5, 1);
     expect(8, NATIVE_GAP, 6, 2);
@@ -176,7 +177,7 @@ static void test_resumed(void **state)
         expect(seq, NATIVE_NO_NOTICE, seq, 1);
     native_sequence_resume(&sequence);
     expect(7, NATIVE_RESTARTED, 7, 1);
-    /* It is not late either, though its number was missing. */
+    /* A restarted head's first frame is not late either, though its number was missing. */
     expect(9, NATIVE_GAP, 8, 1);
     native_sequence_resume(&sequence);
     expect(8, NATIVE_RESTARTED, 8, 1);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* These tests compare frames of waveforms byte by byte. They are sent after their points, attributes and colours,
+/* These tests compare frames of waveforms byte by byte. The frames are sent after their points, attributes and colours,
  * cut with them, and refused where they are wrong. Deviations are behind the attributes. */
 #include "drivers/protocol/native_waves.h"
 #include "tests/unit/native_rig.h"

@@ -36,7 +36,7 @@ static void act(void (**fn)(void))
     if (now != NULL) now();
 }
 
-/* It takes the place of libc's. */
+/* This flock takes the place of libc's. */
 int flock(int fd, int operation)
 {
     act(&before_lock);

@@ -25,7 +25,7 @@ static struct sh_err err;
 static void (*before_lock)(void);
 static int has_locks = 1;
 
-/* It takes the place of libc's. */
+/* This flock takes the place of libc's. */
 int flock(int fd, int operation)
 {
     void (*now)(void) = before_lock;

@@ -18,7 +18,7 @@ static void open_rig(int64_t t_ns)
     rig.ops->open(rig.protocol, t_ns);
 }
 
-/* There is a fix each second. Its sentences come once its time has passed, as one unit, and each once. */
+/* There is a fix each second. A fix's sentences come once its time has passed, as one unit, and each once. */
 static void each_fix_once_and_after_its_time(void **state)
 {
     (void)state;
@@ -53,7 +53,7 @@ static void from_the_session_s_begin_on(void **state)
     protocol_rig_close(&rig);
 }
 
-/* It takes no commands: received bytes are counted, and get no answer. */
+/* The protocol takes no commands: received bytes are counted, and get no answer. */
 static void what_comes_is_counted(void **state)
 {
     (void)state;

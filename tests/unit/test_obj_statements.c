@@ -185,7 +185,7 @@ static void lines_of_errors(void **state)
         refuse("a.obj", row[i].text, strlen(row[i].text), row[i].says);
 }
 
-/* A polygon has up to 65536 corners. One more is refused, with its line. */
+/* A polygon has up to 65536 corners. One corner more is refused, with its line. */
 static void corners_of_a_polygon(void **state)
 {
     (void)state;

@@ -224,8 +224,8 @@ static void nothing_asked_for_changes_nothing(void **state)
     close_optics(&o);
 }
 
-/* A room whose ceiling and more is out of range. Those shots keep their scheduled angles and a range of 0 to the bit,
- * with any noise; the others don't. */
+/* A room whose ceiling and more is out of range. Shots without echo keep their scheduled angles and a range of 0 to the
+ * bit, with any noise; the others don't. */
 static void noise_never_touches_empty_shots(void **state)
 {
     (void)state;

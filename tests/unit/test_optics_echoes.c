@@ -4,7 +4,8 @@
 #include "tests/unit/optics_rig.h"
 
 /* A mirror is ahead, a pane behind the head, and a wall behind that. Pane and wall, seen in the mirror, are both
- * ghosts, and are no hits. Seen directly they are none. Their ranges are those of the folded way. */
+ * ghosts, and are no hits. Seen directly, pane and wall are no ghosts. The ranges of ghosts are those of the folded
+ * way. */
 static void glass_in_a_mirror(void **state)
 {
     (void)state;
@@ -98,8 +99,8 @@ static void echoes_have_their_own_noise(void **state)
     close_optics(&o);
 }
 
-/* An echo that does not fit into 31 bits of counts is dropped and counted. Here the wall does not fit, while the pane's
- * two sides do and are numbered as two. If no echo fits, one entry stays, without echo. */
+/* An echo that does not fit into 31 bits of counts is dropped and counted. In this test the wall does not fit, while
+ * the pane's two sides do and are numbered as two. If no echo fits, one entry stays, without echo. */
 static void echoes_that_do_not_fit(void **state)
 {
     (void)state;

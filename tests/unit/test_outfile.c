@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* drivers/record/outfile.h: beyond DIRECT_FROM a file is written past the system's cache, in whole blocks. Its
- * bytes are the given ones, in any pieces, and on any file system. Files begin with a hole up to there, so that the
- * tests cost little. */
+/* drivers/record/outfile.h: beyond DIRECT_FROM a file is written past the system's cache, in whole blocks. The file's
+ * bytes are the given ones, in any pieces, and on any file system. Files begin with a hole up to DIRECT_FROM, so that
+ * the tests cost little. */
 #include <errno.h>
 #include <fcntl.h>
 #include <setjmp.h>

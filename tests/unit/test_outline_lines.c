@@ -199,7 +199,7 @@ static void expect_line(const struct beam *beam, const struct beam_sight *sight,
         fail_msg("%g %g instead of %g %g", line->n[0], line->n[1], n[0], n[1]);
 }
 
-/* Lines come nearest first. Those beyond the limit are not given, but next_m says where they begin. */
+/* Lines come nearest first. Lines beyond the limit are not given, but next_m says where they begin. */
 static void lines_across_a_footprint(void **state)
 {
     (void)state;
@@ -217,7 +217,7 @@ static void lines_across_a_footprint(void **state)
         for (int k = 0; k < most; k++)
             expect_line(&beam, &sight, &line[k], x_m[order[k]], y_m[order[k]]);
         if (most == 3) break;
-        /* It is the edge's own distance, but for a share of 1e-5. */
+        /* next_m is the edge's own distance, but for a share of 1e-5. */
         const double next_edge_m = hypot(x_m[order[most]], y_m[order[most]]);
         assert_true(next_m <= next_edge_m && next_m > next_edge_m * 0.99999);
     }
@@ -287,7 +287,7 @@ static void edges_out_of_reach(void **state)
 }
 
 /* An edge goes by from the right, 5 m ahead, to the left, 15 m ahead. It crosses the axis at 10 m, and the footprint of
- * 0.1 m from 9.83 to 10.17 m. So up to 9.6 m nothing crosses it, although the edge is nearer beside it. */
+ * 0.1 m from 9.83 to 10.17 m. Up to 9.6 m nothing crosses the footprint, although the edge is nearer beside it. */
 static void an_edge_that_crosses_far_away(void **state)
 {
     (void)state;
@@ -310,8 +310,8 @@ static void an_edge_that_crosses_far_away(void **state)
     beam_outlines_free(o);
 }
 
-/* An edge with a triangle on each side is no outline, unless one kind of surface ends there. One with both triangles on
- * one side is: beyond it something else is seen. Corners at the same place are one. */
+/* An edge with a triangle on each side is no outline, unless one kind of surface ends there. An edge with both
+ * triangles on one side is an outline: beyond it something else is seen. Corners at the same place are one. */
 static void triangles_on_both_sides(void **state)
 {
     (void)state;

@@ -13,8 +13,8 @@
 enum { MAX_TICKS = 400 };
 static const int64_t MS = 1000000, NEVER = INT64_MAX / 4;
 
-/* One pacing thread, and one caster that is at most ahead_ticks ahead and takes cast_ns for a tick. Both stand still
- * for still_ns from still_at_ns on. */
+/* One pacing thread, and one caster that is at most ahead_ticks ahead and takes cast_ns for a tick. Thread and caster
+ * stand still for still_ns from still_at_ns on. */
 struct machine {
     struct pace pace;
     struct device_counters counters;
@@ -155,7 +155,7 @@ static void late_ticks_are_counted(void **state)
 }
 
 /* The machine stands still for 300 ms. A head with one tick ahead gains 9 ms on each of the next 10 ms, as its caster
- * takes 1 ms. It has caught up after ceil(300 / 9) ticks and the one that was waited for. */
+ * takes 1 ms. The head has caught up after ceil(300 / 9) ticks and the one that was waited for. */
 static void a_stall_is_caught_up(void **state)
 {
     (void)state;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The pacing thread allocates nothing, takes no lock, and calls the system only for the clock, the semaphores of
- * sleeping threads, and wake-ups. It is watched (pacing_rig.h) while a head with several links, clients, faults and a
- * hash works. The head starts and stops scans, changes its rate so that slots grow, is late and catches up again. */
+ * sleeping threads, and wake-ups. The thread is watched (pacing_rig.h) while a head with several links, clients, faults
+ * and a hash works. The head starts and stops scans, changes its rate so that slots grow, is late and catches up
+ * again. */
 #include "tests/unit/pacing_rig.h"
 
 #ifndef SH_SANITIZE
@@ -45,7 +46,7 @@ static void start(struct run *run, const char *const *sets, int n_sets, double d
 /* The run's own end is far away, and its clients end it. */
 enum { ENDLESS_S = 3600 };
 
-/* Between two beats clients of the run act, every 5 ms at most. A beat that returns 0 ends the run. It gives up after
+/* Between two beats clients of the run act, every 5 ms at most. A beat that returns 0 ends the run. The run fails after
  * minutes. */
 static void finish(struct run *run, int (*beat)(struct run *run, int turn))
 {
@@ -226,8 +227,8 @@ static void say(struct run *run, const char *line)
     (void)!write(client[0], line, strlen(line));
 }
 
-/* The head has booted after 0.2 s: 40 turns. It goes on until all lines are sent, two scans have begun, and the pacing
- * thread has stood still. */
+/* The head has booted after 0.2 s: 40 turns. The run goes on until all lines are sent, two scans have begun, and the
+ * pacing thread has stood still. */
 static int use(struct run *run, int turn)
 {
     static const char *const said[] = {"HEAD:PRR MAX\n",   "SCAN:STOP\n", "HEAD:STATE?\n", "SCAN:START\n",

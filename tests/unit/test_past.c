@@ -40,7 +40,7 @@ static void give(struct past *past, int type, int flags, uint32_t seq, uint32_t 
     past_take(past, &frame, 7);
 }
 
-/* Gives a scan: the frames that place its points, then so many frames of them. Their numbers go on from *seq. */
+/* Gives a scan: the frames that place its points, then so many frames of them. The frames' numbers go on from *seq. */
 static void give_scan(struct past *past, uint32_t *seq, uint32_t frames, uint8_t mark)
 {
     give(past, SCANHEAD_DESCRIPTOR, 0, (*seq)++, 0, mark);

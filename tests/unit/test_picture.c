@@ -142,7 +142,7 @@ static struct extent extent_of(const struct picture *p)
     return e;
 }
 
-/* Capitals are 28 pixels high. Then strokes are 0.11 of it wide, 3.08, and their border is a pixel wide. So ink goes
+/* Capitals are 28 pixels high. Strokes are 0.11 of that height wide, 3.08, and their border is a pixel wide. Ink goes
  * 1.54 + 0.5 pixels beyond a stroke's end. */
 static const struct picture_type TALL = {28, 0, 0};
 

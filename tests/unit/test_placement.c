@@ -337,8 +337,8 @@ static void the_house_has_its_site(void **state)
     }
 }
 
-/* Makes a slab of 8 x 8 m. Its x axis points 30 deg to the left of grid east. Scene and grid agree but for the grid's
- * scale. */
+/* Makes a slab of 8 x 8 m. The slab's x axis points 30 deg to the left of grid east. Scene and grid agree but for the
+ * grid's scale. */
 static const char mapped_ifc[] =
     "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('a','2026-01-01T00:00:00',(''),(''),'','','');\n"
     "FILE_SCHEMA(('IFC4'));\nENDSEC;\nDATA;\n#1=IFCPERSON($,'a',$,$,$,$,$,$);\n"

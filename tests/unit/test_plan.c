@@ -183,7 +183,7 @@ static void test_sight_packets(void **state)
 }
 
 /* A map saves the cost of the BVH, and costs its own look-up, by the kinds of cells that pulses go to (core/plan/cost.h).
- * Its making is shared by all pulses: 60 ns for each cell of several triangles, and what triangles cost. */
+ * The map's making is shared by all pulses: 60 ns for each cell of several triangles, and what triangles cost. */
 static void test_sight_costs(void **state)
 {
     (void)state;

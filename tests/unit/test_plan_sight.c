@@ -58,9 +58,8 @@ static void cells_of_each_kind(void **state)
         near_share(found.nothing, quarter);
         assert_true(found.ask == 0.0 && found.small == 0.0);
         assert_true(fabs(found.few + found.one + found.nothing - 1.0) < 1e-12);
-        /* The first has 20,000 m2 at 20 m, the second 5,000: of rays in all directions 3.979 and 0.995 times as many
-         * as these would come to them. A pulse of an empty place hits none. These
-         * shares scatter by 3 %. */
+        /* The first face has 20,000 m2 at 20 m, the second 5,000: 3.979 and 0.995 times the sphere of 20 m. A pulse of
+         * an empty place hits none. The shares scatter by 3 %. */
         const double whole_m2 = 4.0 * M_PI * 400.0, want = (0.5 * whole_m2 / 20000.0 + 0.25 * whole_m2 / 5000.0) / 1e12;
         assert_true(fabs(found.per_pulse - want) < 0.15 * want);
         assert_true(found.examined == 2.0);

@@ -198,7 +198,7 @@ static void shots_without_echo(void **state)
         assert_int_equal(scan.whole->n[i], i % 2);
 }
 
-/* Any one frame of a turn is missing: 3 of points, each with attributes or without. It is counted once. */
+/* Any one frame of a turn is missing: 3 of points, each with attributes or without. The turn is counted once. */
 static void a_frame_is_missing(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The header of a PLY file, line by line. Its words are those of the format by Turk; each comment is compared with the
- * facts that were given. */
+/* The header of a PLY file, line by line. The header's words are those of the format by Turk; each comment is compared
+ * with the facts that were given. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

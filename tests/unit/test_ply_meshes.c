@@ -129,7 +129,7 @@ static void names_of_texture_coordinates(void **state)
     unlink(path_in("a b.png"));
 }
 
-/* A header has up to 16 elements, 512 properties and 256 textures. One more is refused, with its line. */
+/* A header has up to 16 elements, 512 properties and 256 textures. One more of each is refused, with its line. */
 static void limits_of_a_header(void **state)
 {
     (void)state;

@@ -54,7 +54,8 @@ static void test_convention(void **state)
     assert_true(out[2] < -0.08);
 }
 
-/* A heading just below 0 is nearer to a whole turn than doubles can tell. It is 0, not a whole turn. */
+/* A heading just below 0 is nearer to a whole turn than doubles can tell. Such a heading is reported as 0, not as a
+ * whole turn. */
 static void test_heading_stays_below_a_turn(void **state)
 {
     (void)state;

@@ -101,7 +101,7 @@ static void these_lines_are_poses(void **state)
     assert_int_equal(send(fd, "", 1, 0), 1); /* an empty text, with its NUL */
     assert_int_equal(take("", 0), 0);
     assert_int_equal(count_bad(), 0);
-    /* Its numbers are time, place, roll, pitch and heading. */
+    /* A line's numbers are time, place, roll, pitch and heading. */
     char text[128];
     struct device_sample sample;
     double quat[4];

@@ -328,7 +328,7 @@ static void test_level_waypoints(void **state)
         quat_matrix(p.quat, r);
         for (int k = 0; k < 3; k++) {
             assert_true(fabs(r[3 * k + 2] - up[k]) < 1e-9);
-            /* These are differences of coordinates that are right to 1e-9 m, over 1 mm, or 0.1 mm when it is slow. */
+            /* Forward is a difference of coordinates that are right to 1e-9 m, over 1 mm, or 0.1 mm on the slow way. */
             assert_true(fabs(r[3 * k + 1] - east[k]) < 3e-5);
         }
         trajectory_free(tr);

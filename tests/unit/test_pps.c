@@ -23,7 +23,7 @@ static void expect(const struct pps *pps, int64_t t_ns, enum protocol_pps state,
     assert_int_equal(was_ns, hour_ns);
 }
 
-/* Pulses come at seconds 1 to 4, not at 5 and 6, and at 7 to 9. Then they come 0.3 s early. */
+/* Pulses come at seconds 1 to 4, not at 5 and 6, and at 7 to 9. After that, pulses come 0.3 s early. */
 static void states_follow_the_pulses(void **state)
 {
     (void)state;

@@ -73,7 +73,7 @@ static void test_next_in_section(void **state)
     room_close(&r);
 }
 
-/* Every part of a closed room is seen from some of its places, except near walls. There the ground and the ceiling
+/* Every part of a closed room is seen from some of its places, except near walls. Near walls the ground and the ceiling
  * lie within the cones that heads can't scan, and few places are far enough away. A body in the room is hidden
  * within. */
 static void test_reach(void **state)
@@ -161,7 +161,7 @@ static void test_drag_beside_search(void **state)
     room_close(&r);
 }
 
-/* The bottom of a closed body lies on the ground. It is seen only from within the body, where nobody stands. */
+/* The bottom of a closed body lies on the ground. The bottom is seen only from within the body, where nobody stands. */
 static void test_bodies(void **state)
 {
     (void)state;

@@ -84,7 +84,7 @@ static void a_search_has_named_previews_and_a_section(void **state)
     assert_int_equal(read_request("/reach", "station=1&turn_deg=1", &r), SH_EINPUT); /* it has no section */
 }
 
-/* Both ends are allowed, and nothing beyond. */
+/* Both ends of a word's range are allowed, and nothing beyond. */
 static void words_have_limits(void **state)
 {
     static const struct {

@@ -190,7 +190,7 @@ static void targets_vanish_at_the_reach_of_each_program(void **state)
 }
 
 /* Signals have no noise. Each pulse of one rate sees a target between the reaches of two rates, and no pulse of the
- * other rate does. That holds from the very pulse at which the command took effect. */
+ * other rate does. The change holds from the very pulse at which the command took effect. */
 static void a_rate_changes_the_reach_at_its_pulse(void **state)
 {
     (void)state;
@@ -337,7 +337,8 @@ static void a_rate_between_them_is_refused(void **state)
 
 enum { TICKS = 160 };
 
-/* A session goes through all rates, or its journal is replayed, without a command. It keeps the counts of each tick. */
+/* A session goes through all rates, or its journal is replayed, without a command. `seen` gets the counts of each
+ * tick. */
 static void run_session(const struct device_options *options, struct seen seen[TICKS])
 {
     static const char *const sets[] = {"scene.meshes[0].scale=230", "surfaces[0].reflectance=0.2"};

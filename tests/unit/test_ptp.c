@@ -41,7 +41,7 @@ static struct answer ask(struct rig *rig, uint64_t tick)
     return a;
 }
 
-/* The head's time of day since its epoch, ns. It is within the first minute. */
+/* The head's time of day since its epoch, ns. The time is within the first minute. */
 static int64_t shown_ns(struct rig *rig, uint64_t tick)
 {
     const char *text = rig_tell(rig, "TIME:UTC?", tick);

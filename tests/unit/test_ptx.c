@@ -265,8 +265,8 @@ static void test_shared_padding(void **state)
     }
 }
 
-/* FILE.grid is what a repair needs of a grid that is not in FILE.part yet. It goes where there is no such grid, or no
- * FILE.part. */
+/* FILE.grid is what a repair needs of a grid that is not in FILE.part yet. FILE.grid goes where there is no such grid,
+ * or no FILE.part. */
 static void test_grid_stays_for_a_repair(void **state)
 {
     (void)state;

@@ -89,8 +89,8 @@ static const char *next_line(const char *at)
     return at + 1;
 }
 
-/* Each grid has the shape of its header, and its points are where their coordinates say. They are the first ones of the
- * stream. Returns how many there are. */
+/* Each grid has the shape of its header, and its points are where their coordinates say. The points are the first ones
+ * of the stream. Returns how many points there are. */
 static uint64_t check_text(const uint8_t *text, uint64_t *n_grids)
 {
     const char *at = (const char *)text;
@@ -342,7 +342,7 @@ static void test_refused(void **state)
     remove_state();
 }
 
-/* Cells of a killed recorder never go back. One at the end that does is no cell of this grid, and is cut. */
+/* Cells of a killed recorder never go back. A cell at the end that does is no cell of this grid, and is cut. */
 static void test_cell_that_goes_back(void **state)
 {
     (void)state;

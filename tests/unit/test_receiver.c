@@ -83,7 +83,7 @@ static void follows_what_comes(void **state)
           {6.6, ERROR, 4.1},
           {7.6, SYNC, 5.1},
           {8.6, LOCKED, 6.1}}},
-        /* It is 0.5 ms late, and taken for the second. */
+        /* The pulse is 0.5 ms late, and taken for the second. */
         {{"faults[0].kind=pps_jitter", "faults[0].for_ms=0.5", "faults[0].from_s=3", NULL},
          {{3.5, LOCKED, 1}, {3.6, LOCKED, 1.0995}, {4.6, LOCKED, 2.1}}},
         /* A late sentence without its second's pulse having changed is a second behind; so is the time. */
@@ -104,7 +104,7 @@ static void follows_what_comes(void **state)
         /* The head's own clock gains 400 ppm: 0.4 ms a second, that a locked pulse takes back. */
         {{"time.drift_ppm=400", "faults[0].kind=pps_lost", "faults[0].from_s=5", NULL},
          {{2.4, SYNC, 3599.90096}, {2.5, LOCKED, 0}, {3.25, LOCKED, 0.7503}, {3.5, LOCKED, 1}, {10.5, ABSENT, 8.0024}}},
-        /* It jumps by 0.3 s. Three pulses later all is well again. */
+        /* The clock jumps by 0.3 s. Three pulses later all is well again. */
         {{"faults[0].kind=clock_jump", "faults[0].jump_s=0.3", "faults[0].from_s=3", NULL},
          {{3.2, LOCKED, 1}, {3.6, ERROR, 1.4}, {4.6, SYNC, 2.4}, {5.6, LOCKED, 3.1}}},
         /* A second 60 that no table has comes at 2.5 s: 00:59:60 is 0 s, and so is 01:00:00 after it. */

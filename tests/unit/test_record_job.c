@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* `record` refuses a configuration that it can't record before the scene is loaded, with the file and what is allowed.
- * It leaves all else as it is. */
+ * The command leaves all else as it is. */
 #include "firmware_sim/app/studio/record/job.h"
 
 #include <setjmp.h>

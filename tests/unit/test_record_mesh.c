@@ -112,7 +112,7 @@ static void a_step_as_ply(void **state)
     has(text, "element vertex 12\n");
     has(text, "property double z\nproperty float nx\nproperty float ny\nproperty float nz\nproperty double range\n"
               "property float reflectance\nproperty ushort label\nproperty ushort station\nelement face 8\n");
-    /* The first point is 10 m away, with a reflectance of -5 dB. Its normal points to the head. */
+    /* The first point is 10 m away, with a reflectance of -5 dB. The point's normal points to the head. */
     has(text, "end_header\n10 30 30 0 -1 0 10 -5 0 3\n");
     has(text, "\n13 31 32 0 -1 0 "); /* the last one */
     assert_int_equal(rig_count(text, "\n3 "), 8);
@@ -192,7 +192,7 @@ static void a_wall_beside_the_way(void **state)
     free(text);
 }
 
-/* 4 m2 have 400 points at 100 a square metre. They lie on the walls, with their labels. */
+/* 4 m2 have 400 points at 100 a square metre. The points lie on the walls, with their labels. */
 static void points_spread_over_the_step(void **state)
 {
     (void)state;
@@ -233,7 +233,7 @@ static void points_spread_over_the_step(void **state)
 
 /* ---- meshes with a material */
 
-/* Ten lines of four shots are on a tube of 5 m radius, rows 0.5 m apart. It is closed: 10 * 3 cells of two. */
+/* Ten lines of four shots are on a tube of 5 m radius, rows 0.5 m apart. The tube is closed: 10 * 3 cells of two. */
 static void put_tube(uint32_t lines)
 {
     for (uint32_t line = 0; line < lines; line++) {

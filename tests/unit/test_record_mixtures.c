@@ -147,7 +147,7 @@ static void test_other_kinds(void **state)
     expect_refused(&a, &b, "station 65536; a file holds stations up to 65535");
 }
 
-/* These are the last stations, and stops, that a file takes. */
+/* 65535 is the last station, and the last stop, that a file takes. */
 static void test_same_kinds(void **state)
 {
     (void)state;

@@ -307,7 +307,7 @@ static void test_joined_within_a_scan(void **state)
     check_counts(&result.counts, 1);
 }
 
-/* A head that is much too slow sends an end again after the mirror has come to rest. It is one scan. */
+/* A head that is much too slow sends an end again after the mirror has come to rest. Both ends are of one scan. */
 static void test_an_end_after_telemetry(void **state)
 {
     (void)state;

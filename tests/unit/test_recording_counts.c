@@ -52,8 +52,8 @@ static void test_left_out(void **state)
     assert_true(c.scans == 2 && c.cast == 230 && c.missing == 50);
 }
 
-/* Frames of another scan come: the end of the one before was lost. This includes a head that started again and counts
- * from 1. */
+/* Frames of another scan come: the end of the one before was lost. A head that started again and counts from 1 sends
+ * another scan, too. */
 static void test_end_lost(void **state)
 {
     static const uint32_t next[] = {2, 7, 1};

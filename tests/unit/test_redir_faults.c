@@ -19,7 +19,8 @@ static void turn_until(struct guest *g, const int *count, int value)
     assert_int_equal(*count, value);
 }
 
-/* The device goes from the channel, which stays. Then it is there again. A reset is the same without a pause. */
+/* The device goes from the channel, which stays. Then the device is there again. A reset is the same without a
+ * pause. */
 static void test_unplug(void **state)
 {
     (void)state;
@@ -128,7 +129,7 @@ static void test_slow(void **state)
     usbredirparser_send_set_alt_setting(g->parser, 7, (struct usb_redir_set_alt_setting_header *)(uintptr_t)&alt);
     assert_int_equal(guest_await(g, n_seen + 1)->type, usb_redir_alt_setting_status);
     assert_true(now_ms() - from_ms >= 3 * SLOW_MS - 1); /* a clock that is rounded down */
-    /* One is given up, and its answer says so; another is left behind at the end. */
+    /* One request is given up, and its answer says so; another is left behind at the end. */
     struct usb_redir_control_packet_header h = {.endpoint = 0x80, .requesttype = 0x80, .length = 2};
     usbredirparser_send_control_packet(g->parser, 21, &h, NULL, 0);
     usbredirparser_send_control_packet(g->parser, 22, &h, NULL, 0);
@@ -151,7 +152,8 @@ static void send_control(struct guest *g, uint64_t id)
     usbredirparser_send_control_packet(g->parser, id, &h, NULL, 0);
 }
 
-/* As many as 256 requests wait. One more ends the connection, since no virtual machine sends so many at once. */
+/* As many as 256 requests wait. One request more ends the connection, since no virtual machine sends so many at
+ * once. */
 static void test_most_slow(void **state)
 {
     enum { MOST = 256 };

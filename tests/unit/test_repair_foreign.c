@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Repair and the files of other programs. These may end or go on in ways that no recorder writes. So they are checked,
- * and never changed. */
+/* Repair and the files of other programs. Such files may end or go on in ways that no recorder writes, so they are
+ * checked, and never changed. */
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -35,7 +35,8 @@ static int repair_untouched(const char *name, const void *data, size_t len)
     return rc;
 }
 
-/* They are whole for their programs: without a last newline, with tabs, an empty line, or unknown kinds of lines. */
+/* The files are whole for their programs: without a last newline, with tabs, an empty line, or unknown kinds of
+ * lines. */
 static void test_whole_elsewhere(void **state)
 {
     (void)state;

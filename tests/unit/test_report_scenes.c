@@ -81,7 +81,8 @@ static void so_many_surfaces_are_shown(void **state)
     }
 }
 
-/* A floor that mirrors, under a ceiling: the ceiling is seen once more below the floor. These points are left out. */
+/* A floor that mirrors, under a ceiling: the ceiling is seen once more below the floor. The mirrored points are left
+ * out. */
 static void points_in_a_mirror_are_left_out(void **state)
 {
     (void)state;

@@ -327,8 +327,8 @@ static void *claim_one(void *arg)
     return NULL;
 }
 
-/* Starts the claim, lets it have a hundred times the processor time that it needs, and sees that it waits. Then it
- * releases the hold. */
+/* Starts the claim, lets it have a hundred times the processor time that it needs, and sees that it waits. Then the
+ * check releases the hold. */
 static void check_claim_waits(uint64_t tick, _Atomic uint64_t *hazard, _Atomic int *busy)
 {
     enum { ENOUGH_NS = 100000 };

@@ -350,7 +350,7 @@ static void the_pacing_thread_has_the_allowed_priority(void **state)
 
 /* ---- the link of --view */
 
-/* It takes as many clients as a web link of a configuration that does not give their number. */
+/* The added page takes as many clients as a web link of a configuration that does not give their number. */
 static void view_adds_a_page_where_there_is_none(void **state)
 {
     (void)state;

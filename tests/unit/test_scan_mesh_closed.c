@@ -54,8 +54,8 @@ static void a_sphere_in_a_box_is_closed(void **state)
     }
 }
 
-/* Returns the volume within, by the divergence theorem. It is below that of the box, whose edges and corners are cut
- * off. Normals are inward, so it is negative. */
+/* Returns the volume within, by the divergence theorem. The volume is below that of the box, whose edges and corners
+ * are cut off. Normals are inward, so the result is negative. */
 static double volume(void)
 {
     double sum = 0;

@@ -157,7 +157,8 @@ static void a_journal_has_the_dates(void **state)
     assert_memory_equal(dates_ns[0], dates_ns[1], sizeof dates_ns[0]);
 }
 
-/* It has no UTC where a time server is to be asked; only a scanner with dates can ask one. The configuration stays. */
+/* A scanner that is to ask a time server begins with 1970, whatever time.epoch says. Only a scanner with dates can ask
+ * one. The test's run.yaml stays. */
 static void a_client_begins_with_1970(void **state)
 {
     (void)state;

@@ -140,7 +140,7 @@ static struct scene *load_glow(const char *colour, const char *more)
     return s;
 }
 
-/* One beyond 0 to 1 is a colour of light, not of a surface. */
+/* A colour beyond 0 to 1 is one of light, not of a surface. */
 static void colours_beyond_their_range_are_left_out(void **state)
 {
     (void)state;

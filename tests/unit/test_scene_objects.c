@@ -6,7 +6,7 @@
 #include "core/vec3.h"
 #include "tests/unit/scene_files.h"
 
-/* The box has 2 x 3 x 4 m, and its top follows separately. It has 52 m2 and 24 m3. */
+/* The box has 2 x 3 x 4 m, and its top follows separately. The whole box has 52 m2 and 24 m3. */
 #define CORNERS "v 0 0 0\nv 2 0 0\nv 2 3 0\nv 0 3 0\nv 0 0 4\nv 2 0 4\nv 2 3 4\nv 0 3 4\n"
 #define SIDES   "f 4 3 2 1\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
 #define BOX     CORNERS "o box\n" SIDES

@@ -327,8 +327,8 @@ static void stl_may_be_large(void **state)
     free(data);
 }
 
-/* A facet of two points or fewer is left out and counted. One of four makes two triangles. Errors name the line of the
- * vertex. */
+/* A facet of two points or fewer is left out and counted. A facet of four points makes two triangles. Errors name the
+ * line of the vertex. */
 static void test_stl_facets(void **state)
 {
     (void)state;

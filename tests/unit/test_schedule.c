@@ -354,7 +354,7 @@ static void without_frames_there_is_no_end(void **state)
     assert_true(seg.end_pulse == UINT64_MAX);
 }
 
-/* The end is beyond 64 bits. It counts as none, and not as a small number that wrapped. */
+/* The end is beyond 64 bits. The end counts as none, and not as a small number that wrapped. */
 static void an_end_beyond_all_numbers_is_never_reached(void **state)
 {
     (void)state;

@@ -316,9 +316,9 @@ static void whatever_is_allowed_is_consistent(void **state)
 }
 
 /* 2.2 MHz is 454.54 ns a pulse. Settings change any number of times. Back at one rate for m pulses, these take the
- * floor of the whole, and the rest of a nanosecond is carried along. Here the rate changes every seventh pulse, from
- * 2.2 to 1.1 MHz (twice as long) and back. The time of pulse k is the floor of the sum, to the nanosecond, after 20,000
- * changes. */
+ * floor of the whole, and the rest of a nanosecond is carried along. In this test the rate changes every seventh pulse,
+ * from 2.2 to 1.1 MHz (twice as long) and back. The time of pulse k is the floor of the sum, to the nanosecond, after
+ * 20,000 changes. */
 static void no_part_of_a_nanosecond_is_lost(void **state)
 {
     (void)state;

@@ -57,7 +57,8 @@ static void values_of_all_kinds(void **state)
     check_scans("GD0000003901\n", 3, 0, 4 * 40 * 3);
 }
 
-/* Other replies have no measured values. Their sums are made right, too; that of a key line is without its ';'. */
+/* Other replies have no measured values. The replies' sums are made right, too; the sum of a key line is without the
+ * line's ';'. */
 static void other_replies_keep_their_sums(void **state)
 {
     (void)state;

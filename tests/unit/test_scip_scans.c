@@ -112,7 +112,7 @@ static void left_is_left(void **state)
         assert_int_equal(got.range_mm[i - 100][0], i == 600 + 1440 / 4 ? 2000 : 5000);
 }
 
-/* A cluster has its least range, without errors. It has an error where there is nothing else. */
+/* A cluster has its least range, without errors. The cluster has an error where there is nothing else. */
 static void clusters(void **state)
 {
     (void)state;

@@ -316,7 +316,8 @@ static void a_failure_to_write_is_said(void **state)
     assert_int_equal(rmdir(part), 0);
 }
 
-/* The warning says that the write has failed. Then its reason goes away, and the same text is stored once more. */
+/* The warning says that the write has failed. Then the failure's reason goes away, and the same text is stored once
+ * more. */
 static void what_could_not_be_written_is_written_later(void **state)
 {
     (void)state;

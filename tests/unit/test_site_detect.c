@@ -36,9 +36,9 @@ static double amplitude(const char *signal)
     return a;
 }
 
-/* An extinction replaces that of the air. The data sheet's reaches hold for air with a visibility of 23 km. Its
- * extinction at 1550 nm is, by Kruse, 3.912 / 23 km (550 / 1550)^1.3. So the signal changes by the difference of both,
- * on the way there and back. The exponentials are rounded to some 1e-16 each. */
+/* An extinction replaces that of the air. The data sheet's reaches hold for air with a visibility of 23 km. Such air's
+ * extinction at 1550 nm is, by Kruse, 3.912 / 23 km (550 / 1550)^1.3. The signal changes by the difference of the
+ * two extinctions, on the way there and back. The exponentials are rounded to some 1e-16 each. */
 static void extinction_replaces_that_of_the_days_air(void **state)
 {
     (void)state;

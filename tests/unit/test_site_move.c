@@ -129,8 +129,8 @@ static void test_wall_that_goes_away(void **state)
             assert_range(l, i, nearest_m / cosl(l->azimuth[i]), wall_m < 50.0);
     }
     site_free(site);
-    /* It goes back and forth within 4 s. At 3 s it is where it is at 1 s. At 10.5 s it is where it is at 2.5 s, 1.5 s
-     * on the way back. */
+    /* The wall goes back and forth within 4 s. At 3 s it is where it is at 1 s. At 10.5 s it is where it is at 2.5 s,
+     * 1.5 s on the way back. */
     site = load(WALL, ", move_m_s: [0, 1, 0], cycle_s: 4", cfg);
     static const double cycle[][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 1}, {4, 0}, {10.5, 1.5}};
     for (int n = 0; n < 6; n++) {

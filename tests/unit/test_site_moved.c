@@ -42,8 +42,8 @@ static void expect_attitude(const struct site *site, double heading_deg, double 
         assert_true(fabs(site->station[0].at.rotation[i] - want[i]) < 1e-15);
 }
 
-/* It stands at the given place, no longer at a height above the floor. A turn alone turns it. Back at its first place
- * it has its floor again. */
+/* The station stands at the given place, no longer at a height above the floor. A turn alone turns the station. Back at
+ * its first place it has its floor again. */
 static void a_place_is_taken_as_it_is(void **state)
 {
     (void)state;

@@ -37,7 +37,7 @@ static struct site *load(const char *platform)
     return load_path(PATH, platform);
 }
 
-/* 0.1 s divides 1.2 s, 0.3 s and 0.9 s, but not to the last bit. The stop at the end counts. It lies at the end of the
+/* 0.1 s divides 1.2 s, 0.3 s and 0.9 s, but not to the last bit. The stop at the end counts, and lies at the end of the
  * requested part, not beyond it. */
 static void the_last_stop_is_at_the_end(void **state)
 {

@@ -161,7 +161,7 @@ static void so_many_are_kept(void **state)
     assert_int_equal(at->row[FAULT_SELF_TEST].noticed, SOAK_MAX_MOMENTS);
 }
 
-/* The jump is of 0.5 s. It is noticed where the clock went on by that, less or more by up to a half. */
+/* The jump is of 0.5 s. The jump is noticed where the clock went on by that much, less or more by up to a half. */
 static void a_jump_of_the_clock(void **state)
 {
     static const struct {

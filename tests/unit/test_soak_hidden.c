@@ -98,7 +98,7 @@ static void faults_beside_a_drop(void **state)
     }
 }
 
-/* One frame was to overtake this one. Where that is dropped, or held back itself, the order stays. */
+/* One frame was to overtake another. Where the overtaking frame is dropped, or held back itself, the order stays. */
 static void nothing_overtakes(void **state)
 {
     static const enum fault_kind others[] = {FAULT_DROP, FAULT_REORDER};

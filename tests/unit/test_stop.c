@@ -129,8 +129,8 @@ static int cut_polygon(const struct sh_report *report, struct sh_err *err)
     return rc;
 }
 
-/* The test first counts how often each asks when it is not stopped. Then it is stopped at its first call, and at one
- * halfway. */
+/* The test first counts how often each work asks when it is not stopped. Then the work is stopped at its first call,
+ * and at one halfway. */
 static void work_is_ended(void **state)
 {
     (void)state;

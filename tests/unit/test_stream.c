@@ -62,7 +62,7 @@ static void release(struct ring_slot *slot, uint64_t tick)
     stream_release(&stream, slot, tick, 5);
 }
 
-/* Returns the echoes of the only line end of a tick. Its frames have the numbers from first_seq on. */
+/* Returns the echoes of the only line end of a tick. The tick's frames have the numbers from first_seq on. */
 static uint32_t read_echoes(uint64_t tick, uint32_t first_seq, uint32_t n_frames)
 {
     uint8_t bytes[512];
@@ -188,7 +188,8 @@ static void a_scan_end_counts_what_was_lost_after_it_was_made(void **state)
     assert_true(copy.pulses_before == 1030 && copy.n_cast == 40);
 }
 
-/* Its tick was lost, too. The end comes in a tick of the next scan, whose pulses do not count for it. */
+/* The tick of a scan's end was lost, too. The end comes in a tick of the next scan, whose pulses do not count for
+ * it. */
 static void a_scan_end_that_comes_late_counts_its_own_scan(void **state)
 {
     (void)state;

@@ -57,8 +57,8 @@ static double light_of(double srgb)
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-/* A square board is upright across the y axis, twice the image a side. It is one polygon, so that the loader cuts
- * it. */
+/* A square board is upright across the y axis, twice the image a side. The board is one polygon, so that the loader
+ * cuts it. */
 static const char BOARD[] = "mtllib board.mtl\no board\n"
                             "v -2 10 -2\nv 2 10 -2\nv 2 10 2\nv -2 10 2\n"
                             "vt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\n"

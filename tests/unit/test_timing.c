@@ -157,7 +157,8 @@ static void a_stop_within_a_line(void **state)
     (void)state;
     begin();
     is(shot(0, 0, 0, 15), TIMING_KNOWN, T0_NS + fired(15));
-    /* The scan was stopped after 20 pulses. They were sent with the tick of the stop, before their packet was full. */
+    /* The scan was stopped after 20 pulses. The last pulses were sent with the tick of the stop, before their packet
+     * was full. */
     is(shot(0, 0, 16, 19), TIMING_AT_MOST, T0_NS + fired(31));
     assert_int_equal(line_end(0, 0, 20, fired(20), LINE_PARTIAL).kind, TIMING_STOPS);
     is(event(NATIVE_EV_SCAN_END, 1, T0_NS + 70000), TIMING_KNOWN, T0_NS + 70000);
@@ -166,7 +167,7 @@ static void a_stop_within_a_line(void **state)
     is(shot(0, 0, 0, 15), TIMING_KNOWN, T0_NS + fired(15));
 }
 
-/* The rates change with pulse 40 of a line. It keeps its time, and packets count from it. */
+/* The rates change with pulse 40 of a line. The line keeps its time, and packets count from that pulse. */
 static void rates_change_within_a_line(void **state)
 {
     (void)state;

@@ -181,7 +181,8 @@ static void test_geo(void **state)
     free(text);
 }
 
-/* A shot without echo is kept where that is asked for, also if its pose was lost. Then its frame scalar is not known. */
+/* A shot without echo is kept where that is asked for, also if its pose was lost. The frame scalar of a shot without a
+ * pose is not known. */
 static void test_empty_shot(void **state)
 {
     (void)state;

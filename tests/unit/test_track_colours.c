@@ -9,7 +9,7 @@ enum { SHOTS = 10, ATTRIBUTES = NATIVE_HAS_ATTRIBUTES, COLOURS = NATIVE_HAS_COLO
 static uint8_t out[1 << 16];
 static uint32_t seq;
 
-/* Numbers the frames at `out`. Those whose bit (1 << number) is in `lost` are only counted. */
+/* Numbers the frames at `out`. Frames whose bit (1 << number) is in `lost` are only counted. */
 static void put(size_t len, unsigned lost)
 {
     int n = 0;

@@ -95,7 +95,7 @@ static double ground_range(const double d[3], double h, double slope)
     return t > 0 && fabs(t * d[0]) < 20 && fabs(t * d[1]) < 20 ? t : 0;
 }
 
-/* Each shot is hidden where its cosine with straight down is above the opening's, else at the ground's range. Those
+/* Each shot is hidden where its cosine with straight down is above the opening's, else at the ground's range. Shots
  * within 1e-12 of the border may be either, as arithmetic is in double. */
 static void check_holes(double h, double slope, double cos_opening)
 {

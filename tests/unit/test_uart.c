@@ -143,8 +143,8 @@ static void usual_rates(void **state)
         }
 }
 
-/* The stop bit is sampled after 9.5 bits. It is the right one from 9 up to 10 bits of the sender: 9/9.5 is 0.9474, and
- * 10/9.5 is 1.0526. */
+/* The stop bit is sampled after 9.5 bits. The sampled bit is the right one from 9 up to 10 bits of the sender: 9/9.5 is
+ * 0.9474, and 10/9.5 is 1.0526. */
 static void near_rates(void **state)
 {
     (void)state;

@@ -36,7 +36,8 @@ static void expect_text(struct client *c, const char *text)
     assert_memory_equal(r.data, text, r.actual);
 }
 
-/* It is begun while it is open. The link reports the end of the one and then the begin of the other, each time. */
+/* A stream is begun while it is open. The link reports the end of the old session and then the begin of the new one,
+ * each time. */
 static void test_stream_begun_again(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A device plugs itself in (`attach: on`), and its host lets go of it. It comes back by itself, and reports that. */
+/* A device plugs itself in (`attach: on`), and its host lets go of it. The device comes back by itself, and reports
+ * that. */
 #include "tests/unit/usbip_client.h"
 
 #include <fcntl.h>
@@ -9,8 +10,8 @@
 #include "drivers/usb/retry.h"
 #include "drivers/usb/vhci.h"
 
-/* It replaces the kernel's virtual host controller, and the module that talks to it: it takes the other end of the
- * socket pair, as the kernel does. */
+/* This fake replaces the kernel's virtual host controller, and the module that talks to it. The fake takes the other
+ * end of the socket pair, as the kernel does. */
 static struct {
     int fd, attempts, refuses;
 } vhci = {.fd = -1};
@@ -92,8 +93,8 @@ static void test_usbip_refused(void **state)
     assert_non_null(strstr(err.text, "no such module"));
 }
 
-/* Within the time between two attempts an injected fault unplugs the device and plugs it in. It is plugged in once:
- * vhci_attach fails the test where the end before was not taken. */
+/* Within the time between two attempts an injected fault unplugs the device and plugs it in. The device is plugged in
+ * once: vhci_attach fails the test where the end before was not taken. */
 static void test_unplugged_meanwhile(void **state)
 {
     (void)state;

@@ -155,7 +155,7 @@ static void test_effects(void **state)
     host_control(host, 0x02, 3, 0, 0x82, 0, NULL);
     assert_int_equal(host_control(host, 0x82, 0, 0, 0x82, 2, NULL), 2);
     assert_int_equal(le_get16(host_in), 1);
-    /* Its interface is set, which resets its endpoints, and so does a new configuration. */
+    /* A set interface resets its endpoints, and so does a new configuration. */
     for (unsigned configures = 0; configures < 2; configures++) {
         host_control(host, 0x02, 3, 0, 0x82, 0, NULL);
         assert_int_equal(host_control(host, configures ? 0 : 1, configures ? 9 : 11, configures, !configures, 0, NULL),

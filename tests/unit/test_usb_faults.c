@@ -235,7 +235,7 @@ static void expect_plugged(struct bench *bench, int times)
     assert_int_equal(bench->n_plugged, times);
 }
 
-/* Each request takes its time. One that the host gives up meanwhile is gone. */
+/* Each request takes its time. A request that the host gives up meanwhile is gone. */
 static void test_enumeration(void **state)
 {
     (void)state;

@@ -14,9 +14,9 @@ static struct host *configured(enum usb_rate rate)
     return host;
 }
 
-/* The result of one write, by its length L, into transfers of 1024 bytes at each packet size. It fills as many as fit,
- * and one ends short. There is a zero-length packet exactly where L is a whole number of packets and fills no
- * transfer. */
+/* The result of one write, by its length L, into transfers of 1024 bytes at each packet size. The write fills as many
+ * transfers as fit, and one ends short. There is a zero-length packet exactly where L is a whole number of packets and
+ * fills no transfer. */
 static void test_fill(void **state)
 {
     (void)state;
@@ -65,20 +65,20 @@ static void test_zero_packet(void **state)
     host_expect(host, 2, USB_OK, 0);
     host_submit(host, 3, 0x81, NULL, 1024); /* only once */
     assert_int_equal(host->n_done, 0);
-    /* It is full, but more was to come: no end yet. */
+    /* The transfer is full, but more was to come: no end yet. */
     assert_int_equal(usb_device_write(host->device, 0x81, pattern, 1500), 1024);
     host_expect(host, 3, USB_OK, 1024);
     host_submit(host, 4, 0x81, NULL, 1024);
     assert_int_equal(host->n_done, 0);
     assert_int_equal(usb_device_write(host->device, 0x81, pattern + 1024, 476), 476);
     host_expect(host, 4, USB_OK, 476);
-    /* It is full, with a short packet at its end: that is the end. */
+    /* The transfer is full, with a short packet at its end: the write ends there. */
     host_submit(host, 5, 0x81, NULL, 700);
     assert_int_equal(usb_device_write(host->device, 0x81, pattern, 700), 700);
     host_expect(host, 5, USB_OK, 700);
     host_submit(host, 6, 0x81, NULL, 1024);
     assert_int_equal(host->n_done, 0);
-    /* It is due, and then the host clears the endpoint. Its next request is another transfer. */
+    /* An end is due, and then the host clears the endpoint. The host's next request is another transfer. */
     assert_int_equal(usb_device_write(host->device, 0x81, pattern, 1024), 1024);
     host_expect(host, 6, USB_OK, 1024);
     assert_int_equal(host_control(host, 0x02, USB_REQ_CLEAR_FEATURE, 0, 0x81, 0, NULL), 0);

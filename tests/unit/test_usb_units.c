@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Telegrams on USB: each one is a transfer, over the device core, USB/IP and usbredir.
  *
- * A unit ends with a packet shorter than wMaxPacketSize (USB 2.0, 5.8.3). One whose length is a multiple of it needs a
- * packet of no bytes after it. A host's transfer that has room left ends there by itself. If the unit fills the
- * transfer to its last byte, that packet is the next transfer. */
+ * A unit ends with a packet shorter than wMaxPacketSize (USB 2.0, 5.8.3). A unit whose length is a multiple of
+ * wMaxPacketSize needs a packet of no bytes after it. A host's transfer that has room left ends there by itself. If the
+ * unit fills the transfer to its last byte, that packet is the next transfer. */
 #include "tests/unit/usbip_client.h"
 #ifdef HAVE_USBREDIR
 #include "tests/unit/usbredir_guest.h"

@@ -57,7 +57,7 @@ static void test_import(void **state)
     client_write(&other, request, sizeof request);
     assert_true(client_read(&other, back, 8));
     assert_int_equal(back[7], 1);
-    /* It has the device when the first one is gone: closing is unplugging. */
+    /* The other client has the device when the first one is gone: closing is unplugging. */
     close(c.fd);
     request[10] = '1';
     for (const int64_t end_ms = now_ms() + DEADLINE_MS;;) {
@@ -138,7 +138,7 @@ static void test_commands(void **state)
     assert_memory_equal(text, "*RST\n", 5);
     assert_true(client_reply(&c, &r, 0));
     assert_int_equal(r.seqnum, seqnum);
-    /* It ends without DTR, after earlier bytes were read. */
+    /* The session ends without DTR, after earlier bytes were read. */
     bench.n_queue = 0;
     client_submit(&c, 0, 1, NULL, "BYE\n", 4);
     setup[2] = 2;
@@ -210,7 +210,7 @@ static void expect_no_notice(struct client *c)
 }
 
 /* The interrupt endpoint reports that the line is ready: when the interface comes to life, and to each program that
- * opens the port, where DTR rises. It does not while DTR stays up, nor when it falls. */
+ * opens the port, where DTR rises. The endpoint does not report while DTR stays up, nor when it falls. */
 static void test_serial_state(void **state)
 {
     (void)state;
@@ -251,7 +251,7 @@ static void test_unlink(void **state)
     assert_true(client_reply(&c, &r, 1));
     assert_int_equal(r.seqnum, second);
     assert_int_equal(r.actual, 3);
-    /* These are too late, unknown, and its own number: all are "not pending". */
+    /* The numbers are too late, unknown, and the unlink's own: all are "not pending". */
     const uint32_t victims[] = {second, 0x7fffffff, c.seqnum + 3};
     for (int i = 0; i < 3; i++) {
         client_unlink(&c, victims[i]);

@@ -25,7 +25,7 @@ static int connect_silent(struct bench *bench)
     return fd;
 }
 
-/* There are more of them than the back end has places for. */
+/* There are more silent clients than the back end has places for. */
 static void test_silent(void **state)
 {
     (void)state;
@@ -119,7 +119,7 @@ static uint32_t send_requests(struct client *c)
             continue;
         }
         assert_int_equal(errno, EAGAIN); /* and not cut off */
-        /* A link that can't go on waits. One whose host can't read yet moves as much as the kernel takes. */
+        /* A link that can't go on waits. A link whose host can't read yet moves as much as the kernel takes. */
         const int64_t start_ms = now_ms();
         bench_poll(c->bench, 0, 50);
         if (now_ms() - start_ms >= 49) stuck++;
@@ -176,7 +176,7 @@ static void test_turns(void **state)
     bench_close(&bench);
 }
 
-/* Runs one whole session of a host. Its answers are the same however the bytes are cut. */
+/* Runs one whole session of a host. The answers are the same however the bytes are cut. */
 static size_t session(size_t piece, uint8_t *got, size_t room)
 {
     static const uint8_t import[40] = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'};
@@ -258,7 +258,7 @@ static void test_short_not_ok(void **state)
 }
 
 /* Requested bytes that were not received count up to 64 MiB (drivers/usb/usbip_private.h), the last one as well. One
- * more cuts the client off. */
+ * byte more cuts the client off. */
 static void test_bytes_pending(void **state)
 {
     (void)state;

@@ -21,7 +21,7 @@ static void expect_empty(const struct usbip_conn *conn)
     assert_true(conn->pending_bytes == 0 && conn->unsent_bytes == 0);
 }
 
-/* An URB is pending until it is freed or queued. Then there is room for one more. */
+/* An URB is pending until it is freed or queued. After that there is room for one more. */
 static void pending_urbs_have_a_limit(void **state)
 {
     (void)state;

@@ -35,7 +35,7 @@ static void test_silent(void **state)
 
 /* Headers are those of usbredirproto.h: type, length, id (64 bits); endpoint, request, type, status, value, index,
  * length. MANY: the kernel counts 768 bytes or more for each small piece in a Unix socket's buffers, which have 2 MiB
- * at most each way (SO_SNDBUF, doubled). That is some 5,500 pieces, and the back end's 64. */
+ * at most each way (SO_SNDBUF, doubled). Both ways hold some 5,500 pieces, and the back end's 64. */
 enum { CONTROL_HEAD = 16 + 10, MANY = 20000 };
 
 static void put_get_config(uint8_t *at, uint32_t id)
@@ -265,7 +265,7 @@ static void test_busy_path(void **state)
     unlink(guest_path);
 }
 
-/* A path was removed, and another head listens on it by now. It stays that head's. */
+/* A path was removed, and another head listens on it by now. The path stays that head's. */
 static void test_path_of_another(void **state)
 {
     (void)state;

@@ -61,7 +61,8 @@ static void published_dates(void **state)
     }
 }
 
-/* gmtime_r of the C library has no leap seconds in the default zone. It is compared over all days of 228 years. */
+/* gmtime_r of the C library has no leap seconds in the default zone. Our calendar is compared with it over all days of
+ * 228 years. */
 static void calendar_as_the_library_has_it(void **state)
 {
     (void)state;

@@ -77,7 +77,7 @@ static void room_for_leap_seconds(void **state)
         assert_int_equal(utc_table_add(&table, at), 0);
     }
     assert_int_equal(utc_table_add(&table, table.leap[table.n - 1].posix_s + 86400), 0);
-    /* One in the middle moves those after it on by a second. */
+    /* A leap second in the middle moves the later ones on by a second. */
     table = *utc_table_builtin();
     const struct utc_table before = table;
     assert_int_equal(utc_table_add(&table, before.leap[3].posix_s + 60), 1);

@@ -53,8 +53,8 @@ static void test_bytes_of_a_packet(void **state)
     assert_int_equal(rig.count[PROTOCOL_UNITS_LOST] + rig.count[PROTOCOL_POINTS_LOST], 0);
 }
 
-/* A client, from the published layout alone. It takes all blocks of all packets in a row. An entry's azimuth lies
- * between its block's and the next one's by its time. It reads up to the block before the last. */
+/* A client, from the published layout alone. The client takes all blocks of all packets in a row. An entry's azimuth
+ * lies between its block's and the next one's by its time. The client reads up to the block before the last. */
 struct seen {
     double range_m, elevation_deg, azimuth_deg;
     int reflectivity;
@@ -131,7 +131,7 @@ static void test_azimuth_wraps(void **state)
 }
 
 /* t(block, entry) = 55.296 (2 block + entry div 16) + 2.304 (entry mod 16) us after the packet's time stamp, which
- * counts from the top of the hour. This is exact, over an hour and beyond its end. */
+ * counts from the top of the hour. The time is exact, over an hour and beyond its end. */
 static void test_times_over_an_hour(void **state)
 {
     (void)state;

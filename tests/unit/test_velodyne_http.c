@@ -23,7 +23,7 @@ static void test_curl(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
-/* CVelodyneScanner of MRPT 2.5.8, captured. Its Origin is the device's own address. */
+/* CVelodyneScanner of MRPT 2.5.8, captured. The request's Origin is the device's own address. */
 static void test_mrpt(void **state)
 {
     (void)state;

@@ -106,8 +106,8 @@ static void test_pulses_per_second(void **state)
     }
 }
 
-/* There is one for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever the session was
- * opened. */
+/* There is one position packet for 14 data packets of a single return: 18.579456 ms, from device time 0 on, whenever
+ * the session was opened. */
 static void test_rate(void **state)
 {
     (void)state;

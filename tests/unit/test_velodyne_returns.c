@@ -69,7 +69,7 @@ static void test_dual_returns(void **state)
         {{3, {10.0, 11.0, 21.0}, {-1000, -700, 0}, {0}}, 10500, 5500, 100, 20},
         /* The last is the strongest of three; then the first, of the two before it. */
         {{3, {10.0, 11.0, 12.0}, {-700, -1000, 0}, {0}}, 6000, 5000, 100, 20},
-        /* They are not modelled, so the nearest is the strongest. */
+        /* Reflectances are not modelled, so the nearest is the strongest. */
         {{2, {10.0, 20.0}, {INT16_MIN, INT16_MIN}, {0}}, 10000, 5000, 0, 0},
     };
     enum { N = sizeof cases / sizeof cases[0] };

@@ -100,7 +100,7 @@ static void connections(void **state)
     judge(VERDICT_COMES_BACK, FOUND, "it closed its connection by itself, and had none at the end");
 }
 
-/* It was back after 1 s and after 3 s, within the limit of 5 s. */
+/* The client was back after 1 s and after 3 s, within the limit of 5 s. */
 static void absences(void **state)
 {
     (void)state;

@@ -79,8 +79,8 @@ static pid_t wait_for_number(void)
     return number;
 }
 
-/* It is in the group that the shell leaves behind, and does not end at SIGTERM. The whole group is waited for, and
- * killed. It says when it has set that up: a signal before that would end it. */
+/* The loop is in the group that the shell leaves behind, and does not end at SIGTERM. The whole group is waited for,
+ * and killed. The loop's shell says when the trap is set: a signal before that would end it. */
 static void test_what_the_shell_leaves(void **state)
 {
     (void)state;
@@ -118,7 +118,7 @@ static void test_what_leaves_the_group(void **state)
     assert_int_equal(kill(pid, 0), -1);
 }
 
-/* Some programs end with their input, or at a key. This one would end by itself, with status 5. */
+/* Some programs end with their input, or at a key. This client would end by itself, with status 5. */
 static void test_its_input_stays_open(void **state)
 {
     (void)state;

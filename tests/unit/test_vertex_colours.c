@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Colours of vertices in PLY, OBJ and the formats that Assimp reads. They are interpolated between the corners at a
- * hit. They count after a texture and before the material's colour. A mesh without any is unchanged, as is a load that
- * does not want them. */
+/* Colours of vertices in PLY, OBJ and the formats that Assimp reads. The colours are interpolated between the corners
+ * at a hit. They count after a texture and before the material's colour. A mesh without any is unchanged, as is a load
+ * that does not want them. */
 #include <math.h>
 
 #include "core/cast.h"
@@ -115,8 +115,8 @@ static void obj_of_two_ranges(void **state)
     scene_free(s);
 }
 
-/* Numbers that rounding left above 1, or a few that shine, do not make a file one of 0 to 255. They are cut to 1, and
- * counted. */
+/* Numbers that rounding left above 1, or a few that shine, do not make a file one of 0 to 255. Such numbers are cut to
+ * 1, and counted. */
 static void a_little_above_one(void **state)
 {
     (void)state;

@@ -267,8 +267,8 @@ static void test_marks(void **state)
     struct sh_err err;
     struct view_entry entry[VIEW_MAX_NAMES] = {{{255, 0, 0}, "a"}};
     assert_int_equal(picture_make(&picture, 200, 150, white, &err), SH_OK);
-    /* One is before the eye, one behind it, one beside the image. Two more are at nearly the same place: one name fits
-     * on the left of its mark, and there is no room for the other. */
+    /* One station is before the eye, one behind it, one beside the image. Two more are at nearly the same place: one
+     * name fits on the left of its mark, and there is no room for the other. */
     const struct view_station stations[] = {{{1, 10, 0}, "here"},
                                             {{0, -10, 0}, "behind"},
                                             {{30, 10, 0}, "beside"},

@@ -194,7 +194,8 @@ static void names_and_the_number_of_others(void **state)
     }
 }
 
-/* Stations beyond any border have neither mark nor name, and don't count. One at each border's inner side has. */
+/* Stations beyond any border have neither mark nor name, and don't count. A station just within the left and the lower
+ * border is drawn. */
 static void stations_beyond_the_image(void **state)
 {
     (void)state;

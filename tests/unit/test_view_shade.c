@@ -42,7 +42,7 @@ static void smooth(void)
 
 static const int side[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
 
-/* A hole is closed by points on six of its eight sides, up to three places away. It takes the nearest. */
+/* A hole is closed by points on six of its eight sides, up to three places away. The hole takes the nearest point. */
 static void holes_are_closed(void **state)
 {
     (void)state;

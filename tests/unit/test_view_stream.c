@@ -270,7 +270,8 @@ static void ecef_is_turned_to_metres(void **state)
     assert_true(fabs(shown.lat_deg) < 1e-9 && fabs(shown.lon_deg) < 1e-9 && fabs(shown.height_m) < 1e-6);
     for (int k = 0; k < 3; k++)
         assert_true(fabs(shown.points.xyz_m[1][k] - (const double[]){2.0, 3.0, 1.0}[k]) < 1e-6);
-    /* Its forward axis, Y, is east; its right axis, X, is up, and a roll that lowers the right side is positive. */
+    /* The head's forward axis, Y, is east; its right axis, X, is up, and a roll that lowers the right side is
+     * positive. */
     near(shown.station[0].heading_rad, M_PI_2);
     near(shown.station[0].pitch_rad, 0.0);
     near(shown.station[0].roll_rad, -M_PI_2);

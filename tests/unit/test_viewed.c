@@ -20,7 +20,7 @@
 static struct sh_err err;
 static char path[64];
 
-/* Writes a PLY file of the test's own, as text. Its name is good until the next one. */
+/* Writes a PLY file of the test's own, as text. The file's name is good until the next one. */
 static const char *write_ply(const char *comments, const char *properties, int n, const char *rows)
 {
     snprintf(path, sizeof path, "/tmp/test_viewed.XXXXXX.ply");

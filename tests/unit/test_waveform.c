@@ -100,8 +100,8 @@ static void samples_have_the_energy(void **state)
 
 /* h has a closed form: a Gaussian with the receiver's sigma added, or the log-normal with its centroid at 0. Cubics
  * through 16 points a sigma have an error of (9/16) / 24 * 3 / 16^4 = 1.1e-6 on a Gaussian. A log-normal's peak
- * bends more. Its tail is cut at 1e-6 of the peak, 48 widths behind it with a skew of 3, which moves the centroid by
- * 4e-4 widths. */
+ * bends more. The log-normal's tail is cut at 1e-6 of the peak, 48 widths behind it with a skew of 3, which moves the
+ * centroid by 4e-4 widths. */
 static void shapes_are_the_closed_forms(void **state)
 {
     (void)state;

@@ -121,9 +121,9 @@ static void a_limited_receiver(void **state)
     waveform_free(w);
 }
 
-/* A term of sigma 1 is h. Its middle lies between its half maxima, which are 2.355 sigmas apart. The logarithm of h goes
- * straight over steps of 1/64 width: d^2 / 8 times its second derivative, which is 30 / width^2 where it rises, is
- * 1e-3. */
+/* A term of sigma 1 is h. The term's middle lies between its half maxima, which are 2.355 sigmas apart. The logarithm
+ * of h goes straight over steps of 1/64 width: d^2 / 8 times its second derivative, which is 30 / width^2 where it
+ * rises, is 1e-3. */
 static void values_of_a_term(void **state)
 {
     (void)state;

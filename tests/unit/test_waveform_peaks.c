@@ -130,7 +130,7 @@ static void maxima_of_a_window(void **state)
     assert_true(peak[1].to > 30 && peak[1].to == peak[2].from + 1);
     assert_true(peak[2].top == 45 && peak[2].to == N);
     assert_int_equal(finder_peaks(&run, 0.7, peak, 4), 2); /* less than `least` is none */
-    /* Those without room are counted, and the first ones stay. */
+    /* Peaks without room are counted, and the first ones stay. */
     memset(peak, 0, sizeof peak);
     assert_int_equal(finder_peaks(&run, 0.5, peak, 1), 3);
     assert_int_equal(peak[0].top, 15);
@@ -190,8 +190,8 @@ static void maxima_beside_blind_samples(void **state)
     assert_false(finder_limited(&run, &peak[0]));
 }
 
-/* One term explains the echo of one plane, and says where, how wide and how high it is. It explains neither two echoes,
- * nor one that is narrower than any pulse, nor one with another further out. */
+/* One term explains the echo of one plane, and says where, how wide and how high it is. One term explains neither two
+ * echoes, nor one that is narrower than any pulse, nor one with another further out. */
 static void one_term_is_fitted(void **state)
 {
     (void)state;

@@ -141,7 +141,7 @@ static uint32_t check_windows(const struct waveform_record *record, const uint8_
     return parts;
 }
 
-/* Random pulses have stretches longer than a piece. Their windows are where the plain reading has them. */
+/* Random pulses have stretches longer than a piece. The pulses' windows are where the plain reading has them. */
 static void windows_are_where_light_is(void **state)
 {
     (void)state;

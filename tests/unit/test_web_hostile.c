@@ -255,7 +255,7 @@ static void test_nobody_is_shut_out(void **state)
     bench_close(&bench);
 }
 
-/* One address keeps some of the places, those of its newest clients. The client of another one stays. */
+/* One address keeps some of the places, those of its newest clients. The client of another address stays. */
 static void test_one_address(void **state)
 {
     (void)state;

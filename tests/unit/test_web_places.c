@@ -50,7 +50,7 @@ static void test_who_goes(void **state)
     assert_int_equal(take(3, 100), WEB_PLACES_OF_ONE);
 }
 
-/* A client that takes its answer stays. One that does not is silent. */
+/* A client that takes its answer stays. A client that does not is silent. */
 static void test_answers(void **state)
 {
     (void)state;

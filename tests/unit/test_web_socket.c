@@ -134,8 +134,8 @@ static void test_early_frames(void **state)
     bench_close(&bench);
 }
 
-/* A client sends commands and closes at once. They are read before its end, also where the owner has not heard of its
- * session by then, or has something to write. Half a message is not. */
+/* A client sends commands and closes at once. The commands are read before the client's end, also where the owner has
+ * not heard of the session by then, or has something to write. Half a message is not. */
 static void test_last_words(void **state)
 {
     (void)state;

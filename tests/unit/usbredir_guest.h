@@ -50,10 +50,10 @@ void guest_turn(struct guest *g, uint32_t want_write);
 /* Waits until n packets have been seen. */
 struct seen *guest_await(struct guest *g, int n);
 
-/* Begins on a connected socket, which it takes over. It says hello with the next turns. */
+/* Begins on a connected socket, which it takes over. The guest says hello with the next turns. */
 struct guest *guest_begin(struct bench *bench, int fd);
 
-/* The same, but it has the device when it returns. */
+/* The same, but the guest has the device when the call returns. */
 struct guest *guest_on(struct bench *bench, int fd);
 
 struct guest *guest_new(struct bench *bench);

@@ -13,7 +13,8 @@
     "Content-Type: text/plain; charset=us-ascii" END "X-Content-Type-Options: nosniff" END "Content-Length: 0" END END
 
 extern struct protocol_rig http_rig;
-/* The head's answers: state, rate, echoes; the others are a test's own. It scans at 10 Hz, with strongest echoes. */
+/* The head's answers: state, rate, echoes; the others are a test's own. The head scans at 10 Hz, with strongest
+ * echoes. */
 extern struct protocol_rig_reply http_replies[7];
 
 int http_setup(void **state);

@@ -59,7 +59,8 @@ extern struct rig rig;
 
 /* Returns a fault that strikes at each frame. */
 struct fault fault_of_kind(enum fault_kind kind);
-/* Opens a session of link 1. It is native, or of a protocol whose units have a byte that is their sum at the end. */
+/* Opens a session of link 1. The session is native, or of a protocol whose units have a byte that is their sum at the
+ * end. */
 void rig_open(const struct fault *fault, uint32_t n, int native);
 void rig_close(void);
 /* Closes the session of a test that failed before it did so. */
@@ -78,7 +79,8 @@ struct rig_item *rig_unit(size_t len, int is_reply);
 
 /* Takes the pieces that may go out now. Returns how many writes there were. last: there is no more input. */
 uint32_t rig_take(int last);
-/* The same, with the clock going to each time at which something may. It fails when that does not end. */
+/* The same, with the clock going to each time at which something may. The call fails when there is no end of such
+ * times. */
 void rig_drain(void);
 
 /* The sent bytes are those of the items of these numbers (from 0), one after the other; ends with -1. */

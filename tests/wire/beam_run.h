@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* This makes a scan of the room with faults, off line, as a native client receives it. It has its shots by pulse
+/* This makes a scan of the room with faults, off line, as a native client receives it. The run has its shots by pulse
  * number, its line ends, and the truth about the faults. */
 #ifndef TESTS_WIRE_BEAM_RUN_H
 #define TESTS_WIRE_BEAM_RUN_H
@@ -45,7 +45,7 @@ const struct beam_run *beam_record_room(struct wire *wire, int slot, const struc
                                         const char *const *sets);
 /* The same for a stream and a truth that are there already. */
 const struct beam_run *beam_read(const struct wire *wire, int slot, const char *stream, const char *truth);
-/* Returns the n-th note of a kind, from 0, that begins or ends it. It fails where there is none. */
+/* Returns the n-th note of a kind, from 0, that begins or ends it. The call fails where there is no such note. */
 const struct beam_note *beam_note(const struct beam_run *run, const char *kind, uint32_t n, int ended);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The recorder of `record --raw`, started and ended. Its captures are read back into packets, and tshark checks
+/* The recorder of `record --raw`, started and ended. The captures are read back into packets, and tshark checks
  * them. */
 #ifndef TESTS_WIRE_CAPTURED_H
 #define TESTS_WIRE_CAPTURED_H
@@ -12,16 +12,17 @@ struct raw_recorder {
     char endpoint[128];
 };
 
-/* Starts `scanhead record SOURCE --raw -o DIR/cap.pcapng --stats DIR/stats.json ...`; more ends with NULL. It waits
- * until the recorder listens, or is connected. */
+/* Starts `scanhead record SOURCE --raw -o DIR/cap.pcapng --stats DIR/stats.json ...`; more ends with NULL. The call
+ * waits until the recorder listens, or is connected. */
 struct raw_recorder raw_recorder_start(struct wire *wire, const char *source, const char *const *more);
 /* The same, with the size of its files limited (ulimit -f, blocks of 512 bytes). */
 struct raw_recorder raw_recorder_start_limited(struct wire *wire, const char *source, const char *blocks);
-/* Ends it with a signal (0: it ends by itself). Its exit status must be `status`, and its messages must have `says`
- * (NULL: any). */
+/* Ends the recorder with a signal (0: it ends by itself). The recorder's exit status must be `status`, and its messages
+ * must have `says` (NULL: any). */
 void raw_recorder_end(struct raw_recorder *recorder, int signal_number, int status, const char *says);
 
-/* Stops the recorder until raw_recorder_go_on. That returns a time of UTC at which it was still stopped. */
+/* Stops the recorder until raw_recorder_go_on. The latter returns a time of UTC at which the recorder was still
+ * stopped. */
 void raw_recorder_stop(const struct raw_recorder *recorder);
 int64_t raw_recorder_go_on(const struct raw_recorder *recorder);
 

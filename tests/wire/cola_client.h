@@ -18,7 +18,7 @@ void cola_client_send(struct cola_client *c, const char *request);
 /* Returns the answer; NULL as cola_client_next. Scans that come before it are passed over. */
 const char *cola_client_ask(struct cola_client *c, const char *request);
 void cola_client_expect(struct cola_client *c, const char *request, const char *answer);
-/* Reboots, and connects again. It has to be logged in. */
+/* Reboots, and connects again. The client has to be logged in. */
 void cola_client_reboot(struct cola_client *c, const struct head *head);
 
 #endif

@@ -16,8 +16,8 @@ void shot_urg(uint64_t k, struct shot *out)
     *out = (struct shot){(int64_t)(k * 1000000000 / 10240), 0, -(step - 384) * 360.0 / 1024, step >= 44 && step <= 725};
 }
 
-/* A turn has 811 steps of a third of a degree from -45 deg on: 0 is right (x), 90 ahead, counter-clockwise. There are
- * 15 turns a second. */
+/* A turn has 1080 steps of a third of a degree, of which 811 are seen, from -45 deg on. 0 is right (x), 90 ahead,
+ * counter-clockwise. There are 15 turns a second. */
 void shot_tim(uint64_t k, struct shot *out)
 {
     const int step = (int)(k % 1080);

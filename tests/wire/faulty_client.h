@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A client in plain sockets, which starts a scan, writes its points as text, and comes back after each end of its
- * connection. It can have faults. As a program of its own: PROGRAM client HOST PORT FILE FAULTS. */
+ * connection. The client can have faults. As a program of its own: PROGRAM client HOST PORT FILE FAULTS. */
 #ifndef TESTS_WIRE_FAULTY_CLIENT_H
 #define TESTS_WIRE_FAULTY_CLIENT_H
 

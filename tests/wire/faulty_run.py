@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Runs a client that has faults: HOST PORT FILE FAULTS on the command line. It connects again each time that its
+# Runs a client that has faults: HOST PORT FILE FAULTS on the command line. The client connects again each time that its
 # connection ends, unless its fault is `s`, and ends at SIGTERM with a whole file.
 import signal
 import socket

@@ -5,8 +5,8 @@
 
 #include "tests/wire/room.h"
 
-/* The place is neither at the pole nor near zero. It has seven decimals of a degree, so that no rounding hides an
- * error. */
+/* The place is neither at the pole nor near zero. The place has seven decimals of a degree, so that no rounding hides
+ * an error. */
 #define LAT_DEG  (-33.8567844)
 #define LON_DEG  151.2152967
 #define HEIGHT_M 87.6543

@@ -40,7 +40,7 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
              wire->dir, name, name, name, sensor);
     snprintf(file, sizeof file, "%s.ini", name);
     snprintf(path, sizeof path, "%s", wire_write_text(wire, file, text));
-    /* It writes to a terminal, and therefore line by line. */
+    /* The grabber writes to a terminal, and therefore line by line. */
     int in[2], out[2];
     assert_int_equal(pipe2(in, O_CLOEXEC), 0);
     assert_int_equal(openpty(&out[0], &out[1], NULL, NULL, NULL), 0);

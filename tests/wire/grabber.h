@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* rawlog-grabber of Debian's mrpt-apps, unmodified. It is started with a configuration of the test's, ended as its user
- * ends it, and its recording is read. A rawlog is a gzip stream of MRPT's serialised objects. The rig reads scans,
- * turns and GPS observations. */
+/* rawlog-grabber of Debian's mrpt-apps, unmodified. The grabber is started with a configuration of the test's, ended as
+ * its user ends it, and its recording is read. A rawlog is a gzip stream of MRPT's serialised objects. The rig reads
+ * scans, turns and GPS observations. */
 #ifndef TESTS_WIRE_GRABBER_H
 #define TESTS_WIRE_GRABBER_H
 
@@ -26,20 +26,21 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
 /* Waits until it has saved so many observations. Returns 0 when it complained before. */
 int grabber_wait(struct grabber *grabber, int n_saved);
 
-/* Lets all threads of a process go before others, where the kernel permits that (root, RLIMIT_RTPRIO). This client has
- * it, too. It waits 100 ms for the reply to a command and then does without it, so its head has to hurry, too. */
+/* Lets all threads of a process go before others, where the kernel permits that (root, RLIMIT_RTPRIO). The grabber goes
+ * before others, too. It waits 100 ms for the reply to a command and then does without it, so its head has to hurry,
+ * too. */
 void grabber_hurry(pid_t pid);
 
-/* Starts it and waits; where it complains, it is started anew. Beside eight busy processes, and without the right to
- * hurry, it gets its replies in about one of three tries. So it has fifteen tries. */
+/* Starts the grabber and waits; where it complains, it is started anew. Beside eight busy processes, and without the
+ * right to hurry, it gets its replies in about one of three tries. It has fifteen tries. */
 void grabber_start_and_wait(struct wire *wire, const char *name, const char *sensor, int n_saved,
                             struct grabber *grabber);
 
-/* Returns how many datagrams the kernel threw away because a socket's owner did not read them in time. That happens on
- * a busy machine. */
+/* Returns how many datagrams the kernel threw away because a socket's owner did not read them in time. Such losses
+ * happen on a busy machine. */
 uint32_t grabber_dropped_at(int port);
 
-/* Ends it by a key, as a user does. It must end with status 0. */
+/* Ends the grabber by a key, as a user does. The grabber must end with status 0. */
 void grabber_end(struct grabber *grabber);
 
 enum { RAWLOG_PACKET_LEN = 1206 };

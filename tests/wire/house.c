@@ -17,7 +17,8 @@ struct house {
     uint32_t mark_triangle; /* the first one of the mark */
 };
 
-/* A post stands 1 m to the right of the head and 0.4 m before it. It is 20 cm wide, from the floor to the ceiling. */
+/* A post stands 1 m to the right of the head and 0.4 m before it. The post is 20 cm wide, from the floor to the
+ * ceiling. */
 static void write_mark(const struct wire *wire)
 {
     const double heading = HOUSE_HEADING_DEG * M_PI / 180.0;

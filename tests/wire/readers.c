@@ -14,7 +14,7 @@ void keep_truth(const struct scanhead_point *point, uint32_t station)
     if (station == 1) n_first = n_truth;
 }
 
-/* Debian 13's CloudCompare looks for its plugins in a folder where they are not. One of them reads PTX. */
+/* Debian 13's CloudCompare looks for its plugins in a folder where they are not. One of the plugins reads PTX. */
 static void say_where_plugins_are(void)
 {
     glob_t found;

@@ -256,7 +256,7 @@ static uint64_t check_e57(const struct bytes *whole, const struct bytes *left, c
     return all;
 }
 
-/* Its first note (288 bytes from 48 on) and header (32), which are in the first page, are not there. */
+/* The file's first note (288 bytes from 48 on) and header (32), which are in the first page, are not there. */
 static int is_no_e57(const struct bytes *left)
 {
     return left->len < 1024 || memcmp(left->data + 64, "scanhead e57 1", 15) != 0;

@@ -17,9 +17,9 @@ struct repair_row {
     const char *option[8]; /* of `record`; ends with NULL */
     const char *
         reader[8]; /* a program of others that prints as many lines as the file has units; $F is the file. NULL: none */
-    /* Compares a complete recording of the same stream, the left file and the repaired one. It fails, or returns how
-     * many units the repaired one holds. All units that are whole in `left` must be in it, and it must begin as `whole`
-     * does. */
+    /* Compares a complete recording of the same stream, the left file and the repaired one. The check fails, or returns
+     * how many units the repaired file holds. All units that are whole in `left` must be in it, and it must begin as
+     * `whole` does. */
     uint64_t (*check)(const struct bytes *whole, const struct bytes *left, const struct bytes *repaired);
     /* Returns 1 where so little was left that there is nothing to repair. */
     int (*is_none)(const struct bytes *left);

@@ -40,12 +40,12 @@ void tape_read(const char *path, struct tape *tape);
 void tape_step(struct wire *wire, const char *what, const char *const *more, const struct tape_line *lines, int n,
                struct tape *tape);
 
-/* Both have the same frames with the same bytes, and as many ticks between them. */
+/* Both tapes have the same frames with the same bytes, and as many ticks between them. */
 void tape_same_ticks(const struct tape *tape, const struct tape *want);
-/* Both have the same bytes. */
+/* Both tapes have the same bytes. */
 void tape_same_bytes(const struct tape *tape, const struct tape *want);
 
-/* Runs `scanhead ...` to its end and returns the exit status. Its messages are in "err". */
+/* Runs `scanhead ...` to its end and returns the exit status. The program's messages are in "err". */
 int replay_call(struct wire *wire, const char *const *args);
 /* The messages of the last call have the text. */
 void replay_said(const struct wire *wire, const char *text);

@@ -36,7 +36,7 @@ struct room_config {
 
 extern const double STATION[3], HEADING_DEG;
 
-/* Writes config.yaml in the folder, for room.obj beside it. Its path is good as long as those of wire_path. */
+/* Writes config.yaml in the folder, for room.obj beside it. The file's path is good as long as those of wire_path. */
 const char *room_config_write(const struct wire *wire, const struct room_config *c);
 
 /* ---- the range along a direction given in the head's frame by mirror and pan angle */

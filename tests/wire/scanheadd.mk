@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# This runs the wire tests of links, protocols, faults and replay with scanheadd as the head. It takes minutes. Clients
-# are those of scanhead.
+# This runs the wire tests of links, protocols, faults and replay with scanheadd as the head. The run takes minutes.
+# Clients are those of scanhead.
 SCANHEADD_TESTS = pty split sessions join half_closed slow_reader stalled_files loopback step step_links flood three_heads \
 	cola_stream cola_reboot grabber_hokuyo grabber_sick grabber_velodyne gnss gpsd clients python samples same_stream \
 	usb_devices usb_identity usb_capacity knobs overrun reboot signals \

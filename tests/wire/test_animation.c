@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* An animation: stops at stations while meshes move, and at way-points, counted in frames. There is a file for each
- * frame and one of all. Each point lies on its body where that stands in the frame. */
+ * frame and one of all. Each point lies on its body where the body stands in the frame. */
 #include <math.h>
 
 #include "tests/wire/wire.h"
 
 /* The scene has wide ground and two plates. The plate at x = 5 m goes east at 2 m/s, and the one at x = -4 m turns
- * about its own origin by 10 deg/s. Both are much larger than their visible part. */
+ * about its own origin by 10 deg/s. Both plates are much larger than their visible part. */
 #define SCENE                                                                              \
     "scene:\n  meshes:\n    - {file: ground.obj, up: z, scale: 1}\n"                       \
     "    - {file: plate.obj, up: z, scale: 1, offset_m: [5, 0, 0], move_m_s: [2, 0, 0]}\n" \

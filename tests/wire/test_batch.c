@@ -3,7 +3,7 @@
 #include "tests/wire/batch_rig.h"
 
 /* One job by `record` is the same file. So is the whole campaign in 2 and in 7 shards, which run from the last to the
- * first. One of the seven has no job. */
+ * first. One of the seven shards has no job. */
 static void test_shards(void **state)
 {
     struct wire *wire = *state;
@@ -22,8 +22,8 @@ static void test_shards(void **state)
 }
 
 /* Meshes that one process shares among combinations, and BVHs among those of the same places, change no byte. There are
- * two scanners, two places of the second one, and three rates of the first. They run in one process, and in one for
- * each job. */
+ * two scanners, two places of the second one, and three rates of the first. The jobs run in one process, and then in
+ * one process for each job. */
 static void test_shared(void **state)
 {
     static const char sweep[] = "stations.1.position_m=[0.5,0.25,1.5],[-0.5,0,1.25]";
@@ -68,7 +68,7 @@ static void test_failing(void **state)
     assert_int_not_equal(access(wire_path(wire, "none"), F_OK), 0); /* nothing was begun */
 }
 
-/* A scanner whose scans never end can't record. It stops only campaigns in which its station is chosen. */
+/* A scanner whose scans never end can't record. Such a scanner stops only campaigns in which its station is chosen. */
 static void test_chosen_stations(void **state)
 {
     struct wire *wire = *state;

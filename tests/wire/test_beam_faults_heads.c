@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the beam with other heads, other ways to cast and other paces. They hit the same pulses and give the same
- * bytes. */
+/* Faults of the beam with other heads, other ways to cast and other paces. The faults hit the same pulses and give the
+ * same bytes. */
 #include "tests/wire/beam_run.h"
 #include "tests/wire/emitter_rig.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A personality's link does not change the native stream: its hash is the same with it and without. Its ports survive
- * clients that come, send half a word and go. */
+/* A personality's link does not change the native stream: its hash is the same with it and without. The personality's
+ * ports survive clients that come, send half a word and go. */
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"
 
@@ -69,7 +69,7 @@ static pid_t ask_and_drain(struct wire *wire, const char *endpoint, const char *
     _exit(sum < 100000); /* scans came, not only replies */
 }
 
-/* Scans ten seconds of device time as fast as the head computes. It waits for each client meanwhile. */
+/* Scans ten seconds of device time as fast as the head computes. The head waits for each client meanwhile. */
 static void scan(struct wire *wire, const struct personality *p, int with, const char *frames, char hex[65])
 {
     int udp[2];
@@ -162,7 +162,7 @@ static void expect_answer(const char *endpoint, const struct crowd *c)
     }
 }
 
-/* Ten thousand clients come to each head. Then the heads answer as if none had been there. */
+/* Thousands of clients come to each head. Afterwards the heads answer as if none had been there. */
 static void test_crowds(void **state)
 {
     (void)state;

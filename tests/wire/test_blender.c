@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The same scene, stations and step in Blender. tests/readers/blender_scan.py scans with geometry nodes, in single
  * precision and with no code of ours. scanhead records the same here, and each of its shots is compared with Blender's
- * ray of that direction. Both meet something, at the same place, or neither does.
+ * ray of that direction. Shot and ray both meet something, at the same place, or neither does.
  *
  * The bound of their distance, with e = 2^-23, at range r, where coordinates go up to C and the surface is met at an
  * incidence i: Directions come from float angles. An azimuth of up to 2 pi is rounded twice (12.6 e/2), an elevation of
@@ -10,8 +10,8 @@
  * about ten roundings of differences of up to 2 C. Together that is less than 8 e C. On a slanted surface an error
  * across the ray is 1 / cos i of it along the ray: e (13 r + 8 C) / cos i. scanhead adds half a count of 1e-6 m.
  *
- * Where a ray passes an edge within that, Blender may take the surface beside or behind it. Such rays are counted, and
- * each has to be that near to an edge of the mesh. */
+ * Where a ray passes an edge within that bound, Blender may take the surface beside or behind it. Such rays are
+ * counted, and each has to be that near to an edge of the mesh. */
 #include <math.h>
 
 #include "tests/wire/wire.h"

@@ -187,8 +187,8 @@ static void no_power_no_count(void **state)
         assert_in_range(n, 0, 20); /* until power goes: from 1 s on */
     assert_int_equal(scanhead_reattach(sh, DEADLINE_MS), SCANHEAD_OK);
     assert_string_equal(client_ask(sh, "HEAD:STAT?"), "off");
-    /* The other link's thread may still be on its way: then it cuts this client, and refuses others for a moment. It
-     * has been there once the step is written to this client, or this client is cut. */
+    /* The other link's thread may still be on its way: then it cuts this client, and refuses others for a moment. The
+     * thread has been there once the step is written to this client, or this client is cut. */
     int fd = raw_connect_again(head_link(&head, 0), "*IDN?\n");
     client_tell(sh, "TIME:STEP 2500 MS");
     close(fd);

@@ -242,7 +242,7 @@ static void test_links_as_run(void **state)
     }
 }
 
-/* A file of a link is shown, and stays as it is. It needs a folder. */
+/* A file of a link is shown, and stays as it is. The file needs a folder. */
 static void test_file_stays(void **state)
 {
     struct wire *wire = *state;

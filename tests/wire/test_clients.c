@@ -41,8 +41,8 @@ static void expect_points(struct scanhead *sh, int n)
     }
 }
 
-/* The frames that a killed client did not read from a terminal may come first. They are older than the head's answer to
- * us. */
+/* The frames that a killed client did not read from a terminal may come first. The frames are older than the head's
+ * answer to us. */
 static void pass_frames_before(struct scanhead *sh, int64_t t_ns)
 {
     struct scanhead_frame frame;
@@ -58,8 +58,8 @@ static int is_among(int number, const int *list)
     return *list != 0;
 }
 
-/* Takes errors off the queue until one of this number comes. Those before it must be among the allowed ones (0 ends the
- * list). */
+/* Takes errors off the queue until one of this number comes. Errors before it must be among the allowed ones (0 ends
+ * the list). */
 static void expect_error(struct scanhead *sh, int number, const int *allowed)
 {
     struct scanhead_frame frame;
@@ -192,7 +192,7 @@ static void babbling_client(struct wire *wire, const char *link)
     scanhead_close(sh);
     expect_error(watch, 101, NONE);
 
-    /* Sends bytes of all values and leaves without a line's end. They give fewer errors than the queue holds. */
+    /* Sends bytes of all values and leaves without a line's end. The bytes give fewer errors than the queue holds. */
     int fd = raw_open(&head, link);
     unsigned char garbage[2500];
     uint32_t x = 12345;

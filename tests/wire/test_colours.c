@@ -193,8 +193,8 @@ static void test_texture(void **state)
     check_other_formats();
 }
 
-/* The nearest point is red and the farthest blue, as the file says. That is so by --colour, by the configuration, and
- * again from the stream. */
+/* The nearest point is red and the farthest blue, as the file says. The colours are so by --colour, by the
+ * configuration, and again from the stream. */
 static void test_own_limits(void **state)
 {
     wire = *state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* --duration of `record` off line, and of `run --start` or head.start. Both are device time. */
+/* --duration of `record` off line, and of `run --start` or head.start. Both durations are device time. */
 #include "tests/wire/room.h"
 
 /* A frame takes 0.4 s. */

@@ -107,8 +107,8 @@ static void begin(struct scanhead *hit, struct scanhead *clean)
     client_tell(clean, "SCAN:START");
 }
 
-/* A client is cut off at the frame that the truth names: it has all before and nothing after. It comes back and gets
- * the rest. The count of one holds for the link, so the second session is not cut. */
+/* A client is cut off at the frame that the truth names: it has all before and nothing after. The client comes back and
+ * gets the rest. The count of one holds for the link, so the second session is not cut. */
 static void cut_and_return(struct wire *wire, const char *link, const char *fault, const char *kind)
 {
     struct head head = start(wire, link, fault, NULL);
@@ -185,7 +185,7 @@ static void test_each_session(void **state)
     assert_true(whole > 0);
 }
 
-/* Two clients of the link come to the frame of an unplugging. It is carried out and reported once. */
+/* Two clients of the link come to the frame of an unplugging. The unplugging is carried out and reported once. */
 static void test_two_clients(void **state)
 {
     struct wire *wire = *state;
@@ -217,7 +217,7 @@ static void test_fast(void **state)
     begin(hit, clean);
     read_to_cut(hit, 0, &t_ns);
     read_clean(clean, seen);
-    /* It is turned away until the fault's time is over. The head only says that a client was lost. */
+    /* The client is turned away until the fault's time is over. The head only says that a client was lost. */
     int rc;
     char reply[100];
     do
@@ -315,7 +315,7 @@ static void test_record(void **state)
     assert_int_equal(truth(wire, 0, "unplug", "frame"), 100);
 }
 
-/* A fault that a link can't have is refused. One for all links is for those that can have it. */
+/* A fault that a link can't have is refused. A fault for all links is for the links that can have it. */
 static void test_wrong_link(void **state)
 {
     struct wire *wire = *state;

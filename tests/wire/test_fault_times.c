@@ -131,8 +131,8 @@ static void test_a_stall_makes_a_slow_reader(void **state)
     assert_int_equal(stats_uint(wire, "pulses"), pulses + told);
 }
 
-/* Frames that would come within two seconds are not cut. Later ones are, and count as left out. That is so, too, where
- * one stall after the other ends in time. */
+/* Frames that would come within two seconds are not cut. Later ones are, and count as left out, also where one stall
+ * after the other ends in time. */
 static void test_the_end_waits_for_what_is_on_its_way(void **state)
 {
     static const struct {
@@ -223,7 +223,8 @@ static void test_each_pulse_is_in_a_packet_or_counted(void **state)
     assert_int_equal(stats_uint(wire, "pulses"), 12 * 16 * stats_link_uint(wire, "sent_units") + unsent);
 }
 
-/* Packets that a fault holds back when power goes are neither sent nor counted as sent. Those in the file are. */
+/* Packets that a fault holds back when power goes are neither sent nor counted as sent. Packets in the file are
+ * counted. */
 static void test_what_power_takes_is_not_sent(void **state)
 {
     enum { PACKET_BYTES = 1206 };

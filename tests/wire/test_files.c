@@ -19,7 +19,7 @@ static void begin(struct wire *wire, char config[352])
     snprintf(config, 352, "%s", room_config_write(wire, &SCAN));
 }
 
-/* It ends with this status and one line on standard error that has both texts. */
+/* The program ends with this status and one line on standard error that has both texts. */
 static void expect(struct wire *wire, pid_t pid, int want, const char *says, const char *more)
 {
     int status = wire_wait(wire, pid);

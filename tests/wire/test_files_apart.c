@@ -172,7 +172,7 @@ static void begin(struct wire *wire)
     emitter_write_profile(wire, "emitter: directions\ndirections: list.txt\n");
 }
 
-/* The file has another name, `alias`, which the command is told to write. Its bytes stay. */
+/* The file has another name, `alias`, which the command is told to write. The file's bytes stay. */
 static void expect_refusal(struct wire *wire, const char *line, const char *file, const char *alias, const char *who,
                            const char *other)
 {

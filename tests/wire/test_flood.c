@@ -27,7 +27,7 @@ struct flood {
     _Atomic int over;
 };
 
-/* Frames lie between reply lines. They are skipped by the length in their header. */
+/* Frames lie between reply lines. Frames are skipped by the length in their header. */
 static void take_bytes(struct flood *f, const unsigned char *bytes, size_t n)
 {
     for (size_t i = 0; i < n; i++) {

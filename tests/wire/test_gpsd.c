@@ -30,7 +30,8 @@ static pid_t spawn(struct wire *wire, const char *const *args, int out_fd)
     _exit(127);
 }
 
-/* Waits until the program (pid) listens there. It does not announce that, so it is asked again and again. */
+/* Waits until the program (pid) listens there. The program does not announce that, so its port is asked again and
+ * again. */
 static void wait_listening(pid_t pid, int port)
 {
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
@@ -182,7 +183,7 @@ static void check_gpsd(struct wire *wire, int quality, int status)
         if (before >= 0 && tenths != before) assert_true(tenths > before && (tenths - before) % 2 == 0);
         n += tenths != before;
         before = tenths;
-        /* Its time is in the past: the head's own clock, asked now, is not before it. */
+        /* The fix's time is in the past: the head's own clock, asked now, is not before it. */
         int h, m;
         double s;
         assert_int_equal(sscanf(client_ask(sh, "TIME:UTC?"), "2026-01-01T%d:%d:%lfZ", &h, &m, &s), 3);
@@ -242,8 +243,8 @@ static uint32_t last_note(const struct wire *wire, struct truth_note **note, uin
     return *n_notes != 0 ? (uint32_t)(*note)[*n_notes - 1].number : 0;
 }
 
-/* The truth is written by a thread of its own, so gpsd may have a sentence before its note. Its note is then the next
- * one. */
+/* The truth is written by a thread of its own, so gpsd may have a sentence before its note. The sentence's note is then
+ * the next one. */
 static uint32_t next_note(const struct wire *wire, struct truth_note **note, uint32_t *n_notes)
 {
     size_t len;
@@ -271,8 +272,8 @@ static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_
     return n_wrong;
 }
 
-/* A sentence with a wrong checksum gives no position. One whose checksum was made right is taken. gpsd reports after a
- * sentence at most, and a fix has five; those of the next one end the last. */
+/* A sentence with a wrong checksum gives no position. A sentence whose checksum was made right is taken. gpsd reports
+ * after a sentence at most, and a fix has five; the sentences of the next fix end the last. */
 static void test_gpsd_hurt(void **state)
 {
     struct wire *wire = *state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* rawlog-grabber reads the ready configuration of a Hokuyo, over TCP and over a pty at once. Rates and times are those
- * of the device's own clock, nothing is lost, and ranges are right. It also reads a URG-04LX, which is slower, over its
- * pty. */
+ * of the device's own clock, nothing is lost, and ranges are right. The grabber also reads a URG-04LX, which is slower,
+ * over its pty. */
 #include "tests/wire/grabber.h"
 #include "tests/wire/house.h"
 

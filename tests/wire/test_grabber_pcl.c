@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* PCL's VLPGrabber, where PCL is installed. Turns are whole, and each point lies on the house. It treats all lasers of
- * a firing sequence as fired at once. The test knows the laser by its elevation, and so its true time. */
+/* PCL's VLPGrabber, where PCL is installed. Turns are whole, and each point lies on the house. The grabber treats all
+ * lasers of a firing sequence as fired at once. The test knows the laser by its elevation, and so its true time. */
 #include "tests/wire/house.h"
 
-/* On a busy machine the kernel drops packets that the client does not fetch in time. One of RUNS has to be whole. */
+/* On a busy machine the kernel drops packets that the client does not fetch in time. One run of RUNS has to be
+ * whole. */
 enum { SWEEPS = 3, RUNS = 5 };
 
 /* The lasers in the order of firing, 2.304 us apart, at 3,600 degrees a second. */

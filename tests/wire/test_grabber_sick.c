@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* rawlog-grabber's CLMS100Eth reads a SICK LMS111 over TCP. It polls, and logs times of the host, so the device's own
- * times and counts are in the telegrams alone. A relay between the two keeps them. The client itself waits 15 s while
- * it turns the scanner on. */
+/* rawlog-grabber's CLMS100Eth reads a SICK LMS111 over TCP. The client polls, and logs times of the host, so the
+ * device's own times and counts are in the telegrams alone. A relay between the two keeps them. The client itself waits
+ * 15 s while it turns the scanner on. */
 #include "tests/wire/grabber.h"
 #include "tests/wire/house.h"
 

@@ -84,8 +84,8 @@ static double turned_deg(uint32_t n, int sequence, int laser)
     return DEG_PER_US * (n * PACKET_US + sequence * SEQUENCE_US + laser * LASER_US);
 }
 
-/* The difference of each block's azimuth, rounded to 0.01 degrees, from the expected one. Its mean is the first block's
- * azimuth. */
+/* Checks how far each block's azimuth, rounded to 0.01 degrees, differs from the expected one. The first block's
+ * azimuth is then corrected by the mean difference. */
 static void check_azimuths(struct packets *all)
 {
     const double begin_deg = 0.01 * le_get16(all->packet[0].bytes + 2);

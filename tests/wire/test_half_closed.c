@@ -84,7 +84,8 @@ static void a_question_and_no_more(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Its client takes the whole scan, though control went back to others. This is so at any pace. */
+/* A client that has sent all takes the whole scan, though control went back to others. The scan is whole at any
+ * pace. */
 static void a_scan_and_no_more(void **state)
 {
     static const char *const paces[] = {"realtime", "fast"};

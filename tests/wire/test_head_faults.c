@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the head's states, power, time and counters, as a client of the program sees them. They are those of
+/* Faults of the head's states, power, time and counters, as a client of the program sees them. The faults are those of
  * --truth, by number and by time. Most tests run in the pace step, where nothing depends on when a client connects. */
 #include "tests/wire/room.h"
 
@@ -308,8 +308,8 @@ static void test_power_cycle_in_steps(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* In real time, and as fast as it computes, the client is hung up. It comes back and finds the head idle with an empty
- * queue. */
+/* In real time, and as fast as it computes, the client is hung up. The client comes back and finds the head idle with
+ * an empty queue. */
 static void power_cycle_at(struct wire *wire, const char *pace, const char *link)
 {
     struct head head = start(wire,
@@ -324,7 +324,7 @@ static void power_cycle_at(struct wire *wire, const char *pace, const char *link
     client_tell(sh, "SCAN:START");
     while ((rc = scanhead_next(sh, &frame, DEADLINE_MS)) == SCANHEAD_OK && !is_event(&frame, SCANHEAD_EV_SCAN_START))
         continue;
-    /* A client that is late is hung up before it has read that. It loses all that it has not read. */
+    /* A client that is late is hung up before it has read that. Such a client loses all that it has not read. */
     if (rc != SCANHEAD_OK && rc != SCANHEAD_ECLOSED) fail_msg("%s", scanhead_error(sh));
     ends = -1; /* for the state `scanning` */
     const int64_t last_ns = until_hung_up(sh, &pulse_end, &ends);

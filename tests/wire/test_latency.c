@@ -54,8 +54,8 @@ static int has_command(const char *text, const void *commands)
     return line_behind(text, *(const int *)commands) != NULL;
 }
 
-/* Sends a command that has an effect, and returns the device time of its arrival by the journal. It must lie between
- * the head's times before and after. */
+/* Sends a command that has an effect, and returns the device time of its arrival by the journal. The arrival must lie
+ * between the head's times before and after. */
 static int64_t command(struct session *s, const char *line)
 {
     int64_t before_ns = atoll(client_ask(s->sh, "TIME?"));

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Personalities are read twice at once: by a parser written from the published layout alone, and by libscanhead from
- * the native link beside it. Both get the same points, to half a unit of the protocol's last digit. Range noise makes
- * all scans differ, so they are matched by their contents. */
+ * the native link beside it. Both readers get the same points, to half a unit of the protocol's last digit. Range noise
+ * makes all scans differ, so they are matched by their contents. */
 #include "tests/wire/wire.h"
 
 #include <math.h>
@@ -49,8 +49,8 @@ static int is_same(const struct scan *a, const struct scan *b)
     return a->n == b->n;
 }
 
-/* Each scan of the protocol is one of the native ones. They follow each other, and their angles and times agree. The
- * two clocks begin at different times; unit_ms: a time is rounded down to it. */
+/* Each scan of the protocol is one of the native ones. The scans follow each other, and their angles and times agree.
+ * The two clocks begin at different times; unit_ms: a time is rounded down to it. */
 static void compare(int lines, int scans, double unit_ms)
 {
     int first = -1;
@@ -68,7 +68,8 @@ static void compare(int lines, int scans, double unit_ms)
     }
 }
 
-/* Starts the ready configuration with noise. Its terminals are moved to the test's folder. Lists end with NULL. */
+/* Starts the ready configuration with noise. The configuration's terminals are moved to the test's folder. Lists end
+ * with NULL. */
 static struct head start(struct wire *wire, const char *config, const char *const *ptys, const char *const *sets)
 {
     static char path[4][400];

@@ -200,8 +200,8 @@ static void test_a_plain_scan(void **state)
     scan(*state, NULL, "beam: {mode: single}\n", nothing_else, &sums);
 }
 
-/* A ball that is flattened to a rod along the scene's x axis. It is so large that points leave the range of the
- * stream's integers, +-(2^31 - 1) counts of the automatic 1e-6 m from the station. */
+/* A ball that is flattened to a rod along the scene's x axis. The ball is so large that points leave the stream's
+ * integers, +-(2^31 - 1) counts of the automatic 1e-6 m from the station. */
 static const double BALL_M = 100.0, GROWTH_1_M = 5.0, FARTHEST_M = 2147.483647;
 
 /* Returns the probability that the x of a point in a ball of radius 1, uniform over its volume, is beyond q. The disc

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Every model of Debian's assimp-testmodels whose ending the scene reader takes. `scanhead init` and `scanhead record`
  * with no further key scan it, or refuse it with a reason that names the remedy. Nothing crashes or hangs. The counts
- * are printed. One in six is scanned; all with THOROUGH=1. */
+ * are printed. One model in six is scanned; all with THOROUGH=1. */
 #define _XOPEN_SOURCE 700
 #include "tests/common/thorough.h"
 #include "tests/wire/wire.h"

@@ -13,7 +13,8 @@ static const struct room_config RIDE = {.profile = NULL,
                                                 " mount_heading_deg: 20, mount_pitch_deg: 5}\n"
                                                 "loop: {queue_ms: 10000, late_ms: 10000}\n"};
 
-/* The platform goes round in a circle at constant rate, leaning. That is a closed form, whatever the interpolation. */
+/* The platform goes round in a circle at constant rate, leaning. The circle is a closed form, whatever the
+ * interpolation. */
 static const double RADIUS_M = 1.7, RATE = 1.9, MIDDLE[3] = {0.6, -1.1, 0.1};
 
 static void write_ride(const struct wire *wire)
@@ -187,8 +188,8 @@ static void test_end_of_the_path(void **state)
     }
 }
 
-/* It may begin at the end only where the platform waits there. From 5 to 6.2 s are 1.2 s, but not to the last bit: the
- * difference is larger. */
+/* The ride may begin at the end only where the platform waits there. From 5 to 6.2 s are 1.2 s, but not to the last
+ * bit: the difference is larger. */
 static void test_beginning_at_the_end(void **state)
 {
     struct wire *wire = *state;

@@ -239,7 +239,7 @@ static void test_overload_two_casters(void **state)
     check_balance(&a, wire);
 }
 
-/* The whole process stands still for 400 ms, twice, in mid-scan. That may or may not cost pulses. */
+/* The whole process stands still for 400 ms, twice, in mid-scan. The stalls may or may not cost pulses. */
 static void test_stall(void **state)
 {
     struct wire *wire = *state;

@@ -112,8 +112,8 @@ static void test_same_picture(void **state)
         free(scans[i].rgb);
 }
 
-/* From UTM, turned and scaled, the points come back to the scene to a micrometre. That moves hardly a point into
- * another pixel. */
+/* From UTM, turned and scaled, the points come back to the scene to a micrometre. A micrometre moves hardly a point
+ * into another pixel. */
 static void test_other_crs(void **state)
 {
     struct wire *wire = *state;

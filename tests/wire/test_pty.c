@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The virtual serial port with clients that know nothing of it. They open it with any settings, and close it in the
- * middle of a frame. The next client never gets frames that were meant for the one before. */
+/* The virtual serial port with clients that know nothing of it. The clients open it with any settings, and close it in
+ * the middle of a frame. The next client never gets frames that were meant for the one before. */
 #include "tests/wire/room.h"
 
 #include <termios.h>
@@ -44,7 +44,8 @@ struct look {
     int n;
 };
 
-/* Reads as cat would, until `frames` frames have come. It fails when they are not among so many bytes. */
+/* Reads as cat would, until `frames` frames have come. The test fails where they are not among the bytes of
+ * two frames more of the largest size. */
 static void look_at(struct look *look, int fd, int frames)
 {
     native_parser_init(&look->parser);
@@ -183,7 +184,7 @@ static void test_taken_over_at_once(void **state)
 }
 
 /* The kernel throws away the bytes that wait in a terminal when its master is closed. So the head waits for a reader
- * who is slow to take the end. Here one reads nothing for a third of a second, when the whole scan is with the
+ * who is slow to take the end. In this test one reads nothing for a third of a second, when the whole scan is with the
  * kernel. */
 static void test_a_slow_reader_has_the_end(void **state)
 {

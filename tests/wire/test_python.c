@@ -55,8 +55,8 @@ static void same(const char *what, double ours, double theirs)
     near(what, ours, theirs, 0.0);
 }
 
-/* In degrees a range is the difference of places 6.4e6 m from the middle of the Earth. Both round sines, and angles up
- * to pi, to 2^-53 of them, a few times each: each rounding moves a place by up to 2.2e-9 m. */
+/* In degrees a range is the difference of places 6.4e6 m from the middle of the Earth. Python and C round sines, and
+ * angles up to pi, to 2^-53 of them, a few times each. Each rounding moves a place by up to 2.2e-9 m. */
 static void same_point(const struct row *r, const struct scanhead_point *p, const struct scanhead_point *in_scene,
                        int is_geodetic)
 {
@@ -181,10 +181,10 @@ static void test_same_numbers(void **state)
     }
 }
 
-/* ---- both layouts of one scan, in the CRS and in the scene. Both are made of the same encoder counts. They differ
- * in four ways: the range is a count of range_scale_m in one (0.5 um, half of it); coordinates are counts of 1 um in
- * the other (sqrt(3) / 2 um); georeferencing is good to output.tolerance_m (set to 1 um); the axes are good to 1e-10
- * rad. */
+/* ---- both layouts of one scan, in the CRS and in the scene. Both layouts are made of the same encoder counts. The two
+ * differ in four ways: the range is a count of range_scale_m in one (0.5 um, half of it); coordinates are counts of
+ * 1 um in the other (sqrt(3) / 2 um); georeferencing is good to output.tolerance_m (set to 1 um); the axes are good to
+ * 1e-10 rad. */
 static void test_both_layouts(void **state)
 {
     struct wire *wire = *state;

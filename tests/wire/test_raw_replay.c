@@ -2,8 +2,9 @@
 /* A capture of a VLP-16, replayed by tcpreplay onto loopback, is read by rawlog-grabber as the live sensor was. So is
  * the file itself. The head is started twice, and sends the same bytes both times: to the grabber, and to the recorder.
  *
- * All runs in a network namespace of the test's own. It has the sensor's ports, and a loopback that takes packets with
- * its own addresses from outside. Without the right to that, or without the two programs, the test is skipped. */
+ * All runs in a network namespace of the test's own. The namespace has the sensor's ports, and a loopback that takes
+ * packets with its own addresses from outside. Without the right to that, or without the two programs, the test is
+ * skipped. */
 #include <sched.h>
 
 #include <net/if.h>
@@ -137,8 +138,8 @@ static void check_packets(const char *what, const struct read_packets *all, cons
     if (missing > dropped) fail_msg("%s: %u packets are missing, and %u were not read", what, missing, dropped);
 }
 
-/* From the first fix on a turn's date is the sensor's: that hour, and its first packet's time in it. Before, it is the
- * host's. That is the first turn, at most, since fixes come while the sensor spins up. */
+/* From the first fix on a turn's date is the sensor's: that hour, and its first packet's time in it. Before, the date
+ * is the host's. The first turn alone, at most, has such a date, since fixes come while the sensor spins up. */
 static void check_dates(const char *what, const struct read_packets *all)
 {
     struct tm hour = {.tm_year = 126, .tm_mon = 4, .tm_mday = 4, .tm_hour = 3}; /* as CONFIG has it */
@@ -172,7 +173,7 @@ static int is_bound(int port)
     return found;
 }
 
-/* Its ports are open when this returns, so each packet is read, or counted as dropped. */
+/* The grabber's ports are open when this returns, so each packet is read, or counted as dropped. */
 static void start_grabber(struct wire *wire, const char *name, struct grabber *grabber)
 {
     const int64_t end_ms = wire_now_ms() + DEADLINE_MS;

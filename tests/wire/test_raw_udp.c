@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `record --raw` of UDP: each datagram is captured whole and in order, of a test's socket and of a VLP-16. Those that
- * the kernel has no room for are counted. Wrong command lines are refused. */
+/* `record --raw` of UDP: each datagram is captured whole and in order, of a test's socket and of a VLP-16. Datagrams
+ * that the kernel has no room for are counted. Wrong command lines are refused. */
 #include "core/bytes.h"
 #include "tests/wire/captured.h"
 #include "tests/wire/room.h"
@@ -244,7 +244,7 @@ static void test_nothing_came(void **state)
     assert_int_equal(access(wire_path(wire, "cap.pcapng.part"), F_OK), -1);
 }
 
-/* It ends by itself 100 ms after its first packet. */
+/* The recorder ends by itself 100 ms after its first packet. */
 static void test_duration(void **state)
 {
     struct wire *wire = *state;
@@ -258,7 +258,8 @@ static void test_duration(void **state)
     raw_recorder_end(&recorder, 0, 0, "1 packets");
 }
 
-/* A file may have 8 KiB. That gives an error, and no half of a file under its name. The written part is repaired. */
+/* A file may have 8 KiB. A longer capture gives an error, and no half of a file under its name. The written part is
+ * repaired. */
 static void test_disk_full(void **state)
 {
     struct wire *wire = *state;

@@ -7,7 +7,7 @@
 #include "tests/wire/readers.h"
 
 /* Two stations on the ground of a yard with three walls and no roof. There are shots without echo, and lines of unequal
- * length (47 lines of 10,000 pulses). The second one's degrees are close to those of its position in metres. */
+ * length (47 lines of 10,000 pulses). The second station's degrees are close to those of its position in metres. */
 static const char CONFIG[] =
     "head: {profile: full-sweep, prr_hz: 10000, lines_hz: 47, pan_deg_s: 120, pan_stop_deg: 350, frames: 1}\n"
     "scene: {meshes: [{file: yard.obj, up: z, scale: 1}]}\n"
@@ -188,7 +188,8 @@ static void test_las_12(void **state)
     free(text);
 }
 
-/* CloudCompare lists the loaded colours and scalar fields as columns. Its positions are floats, as for PTX. */
+/* CloudCompare lists the loaded colours and scalar fields as columns. CloudCompare's positions are floats, as for
+ * PTX. */
 static void test_ply_cloudcompare(void **state)
 {
     (void)state;

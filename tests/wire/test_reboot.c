@@ -95,8 +95,8 @@ static void step(struct scanhead *sh, int ms)
     client_tell(sh, line);
 }
 
-/* Grants time until the client is hung up: a second, and the delay of the client's link. That is at most half a second,
- * since a link holds the head back when it is later than loop.queue_ms. */
+/* Grants time until the client is hung up: a second, and the delay of the client's link. The delay is at most half a
+ * second, since a link holds the head back when it is later than loop.queue_ms. */
 static void reboot(struct scanhead *sh, struct client *c, const struct head *head)
 {
     char reply[64];

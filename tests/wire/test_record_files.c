@@ -65,7 +65,7 @@ static void test_same_file(void **state)
     assert_int_equal(unlink(part), 0);
     wire_write_text(wire, "a-1.las.part", "left behind");
     expect_refusal(wire, (const char *const[]){"record", config, "-o", a, "--quiet", "--split", NULL}, "a-1.las.part");
-    /* Its second file is kept, too, also where it is there alone. */
+    /* An earlier recording's second file is kept, too, also where it is there alone. */
     static const struct {
         const char *file, *left;
     } second[] = {{"b.las", "b.wdp.part"}, {"b.ptx", "b.ptx.grid"}};
@@ -220,7 +220,7 @@ static size_t write_two_lines(const struct wire *wire, const char *name, uint32_
     return len;
 }
 
-/* A kilobyte of stream has lines 0 and 2^32 - 1. It gives no 43 GB of empty places between. */
+/* A kilobyte of stream has lines 0 and 2^32 - 1. The stream gives no 43 GB of empty places between. */
 static void test_lines_far_apart(void **state)
 {
     struct wire *wire = *state;
@@ -238,7 +238,7 @@ static void test_lines_far_apart(void **state)
     free(err);
 }
 
-/* A stream ends within its scan, as that of a killed recorder. Its statistics are there all the same. */
+/* A stream ends within its scan, as that of a killed recorder. The stream's statistics are there all the same. */
 static void test_end_within_scan(void **state)
 {
     struct wire *wire = *state;

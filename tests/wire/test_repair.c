@@ -51,7 +51,7 @@ static struct bytes slurp(const char *path)
 
 /* ---- one recording */
 
-/* The bytes of the stream that the recorder gets. Then it is killed, unless it ends by itself. */
+/* The bytes of the stream that the recorder gets. Then the recorder is killed, unless it ends by itself. */
 struct moment {
     size_t fed;
     int kills, ends; /* ends: nothing more comes */

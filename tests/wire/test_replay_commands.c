@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Answers of a recording to commands. It answers queries as the head did, and takes no settings. Commands play it. */
+/* Answers of a recording to commands. The recording answers queries as the head did, and takes no settings. Commands
+ * play it. */
 #include "drivers/protocol/native_encode.h"
 #include "tests/wire/replay_rig.h"
 
@@ -173,13 +174,13 @@ static void test_how_it_is_played(void **state)
     assert_true(take_all(sh, &first_ns, &last_ns) > 10);
     assert_int_equal(first_ns, 0);
     assert_in_range(last_ns, 245000000, 250000000);
-    /* It starts anew while it plays. */
+    /* The recording starts anew while it plays. */
     client_tell(sh, "SCAN:STARt");
     grant(sh, 300);
     assert_true(take_all(sh, &first_ns, &last_ns) > 30);
     assert_int_equal(first_ns, 0);
     assert_in_range(last_ns, 295000000, 300000000);
-    /* It is stopped: no more frames come, and it is idle. */
+    /* The recording is stopped: no more frames come, and the head is idle. */
     client_tell(sh, "SCAN:STOP");
     grant(sh, 1);
     take_all(sh, &first_ns, &last_ns);
@@ -195,7 +196,7 @@ static void test_how_it_is_played(void **state)
     take_all(sh, &first_ns, &last_ns);
     grant(sh, 300);
     assert_int_equal(take_all(sh, &first_ns, &last_ns), 0);
-    /* It plays to its end. */
+    /* The recording plays to its end. */
     client_tell(sh, "SCAN:STARt");
     grant(sh, 600);
     assert_true(take_all(sh, &first_ns, &last_ns) > 200);

@@ -114,8 +114,8 @@ static void test_a_client_notices_what_the_truth_says(void **state)
     same_numbers(&truth.broken, &seen.broken, "broken");
 }
 
-/* The same faults with the same seeds hit the replay where they hit the head. Its link's bytes, and the truth, are the
- * same. */
+/* The same faults with the same seeds hit the replay where they hit the head. The bytes of the replay's link, and the
+ * truth, are the same. */
 static void test_hit_as_the_head_was(void **state)
 {
     struct wire *wire = *state;

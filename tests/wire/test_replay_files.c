@@ -99,7 +99,8 @@ static void same_but_numbers(const struct tape *a, const struct tape *b)
     }
 }
 
-/* It plays three times, tick by tick, each as the first time. Numbers go back by 2^30 from where they were. */
+/* The recording plays three times, tick by tick, each as the first time. Numbers go back by 2^30 from where they
+ * were. */
 static void three_times(struct wire *wire, const char *path, const char *const *more, int n_ticks)
 {
     static const struct tape_line start[] = {{0, "SCAN:STARt"}, {0, NULL}};
@@ -290,12 +291,12 @@ static void test_duration(void **state)
     replay_to_file(wire, file, duration, "out.shs");
     pulses_of(wire_path(wire, "out.shs"), &first_ns, &last_ns, 0);
     assert_in_range(last_ns, 300000000 - 2 * PACKET_NS, 300000000);
-    /* It lasts 0.53 s, and begins anew with the next tick: three whole times, and a fourth. */
+    /* The recording lasts 0.53 s, and begins anew with the next tick: three whole times, and a fourth. */
     replay_to_file(wire, file, loop, "out.shs");
     assert_in_range(pulses_of(wire_path(wire, "out.shs"), &first_ns, &last_ns, 3), 3 * 3000 + 1000, 4 * 3000);
 }
 
-/* It begins with the second client, for both from the first frame on, and ends by itself. */
+/* The replay begins with the second client, for both from the first frame on, and ends by itself. */
 static void test_waits_for_clients(void **state)
 {
     static const char *const more[] = {

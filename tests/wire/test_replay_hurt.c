@@ -71,7 +71,7 @@ static void test_no_recordings(void **state)
     tape_free(&tape);
 }
 
-/* A descriptor has absurd numbers, with right checksums. It is served all the same, at once. */
+/* A descriptor has absurd numbers, with right checksums. The recording is served all the same, at once. */
 static void test_absurd_numbers(void **state)
 {
     struct wire *wire = *state;

@@ -113,7 +113,8 @@ static uint32_t grant(struct scanhead *sh, const char *step, uint64_t *last_ns)
     return n;
 }
 
-/* It begins once both are there, and lasts its time from then on. Waiting, of any length, does not count. */
+/* The replay begins once both clients are there, and lasts its time from then on. Waiting, of any length, does not
+ * count. */
 static void test_clients_and_duration(void **state)
 {
     static const char *const args[] = {"--start", "--clients", "2",      "--duration",         "0.1",

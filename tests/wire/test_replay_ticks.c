@@ -4,7 +4,7 @@
 #include "tests/wire/emitter_rig.h"
 #include "tests/wire/replay_rig.h"
 
-/* A head boots, spins up, scans and spins down. It is recorded to the last tick, and replayed with some more. */
+/* A head boots, spins up, scans and spins down. The head is recorded to the last tick, and replayed with some more. */
 static void same_ticks(struct wire *wire, const struct room_config *c, const struct tape_line *lines, int n)
 {
     const struct tape_line start[] = {{3, "SCAN:STARt"}, {0, NULL}};

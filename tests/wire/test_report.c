@@ -85,9 +85,9 @@ static double farthest_m(void)
     return sqrt(sum);
 }
 
-/* The bound of a point's error, worked out by hand. It is 1e-6 m of the cast and the tolerance of georeferencing (the
- * cheapest method has to hold 1e-5 m here). Half a count an axis is added, and half a count of each encoder, which has
- * 2^20. */
+/* The bound of a point's error, worked out by hand. The bound is 1e-6 m of the cast and the tolerance of georeferencing
+ * (the cheapest method has to hold 1e-5 m here). Half a count an axis is added, and half a count of each encoder, which
+ * has 2^20. */
 static void noise_free_scans_hold_the_bound(void **state)
 {
     struct wire *wire = *state;
@@ -173,8 +173,8 @@ static void a_noisy_scan_deviates_by_its_noise(void **state)
     free(json);
 }
 
-/* In a ball of 5 mm the mean distance from a plane is 3/8 of the radius (|x| for x uniform in the unit ball). Its
- * scatter is 0.244 of the radius. Six standard errors of 10,000 points are 1.5 % of the radius. */
+/* In a ball of 5 mm the mean distance from a plane is 3/8 of the radius (|x| for x uniform in the unit ball). The
+ * distance's scatter is 0.244 of the radius. Six standard errors of 10,000 points are 1.5 % of the radius. */
 static void noise_of_balls_and_angles_is_known(void **state)
 {
     struct wire *wire = *state;
@@ -201,7 +201,7 @@ static void noise_of_balls_and_angles_is_known(void **state)
     free(json);
 }
 
-/* A station with a scanner of its own is judged by that. One is without noise, one with it. */
+/* A station with a scanner of its own is judged by that scanner. One station is without noise, one with it. */
 static void stations_are_judged_by_their_scanners(void **state)
 {
     struct wire *wire = *state;
@@ -229,7 +229,7 @@ static void stations_are_judged_by_their_scanners(void **state)
 }
 
 /* With a footprint only points on smooth faces are judged. A cloud of another place has none there, so it may not pass.
- * It lies in the room's middle, or farther than everything. A place whose squares no double holds is far. */
+ * Such a cloud lies in the room's middle, or farther than everything. A place whose squares no double holds is far. */
 static void another_place_does_not_pass(void **state)
 {
     struct wire *wire = *state;

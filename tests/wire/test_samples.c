@@ -54,8 +54,8 @@ static void take_waves(const uint8_t *frame, struct line_waves *waves)
     }
 }
 
-/* Encodes a block. Its attributes come from the frame after it, its colours from the one after that, its waveforms from
- * the next. */
+/* Encodes a block. The block's attributes come from the frame after it, its colours from the one after that, its
+ * waveforms from the next. */
 static size_t encode_block(const uint8_t *frame, const uint8_t *next, uint8_t *out, size_t room)
 {
     struct native_header header;

@@ -3,7 +3,7 @@
  * are known planes; a board stands before one of them. */
 #include "tests/wire/room.h"
 
-/* Its label is 6, after the walls. */
+/* The board's label is 6, after the walls. */
 static const char BOARD[] = "v 2 -2 -1\nv 2 2 -1\nv 2 2 2\nv 2 -2 2\no board\nusemtl wood\nf -4 -3 -2 -1\n";
 
 /* The middle one of three stations has a Velodyne. */
@@ -87,8 +87,8 @@ static int is_on_plane(const double p[3])
     return fabs(p[0] - 2.0) < NEAR_M;
 }
 
-/* There are one cloud of all and one of each, with the same points, each with the number of its scanner's station. They
- * are the scanners' points: the Velodyne's elevations are odd degrees from -15 to 15, by its manual. */
+/* There are one cloud of all and one of each, with the same points, each with the number of its scanner's station. The
+ * points are the scanners' own: the Velodyne's elevations are odd degrees from -15 to 15, by its manual. */
 static void test_together(void **state)
 {
     struct wire *wire = *state;
@@ -187,7 +187,7 @@ static void test_the_head_on_the_wire(void **state)
                                             "stations.1.scanner.head.range_min_m=1", NULL});
     sh = client_open(head_endpoint(&head, "tcp"));
     assert_non_null(strstr(client_ask(sh, "*IDN?"), "VLP-16"));
-    /* Its range limits are in the descriptor. */
+    /* The second scanner's range limits are in the descriptor. */
     struct scanhead_frame frame;
     struct scanhead_info info;
     client_wait_state(sh, "idle");

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Sessions of protocols that are not native. They don't change the stream, are part of journals, hold the head back in
- * pace fast, and lose whole units where a client doesn't read. */
+/* Sessions of protocols that are not native. The sessions don't change the stream, and are part of journals. They hold
+ * the head back in pace fast, and lose whole units where a client doesn't read. */
 #include "tests/common/thorough.h"
 #include "tests/wire/room.h"
 
@@ -127,8 +127,8 @@ static void the_stream_is_the_same(void **state)
     assert_int_equal(len, 289351 / 192 * 1206);
 }
 
-/* ---- a client that connects is answered at once, before the first scan, in it and between scans. Its commands to the
- * head are in the journal, which repeats them. */
+/* ---- a client that connects is answered at once, before the first scan, in it and between scans. The client's
+ * commands to the head are in the journal, which repeats them. */
 
 static void what_a_client_does_is_replayed(void **state)
 {
@@ -192,8 +192,8 @@ static void many_come_one_after_the_other(void **state)
 
 /* ---- a client that doesn't read */
 
-/* Streams scans and does not read them until the system holds no more. Then all that comes is whole, and the missing
- * units are the counted ones. */
+/* Streams scans and does not read them until the system holds no more. After that all that comes is whole, and the
+ * missing units are the counted ones. */
 static void a_client_that_does_not_read(void **state)
 {
     struct wire *wire = *state;
@@ -321,7 +321,7 @@ static void garbage_and_sudden_ends(void **state)
 
 /* ---- the head ends the session */
 
-/* RB twice within a second starts the sensor anew. Its connection is over, and the port stays. */
+/* RB twice within a second starts the sensor anew. The client's connection is over, and the port stays. */
 static void a_session_that_the_head_ends(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* These are tests of SITE:POSE on the wire. The scan after it is that of `record` with a configuration of that place,
- * in the paces fast and step. The journal brings the session back. At the wrong time it is refused. */
+ * in the paces fast and step. The journal brings the session back. SITE:POSE is refused at the wrong time. */
 #include "tests/wire/room.h"
 
 static const struct room_config SHORT = {.profile = "any-rate",

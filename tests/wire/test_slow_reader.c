@@ -127,7 +127,8 @@ static void overtake(struct wire *wire, const char *more_yaml)
     atomic_store(&fast.stop, 1);
     follow(&slow);
     pthread_join(thread, NULL);
-    /* A machine that is busy for 500 ms may make the fast one slow for once. Then it has announced losses, too. */
+    /* A machine that is busy for 500 ms may make the fast one slow for once. Then losses are announced to the fast
+     * reader, too. */
     check_nothing_bad(&fast);
     /* The announced losses may begin before the first frame that is counted here, but never end before a gap. */
     assert_true(fast.frames + fast.told_lost >= fast.last_seq - fast.first_seq + 1);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A head writes files beside its stream, and nobody reads them: a FIFO takes the place of a slow disk. That loses no
- * pulse, and no client waits. Lines that the files lack are counted in them, by SYST:LOST? and in the statistics. */
+/* A head writes files beside its stream, and nobody reads them: a FIFO takes the place of a slow disk. The FIFO costs
+ * no pulse, and no client waits. Lines that the files lack are counted in them, by SYST:LOST? and in the statistics. */
 #include <pthread.h>
 
 #include "drivers/protocol/native.h"

@@ -176,8 +176,8 @@ static const struct room_config LIVE = {.profile = NULL,
                                         .links = LINK_YAML_TCP,
                                         .more = "platform: {kind: live, reach_m: 5, extrapolate_ms: 20}\n"};
 
-/* This is the vehicle of the other simulator, t seconds after power-up. It moves back and forth and turns, heading
- * clockwise. */
+/* This is the vehicle of the other simulator, t seconds after power-up. The vehicle moves back and forth and turns,
+ * heading clockwise. */
 static void vehicle(double t, double p[6])
 {
     p[0] = 0.3 + 1.2 * sin(2 * t);

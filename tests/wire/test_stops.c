@@ -143,8 +143,8 @@ static void check_report(struct wire *wire)
     free(text);
 }
 
-/* A stop is a snapshot: a wall that goes north at 1 m/s stands where it is at the stop's time, for the whole scan. It
- * is in front of the room's north wall at first, and none of it is left when it has gone through. */
+/* A stop is a snapshot: a wall that goes north at 1 m/s stands where it is at the stop's time, for the whole scan. The
+ * moving wall is in front of the room's north wall at first, and none of it is left when it has gone through. */
 static void test_snapshot(void **state)
 {
     struct wire *wire = *state;

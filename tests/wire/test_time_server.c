@@ -170,7 +170,8 @@ struct reply {
 };
 
 /* Answers the request of T1, and waits for the state that follows from it. The head waits a second for an answer. On a
- * busy machine one may come later. Then the head asks again. Returns T1 of the request that was answered in time. */
+ * busy machine an answer may come later. Then the head asks again. Returns T1 of the request that was answered in
+ * time. */
 static double serve(struct scanhead *sh, double t1_s, struct reply r, const char *state)
 {
     for (;;) {
@@ -199,7 +200,7 @@ static void scans_have_the_servers_time(void **state)
     int64_t start_us, date_us, later_us, later_date_us;
     scanner_start(state, "time: {drift_ppm: 500}\n");
     struct scanhead *sh = client_open(head_endpoint(&head, "pty"));
-    read_times(&start_us, &date_us); /* 1970, and the clock's gain. Both are rounded down to 1 us */
+    read_times(&start_us, &date_us); /* 1970, and the clock's gain. Both times are rounded down to 1 us */
     assert_true(llabs(date_us - start_us - start_us / 2000) <= 2);
 
     cola_client_expect(&scanner, "sWN TSCTCInterface 0", "sWA TSCTCInterface");
@@ -329,7 +330,7 @@ static struct rlimit take_descriptors(void)
     return before;
 }
 
-/* The head has no socket for its requests. It says so, and tries again after the time between two of them. */
+/* The head has no socket for its requests. The head says so, and tries again after the time between two requests. */
 static void it_tries_again_without_a_way(void **state)
 {
     struct scanhead_frame frame;

@@ -275,7 +275,7 @@ static void test_two_failures_are_both_shown(void **state)
     }
 }
 
-/* The shell sets a limit that is too small for any command. That is an error, not a crash. */
+/* The shell sets a limit that is too small for any command. Such a limit gives an error, not a crash. */
 static void test_small_stack(void **state)
 {
     struct wire *wire = *state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head whose stream is too fast for its USB speed says so at start, with both figures. One whose stream fits runs.
+/* A head whose stream is too fast for its USB speed says so at start, with both figures. A head whose stream fits runs.
  *
  * The figures are worked out by hand. A point has 20 bytes (POINTS.md), and full-sweep's mirror (36 facets, gain 10)
  * fires over its whole sweep of 100 deg. USB 2.0 fits 19 bulk packets of 64 bytes into a frame of 1 ms at full speed

@@ -100,8 +100,8 @@ static double azimuth_deg(const uint8_t *packet, double us)
 static const double EDGE_DEG = 0.02 + 0.0036 + 0.0002;
 
 /* Pulses are locked from 2.5 s on, so the rotor is where the lock wants it from 3.5 s on, when the device's second 1
- * begins. It is let go 1 ms after 9.5 s, second 7, since that pulse and the next one are lost. Then it gains 0.72
- * degree a second. */
+ * begins. The rotor is let go 1 ms after 9.5 s, second 7, since that pulse and the next one are lost. From then on the
+ * rotor gains 0.72 degree a second. */
 static void check_azimuths(const uint8_t *bytes, size_t len)
 {
     uint32_t held = 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* These tests run `scanhead view` through the real program. Its page gets the same figures over HTTP as `scanhead
- * record` makes of the same recording. Its end and taken ports are tested, too. The recording is a sphere in a closed
- * room, whose mesh has no hole. */
+/* These tests run `scanhead view` through the real program. The page gets the same figures over HTTP as `scanhead
+ * record` makes of the same recording. The command's end and taken ports are tested, too. The recording is a sphere in
+ * a closed room, whose mesh has no hole. */
 #include <netinet/in.h>
 
 #include "core/bytes.h"

@@ -98,8 +98,9 @@ static void check_figures(const char *quality, const char *report)
     same("lost", number(quality, "{", "lost_frames"), 0, 0);
 }
 
-/* A point is half a count from where its pulse met the surface, so it may lie in the next cell. That shows only where
- * no other pulse meets one of the two. It is one cell more or less, and rare; its area is at most (2.5 cells)^2. */
+/* A point is half a count from where its pulse met the surface, so it may lie in the next cell. The error shows only
+ * where no other pulse meets one of the two. The difference is one cell, and rare; the cell's area is at most
+ * (2.5 cells)^2. */
 static void check_coverage(struct wire *wire, const char *config, const char *quality)
 {
     const char *const args[] = {"coverage", config, "--json", "--quiet", NULL};
@@ -112,7 +113,7 @@ static void check_coverage(struct wire *wire, const char *config, const char *qu
     free(coverage);
 }
 
-/* A station was moved and turned. Its points lie on the scene; from its old place they would not. */
+/* A station was moved and turned. The station's points lie on the scene; from the old place they would not. */
 static void check_move(const struct head *head, struct scanhead *sh)
 {
     size_t len;
@@ -218,8 +219,8 @@ static void noise_is_expected(void **state)
 }
 
 /* An observer that the head waits for is not the last to get a processor, as the head would stand still while others
- * work. In real time the head does not wait, and the observer is the last. Its priority is set before it has seen a
- * scan. A head that runs at the lowest priority itself, like this test, has no thread below it. */
+ * work. In real time the head does not wait, and the observer is the last. The observer's priority is set before a scan
+ * is seen. A head that runs at the lowest priority itself, like this test, has no thread below it. */
 static void who_is_waited_for_is_not_last(void **state)
 {
     struct wire *wire = *state;
@@ -307,7 +308,7 @@ static void scene_is_the_scene(void **state)
     same("x", number(json, "\"name\":\"second\"", "x_m"), -2.2, 0);
     same("heading", number(json, "\"name\":\"second\"", "heading_deg"), 200, 1e-9);
     expect_keys(json);
-    /* Its top is 1.3 m above the floor, and each leg is the longest side of a right triangle. */
+    /* The tripod's top is 1.3 m above the floor, and each leg is the longest side of a right triangle. */
     same("leg", number(json, "\"tripod\":{", "leg_m"), 1.8, 0);
     same("head above", number(json, "\"tripod\":{", "head_above_m"), 0.2, 0);
     same("top", number(json, "\"tripod\":{", "height_m"), 1.3, 1e-9);

@@ -184,7 +184,7 @@ static void check_csv(void)
     free(text);
 }
 
-/* A board stands before the wall. Its edges cut footprints, so some pulses have two returns. */
+/* A board stands before the wall. The board's edges cut footprints, so some pulses have two returns. */
 static void write_scene(void)
 {
     room_write(wire);

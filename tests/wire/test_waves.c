@@ -167,9 +167,9 @@ static void test_energy(void **state)
     assert_true(n > 5000);
 }
 
-/* A pane stands 2 m before a wall. The samples have the light of both. They have up to 3 % more where the model
- * leaves out light: at the pane's edge, echoes with less than 1 % of a footprint; where pane and floor are one echo,
- * 1 / R^2 of both is more than that of their mean, by 3 (0.3 m / R)^2 at most. */
+/* A pane stands 2 m before a wall. The samples have the light of pane and wall. They have up to 3 % more where the
+ * model leaves out light: at the pane's edge, echoes with less than 1 % of a footprint; where pane and floor are one
+ * echo, 1 / R^2 of both is more than that of their mean, by 3 (0.3 m / R)^2 at most. */
 static void test_glass(void **state)
 {
     struct wire *wire = *state;

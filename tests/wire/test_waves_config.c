@@ -155,7 +155,8 @@ static double figure_of(const char *plan, const char *stage, const char *key)
     return strtod(row + strlen(key), NULL);
 }
 
-/* A single ray misses the other surfaces in its footprint: its samples are as wrong as its points. Those of rings are not. */
+/* A single ray misses the other surfaces in its footprint: its samples are as wrong as its points. The samples of rings
+ * are not. */
 static void test_plan_single(void **state)
 {
     struct wire *wire = *state;

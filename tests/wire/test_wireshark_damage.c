@@ -74,7 +74,7 @@ static void set_round(uint8_t *frame, int round)
     seal_frame(frame);
 }
 
-/* Takes 1 to 3 frames from a frame of n bytes on, but no more than up to end. The last of them is sent now. Those
+/* Takes 1 to 3 frames from a frame of n bytes on, but no more than up to end. The last of them is sent now. The frames
  * between lie after the n bytes, in *between. Returns the length of all of them. */
 static size_t take_ahead(uint8_t *frame, size_t n, const uint8_t *end, int round, uint64_t *random, size_t *between)
 {

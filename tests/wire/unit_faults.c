@@ -280,7 +280,7 @@ static void check_stream(const struct unit_kind *kind, const struct pieces *want
     if (at < got->len) fail_msg("%zu bytes came, and the clean session's end is at %zu", got->len, at);
 }
 
-/* Each datagram is a unit. One may be split into some, or merged with those after it. */
+/* Each datagram is a unit. A unit may be split into some, or merged with the units after it. */
 static void check_datagrams(const struct unit_kind *kind, const struct pieces *want, const struct unit_list *got)
 {
     uint32_t g = 0;

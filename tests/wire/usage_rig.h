@@ -13,11 +13,12 @@ extern int usage_complaints;
 
 #define usage_complain(...) (usage_complaints++, print_message(__VA_ARGS__), print_message("\n"))
 
-/* Runs the program. Its status must be `status`, and its one line of error must have all of `says` (ends with NULL). */
+/* Runs the program. The program's status must be `status`, and its one line of error must have all of `says` (ends with
+ * NULL). */
 void usage_expect(struct wire *wire, const char *what, const char *const *args, int status, const char *const *says);
 
-/* The words of a command line with blanks between them, for wire_spawn; @ is the folder. They are good until the next
- * call. */
+/* The words of a command line with blanks between them, for wire_spawn; @ is the folder. The words are good until the
+ * next call. */
 const char *const *usage_words(const struct wire *wire, const char *line);
 
 #endif

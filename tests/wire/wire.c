@@ -155,7 +155,7 @@ pid_t wire_spawn_program(struct wire *wire, const char *program, const char *con
     _exit(127);
 }
 
-/* $SCANHEAD may be scanheadd, a head to be tested. Its clients and judges are then of the scanhead beside it. */
+/* $SCANHEAD may be scanheadd, a head to be tested. Clients and judges are then of the scanhead beside it. */
 static const char *program_for(const char *command)
 {
     static char path[PATH_MAX];

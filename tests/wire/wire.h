@@ -136,8 +136,8 @@ void client_tell(struct scanhead *sh, const char *command);
 
 void client_next(struct scanhead *sh, struct scanhead_frame *frame);
 
-/* For loops over frames or replies that go on for as long as the head runs. It fails once the head's time is SOON_MS
- * beyond the first one given (*since_ns, 0 at first). The head's time stands still where the machine does. */
+/* For loops over frames or replies that go on for as long as the head runs. The call fails once the head's time is
+ * SOON_MS beyond the first one given (*since_ns, 0 at first). The head's time stands still where the machine does. */
 void wire_soon(int64_t *since_ns, int64_t t_ns, const char *what);
 /* Asks for the head's time. */
 int64_t client_time_ns(struct scanhead *sh);
