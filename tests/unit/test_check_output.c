@@ -119,6 +119,18 @@ static void two_scanners(void **state)
     has(text, "range     0.5 to 900 m only (head.range_min_m, range_max_m); the head profile has 0.5 to 1000");
     has(text, "station 2 two, ...");
     has(text, "station 3 ...");
+    has_not(text, "output    of this head"); /* the same for both: it stands once */
+    free(text);
+}
+
+/* Micrometres in 31 bits and a sign reach 2147 m: enough for a range of 1000 m, not for one of 2500 m. */
+static void scanners_with_other_counts(void **state)
+{
+    (void)state;
+    char *text = checked(ONE ", {name: two, position_m: [4, 0, 2], scanner: {head: {profile: riegl-vz2000i}}}",
+                         (const char *const[]){"output.layout=geo", NULL});
+    has(text, "output    geo, 1e-06 m per count");
+    has(text, "output    of this head 1e-05 m per count");
     free(text);
 }
 
@@ -314,6 +326,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plain_scene),
         cmocka_unit_test(two_scanners),
+        cmocka_unit_test(scanners_with_other_counts),
         cmocka_unit_test(the_target_and_the_others),
         cmocka_unit_test(an_output_has_heights),
         cmocka_unit_test(anchors),

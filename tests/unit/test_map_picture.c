@@ -200,7 +200,8 @@ static uint8_t *drawn_rows(const struct site *site)
     return rgb;
 }
 
-/* A case: how the rows are coloured, and the legend. A legend without names is a scale. */
+/* A case: how the rows are coloured, and the legend. A legend without names is a scale. Limits that are not given are those of
+ * what is seen. */
 struct legend {
     const char *colour, *limits;
     int configured;
@@ -237,7 +238,7 @@ static void legend_colour(const void *legend, double value, uint8_t rgb[3])
 
 /* Makes the same picture by the parts of core alone, with this legend. The box is 2 m wide and high, and 700 points
  * along its longest side show no gaps. */
-static struct picture expected_rows(const struct legend *l)
+static struct picture expected_rows(struct legend *l)
 {
     const struct view_spec spec = {plan.camera, 2.0 / 700, 8};
     const struct view_colours colours = {legend_colour, l, 0, {252, 252, 252}, NULL};
@@ -254,6 +255,7 @@ static struct picture expected_rows(const struct legend *l)
             row_place(&rows[r], i, p_m[0]);
             view_add_points(view, 1, (const double(*)[3])p_m, &value, NULL);
         }
+    if (isnan(l->low)) assert_true(view_range(view, &l->low, &l->high));
     assert_int_equal(view_draw(view, &colours, &picture, &err), SH_OK);
     if (l->configured) assert_int_equal(view_draw_stations(view, &picture, at, 2), 0);
     for (; l->name[n] != NULL; n++) {
@@ -292,13 +294,16 @@ static void a_picture_has_marks_and_a_legend(void **state)
         {"station", NULL, 1, "Stations", {"near", "far"}, {1, 2}, 0, 0},
         {"height", "-1,0.75", 1, "Height z (m)", {NULL}, {0}, -1, 0.75},
         {"range", "-2,3", 0, "Range (m)", {NULL}, {0}, -2, 3},
+        {"height", NULL, 0, "Height z (m)", {NULL}, {0}, NAN, NAN},
+        {"range", NULL, 1, "Range (m)", {NULL}, {0}, NAN, NAN},
         {"reflectance", NULL, 0, "Reflectance (dB)", {NULL}, {0}, -30, 0},
     };
     (void)state;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         plan_it(cases[i].colour, cases[i].limits);
         uint8_t *got = drawn_rows(cases[i].configured ? &known : NULL);
-        struct picture want = expected_rows(&cases[i]);
+        struct legend legend = cases[i];
+        struct picture want = expected_rows(&legend);
         for (int k = 0; k < 3 * SIDE_PX * SIDE_PX; k++)
             if (got[k] != want.rgb[k])
                 fail_msg("case %zu: pixel %d, %d is not the same", i, k / 3 % SIDE_PX, k / 3 / SIDE_PX);
