@@ -11,6 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/colour.h"
+
 static int go_there(void **state)
 {
     (void)state;
@@ -118,6 +120,43 @@ static void points_in_a_mirror_are_left_out(void **state)
     has(on_err, "; the scene has 2 surfaces, from 0\n");
 }
 
+/* The colours of a page's map, from the scene on: seven of the ramp. */
+static void has_ramp(const char *page)
+{
+    char want[800] = "<linearGradient id=\"ramp\">";
+    for (int k = 0; k <= 6; k++) {
+        uint8_t rgb[3];
+        colour_ramp(k / 6.0, rgb);
+        snprintf(want + strlen(want), sizeof want - strlen(want),
+                 "<stop offset=\"%.4f\" stop-color=\"#%02x%02x%02x\"/>", k / 6.0, rgb[0], rgb[1], rgb[2]);
+    }
+    strcat(want, "</linearGradient>");
+    has(page, want);
+}
+
+/* One point on the roof and one of its image: the third surface is the floor's image, and the fourth the roof's. Where
+ * all points are images, there is no report. */
+static void one_point_in_a_mirror(void **state)
+{
+    static const char head[] = "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\n"
+                               "property double z\nproperty ushort label\nend_header\n%s";
+    char text[400];
+    (void)state;
+    snprintf(text, sizeof text, head, 2, "1 1 3 1\n1 1 -3 3\n");
+    write_text("g.ply", text);
+    does(&app_report, "m.yaml g.ply --html g.html", 0);
+    assert_int_equal(strncmp(on_out, "points     1\nempty      0 shots without echo\nghosts     1 points seen in ", 66),
+                     0);
+    char *page = contents("g.html");
+    has(page, "<div><span>Seen in mirrors, left out</span><b>1</b></div>\n");
+    has_ramp(page);
+    free(page);
+    snprintf(text, sizeof text, head, 1, "1 1 -3 3\n");
+    write_text("g.ply", text);
+    does(&app_report, "m.yaml g.ply", 2);
+    assert_string_equal(on_err, "scanhead: g.ply: it has no points (1 shots without echo)\n");
+}
+
 /* A coordinate of 10^12 m and more is not written with decimals. A cloud without points is refused. */
 static void clouds_that_are_far_or_empty(void **state)
 {
@@ -136,6 +175,7 @@ static void clouds_that_are_far_or_empty(void **state)
     write_text("far.ply", text);
     does(&app_report, "tiles.yaml far.ply", 1);
     has(on_out, "\nmean       -\nRMS        -\n50 %       -\n95 %       -\n99.9 %     -\nmax        -\n");
+    has(on_out, "\nNot within the expected error: 1 of 1 points are farther from everything than --max-m.\n");
     snprintf(text, sizeof text, head, 2, "nan nan nan\nnan nan nan\n");
     write_text("none.ply", text);
     does(&app_report, "tiles.yaml none.ply", 2);
@@ -147,6 +187,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(so_many_surfaces_are_shown),
         cmocka_unit_test(points_in_a_mirror_are_left_out),
+        cmocka_unit_test(one_point_in_a_mirror),
         cmocka_unit_test(clouds_that_are_far_or_empty),
     };
     return cmocka_run_group_tests_name("report scenes", tests, go_there, commands_end);
