@@ -26,6 +26,7 @@ enum { SHOTS = 17 * 36 + 2, POINTS = 8 * 36 + 1, MOST_BYTES = 200000 };
 static uint8_t bytes[MOST_BYTES];
 static size_t n_bytes;
 static int n_lowered, lowered_to;
+static const char *config = "c.yaml";
 
 /* The product's call comes here. The priority of the test stays as it is. */
 int setpriority(__priority_which_t which, id_t who, int to)
@@ -54,7 +55,7 @@ static int go_there(void **state)
 static void record(const char *words)
 {
     char line[256];
-    snprintf(line, sizeof line, "c.yaml -o s.shs -o s.ply --quiet %s", words);
+    snprintf(line, sizeof line, "%s -o s.shs -o s.ply --quiet %s", config, words);
     does(&app_record, line, 0);
     FILE *in = fopen("s.shs", "rb");
     assert_non_null(in);
@@ -63,7 +64,7 @@ static void record(const char *words)
     fclose(in);
 }
 
-/* ---- a watch of a head that doesn't run */
+/* ---- a watch of a head that is at its first scan, and whose stream is that of a recording */
 
 static struct config *cfg;
 static struct site *site;
@@ -79,9 +80,17 @@ static void open_watch(const char *const *set, double cpu_share)
         n++;
     cfg = calloc(1, sizeof *cfg);
     assert_non_null(cfg);
-    if (config_load("c.yaml", set, (int)n, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+    if (config_load(config, set, (int)n, cfg, &err) != SH_OK) fail_msg("%s", err.text);
     if (site_load_for(cfg, SITE_WRITTEN_OUT, NULL, NULL, &site, &err) != SH_OK) fail_msg("%s", err.text);
-    if (device_create(site, &(struct device_options){.start = 0}, &device, &err) != SH_OK) fail_msg("%s", err.text);
+    if (device_create(site, &(struct device_options){.start = 1}, &device, &err) != SH_OK) fail_msg("%s", err.text);
+    struct device_work *work = calloc(1, sizeof *work);
+    assert_non_null(work);
+    while (!work->scanning) {
+        assert_int_equal(device_claim(device, work), 0);
+        device_done(work);
+    }
+    assert_int_equal(work->scan, 1);
+    free(work);
     options.device = device;
     if (watch_page.open(cfg, site, &options, &w, &err) != SH_OK) fail_msg("%s", err.text);
     n_lowered = 0;
@@ -286,6 +295,36 @@ static void what_comes_after_the_end_does_not_count(void **state)
     close_watch();
 }
 
+/* The floor is a mirror below a roof, so the roof is seen once more below the floor. Nothing is there: these points count
+ * and are left out of the figures. */
+static void points_in_mirrors_are_left_out(void **state)
+{
+    (void)state;
+    double points, ghosts;
+    write_text("m.obj", "o floor\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3 4\n"
+                        "o roof\nv -9 -9 3\nv 9 -9 3\nv 9 9 3\nv -9 9 3\nf 8 7 6 5\n");
+    write_text("m.yaml", "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: geo}\n"
+                         "scene: {meshes: [{file: m.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 2]}]\n"
+                         "beam: {mode: single}\nsurfaces: [{object: floor, mirror: 0.9}]\n");
+    config = "m.yaml";
+    record("");
+    open_watch(NULL, 0);
+    give_stream(0);
+    char *quality = observed();
+    does(&app_report, "m.yaml s.ply", 0);
+    const char *at = strstr(on_out, "\nghosts ");
+    assert_non_null(at);
+    assert_int_equal(sscanf(on_out, "points %lf", &points) + sscanf(at, " ghosts %lf", &ghosts), 2);
+    assert_true(points > 20 && ghosts > 20);
+    same("points", number(quality, "{", "points"), points + ghosts, 0);
+    same("left out", number(quality, "{", "left_out"), ghosts, 0);
+    same("sampled", number(quality, "{", "sampled_points"), points, 0);
+    has(quality, "\"judgement\":\"within\"");
+    free(quality);
+    close_watch();
+    config = "c.yaml";
+}
+
 /* The scan of a station that the configuration doesn't have is not looked at. */
 static void another_head_s_stations_are_passed_over(void **state)
 {
@@ -326,6 +365,7 @@ int main(void)
         cmocka_unit_test(stations_follow_each_other),
         cmocka_unit_test(telemetry_ends_a_scan),
         cmocka_unit_test(what_comes_after_the_end_does_not_count),
+        cmocka_unit_test(points_in_mirrors_are_left_out),
         cmocka_unit_test(another_head_s_stations_are_passed_over),
         cmocka_unit_test(one_in_four_pulses_is_looked_at),
     };

@@ -194,7 +194,6 @@ static void rest(struct watch *w)
     uint32_t station;
     const uint32_t scan = device_last_scan(w->options.device, &station);
     if (!w->missed || scan == 0 || device_rests_from(w->options.device) == UINT64_MAX) return;
-    w->missed = 0;
     if (w->at.scan != scan && !(follow_scan(w) && w->at.scan == scan)) begin_unknown(w, scan, station);
     end_scan(w);
 }
