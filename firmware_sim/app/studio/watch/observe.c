@@ -82,7 +82,6 @@ static void end_scan(struct watch *w)
 {
     if (w->at.scan == 0 || w->at.over) return;
     w->at.over = 1;
-    w->dirty = 1;
     watch_publish(w);
     w->at.in_scene = 0; /* no more points of this scan come, and its site is given back */
     let_go(w);
