@@ -265,6 +265,25 @@ static void platforms(void **state)
     free(text);
 }
 
+/* The top of a tripod is 2 - 0.2 = 1.8 m above the ground. */
+static void tripods(void **state)
+{
+    (void)state;
+    char path[160], file[256];
+    write_scene(0, 0, 0);
+    char *text = checked("{name: one, position_m: [0, 0, 2], tripod: {leg_m: 2.5, head_above_m: 0.2}}",
+                         (const char *const[]){NULL});
+    puts(text);
+    free(text);
+    write_in("ride.csv", "t_s,x_m,y_m,z_m,heading_deg\n0,0,0,2,0\n1,3,0,2,0\n2.5,7,0,2,0\n");
+    snprintf(path, sizeof path, "%.*s/ride.csv", (int)(strrchr(config_path, '/') - config_path), config_path);
+    snprintf(file, sizeof file, "platform={kind: stops, file: %s, start_s: 0, step_s: 1}", path);
+    text = checked("{name: one, position_m: [0, 0, 2], tripod: {leg_m: 2.5, head_above_m: 0.2}}",
+                   (const char *const[]){file, NULL});
+    puts(text);
+    free(text);
+}
+
 /* A port that is free now. */
 static int free_port(void)
 {
@@ -333,6 +352,7 @@ int main(void)
         cmocka_unit_test(anchors_at_a_pole_and_in_ecef),
         cmocka_unit_test(a_northing_counts_from_the_grid_s_equator),
         cmocka_unit_test(platforms),
+        cmocka_unit_test(tripods),
         cmocka_unit_test(links_and_time),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
