@@ -265,22 +265,35 @@ static void platforms(void **state)
     free(text);
 }
 
-/* The top of a tripod is 2 - 0.2 = 1.8 m above the ground. */
+/* The top of a tripod is 2 - 0.2 = 1.8 m above the ground, and its legs are 2.5 m long. The head sees no ground within
+ * 2 m times the tangent of the legs' opening. */
 static void tripods(void **state)
 {
     (void)state;
-    char path[160], file[256];
+    static const char stand[] = "{name: one, position_m: [0, 0, 2], tripod: {leg_m: 2.5, head_above_m: 0.2}}";
+    char path[160], file[256], line[256];
+    const double opening_rad = acos(1.8 / 2.5);
     write_scene(0, 0, 0);
-    char *text = checked("{name: one, position_m: [0, 0, 2], tripod: {leg_m: 2.5, head_above_m: 0.2}}",
-                         (const char *const[]){NULL});
-    puts(text);
+    char *text = checked(stand, (const char *const[]){NULL});
+    snprintf(
+        line, sizeof line,
+        "  tripod    legs of 2.5 m, top 1.8 m above the ground; opening %.6g deg, which hides %.6g m around on level "
+        "ground",
+        opening_rad * 180.0 / M_PI, 2.0 * tan(opening_rad));
+    has(text, line);
     free(text);
-    write_in("ride.csv", "t_s,x_m,y_m,z_m,heading_deg\n0,0,0,2,0\n1,3,0,2,0\n2.5,7,0,2,0\n");
+    write_in("ride.csv", "t_s,x_m,y_m,z_m,heading_deg\n0,0,0,2,0\n1,3,0,2,0\n");
     snprintf(path, sizeof path, "%.*s/ride.csv", (int)(strrchr(config_path, '/') - config_path), config_path);
     snprintf(file, sizeof file, "platform={kind: stops, file: %s, start_s: 0, step_s: 1}", path);
-    text = checked("{name: one, position_m: [0, 0, 2], tripod: {leg_m: 2.5, head_above_m: 0.2}}",
-                   (const char *const[]){file, NULL});
-    puts(text);
+    text = checked(stand, (const char *const[]){file, NULL});
+    for (int stop = 1; stop <= 2; stop++) {
+        snprintf(
+            line, sizeof line,
+            "  stop-%d    %d s, frame %d, scene %d.0000 0.0000 2.0000 m; heading 0, pitch 0, roll 0 deg; tripod: legs "
+            "of 2.5 m, top 1.8 m above the ground; opening ...",
+            stop, stop - 1, stop - 1, 3 * (stop - 1));
+        has(text, line);
+    }
     free(text);
 }
 
