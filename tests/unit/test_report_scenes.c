@@ -157,6 +157,25 @@ static void one_point_in_a_mirror(void **state)
     assert_string_equal(on_err, "scanhead: g.ply: it has no points (1 shots without echo)\n");
 }
 
+/* A mesh may have any bytes, also those with which a terminal clears its screen. Neither text nor page has them. */
+static void names_are_one_line(void **state)
+{
+    (void)state;
+    write_text("o.obj", "o a\033[2Jb\nusemtl c\033d\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nf 1 2 3\n");
+    write_text("o.yaml", "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: polar}\n"
+                         "scene: {meshes: [{file: o.obj, up: z, scale: 1}]}\nstations: [{position_m: [1, 0.5, 2]}]\n");
+    write_text("o.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n"
+                        "property double z\nproperty ushort label\nend_header\n5 -5 0 0\n");
+    does(&app_report, "o.yaml o.ply --html o.html", 0);
+    has(on_out, " on a?[2Jb | c?d\n");
+    has(on_out, "  a?[2Jb | c?d\n\nAll in mm.");
+    assert_null(strchr(on_out, '\033'));
+    char *page = contents("o.html");
+    has(page, "a?[2Jb | c?d");
+    assert_null(strchr(page, '\033'));
+    free(page);
+}
+
 /* A coordinate of 10^12 m and more is not written with decimals. A cloud without points is refused. */
 static void clouds_that_are_far_or_empty(void **state)
 {
@@ -185,9 +204,8 @@ static void clouds_that_are_far_or_empty(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(so_many_surfaces_are_shown),
-        cmocka_unit_test(points_in_a_mirror_are_left_out),
-        cmocka_unit_test(one_point_in_a_mirror),
+        cmocka_unit_test(so_many_surfaces_are_shown),   cmocka_unit_test(points_in_a_mirror_are_left_out),
+        cmocka_unit_test(one_point_in_a_mirror),        cmocka_unit_test(names_are_one_line),
         cmocka_unit_test(clouds_that_are_far_or_empty),
     };
     return cmocka_run_group_tests_name("report scenes", tests, go_there, commands_end);
