@@ -157,6 +157,48 @@ static void one_point_in_a_mirror(void **state)
     assert_string_equal(on_err, "scanhead: g.ply: it has no points (1 shots without echo)\n");
 }
 
+/* The top of a page names the files, the scanner with its noise, and the frame of the coordinates. UTM 33 north is EPSG
+ * 32633, ECEF 4978, and latitude, longitude and height 4979. */
+static void the_top_of_a_page(void **state)
+{
+    static const struct {
+        const char *set, *coordinates, *scanner;
+    } rows[] = {
+        {"output.crs=local", "the scene's own frame", "range noise off, angle noise off, ball noise off"},
+        {"output.crs=utm --set output.layout=geo --set noise.range=on", "UTM or UPS; EPSG 32633",
+         "range noise on, angle noise off, ball noise off"},
+        {"output.crs=ecef --set output.layout=geo --set noise.angle=on", "ECEF; EPSG 4978",
+         "range noise off, angle noise on, ball noise off"},
+        {"output.crs=geodetic --set output.layout=geo --set noise.ball.radius_m=0.001",
+         "latitude, longitude, height; EPSG 4979", "range noise off, angle noise off, ball noise on"},
+    };
+    (void)state;
+    write_tiles(3);
+    write_text("g.yaml",
+               "head: {profile: sphere, step_deg: 10}\noutput: {crs: local}\n"
+               "scene: {meshes: [{file: tiles.obj, up: z, scale: 1}], anchor: {source: explicit, origin_m: [0, 0, 0], "
+               "lat_deg: 52, lon_deg: 15, height_m: 40}}\nstations: [{position_m: [1, 0.5, 2]}]\n");
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char words[256], fact[256];
+        snprintf(words, sizeof words, "g.yaml -o g.ply --quiet --set %s", rows[i].set);
+        does(&app_record, words, 0);
+        snprintf(words, sizeof words, "g.yaml g.ply --tolerance-m 1 --html g.html --set %s", rows[i].set);
+        does(&app_report, words, 0);
+        char *page = contents("g.html");
+        snprintf(fact, sizeof fact, "<dt>Coordinates</dt><dd>%s</dd>\n", rows[i].coordinates);
+        has(page, fact);
+        snprintf(fact, sizeof fact, "<dt>Scanner</dt><dd>scanhead sphere, %s</dd>\n", rows[i].scanner);
+        has(page, fact);
+        has(page, "<dt>Recording</dt><dd>g.ply</dd>\n");
+        has(page, "<dt>Configuration</dt><dd>g.yaml</dd>\n<dt>Scene</dt><dd>tiles.obj</dd>\n");
+        for (int k = 0; k < 9; k++) { /* the chart of incidences has all groups */
+            snprintf(fact, sizeof fact, ">%d\xe2\x80\x93%d\xc2\xb0</text>", 10 * k, 10 * k + 10);
+            has(page, fact);
+        }
+        free(page);
+    }
+}
+
 /* A mesh may have any bytes, also those with which a terminal clears its screen. Neither text nor page has them. */
 static void names_are_one_line(void **state)
 {
@@ -204,9 +246,9 @@ static void clouds_that_are_far_or_empty(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(so_many_surfaces_are_shown),   cmocka_unit_test(points_in_a_mirror_are_left_out),
-        cmocka_unit_test(one_point_in_a_mirror),        cmocka_unit_test(names_are_one_line),
-        cmocka_unit_test(clouds_that_are_far_or_empty),
+        cmocka_unit_test(so_many_surfaces_are_shown), cmocka_unit_test(points_in_a_mirror_are_left_out),
+        cmocka_unit_test(one_point_in_a_mirror),      cmocka_unit_test(the_top_of_a_page),
+        cmocka_unit_test(names_are_one_line),         cmocka_unit_test(clouds_that_are_far_or_empty),
     };
     return cmocka_run_group_tests_name("report scenes", tests, go_there, commands_end);
 }

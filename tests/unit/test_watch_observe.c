@@ -265,6 +265,7 @@ static void telemetry_ends_a_scan(void **state)
         char *quality = observed();
         expect_counts(quality, "{\"scan\":1,\"station\":1,", POINTS, SHOTS, rows[i].over);
         free(quality);
+        assert_true(w->held.variant == NULL && w->held.version == NULL); /* the stream's end gives it back, too */
         close_watch();
     }
 }
