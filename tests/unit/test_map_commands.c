@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: MIT */
+/* `scanhead map` in this process: what is refused, what --quiet leaves out, and one picture from a scan and from its
+ * recording. */
+#include "tests/unit/commands_rig.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static int go_there(void **state)
+{
+    (void)state;
+    if (commands_begin() != 0) return -1;
+    write_text("floor.obj", "o floor\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3 4\n");
+    write_text("c.yaml",
+               "head: {profile: sphere, step_deg: 10}\nscene: {meshes: [{file: floor.obj, up: z, scale: 1}]}\n"
+               "stations: [{position_m: [0, 0, 2]}, {position_m: [1, 3, 2]}]\noutput: {crs: local, layout: geo}\n");
+    does(&app_record, "c.yaml --station all -o c.ply --quiet", 0);
+    return 0;
+}
+
+/* Writes a cloud of one point, or of a shot without echo, in a frame; epsg 0: that of the scene. */
+static void write_cloud(const char *name, int epsg, const char *row)
+{
+    char text[300];
+    snprintf(text, sizeof text,
+             "ply\nformat ascii 1.0\ncomment epsg %d\nelement vertex %d\nproperty double x\nproperty double y\n"
+             "property double z\nend_header\n%s",
+             epsg, row[0] != '\0', row);
+    write_text(name, text);
+}
+
+static void what_is_refused(void **state)
+{
+    static const struct {
+        const char *words, *said;
+    } rows[] = {
+        {"xyz.ply --colour range", "xyz.ply: its points have no range for --colour"},
+        {"xyz.ply --colour reflectance", "xyz.ply: its points have no reflectance for --colour"},
+        {"xyz.ply --colour label", "xyz.ply: its points have no label for --colour"},
+        {"xyz.ply --colour station", "xyz.ply: its points have no station for --colour"},
+        {"xyz.ply --colour rgb", "xyz.ply: its points have no red, green and blue for --colour"},
+        {"empty.ply", "empty.ply: there are no points in it"},
+        {"shot.ply", "shot.ply: it has no points, only 1 shots without echo"},
+        {"ecef.ply", "ecef.ply: the z axis of points in ECEF is not up: use scanhead map CONFIG --perspective --cloud "
+                     "ecef.ply"},
+        {"degrees.ply", "degrees.ply: the z axis of points in degrees is not up: use scanhead map CONFIG --perspective "
+                        "--cloud degrees.ply"},
+        {"c.yaml --colour rgb", "--colour rgb: the scan has no colours; set output.colour, as with --set "
+                                "output.colour=texture"},
+        {"c.yaml --colour reflectance",
+         "--colour reflectance: no point has one; --set signal.model=on gives them one in "
+         "a scan"},
+    };
+    (void)state;
+    write_cloud("xyz.ply", 0, "1 2 3\n");
+    write_cloud("empty.ply", 0, "");
+    write_cloud("shot.ply", 0, "nan nan nan\n");
+    write_cloud("ecef.ply", 4978, "6378137 0 0\n");
+    write_cloud("degrees.ply", 4979, "52 15 40\n");
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char words[200], want[256];
+        snprintf(words, sizeof words, "%s --perspective -o m.png --size 60x40", rows[i].words);
+        snprintf(want, sizeof want, "scanhead: %s\n", rows[i].said);
+        does(&app_map, words, 2);
+        assert_string_equal(on_err, want);
+        assert_int_not_equal(access("m.png", F_OK), 0);
+    }
+}
+
+/* All 614 shots of each station are behind an eye that looks up, or have no echo. */
+static void nothing_is_seen(void **state)
+{
+    (void)state;
+    static const char said[] = "scanhead: m.png: no point is in the picture: %u are outside of it or behind the eye, "
+                               "--below and --above leave out %u, and %u shots have no echo\n";
+    unsigned beyond, cut, empty;
+    char want[256];
+    for (int below = 0; below < 2; below++) {
+        does(&app_map,
+             below ? "c.yaml --perspective -o m.png --size 60x40 --below -1"
+                   : "c.yaml --perspective -o m.png --size 60x40 --eye 0,0,50 --look-at 0,0,99",
+             2);
+        assert_int_equal(sscanf(on_err, said, &beyond, &cut, &empty), 3);
+        snprintf(want, sizeof want, said, beyond, cut, empty);
+        assert_string_equal(on_err, want);
+        assert_int_equal(beyond + cut + empty, 2 * (17 * 36 + 2));
+        assert_true(empty > 600 && (below ? beyond : cut) == 0);
+    }
+}
+
+static void options_that_do_not_fit(void **state)
+{
+    static const struct {
+        const char *words, *said;
+    } rows[] = {
+        {"c.yaml", "-o FILE.png or -o FILE.svg is needed"},
+        {"c.yaml -o m.pdf", "-o m.pdf: allowed are names that end in .png or .svg"},
+        {"c.ply -o m.png", "c.ply is a point cloud; a map from above scans a CONFIG: add --perspective"},
+        {"c.yaml -o m.svg --shade 0.5", "options of the eye, sizes, colours and clouds need --perspective; "},
+        {"c.yaml -o m.svg --perspective", "-o m.svg: with --perspective it is an image; allowed is a name that ends in "
+                                          ".png"},
+        {"c.yaml -o m.png --perspective --open-edges", "--open-edges: allowed for a map from above, not with "
+                                                       "--perspective"},
+        {"c.yaml -o m.png --perspective --pixel-m 1",
+         "--pixel-m: allowed for a map from above, not with --perspective"},
+        {"c.ply -o m.png --perspective --cloud c.ply", "c.ply and --cloud c.ply: one cloud is shown at a time"},
+        {"c.ply -o m.png --perspective --set head.prr_hz=1", "--set: c.ply is not a configuration; allowed with a "
+                                                             "CONFIG"},
+        {"c.yaml -o m.png --perspective --colour none", "--colour none: allowed are height, range, "},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        does(&app_map, rows[i].words, 2);
+        has(on_err, rows[i].said);
+        assert_ptr_equal(strchr(on_err, '\n'), on_err + strlen(on_err) - 1); /* one line */
+    }
+}
+
+static size_t read_bytes(const char *name, char *to, size_t cap)
+{
+    FILE *in = fopen(name, "rb");
+    assert_non_null(in);
+    const size_t n = fread(to, 1, cap, in);
+    fclose(in);
+    assert_true(n > 100 && n < cap);
+    return n;
+}
+
+/* A stream and a file of doubles have the same points here, so even the bytes of the pictures agree. */
+static void a_scan_and_its_recording_are_one_picture(void **state)
+{
+    (void)state;
+    static char one[1 << 16], other[1 << 16];
+    static const char seen[] = "--size 120x90 --eye 0,-20,15 --look-at 0,0,0 --point-m 0.3";
+    static const char *const colours[] = {"height", "station"};
+    for (int i = 0; i < 2; i++) {
+        char words[256];
+        snprintf(words, sizeof words, "c.yaml --perspective --quiet -o a.png %s --colour %s", seen, colours[i]);
+        does(&app_map, words, 0);
+        assert_string_equal(on_err, "");
+        snprintf(words, sizeof words, "c.yaml --cloud c.ply --perspective --quiet -o b.png %s --colour %s", seen,
+                 colours[i]);
+        does(&app_map, words, 0);
+        assert_string_equal(on_err, "");
+        const size_t n = read_bytes("a.png", one, sizeof one);
+        assert_int_equal(read_bytes("b.png", other, sizeof other), n);
+        assert_memory_equal(one, other, n);
+    }
+}
+
+static void quiet_is_quiet(void **state)
+{
+    (void)state;
+    does(&app_map, "c.yaml --quiet --open-edges -o m.svg", 0);
+    assert_string_equal(on_err, "");
+    assert_string_equal(on_out, "");
+    char *loud = contents("m.svg");
+    does(&app_map, "c.yaml --open-edges -o m.svg", 0);
+    char *again = contents("m.svg");
+    assert_string_equal(loud, again);
+    has(on_err, "scanhead: 4 open edges drawn\n");
+    free(loud);
+    free(again);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_refused),         cmocka_unit_test(nothing_is_seen),
+        cmocka_unit_test(options_that_do_not_fit), cmocka_unit_test(a_scan_and_its_recording_are_one_picture),
+        cmocka_unit_test(quiet_is_quiet),
+    };
+    return cmocka_run_group_tests_name("map commands", tests, go_there, commands_end);
+}
