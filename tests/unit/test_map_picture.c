@@ -293,7 +293,6 @@ static void a_picture_has_marks_and_a_legend(void **state)
         {"station", NULL, 0, "Stations", {"station 1", "station 2"}, {1, 2}, 0, 0},
         {"station", NULL, 1, "Stations", {"near", "far"}, {1, 2}, 0, 0},
         {"height", "-1,0.75", 1, "Height z (m)", {NULL}, {0}, -1, 0.75},
-        {"range", "-2,3", 0, "Range (m)", {NULL}, {0}, -2, 3},
         {"height", NULL, 0, "Height z (m)", {NULL}, {0}, NAN, NAN},
         {"range", NULL, 1, "Range (m)", {NULL}, {0}, NAN, NAN},
         {"reflectance", NULL, 0, "Reflectance (dB)", {NULL}, {0}, -30, 0},
