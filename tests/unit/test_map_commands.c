@@ -150,6 +150,20 @@ static void a_scan_and_its_recording_are_one_picture(void **state)
     }
 }
 
+/* A ring of 288 shots is one stream frame, whose points are taken in parts of up to 256. In a closed room each shot of
+ * the 143 rings and the two poles is a point. */
+static void long_frames_are_drawn_whole(void **state)
+{
+    (void)state;
+    write_text("room.obj", "v -5 -5 0\nv 5 -5 0\nv 5 5 0\nv -5 5 0\nv -5 -5 4\nv 5 -5 4\nv 5 5 4\nv -5 5 4\n"
+                           "f 1 2 3 4\nf 5 8 7 6\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n");
+    write_text("r.yaml",
+               "head: {profile: sphere, step_deg: 1.25}\nscene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
+               "stations: [{position_m: [0, 0, 2]}]\noutput: {crs: local}\n");
+    does(&app_map, "r.yaml -o m.svg --pixel-m 0.1", 0);
+    assert_string_equal(on_err, "scanhead: m.svg: 41186 points drawn, 0 outside of the area\n");
+}
+
 static void quiet_is_quiet(void **state)
 {
     (void)state;
@@ -168,8 +182,11 @@ static void quiet_is_quiet(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(what_is_refused),         cmocka_unit_test(nothing_is_seen),
-        cmocka_unit_test(options_that_do_not_fit), cmocka_unit_test(a_scan_and_its_recording_are_one_picture),
+        cmocka_unit_test(what_is_refused),
+        cmocka_unit_test(nothing_is_seen),
+        cmocka_unit_test(options_that_do_not_fit),
+        cmocka_unit_test(a_scan_and_its_recording_are_one_picture),
+        cmocka_unit_test(long_frames_are_drawn_whole),
         cmocka_unit_test(quiet_is_quiet),
     };
     return cmocka_run_group_tests_name("map commands", tests, go_there, commands_end);
