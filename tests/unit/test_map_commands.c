@@ -3,6 +3,7 @@
  * recording. */
 #include "tests/unit/commands_rig.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -164,6 +165,35 @@ static void long_frames_are_drawn_whole(void **state)
     assert_string_equal(on_err, "scanhead: m.svg: 41186 points drawn, 0 outside of the area\n");
 }
 
+/* Returns where the mark of a station is: pixels to the right and down. */
+static void mark_of(const char *svg, const char *name, double at[2])
+{
+    char title[64];
+    snprintf(title, sizeof title, "<title>%s, ", name);
+    const char *mark = strstr(svg, title);
+    if (mark == NULL || (mark = strstr(mark, "<line x1=")) == NULL) fail_msg("no mark of %s", name);
+    assert_int_equal(sscanf(mark, "<line x1=\"%lf\" y1=\"%lf\"", &at[0], &at[1]), 2);
+}
+
+/* In ECEF at latitude 0 and longitude 0 the y axis is east and the z axis is north. Pixels are 1 cm, and places are
+ * written in hundredths of a pixel. In 3 m the Earth curves by less than that. */
+static void a_scene_in_ecef_is_drawn_north_up(void **state)
+{
+    (void)state;
+    double one[2], two[2];
+    write_text("ecef.obj", "v 6378137 -9 -9\nv 6378137 9 -9\nv 6378137 9 9\nv 6378137 -9 9\nf 1 2 3 4\n");
+    write_text("e.yaml", "head: {profile: sphere, step_deg: 10}\nstations: [{name: one, position_m: [6378139, 1, 2]}, "
+                         "{name: two, position_m: [6378139, 2.5, 5]}]\n"
+                         "scene: {meshes: [{file: ecef.obj, up: z, scale: 1}], anchor: {source: ecef}}\n");
+    does(&app_map, "e.yaml -o e.svg --pixel-m 0.01 --quiet", 0);
+    char *svg = contents("e.svg");
+    mark_of(svg, "one", one);
+    mark_of(svg, "two", two);
+    if (fabs(two[0] - one[0] - 150) > 0.03 || fabs(one[1] - two[1] - 300) > 0.03)
+        fail_msg("%g %g and %g %g", one[0], one[1], two[0], two[1]);
+    free(svg);
+}
+
 static void quiet_is_quiet(void **state)
 {
     (void)state;
@@ -187,6 +217,7 @@ int main(void)
         cmocka_unit_test(options_that_do_not_fit),
         cmocka_unit_test(a_scan_and_its_recording_are_one_picture),
         cmocka_unit_test(long_frames_are_drawn_whole),
+        cmocka_unit_test(a_scene_in_ecef_is_drawn_north_up),
         cmocka_unit_test(quiet_is_quiet),
     };
     return cmocka_run_group_tests_name("map commands", tests, go_there, commands_end);
