@@ -12,8 +12,8 @@
 #include "firmware_sim/site/site.h"
 
 static char config_file[96];
-/* Coordinates in UTM may be had in several ways, most of which the plan leaves out. */
-static const char *const SETS[] = {"output.crs=utm", "output.layout=geo",
+/* A beam, and coordinates in UTM, may be had in several ways, most of which the plan leaves out. */
+static const char *const SETS[] = {"beam.mode=auto", "output.crs=utm", "output.layout=geo",
                                    "scene.anchor={source: explicit, origin_m: [0, 0, 0], lat_deg: 52, lon_deg: 15, "
                                    "height_m: 40}"};
 enum { N_SETS = sizeof SETS / sizeof SETS[0] };
