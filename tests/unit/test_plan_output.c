@@ -38,14 +38,8 @@ static char *print_plan(const char *option)
     return text;
 }
 
-static struct site *load_plan(struct config *cfg)
-{
-    struct site *site;
-    struct sh_err err;
-    need(config_load(config_file, SETS, N_SETS, cfg, &err), &err);
-    need(site_load_for(cfg, SITE_FOR_PLAN, NULL, NULL, &site, &err), &err);
-    return site;
-}
+static struct config *cfg;
+static struct site *site; /* of this configuration, with its plan */
 
 /* The next member after *at has this key; *at goes on to its value. */
 static void go_to(const char **at, const char *key)
@@ -99,17 +93,12 @@ static void expect_row(const char **at, const struct plan_row *row, int is_measu
 static void the_json_has_each_figure(void **state)
 {
     (void)state;
-    struct config *cfg = calloc(1, sizeof *cfg);
-    assert_non_null(cfg);
-    struct site *site = load_plan(cfg);
     char *text = print_plan("--json");
     const char *at = text;
     assert_true(site->plan.n > 2);
     for (size_t i = 0; i < site->plan.n; i++)
         expect_row(&at, &site->plan.row[i], i + 1 == site->plan.n);
     free(text);
-    site_free(site);
-    free(cfg);
 }
 
 /* Reads a line of the table: a method after the 8 columns of the stage, three figures, and a reason. A figure that is
@@ -149,9 +138,6 @@ static uint32_t expect_left(const char **at, const struct plan_option *left, uin
 static void the_text_has_each_row(void **state)
 {
     (void)state;
-    struct config *cfg = calloc(1, sizeof *cfg);
-    assert_non_null(cfg);
-    struct site *site = load_plan(cfg);
     char *text = print_plan(NULL);
     assert_int_equal(strncmp(text, "stage ", 6), 0);
     const char *at = strchr(text, '\n') + 1;
@@ -169,15 +155,25 @@ static void the_text_has_each_row(void **state)
     if (n_left <= 3) fail_msg("%u left out", n_left);
     assert_int_equal(strncmp(at, "total ", 6), 0);
     free(text);
-    site_free(site);
-    free(cfg);
 }
 
 static int make_all(void **state)
 {
     const int failed = make_folder(state);
+    struct sh_err err;
     snprintf(config_file, sizeof config_file, "%s/run.yaml", folder);
+    cfg = calloc(1, sizeof *cfg);
+    assert_non_null(cfg);
+    need(config_load(config_file, SETS, N_SETS, cfg, &err), &err);
+    need(site_load_for(cfg, SITE_FOR_PLAN, NULL, NULL, &site, &err), &err);
     return failed;
+}
+
+static int remove_all(void **state)
+{
+    site_free(site);
+    free(cfg);
+    return remove_folder(state);
 }
 
 int main(void)
@@ -186,5 +182,5 @@ int main(void)
         cmocka_unit_test(the_json_has_each_figure),
         cmocka_unit_test(the_text_has_each_row),
     };
-    return cmocka_run_group_tests_name("plan's output", tests, make_all, remove_folder);
+    return cmocka_run_group_tests_name("plan's output", tests, make_all, remove_all);
 }

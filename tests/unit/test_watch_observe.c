@@ -209,8 +209,7 @@ static void a_scan_is_judged_as_by_the_report(void **state)
         const char *set[3], *words;
         double cpu_share;
     } rows[] = {{{NULL}, "", 0},
-                {{NULL}, "", 0.05},
-                {{"output.layout=polar", NULL}, " --set output.layout=polar", 0},
+                {{"output.layout=polar", NULL}, " --set output.layout=polar", 0.05},
                 {{"output.crs=utm", "output.layout=geo", NULL}, " --set output.crs=utm --set output.layout=geo", 0}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         record(rows[i].words);
