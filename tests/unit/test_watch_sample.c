@@ -194,7 +194,7 @@ static void the_sample_fits_the_budget(void **state)
     (void)state;
     for (int poor = 0; poor < 2; poor++) {
         open_sample();
-        w.options.cpu_share = poor ? 1e-12 : 1.0;
+        w.options.cpu_share = poor ? 1e-12 : 1e6;
         w.began_ns = clock_now_ns();
         w.began_thread_ns = clock_thread_ns();
         add_places();
