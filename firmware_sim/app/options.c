@@ -115,7 +115,6 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
                                             .n_choices = row->n_choices,
                                             .help = row->help};
     }
-    rows[n] = (struct app_option)OPTION_END;
 }
 
 /* Where the descriptor is not open, a file that is opened later gets its number. The line for the descriptor would then

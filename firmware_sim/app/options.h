@@ -140,8 +140,8 @@ void app_set_help(void (*print)(const struct app_command *command));
 int app_add_set(struct app_sets *sets, const char *set);
 
 /* Adds rows of another command's table to `rows`: those in `names`, which ends with NULL. The added rows become
- * APP_PASS, with the struct app_words at `at`. `rows` ends with OPTION_END, and has room for APP_MAX_OPTIONS + 1. A
- * table that has such rows already stays as it is. */
+ * APP_PASS, with the struct app_words at `at`. `rows` has APP_MAX_OPTIONS + 1 rows; those that are not used are
+ * OPTION_END, which is zeros. A table that has such rows already stays as it is. */
 void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at);
 
 /* Reads n finite numbers with `between` between them, and nothing else. 0: the text is not that. */

@@ -52,28 +52,19 @@ static void decode(const char *name, char *out)
     *out = '\0';
 }
 
-static int is_file_in(const char *folder, const char *name, char path[PATH_MAX])
-{
-    struct stat st;
-    const int n =
-        name[0] == '/' ? snprintf(path, PATH_MAX, "%s", name) : snprintf(path, PATH_MAX, "%s%s", folder, name);
-    return n < PATH_MAX && stat(path, &st) == 0 && S_ISREG(st.st_mode);
-}
-
-static int is_file(const struct search *s, const char *name, char path[PATH_MAX])
-{
-    return is_file_in(s->here, name, path) || is_file_in(s->folder, name, path);
-}
-
-/* Tries the name as it stands, then as readers find files of other machines: by its last part, whatever its case. */
+/* Tries the name as it stands, and decoded. Both may be a file of another machine: then its last part counts, whatever
+ * its case. */
 static int sidecars_find(const struct search *s, const char *name, char path[PATH_MAX])
 {
+    const char *const folder[] = {s->here, s->folder};
     char decoded[NAME_MAX_LEN + 1];
+    struct stat st;
     decode(name, decoded);
-    if (is_file(s, name, path) || is_file(s, decoded, path) || is_file(s, basename(decoded), path)) return 1;
-    char *other = scene_find_file((const char *const[]){s->here, s->folder}, 2, decoded);
-    const int is_found = other != NULL && is_file_in("", other, path);
-    free(other);
+    char *file = scene_find_file(folder, 2, name);
+    if (file == NULL) file = scene_find_file(folder, 2, decoded);
+    const int is_found =
+        file != NULL && stat(file, &st) == 0 && S_ISREG(st.st_mode) && snprintf(path, PATH_MAX, "%s", file) < PATH_MAX;
+    free(file);
     return is_found;
 }
 

@@ -242,6 +242,17 @@ static void test_beside(void **state)
     expect_beside("sub.obj", "/tex/lib.mtl;/tex/d.png;/a.png;/other.png;");
     write_file("tex/other.png", "w", "x"); /* after the library the mesh's own folder comes first again */
     expect_beside("sub.obj", "/tex/lib.mtl;/tex/d.png;/a.png;/other.png;");
+    char line[512]; /* a whole path, in another case, by its last part, and with an escape that is in the file's name */
+    write_file("p%20q.png", "w", "x");
+    write_file("tex/far.png", "w", "x");
+    snprintf(line, sizeof line, "v 0 0 0\nusemtl %s\nusemtl TEX/D.PNG\nusemtl nowhere/E.BIN\nusemtl p%%20q.png\n",
+             path_of("tex/far.png"));
+    write_file("whole.obj", "w", line);
+    expect_beside("whole.obj", "/tex/far.png;/tex/d.png;/e.bin;/p%20q.png;");
+    assert_int_equal(mkdir(path_of("folder.png"), 0700), 0);
+    write_file("folder.obj", "w", "usemtl folder.png\n");
+    expect_beside("folder.obj", "");
+    assert_int_equal(rmdir(path_of("folder.png")), 0);
     write_file("empty.obj", "w", "");
     expect_beside("empty.obj", "");
 }

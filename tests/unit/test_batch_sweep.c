@@ -183,6 +183,11 @@ static void test_stations(void **state)
     assert_int_equal(s.all, 0);
     assert_int_equal(s.n, sizeof want / sizeof want[0]);
     assert_memory_equal(s.number, want, sizeof want);
+    assert_int_equal(batch_stations_parse("1-2,3,4-4", &s, &err), SH_OK); /* each begins after the one before */
+    assert_int_equal(s.n, 4);
+    assert_int_equal(s.number[3], 4);
+    assert_int_equal(batch_stations_parse("1-3,3", &s, &err), SH_EINPUT);
+    assert_string_equal(err.text, "--stations 1-3,3: allowed all, or rising numbers from 1 to 4096, as in 1,3-5");
     assert_int_equal(batch_stations_parse("1-4096", &s, &err), SH_OK);
     assert_int_equal(s.n, 4096);
     for (const char *const *bad = (const char *const[]){"", "0", "1,", ",1", "2,1", "1,1", "5-3", "1-", "-2", "1-2-3",

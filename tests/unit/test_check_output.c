@@ -119,6 +119,18 @@ static void two_scanners(void **state)
     has(text, "range     0.5 to 900 m only (head.range_min_m, range_max_m); the head profile has 0.5 to 1000");
     has(text, "station 2 two, ...");
     has(text, "station 3 ...");
+    has_not(text, "output    of this head"); /* the same for both: it stands once */
+    free(text);
+}
+
+/* Micrometres in 31 bits and a sign reach 2147 m: enough for a range of 1000 m, not for one of 2500 m. */
+static void scanners_with_other_counts(void **state)
+{
+    (void)state;
+    char *text = checked(ONE ", {name: two, position_m: [4, 0, 2], scanner: {head: {profile: riegl-vz2000i}}}",
+                         (const char *const[]){"output.layout=geo", NULL});
+    has(text, "output    geo, 1e-06 m per count");
+    has(text, "output    of this head 1e-05 m per count");
     free(text);
 }
 
@@ -253,6 +265,38 @@ static void platforms(void **state)
     free(text);
 }
 
+/* The top of a tripod is 2 - 0.2 = 1.8 m above the ground, and its legs are 2.5 m long. The head sees no ground within
+ * 2 m times the tangent of the legs' opening. */
+static void tripods(void **state)
+{
+    (void)state;
+    static const char stand[] = "{name: one, position_m: [0, 0, 2], tripod: {leg_m: 2.5, head_above_m: 0.2}}";
+    char path[160], file[256], line[256];
+    const double opening_rad = acos(1.8 / 2.5);
+    write_scene(0, 0, 0);
+    char *text = checked(stand, (const char *const[]){NULL});
+    snprintf(
+        line, sizeof line,
+        "  tripod    legs of 2.5 m, top 1.8 m above the ground; opening %.6g deg, which hides %.6g m around on level "
+        "ground",
+        opening_rad * 180.0 / M_PI, 2.0 * tan(opening_rad));
+    has(text, line);
+    free(text);
+    write_in("ride.csv", "t_s,x_m,y_m,z_m,heading_deg\n0,0,0,2,0\n1,3,0,2,0\n");
+    snprintf(path, sizeof path, "%.*s/ride.csv", (int)(strrchr(config_path, '/') - config_path), config_path);
+    snprintf(file, sizeof file, "platform={kind: stops, file: %s, start_s: 0, step_s: 1}", path);
+    text = checked(stand, (const char *const[]){file, NULL});
+    for (int stop = 1; stop <= 2; stop++) {
+        snprintf(
+            line, sizeof line,
+            "  stop-%d    %d s, frame %d, scene %d.0000 0.0000 2.0000 m; heading 0, pitch 0, roll 0 deg; tripod: legs "
+            "of 2.5 m, top 1.8 m above the ground; opening ...",
+            stop, stop - 1, stop - 1, 3 * (stop - 1));
+        has(text, line);
+    }
+    free(text);
+}
+
 /* A port that is free now. */
 static int free_port(void)
 {
@@ -314,12 +358,14 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plain_scene),
         cmocka_unit_test(two_scanners),
+        cmocka_unit_test(scanners_with_other_counts),
         cmocka_unit_test(the_target_and_the_others),
         cmocka_unit_test(an_output_has_heights),
         cmocka_unit_test(anchors),
         cmocka_unit_test(anchors_at_a_pole_and_in_ecef),
         cmocka_unit_test(a_northing_counts_from_the_grid_s_equator),
         cmocka_unit_test(platforms),
+        cmocka_unit_test(tripods),
         cmocka_unit_test(links_and_time),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);

@@ -142,8 +142,27 @@ static void fifty_of_each_kind(void **state)
     on_out = NULL;
 }
 
+/* A mesh may have any bytes, also those with which a terminal clears its screen. No line has them. */
+static void names_are_one_line(void **state)
+{
+    (void)state;
+    check("mtllib s.mtl\nv 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\no a\033[2Jb\nusemtl blue\nf 1 2 3\n"
+          "o c\033d\nusemtl plain\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n",
+          "", "odd.csv");
+    for (const char *const *line =
+             (const char *const[]){"        -  open   #0000ff  a?[2Jb\n", "open      a?[2Jb, 3 open edges\n",
+                                   "turned    c?d, neighbouring faces", "clear     75 %: a?[2Jb, material blue\n",
+                                   NULL};
+         *line != NULL; line++)
+        if (strstr(on_out, *line) == NULL) fail_msg("no %s in %s", *line, on_out);
+    assert_null(strchr(on_out, '\033'));
+    free(on_out);
+    on_out = NULL;
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(all_kinds_of_objects), cmocka_unit_test(fifty_of_each_kind)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(all_kinds_of_objects), cmocka_unit_test(fifty_of_each_kind),
+                                       cmocka_unit_test(names_are_one_line)};
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

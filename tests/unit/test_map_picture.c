@@ -17,6 +17,7 @@
 #include "core/studio/cloud.h"
 #include "core/studio/view.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
+#include "firmware_sim/config/places.h"
 
 enum { SIDE_PX = 200 };
 
@@ -149,6 +150,167 @@ static void what_is_not_known_is_an_error(void **state)
     picturing_end(p);
 }
 
+/* ---- whole pictures: marks, names and legends */
+
+/* Points of a row: its height, which is their range, too; what they are of; how many there are. */
+struct row {
+    double z_m;
+    uint16_t label, station;
+    int points;
+};
+static const struct row rows[] = {{-1, 0, 1, 20}, {-0.5, 3, 2, 40}, {0, CLOUD_LABEL_NONE, 2, 30}, {0.5, 1, 1, 40}};
+enum { N_ROWS = sizeof rows / sizeof rows[0] };
+
+static struct config_station named[2] = {{.name = "near"}, {.name = "far"}};
+static struct site_station stations[2] = {{.station = &named[0], .at.position_m = {-1, 0, -1}},
+                                          {.station = &named[1], .at.position_m = {1, 0, 1}}};
+static struct scene_surface surfaces[2] = {{.object = "floor", .material = "stone"},
+                                           {.object = "door", .material = "oak"}};
+static struct scene scene = {.surface = surfaces, .n_surfaces = 2};
+static const struct site known = {.station = stations, .n_stations = 2, .scene = &scene, .n_surfaces = 2};
+
+static void row_place(const struct row *row, int i, double p_m[3])
+{
+    p_m[0] = -1 + 0.05 * i;
+    p_m[1] = 0;
+    p_m[2] = row->z_m;
+}
+
+/* Draws the rows, with or without a configuration. Returns the picture's pixels; free it. */
+static uint8_t *drawn_rows(const struct site *site)
+{
+    struct picturing *p;
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    uint8_t *rgb = malloc(3 * SIDE_PX * SIDE_PX);
+    assert_non_null(rgb);
+    assert_int_equal(picturing_begin(&plan, path, 1, &p, &err), SH_OK);
+    p->site = site;
+    assert_int_equal(picturing_look(p, &(struct picturing_bounds){{-1, 0, -1}, {1, 0, 1}}, &err), SH_OK);
+    for (int r = 0; r < N_ROWS; r++)
+        for (int i = 0; i < rows[r].points; i++) {
+            double p_m[3];
+            row_place(&rows[r], i, p_m);
+            picturing_add(p, p_m, &(struct picturing_figures){rows[r].z_m, -12, rows[r].label, rows[r].station, NULL});
+        }
+    if (picturing_finish(p, &err) != SH_OK) fail_msg("%s", err.text);
+    picturing_end(p);
+    assert_true(png_image_begin_read_from_file(&image, path));
+    image.format = PNG_FORMAT_RGB;
+    assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+    return rgb;
+}
+
+/* A case: how the rows are coloured, and the legend. A legend without names is a scale. Limits that are not given are those of
+ * what is seen. */
+struct legend {
+    const char *colour, *limits;
+    int configured;
+    const char *title, *name[5];
+    double number[4], low, high;
+};
+
+static double row_value(const struct legend *l, const struct row *row)
+{
+    switch (l->colour[0]) {
+    case 'l':
+        return row->label;
+    case 's':
+        return row->station;
+    default:
+        return strcmp(l->colour, "reflectance") == 0 ? -12 : row->z_m;
+    }
+}
+
+static void legend_colour(const void *legend, double value, uint8_t rgb[3])
+{
+    const struct legend *l = legend;
+    const double part = (value - l->low) / (l->high - l->low);
+    if (l->name[0] == NULL) {
+        if (strcmp(l->colour, "height") == 0) view_ramp(part, rgb);
+        if (strcmp(l->colour, "range") == 0) colour_ramp(part, rgb);
+        if (strcmp(l->colour, "reflectance") == 0) colour_reflectance(value, rgb);
+        return;
+    }
+    memcpy(rgb, colour_grey, 3);
+    if (value != CLOUD_LABEL_NONE) colour_number((uint32_t)value, rgb);
+    paler(rgb);
+}
+
+/* Makes the same picture by the parts of core alone, with this legend. The box is 2 m wide and high, and 700 points
+ * along its longest side show no gaps. */
+static struct picture expected_rows(struct legend *l)
+{
+    const struct view_spec spec = {plan.camera, 2.0 / 700, 8};
+    const struct view_colours colours = {legend_colour, l, 0, {252, 252, 252}, NULL};
+    const struct view_station at[2] = {{{-1, 0, -1}, "near"}, {{1, 0, 1}, "far"}};
+    struct view_entry entry[4];
+    struct picture picture;
+    struct view *view;
+    uint32_t n = 0;
+    assert_int_equal(view_create(&spec, &view, &err), SH_OK);
+    for (int r = 0; r < N_ROWS; r++)
+        for (int i = 0; i < rows[r].points; i++) {
+            const float value = (float)row_value(l, &rows[r]);
+            double p_m[1][3];
+            row_place(&rows[r], i, p_m[0]);
+            view_add_points(view, 1, (const double(*)[3])p_m, &value, NULL);
+        }
+    if (isnan(l->low)) assert_true(view_range(view, &l->low, &l->high));
+    assert_int_equal(view_draw(view, &colours, &picture, &err), SH_OK);
+    if (l->configured) assert_int_equal(view_draw_stations(view, &picture, at, 2), 0);
+    for (; l->name[n] != NULL; n++) {
+        snprintf(entry[n].name, sizeof entry[n].name, "%s", l->name[n]);
+        legend_colour(l, l->number[n], entry[n].rgb);
+    }
+    if (n > 0)
+        view_draw_names(&picture, l->title, entry, n);
+    else
+        view_draw_scale(&picture, l->title, l->low, l->high, &colours);
+    view_free(view);
+    return picture;
+}
+
+/* Surfaces with the most points come first, of as many points the first label; stations come by their number. */
+static void a_picture_has_marks_and_a_legend(void **state)
+{
+    static const struct legend cases[] = {
+        {"label",
+         NULL,
+         0,
+         "Surfaces",
+         {"label 1", "label 3", "no label", "label 0"},
+         {1, 3, CLOUD_LABEL_NONE, 0},
+         0,
+         0},
+        {"label",
+         NULL,
+         1,
+         "Surfaces",
+         {"door | oak", "label 3", "no label", "floor | stone"},
+         {1, 3, CLOUD_LABEL_NONE, 0},
+         0,
+         0},
+        {"station", NULL, 0, "Stations", {"station 1", "station 2"}, {1, 2}, 0, 0},
+        {"station", NULL, 1, "Stations", {"near", "far"}, {1, 2}, 0, 0},
+        {"height", "-1,0.75", 1, "Height z (m)", {NULL}, {0}, -1, 0.75},
+        {"height", NULL, 0, "Height z (m)", {NULL}, {0}, NAN, NAN},
+        {"range", NULL, 1, "Range (m)", {NULL}, {0}, NAN, NAN},
+        {"reflectance", NULL, 0, "Reflectance (dB)", {NULL}, {0}, -30, 0},
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        plan_it(cases[i].colour, cases[i].limits);
+        uint8_t *got = drawn_rows(cases[i].configured ? &known : NULL);
+        struct legend legend = cases[i];
+        struct picture want = expected_rows(&legend);
+        for (int k = 0; k < 3 * SIDE_PX * SIDE_PX; k++)
+            if (got[k] != want.rgb[k])
+                fail_msg("case %zu: pixel %d, %d is not the same", i, k / 3 % SIDE_PX, k / 3 / SIDE_PX);
+        picture_free(&want);
+        free(got);
+    }
+}
+
 static int make_path(void **state)
 {
     (void)state;
@@ -168,6 +330,7 @@ static int remove_path(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(figures_are_colours),
-                                       cmocka_unit_test(what_is_not_known_is_an_error)};
+                                       cmocka_unit_test(what_is_not_known_is_an_error),
+                                       cmocka_unit_test(a_picture_has_marks_and_a_legend)};
     return cmocka_run_group_tests_name("map picture", tests, make_path, remove_path);
 }

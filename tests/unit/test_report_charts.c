@@ -195,6 +195,24 @@ static void test_ends_and_curve(void **state)
     free(svg);
 }
 
+static void draw_one(FILE *out)
+{
+    page_histogram(out, "t", &(struct figures_histogram){.from = 0, .width = 1, .bins = 1, .count = {1}}, NULL, NULL);
+}
+
+/* A bar of one point is as high as any other tallest one: 1 / 1.05 of the height from 12 to 245. */
+static void test_one_point(void **state)
+{
+    (void)state;
+    char *svg = drawn(draw_one);
+    const char *at = svg;
+    struct rect bar;
+    assert_true(next_bar(&at, "s0", &bar));
+    near("height", bar.height, (BOTTOM - 12.0) / 1.05, ROUNDED);
+    near("foot", bar.y + bar.height, BOTTOM, 2.0 * ROUNDED);
+    free(svg);
+}
+
 static void draw_nothing(FILE *out)
 {
     page_histogram(out, "t", &(struct figures_histogram){.bins = 0}, NULL, NULL);
@@ -303,6 +321,7 @@ int main(void)
         cmocka_unit_test(test_axis_of_bins),
         cmocka_unit_test(test_groups),
         cmocka_unit_test(test_ends_and_curve),
+        cmocka_unit_test(test_one_point),
         cmocka_unit_test(test_without_values),
         cmocka_unit_test(test_names_of_groups),
         cmocka_unit_test(test_figures_as_text),

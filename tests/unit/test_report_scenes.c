@@ -11,6 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "core/colour.h"
+
 static int go_there(void **state)
 {
     (void)state;
@@ -119,6 +121,104 @@ static void points_in_a_mirror_are_left_out(void **state)
     has(on_err, "; the scene has 2 surfaces, from 0\n");
 }
 
+/* The colours of a page's map, from the scene on: seven of the ramp. */
+static void has_ramp(const char *page)
+{
+    char want[800] = "<linearGradient id=\"ramp\">";
+    for (int k = 0; k <= 6; k++) {
+        uint8_t rgb[3];
+        colour_ramp(k / 6.0, rgb);
+        snprintf(want + strlen(want), sizeof want - strlen(want),
+                 "<stop offset=\"%.4f\" stop-color=\"#%02x%02x%02x\"/>", k / 6.0, rgb[0], rgb[1], rgb[2]);
+    }
+    strcat(want, "</linearGradient>");
+    has(page, want);
+}
+
+/* One point on the roof and one of its image: the third surface is the floor's image, and the fourth the roof's. Where
+ * all points are images, there is no report. */
+static void one_point_in_a_mirror(void **state)
+{
+    static const char head[] = "ply\nformat ascii 1.0\nelement vertex %d\nproperty double x\nproperty double y\n"
+                               "property double z\nproperty ushort label\nend_header\n%s";
+    char text[400];
+    (void)state;
+    snprintf(text, sizeof text, head, 2, "1 1 3 1\n1 1 -3 3\n");
+    write_text("g.ply", text);
+    does(&app_report, "m.yaml g.ply --html g.html", 0);
+    assert_int_equal(strncmp(on_out, "points     1\nempty      0 shots without echo\nghosts     1 points seen in ", 66),
+                     0);
+    char *page = contents("g.html");
+    has(page, "<div><span>Seen in mirrors, left out</span><b>1</b></div>\n");
+    has_ramp(page);
+    free(page);
+    snprintf(text, sizeof text, head, 1, "1 1 -3 3\n");
+    write_text("g.ply", text);
+    does(&app_report, "m.yaml g.ply", 2);
+    assert_string_equal(on_err, "scanhead: g.ply: it has no points (1 shots without echo)\n");
+}
+
+/* The top of a page names the files, the scanner with its noise, and the frame of the coordinates. UTM 33 north is EPSG
+ * 32633, ECEF 4978, and latitude, longitude and height 4979. */
+static void the_top_of_a_page(void **state)
+{
+    static const struct {
+        const char *set, *coordinates, *scanner;
+    } rows[] = {
+        {"output.crs=local", "the scene's own frame", "range noise off, angle noise off, ball noise off"},
+        {"output.crs=utm --set output.layout=geo --set noise.range=on", "UTM or UPS; EPSG 32633",
+         "range noise on, angle noise off, ball noise off"},
+        {"output.crs=ecef --set output.layout=geo --set noise.angle=on", "ECEF; EPSG 4978",
+         "range noise off, angle noise on, ball noise off"},
+        {"output.crs=geodetic --set output.layout=geo --set noise.ball.radius_m=0.001",
+         "latitude, longitude, height; EPSG 4979", "range noise off, angle noise off, ball noise on"},
+    };
+    (void)state;
+    write_tiles(3);
+    write_text("g.yaml",
+               "head: {profile: sphere, step_deg: 10}\noutput: {crs: local}\n"
+               "scene: {meshes: [{file: tiles.obj, up: z, scale: 1}], anchor: {source: explicit, origin_m: [0, 0, 0], "
+               "lat_deg: 52, lon_deg: 15, height_m: 40}}\nstations: [{position_m: [1, 0.5, 2]}]\n");
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char words[256], fact[256];
+        snprintf(words, sizeof words, "g.yaml -o g.ply --quiet --set %s", rows[i].set);
+        does(&app_record, words, 0);
+        snprintf(words, sizeof words, "g.yaml g.ply --tolerance-m 1 --html g.html --set %s", rows[i].set);
+        does(&app_report, words, 0);
+        char *page = contents("g.html");
+        snprintf(fact, sizeof fact, "<dt>Coordinates</dt><dd>%s</dd>\n", rows[i].coordinates);
+        has(page, fact);
+        snprintf(fact, sizeof fact, "<dt>Scanner</dt><dd>scanhead sphere, %s</dd>\n", rows[i].scanner);
+        has(page, fact);
+        has(page, "<dt>Recording</dt><dd>g.ply</dd>\n");
+        has(page, "<dt>Configuration</dt><dd>g.yaml</dd>\n<dt>Scene</dt><dd>tiles.obj</dd>\n");
+        for (int k = 0; k < 9; k++) { /* the chart of incidences has all groups */
+            snprintf(fact, sizeof fact, ">%d\xe2\x80\x93%d\xc2\xb0</text>", 10 * k, 10 * k + 10);
+            has(page, fact);
+        }
+        free(page);
+    }
+}
+
+/* A mesh may have any bytes, also those with which a terminal clears its screen. Neither text nor page has them. */
+static void names_are_one_line(void **state)
+{
+    (void)state;
+    write_text("o.obj", "o a\033[2Jb\nusemtl c\033d\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nf 1 2 3\n");
+    write_text("o.yaml", "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: polar}\n"
+                         "scene: {meshes: [{file: o.obj, up: z, scale: 1}]}\nstations: [{position_m: [1, 0.5, 2]}]\n");
+    write_text("o.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n"
+                        "property double z\nproperty ushort label\nend_header\n5 -5 0 0\n");
+    does(&app_report, "o.yaml o.ply --html o.html", 0);
+    has(on_out, " on a?[2Jb | c?d\n");
+    has(on_out, "  a?[2Jb | c?d\n\nAll in mm.");
+    assert_null(strchr(on_out, '\033'));
+    char *page = contents("o.html");
+    has(page, "a?[2Jb | c?d");
+    assert_null(strchr(page, '\033'));
+    free(page);
+}
+
 /* A coordinate of 10^12 m and more is not written with decimals. A cloud without points is refused. */
 static void clouds_that_are_far_or_empty(void **state)
 {
@@ -137,6 +237,7 @@ static void clouds_that_are_far_or_empty(void **state)
     write_text("far.ply", text);
     does(&app_report, "tiles.yaml far.ply", 1);
     has(on_out, "\nmean       -\nRMS        -\n50 %       -\n95 %       -\n99.9 %     -\nmax        -\n");
+    has(on_out, "\nNot within the expected error: 1 of 1 points are farther from everything than --max-m.\n");
     snprintf(text, sizeof text, head, 2, "nan nan nan\nnan nan nan\n");
     write_text("none.ply", text);
     does(&app_report, "tiles.yaml none.ply", 2);
@@ -146,9 +247,9 @@ static void clouds_that_are_far_or_empty(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(so_many_surfaces_are_shown),
-        cmocka_unit_test(points_in_a_mirror_are_left_out),
-        cmocka_unit_test(clouds_that_are_far_or_empty),
+        cmocka_unit_test(so_many_surfaces_are_shown), cmocka_unit_test(points_in_a_mirror_are_left_out),
+        cmocka_unit_test(one_point_in_a_mirror),      cmocka_unit_test(the_top_of_a_page),
+        cmocka_unit_test(names_are_one_line),         cmocka_unit_test(clouds_that_are_far_or_empty),
     };
     return cmocka_run_group_tests_name("report scenes", tests, go_there, commands_end);
 }

@@ -209,6 +209,16 @@ static void without_a_grid_the_reason_is_there(void **state)
     assert_int_equal(shown.n_meshes, 0);
     assert_string_equal(shown.why_no_mesh, "no four points lie in neighbouring rows and lines");
     viewed_free(&shown);
+    /* One scan that has a mesh is enough, whatever the one before it lacks. */
+    begin_geo(NATIVE_CRS_LOCAL, 0, 1);
+    write_two_lines();
+    pan(2);
+    rig_anchor(&anchor);
+    write_two_lines();
+    loads();
+    assert_int_equal(shown.n_meshes, 1);
+    assert_string_equal(shown.why_no_mesh, "");
+    viewed_free(&shown);
 }
 
 /* Points in degrees are shown in metres east, north and up of the first one. At latitude 45 the meridian has the

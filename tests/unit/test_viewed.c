@@ -67,7 +67,8 @@ static void a_ply_with_all_columns(void **state)
     load(
         &v,
         write_ply(
-            "comment epsg 0\ncomment idn Maker,Model,17,x\ncomment label 3 wall | lime plaster\n",
+            "comment epsg 0\ncomment idn Maker,Model,17,x\ncomment label 3 wall | lime plaster\ncomment profile "
+            "sphere\ncomment label 5 door\ncomment label 65535 none\n",
             "property float range\nproperty float amplitude\nproperty uchar echo\nproperty uchar echo_count\nproperty ushort label\n"
             "property ushort station\nproperty double time\nproperty uchar red\nproperty uchar green\n"
             "property uchar blue\n",
@@ -90,7 +91,17 @@ static void a_ply_with_all_columns(void **state)
     assert_true(v.t0_s == 10.5 && v.high[VIEWED_T] == 12.5);
     assert_true(v.low[VIEWED_LABEL] == 3 && v.high[VIEWED_LABEL] == 3);
     assert_true(v.low[VIEWED_RANGE] == 5 && v.high[VIEWED_RANGE] == 8);
-    assert_int_equal(v.n_surfaces, 1);
+    assert_true(v.low[VIEWED_STATION] == 7 && v.high[VIEWED_STATION] == 9);
+    assert_true(v.low[VIEWED_ECHO] == 1 && v.high[VIEWED_ECHO] == 2);
+    assert_true(v.low[VIEWED_ECHOES] == 2 && v.high[VIEWED_ECHOES] == 2);
+    assert_true(isnan(v.low[VIEWED_RGB]) && isnan(v.high[VIEWED_REFLECTANCE]));
+    assert_string_equal(v.why_no_mesh, "a .ply holds points without the scan's grid; meshes are shown of a .shs");
+    assert_string_equal(v.idn, "Maker,Model,17,x");
+    assert_string_equal(v.profile, "sphere");
+    assert_int_equal(v.n_surfaces, 2); /* 65535 is no label */
+    assert_int_equal(v.surface[1].label, 5);
+    assert_string_equal(v.surface[1].object, "door");
+    assert_string_equal(v.surface[1].material, "");
     assert_string_equal(v.surface[0].object, "wall");
     assert_string_equal(v.surface[0].material, "lime plaster");
     assert_int_equal(v.n_stations, 2);

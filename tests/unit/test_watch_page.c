@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A page is told of a head from the watch's opening to its close: the head and its stations, the plan, the scene, and
  * which path leads where. Run from the top of the source tree. */
+#include "core/bytes.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "tests/unit/site_rig.h"
 
@@ -100,6 +101,20 @@ static void the_head_and_its_stations(void **state)
     close_page();
 }
 
+/* The points of one run have its number, by which a page knows that a head is another one: 8 bytes after the first 8. */
+static void a_run_has_one_number(void **state)
+{
+    (void)state;
+    char want[40];
+    open_page(0);
+    struct web_body past = need_body("/past", ""), head = need_body("/head", "");
+    snprintf(want, sizeof want, "{\"run\":\"%016llx\",", (unsigned long long)le_get64((const uint8_t *)past.bytes + 8));
+    assert_memory_equal(head.bytes, want, strlen(want));
+    give_back(past.bytes);
+    give_back(head.bytes);
+    close_page();
+}
+
 static void paths_lead_to_their_answers(void **state)
 {
     static const struct {
@@ -164,6 +179,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_head_and_its_stations),
+        cmocka_unit_test(a_run_has_one_number),
         cmocka_unit_test(paths_lead_to_their_answers),
         cmocka_unit_test(without_previews),
         cmocka_unit_test(an_observer_ends),

@@ -96,6 +96,21 @@ static void each_key(void **state)
     expect(expected);
 }
 
+/* The histogram is of deviations along the beam where one point has any, and of distances where none has. */
+static void the_histogram_is_of_what_there_is(void **state)
+{
+    static const struct figures_histogram one = {.from = -1, .width = 2, .bins = 1, .count = {1}};
+    (void)state;
+    for (int along = 0; along < 2; along++) {
+        struct web_body body;
+        struct sh_err err;
+        w.shown = (struct watch_scan){.scan = 1, .station = 1, .histogram = one, .figures.along = (size_t)along};
+        assert_int_equal(watch_get_quality(&w, &body, &err), SH_OK);
+        assert_non_null(strstr(body.bytes, along ? "\"along_beam\":{\"from_m\":-1," : "\"distances\":{\"from_m\":-1,"));
+        free(body.bytes);
+    }
+}
+
 /* Without a scan nothing is known, and nothing is made up. */
 static void before_the_first_scan(void **state)
 {
@@ -117,6 +132,7 @@ static int open_lock(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(each_key), cmocka_unit_test(before_the_first_scan)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(each_key), cmocka_unit_test(the_histogram_is_of_what_there_is),
+                                       cmocka_unit_test(before_the_first_scan)};
     return cmocka_run_group_tests(tests, open_lock, NULL);
 }

@@ -5,6 +5,7 @@
 
 #include "core/bytes.h"
 #include "firmware_sim/app/studio/watch/inside.h"
+#include "firmware_sim/base/clock.h"
 #include "tests/unit/site_rig.h"
 
 static struct watch w;
@@ -22,6 +23,8 @@ static void open_sample(void)
     w.site = site;
     if (watch_sample_open(&w, &err) != SH_OK) fail_msg("%s", err.text);
     watch_sample_begin(&w);
+    w.at = (struct watch_scan){.scan = 1, .station = 1};
+    report_head_of(site, 0, &w.now);
 }
 
 static void close_sample(void)
@@ -99,6 +102,114 @@ static void a_full_sample_takes_no_more(void **state)
     close_sample();
 }
 
+/* ---- comparing: points above and below the quad, seen from 1 m above its middle */
+
+static const double places[][3] = {{0.25, 0.5, 0}, {0.5, 0.25, 0.001}, {0.75, 0.5, -0.003}, {0.5, 0.75, 0.002}};
+enum { N_PLACES = 4 };
+
+static void add_places(void)
+{
+    for (int i = 0; i < N_PLACES; i++)
+        watch_sample_add(&w, places[i], 0);
+    w.at.points = N_PLACES;
+}
+
+static void same(const char *what, double a, double b, double tolerance)
+{
+    if (!(fabs(a - b) <= tolerance)) fail_msg("%s: %.12g is not %.12g", what, a, b);
+}
+
+/* A point at a height z lies z farther from its station along the beam, times the slope of the beam: a beam to a height
+ * of 1 - z is 1 / (1 - z) of its length long where it meets the floor. Floats round a deviation of 4 mm by 1e-10 m. */
+static void points_are_compared_once(void **state)
+{
+    (void)state;
+    const double mean_m = (0.001 + 0.003 + 0.002) / 4, rms_m = sqrt((1e-6 + 9e-6 + 4e-6) / 4);
+    open_sample();
+    add_places();
+    assert_int_equal(watch_sample_compare(&w, &err), SH_OK);
+    assert_int_equal(w.sample.done, N_PLACES);
+    for (int i = 0; i < N_PLACES; i++) {
+        const double z = places[i][2], range_m = hypot(0.25, 1 - z);
+        same("distance", w.sample.distance_m[i], fabs(z), 1e-12);
+        same("range", (double)w.sample.points.range_m[i], range_m, 1e-7);
+        same("along", (double)w.sample.points.along_m[i], range_m - range_m / (1 - z), 1e-9);
+        assert_true(w.sample.triangle[i] < 2 && w.sample.points.met[i] == w.sample.triangle[i]);
+        w.sample.distance_m[i] += i == 0 ? 0.5 : 0; /* it is not looked at again */
+    }
+    assert_int_equal(watch_sample_compare(&w, &err), SH_OK);
+    assert_true(w.sample.distance_m[0] == 0.5);
+    w.sample.distance_m[0] = 0.0;
+    w.at.over = 1;
+    w.sample.every = 2;
+    assert_int_equal(watch_sample_figures(&w, &err), SH_OK);
+    assert_true(w.at.every == 2 && w.at.sampled_points == N_PLACES && w.at.expects);
+    same("mean", w.at.figures.mean_m, mean_m, 1e-12);
+    same("RMS", w.at.figures.rms_m, rms_m, 1e-12);
+    same("largest", w.at.figures.max_m, 0.003, 1e-12);
+    assert_memory_equal(w.at.max_at_m, places[2], sizeof places[2]);
+    assert_true(w.at.histogram.from < 0.0); /* of deviations along the beam, which have signs */
+    /* So few points have one cell, larger than the quad, and each stands for those of two pulses. */
+    const double each = 2.0 * N_PLACES / (w.at.density_cell_m * w.at.density_cell_m);
+    same("5 %", w.at.density.p5, each, 1e-4 * each);
+    same("50 %", w.at.density.p50, each, 1e-4 * each);
+    same("95 %", w.at.density.p95, each, 1e-4 * each);
+    assert_true(w.at.density_cell_m > 1.0 && w.at.density.cells == 1 && w.sample.cell_m == w.at.density_cell_m);
+    close_sample();
+}
+
+/* The beams of a head that moves do not come from one place. The sample is full here, up to the last point. */
+static void a_head_that_moves_is_not_judged(void **state)
+{
+    (void)state;
+    struct watch_sample *s = &w.sample;
+    open_sample();
+    ((struct site *)w.site)->moving = 1;
+    for (uint32_t i = 0; i < WATCH_MOST_POINTS; i++)
+        watch_sample_add(&w, places[i % N_PLACES], 0);
+    s->done = WATCH_MOST_POINTS - N_PLACES;
+    assert_int_equal(watch_sample_compare(&w, &err), SH_OK);
+    for (int i = 0; i < N_PLACES; i++) {
+        const size_t at = WATCH_MOST_POINTS - N_PLACES + (size_t)i;
+        const struct deviation_points *p = &s->points;
+        same("distance", s->distance_m[at], fabs(places[i][2]), 1e-12);
+        assert_true(isnan(p->along_m[at]) && isnan(p->sigma_m[at]) && isnan(p->counts_m[at]) && isnan(p->cosine[at]) &&
+                    isnan(p->range_m[at]) && p->met[at] == s->triangle[at]);
+    }
+    s->n = s->done = 0;
+    add_places();
+    assert_int_equal(watch_sample_compare(&w, &err), SH_OK);
+    assert_int_equal(watch_sample_figures(&w, &err), SH_OK);
+    assert_string_equal(w.at.verdict.text, "Not judged: the head moves.");
+    assert_true(w.at.verdict.judgement == REPORT_NONE && w.at.verdict.judged == 0 && !w.at.expects);
+    assert_true(w.at.figures.along == 0 && w.at.histogram.from == 0.0); /* of distances */
+    ((struct site *)w.site)->moving = 0;
+    close_sample();
+}
+
+/* Points that were compared cost time. Where that is next to none of the budget all stay, and where the budget is next
+ * to nothing, the sample is thinned to the least share. */
+static void the_sample_fits_the_budget(void **state)
+{
+    (void)state;
+    for (int poor = 0; poor < 2; poor++) {
+        open_sample();
+        w.options.cpu_share = poor ? 1e-12 : 1e6;
+        w.began_ns = clock_now_ns();
+        w.began_thread_ns = clock_thread_ns();
+        add_places();
+        assert_int_equal(watch_sample_compare(&w, &err), SH_OK);
+        assert_int_equal(w.sample.every, poor ? WATCH_LEAST_SHARE : 1);
+        assert_true(w.sample.n == N_PLACES && w.sample.done == N_PLACES); /* their hash is 0 */
+        assert_true(w.sample.spent_ns > 0 && w.sample.point_ns == w.sample.spent_ns / N_PLACES);
+        watch_sample_begin(&w);
+        assert_true(w.sample.spent_ns == 0.0 && w.sample.cell_m == REPORT_CELL_M);
+        close_sample();
+    }
+}
+
+/* ---- the scene */
+
 /* The bodies of the page's scene are where they are at the first stop, 2 s after the trajectory's start. The first one
  * has then turned by 90 degrees, clockwise from above, about (5, 5), and moved by 2 m along x; the second by 1 m along z.
  * Corners are relative to the middle of what stands, (0.5, 0.5, 0). */
@@ -144,8 +255,9 @@ static void bodies_are_where_they_are_at_the_first_stop(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(half_of_the_pulses_stay),
-                                       cmocka_unit_test(a_full_sample_takes_no_more),
-                                       cmocka_unit_test(bodies_are_where_they_are_at_the_first_stop)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(half_of_the_pulses_stay),    cmocka_unit_test(a_full_sample_takes_no_more),
+        cmocka_unit_test(points_are_compared_once),   cmocka_unit_test(a_head_that_moves_is_not_judged),
+        cmocka_unit_test(the_sample_fits_the_budget), cmocka_unit_test(bodies_are_where_they_are_at_the_first_stop)};
     return cmocka_run_group_tests(tests, site_rig_setup, site_rig_teardown);
 }

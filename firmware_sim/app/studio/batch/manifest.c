@@ -29,7 +29,6 @@ static int read_lines(const char *path, int (*take)(void *ctx, struct batch_entr
         struct batch_entry entry;
         number++;
         if (line[n - 1] != '\n') break; /* not whole */
-        line[n - 1] = '\0';
         if (batch_entry_read(line, &entry))
             rc = take(ctx, &entry, err);
         else

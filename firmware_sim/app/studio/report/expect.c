@@ -50,9 +50,7 @@ static void judge_all(struct report *r)
         all->bound_m = fmax(all->bound_m, v->bound_m);
     }
     all->judgement = n[REPORT_BEYOND] > 0 ? REPORT_BEYOND : n[REPORT_NONE] > 0 ? REPORT_NONE : REPORT_WITHIN;
-    if (n_with_points == 0)
-        *all = (struct report_verdict){.judgement = REPORT_NONE, .text = "Not judged: there are no points."};
-    else if (n_with_points == 1)
+    if (n_with_points == 1)
         *all = *only;
     else if (all->judgement == REPORT_WITHIN)
         snprintf(all->text, sizeof all->text, "Within the expected error, at all %u stations.", n_with_points);

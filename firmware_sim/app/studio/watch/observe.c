@@ -82,7 +82,6 @@ static void end_scan(struct watch *w)
 {
     if (w->at.scan == 0 || w->at.over) return;
     w->at.over = 1;
-    w->dirty = 1;
     watch_publish(w);
     w->at.in_scene = 0; /* no more points of this scan come, and its site is given back */
     let_go(w);
@@ -195,7 +194,6 @@ static void rest(struct watch *w)
     uint32_t station;
     const uint32_t scan = device_last_scan(w->options.device, &station);
     if (!w->missed || scan == 0 || device_rests_from(w->options.device) == UINT64_MAX) return;
-    w->missed = 0;
     if (w->at.scan != scan && !(follow_scan(w) && w->at.scan == scan)) begin_unknown(w, scan, station);
     end_scan(w);
 }

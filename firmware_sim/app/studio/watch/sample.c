@@ -26,8 +26,6 @@ int watch_sample_open(struct watch *w, struct sh_err *err)
     if (rc == SH_OK &&
         (s->xyz_m == NULL || s->hash == NULL || s->distance_m == NULL || s->triangle == NULL || s->points.met == NULL))
         rc = sh_fail(err, SH_ENOMEM, "no memory for the points that are looked at");
-    s->every = 1;
-    s->cell_m = REPORT_CELL_M;
     return rc;
 }
 
