@@ -129,6 +129,27 @@ static void lists_are_replaced(void **state)
     assert_true(own.surface[0].surface.mirror == 0.5 && own.surface[0].surface.glass != own.surface[0].surface.glass);
 }
 
+/* What a command changes after the load holds for all scanners: output and loop. The tolerance of positions comes from
+ * each scanner's plan. */
+static void changes_of_output_and_loop_hold_for_all(void **state)
+{
+    (void)state;
+    assert_loads(load_second("{plan: {tolerance_m: 0.02}}", NULL, 0));
+    assert_true(cfg->output.tolerance_m == 1e-6 && cfg->scene.shared_textures == 0);
+    cfg->loop.threads = 3;
+    cfg->loop.pace = PACE_FAST;
+    cfg->loop.tick_hz = 500.0;
+    cfg->output.layout = LINE_GEO;
+    cfg->output.attributes = 1;
+    cfg->scene.shared_textures = 1;
+    load_own(2);
+    assert_memory_equal(&own.loop, &cfg->loop, sizeof own.loop);
+    assert_true(own.output.layout == LINE_GEO && own.output.attributes == 1 && own.output.tolerance_m == 2e-5);
+    assert_true(own.scene.shared_textures == 1 && own.scenario_file[0] == '\0');
+    for (uint32_t i = 0; i < 3; i++)
+        assert_int_equal(own.station[i].scanner, cfg->station[i].scanner);
+}
+
 static void the_same_settings_are_one_scanner(void **state)
 {
     (void)state;
@@ -301,6 +322,7 @@ int main(void)
         cmocka_unit_test(stops_have_the_scanner_of_their_station),
         cmocka_unit_test(sets_reach_the_file_or_one_scanner),
         cmocka_unit_test(lists_are_replaced),
+        cmocka_unit_test(changes_of_output_and_loop_hold_for_all),
         cmocka_unit_test(the_same_settings_are_one_scanner),
         cmocka_unit_test(wrong_ones_are_refused),
         cmocka_unit_test(faults_of_all_are_told_once),
