@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: MIT */
+/* Files that come with the program, found from the working directory: scenarios by name, and names of a folder's files. */
+#include "firmware_sim/config/load.h"
+#include "firmware_sim/config/shared.h"
+#include "tests/unit/config_rig.h"
+
+static char top[512]; /* where the test began */
+
+/* Makes ./config/faults with two scenarios, a hidden file and one that is none, and goes there. */
+static int go_there(void **state)
+{
+    if (getcwd(top, sizeof top) == NULL || set_up(state) != 0 || chdir(dir) != 0) return -1;
+    if (mkdir("config", 0700) != 0 || mkdir("config/faults", 0700) != 0 || mkdir("empty", 0700) != 0) return -1;
+    write_in("config/faults/two.yaml", "faults: [{kind: drop}, {kind: flip}]\n");
+    write_in("config/faults/a.yaml", "faults: [{kind: echo}]\n");
+    write_in("config/faults/.b.yaml", "faults: []\n");
+    write_in("config/faults/c.txt", "");
+    return 0;
+}
+
+static int go_back(void **state)
+{
+    static const char *const made[] = {"config/faults/two.yaml",
+                                       "config/faults/a.yaml",
+                                       "config/faults/.b.yaml",
+                                       "config/faults/c.txt",
+                                       "config/faults",
+                                       "config",
+                                       "empty"};
+    if (chdir(dir) != 0) return -1;
+    for (size_t i = 0; i < sizeof made / sizeof made[0]; i++)
+        remove(made[i]);
+    return chdir(top) != 0 ? -1 : tear_down(state);
+}
+
+static void a_yaml_file_has_a_name_before_its_ending(void **state)
+{
+    (void)state;
+    assert_true(cfg_is_yaml("a.yaml") && cfg_is_yaml("b/.yaml") && cfg_is_yaml("a.b.yaml"));
+    assert_false(cfg_is_yaml(".yaml") || cfg_is_yaml("ayaml") || cfg_is_yaml("a.yml") || cfg_is_yaml("a.yaml2"));
+    assert_false(cfg_is_yaml("") || cfg_is_yaml("a.YAML"));
+}
+
+static void names_are_sorted_and_stand_once(void **state)
+{
+    (void)state;
+    char names[64] = "", few[4] = "";
+    cfg_name_yaml("config/faults", names, sizeof names);
+    assert_string_equal(names, "a, two");
+    cfg_name_yaml("config/faults", names, sizeof names);
+    assert_string_equal(names, "a, two");
+    cfg_name_yaml("nowhere", names, sizeof names);
+    assert_string_equal(names, "a, two");
+    strcpy(names, "two, x");
+    cfg_name_yaml("config/faults", names, sizeof names);
+    assert_string_equal(names, "two, x, a");
+    cfg_name_yaml("config/faults", few, sizeof few);
+    assert_string_equal(few, "a, "); /* as far as they fit */
+}
+
+static void a_name_is_found_in_the_folder(void **state)
+{
+    (void)state;
+    char path[CONFIG_PATH_LEN], name[CONFIG_PATH_LEN + 1];
+    assert_int_equal(cfg_find_shared("faults/a.yaml", path), 1);
+    assert_string_equal(path, "config/faults/a.yaml");
+    assert_int_equal(cfg_find_shared("faults", path), 1);
+    assert_int_equal(cfg_find_shared("faults/none.yaml", path), 0);
+    assert_int_equal(cfg_find_scenario("two", path), 1);
+    assert_string_equal(path, "config/faults/two.yaml");
+    assert_int_equal(cfg_find_scenario("none", path), 0);
+    /* A path is taken as it is, whether there is a file or not. */
+    assert_int_equal(cfg_find_scenario("two.yaml", path), 1);
+    assert_string_equal(path, "two.yaml");
+    assert_int_equal(cfg_find_scenario("x/two", path), 1);
+    assert_string_equal(path, "x/two");
+    memset(name, 'n', sizeof name);
+    name[0] = '/';
+    name[CONFIG_PATH_LEN - 1] = '\0';
+    assert_int_equal(cfg_find_scenario(name, path), 1);
+    assert_string_equal(path, name);
+    name[CONFIG_PATH_LEN - 1] = 'n';
+    name[CONFIG_PATH_LEN] = '\0';
+    assert_int_equal(cfg_find_scenario(name, path), 0);
+    assert_int_equal(cfg_find_scenario(name + 1, path), 0); /* too long a name */
+}
+
+static void an_unknown_scenario_gets_the_names(void **state)
+{
+    (void)state;
+    char names[64];
+    config_name_scenarios(names, sizeof names);
+    assert_string_equal(names, "a, two");
+    assert_loads(load_text(base));
+    assert_int_equal(config_add_scenario(cfg, "tow", &diagnostics), SH_EINPUT);
+    assert_string_equal(diagnostics.err[0].text,
+                        "tow: no such scenario; allowed the path of a file, or one of these: a, two");
+    assert_int_equal(config_add_scenario(cfg, "two", &diagnostics), SH_OK);
+    assert_int_equal(cfg->faults.n, 2);
+    assert_string_equal(cfg->scenario_file, "config/faults/two.yaml");
+    assert_int_equal(chdir("empty"), 0);
+    config_name_scenarios(names, sizeof names);
+    assert_string_equal(names, "none found");
+    assert_int_equal(config_add_scenario(cfg, "two", &diagnostics), SH_EINPUT);
+    assert_string_equal(diagnostics.err[0].text,
+                        "two: no such scenario; allowed the path of a file, or one of these: none found");
+    assert_int_equal(chdir(".."), 0);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_yaml_file_has_a_name_before_its_ending),
+        cmocka_unit_test(names_are_sorted_and_stand_once),
+        cmocka_unit_test(a_name_is_found_in_the_folder),
+        cmocka_unit_test(an_unknown_scenario_gets_the_names),
+    };
+    return cmocka_run_group_tests_name("shared files", tests, go_there, go_back);
+}
