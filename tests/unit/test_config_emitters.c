@@ -305,6 +305,22 @@ static void a_planar_head_has_its_geometries(void **state)
         check_wrong(&wrong[i]);
 }
 
+/* Clockwise unless the profile says otherwise, seen from above. */
+static void a_rotor_turns_as_its_profile_says(void **state)
+{
+    (void)state;
+    static const char against[] = "step_direction: { value: counter-clockwise, from: quoted }";
+    assert_loads(load_changed("velodyne-vlp16", "emitter: beams", "emitter: beams"));
+    assert_int_equal(cfg->profile.emitter.turn, 1);
+    assert_loads(load_changed("velodyne-vlp16", "emitter: beams",
+                              "emitter: beams\nstep_direction: { value: counter-clockwise, from: quoted }"));
+    assert_int_equal(cfg->profile.emitter.turn, -1);
+    assert_loads(load_changed("hokuyo-urg-04lx", against, against));
+    assert_int_equal(cfg->profile.emitter.turn, -1);
+    assert_loads(load_changed("hokuyo-urg-04lx", against, "step_direction: { value: clockwise, from: quoted }"));
+    assert_int_equal(cfg->profile.emitter.turn, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -317,6 +333,7 @@ int main(void)
         cmocka_unit_test(a_bad_value_in_a_list_is_one_fault),
         cmocka_unit_test(a_step_that_leaves_no_line_rate_is_refused),
         cmocka_unit_test(a_planar_head_has_its_geometries),
+        cmocka_unit_test(a_rotor_turns_as_its_profile_says),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -76,7 +76,9 @@ static void keys_make_shapes(void **state)
     assert_int_equal(f->response_ms, 134);
     assert_int_equal(f->shape.kind, COLA_SHAPE_POLYGON);
     assert_int_equal(f->shape.n, 3);
+    assert_true(f->shape.corner[0].x_um == -1000000 && f->shape.corner[0].y_um == 500000);
     assert_true(f->shape.corner[1].x_um == 1250000 && f->shape.corner[1].y_um == 500000);
+    assert_true(f->shape.corner[2].x_um == 0 && f->shape.corner[2].y_um == 2000000);
     f = &made.field[47];
     assert_int_equal(f->shape.kind, COLA_SHAPE_SECTOR);
     assert_int_equal(f->blanking_um, 100000);
@@ -84,6 +86,7 @@ static void keys_make_shapes(void **state)
     assert_true(f->shape.sector.inner_um == 250000 && f->shape.sector.outer_um == 3000000);
     f = &made.field[4];
     assert_int_equal(f->shape.n, 4);
+    assert_true(f->shape.corner[0].x_um == 1000000 && f->shape.corner[0].y_um == 2000000);
     assert_true(f->shape.corner[2].x_um == -3000000 && f->shape.corner[2].y_um == 5000000);
     assert_int_equal(made.field[0].shape.kind, COLA_SHAPE_NONE);
 }
@@ -152,6 +155,27 @@ static void shapes_have_limits(void **state)
     }
 }
 
+/* There is room for 62 points, and all of them arrive. */
+static void the_longest_list_of_points(void **state)
+{
+    (void)state;
+    char with[2048];
+    for (int n = CONFIG_MAX_POINTS; n <= CONFIG_MAX_POINTS + 1; n++) {
+        int len = snprintf(with, sizeof with, "fields: [{number: 1, shape: polygon, points_m: [");
+        for (int i = 0; i < n; i++)
+            len += snprintf(with + len, sizeof with - (size_t)len, "%s[%d.5, %d]", i > 0 ? ", " : "", i, i % 7);
+        snprintf(with + len, sizeof with - (size_t)len, "]}]\n");
+        load_with_head("sick-tim781", "", with);
+        if (n > CONFIG_MAX_POINTS) break;
+        assert_int_equal(err.code, SH_OK);
+        assert_int_equal(cfg->field[0].points_m.n, n);
+        for (int i = 0; i < n; i++)
+            assert_true(cfg->field[0].points_m.at[i][0] == i + 0.5 && cfg->field[0].points_m.at[i][1] == i % 7);
+    }
+    assert_int_equal(err.code, SH_EINPUT);
+    assert_says("fields[0].points_m: has 63 points; allowed up to 62");
+}
+
 /* A list of points can be set, and it replaces the one before. */
 static void points_can_be_set(void **state)
 {
@@ -168,8 +192,9 @@ static void points_can_be_set(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(fields_that_say_nothing_are_refused),
-                                       cmocka_unit_test(keys_make_shapes), cmocka_unit_test(all_that_keys_say_is_there),
-                                       cmocka_unit_test(shapes_have_limits), cmocka_unit_test(points_can_be_set)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fields_that_say_nothing_are_refused), cmocka_unit_test(keys_make_shapes),
+        cmocka_unit_test(all_that_keys_say_is_there),          cmocka_unit_test(shapes_have_limits),
+        cmocka_unit_test(the_longest_list_of_points),          cmocka_unit_test(points_can_be_set)};
     return cmocka_run_group_tests_name("config fields", tests, set_up, tear_down);
 }
