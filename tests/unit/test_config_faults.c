@@ -4,6 +4,8 @@
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
+#include <fcntl.h>
+
 /* The errors are these, in this order. Each begins with PATH:LINE: KEY, or with the text here. */
 static void assert_faults(const char *const *starts, uint32_t n)
 {
@@ -141,6 +143,35 @@ static void a_fifo_or_a_device_is_refused(void **state)
     remove(fifo_obj);
 }
 
+/* Returns the lowest free descriptor. */
+static int lowest_free(void)
+{
+    const int fd = open("/dev/null", O_RDONLY);
+    assert_true(fd >= 0);
+    close(fd);
+    return fd;
+}
+
+static void no_file_stays_open(void **state)
+{
+    (void)state;
+    struct fault fault;
+    struct config_profile profile;
+    const int before = lowest_free();
+    write_in("test.yaml", "faults: [{kind: drop}]\n");
+    assert_int_equal(config_load(config_path, NULL, 0, cfg, &err), SH_EINPUT);
+    assert_int_equal(config_add_scenario(cfg, config_path, &diagnostics), SH_OK);
+    write_in("test.yaml", "faults: [{kind: x}]\n");
+    assert_int_equal(config_add_scenario(cfg, config_path, &diagnostics), SH_EINPUT);
+    assert_loads(load_edited("      up: z\n", "      up: z\n      copies: cube.obj\n"));
+    assert_int_equal(config_read_fault(cfg, "{kind: drop}", &fault, &err), SH_OK);
+    assert_int_equal(load_edited("any-rate", "cube.obj"), SH_EINPUT);
+    assert_int_equal(load_edited("cube.obj", "dir.obj"), SH_EINPUT);
+    assert_int_equal(load_changed("leica-rtc360", "max_echoes: { value: 1,", "max_echoes: { value: x,"), SH_EINPUT);
+    assert_int_equal(config_load_profile("any-rate", NULL, &profile, &err), SH_OK);
+    assert_int_equal(lowest_free(), before);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -150,6 +181,7 @@ int main(void)
         cmocka_unit_test(twenty_are_kept_and_all_are_counted),
         cmocka_unit_test(many_faults_end),
         cmocka_unit_test(a_fifo_or_a_device_is_refused),
+        cmocka_unit_test(no_file_stays_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

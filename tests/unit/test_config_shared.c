@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that come with the program, found from the working directory: scenarios by name, and names of a folder's files. */
+/* Files that come with the program, found from the working directory: scenarios and head profiles by name, and names of a
+ * folder's files. */
 #include "firmware_sim/config/load.h"
+#include "firmware_sim/config/reference.h"
 #include "firmware_sim/config/shared.h"
 #include "tests/unit/config_rig.h"
 
@@ -107,6 +109,95 @@ static void an_unknown_scenario_gets_the_names(void **state)
     assert_int_equal(chdir(".."), 0);
 }
 
+/* ---- head profiles */
+
+static char heads[512]; /* those that come with the program */
+
+static void copy_profile(const char *to, const char *old, const char *with)
+{
+    char from[600];
+    snprintf(from, sizeof from, "%s/any-rate.yaml", heads);
+    char *text = read_source(from), *changed = replaced(text, old, with);
+    write_in(to, changed);
+    free(text);
+    free(changed);
+}
+
+/* Three folders have a profile of this name; they are searched in the order that config/heads/README.md gives. */
+static void the_first_folder_that_has_a_profile(void **state)
+{
+    (void)state;
+    static struct config_profile profile;
+    char all[512], beside[128], mine[128];
+    snprintf(heads, sizeof heads, "%s", getenv("SCANHEAD_HEADS"));
+    snprintf(beside, sizeof beside, "%s/x.yaml", dir); /* its folder has the folder heads */
+    snprintf(mine, sizeof mine, "%s/empty", dir);
+    assert_int_equal(mkdir("config/heads", 0700), 0);
+    copy_profile("empty/mine.yaml", "model: ", "model: a");
+    copy_profile("heads/mine.yaml", "model: ", "model: b");
+    copy_profile("config/heads/mine.yaml", "model: ", "model: c");
+    copy_profile("config/heads/wrong.yaml", "maker: ", "makers: ");
+    static const char models[] = "abc";
+    const char *const unlinked[] = {"empty/mine.yaml", "heads/mine.yaml", "config/heads/mine.yaml"};
+    setenv("SCANHEAD_HEADS", mine, 1);
+    for (int i = 0; i < 3; i++) {
+        memset(&err, 0, sizeof err);
+        assert_loads(config_load_profile("mine", beside, &profile, &err));
+        assert_string_equal(profile.name, "mine");
+        assert_int_equal(profile.model[0], models[i]);
+        /* Without a configuration, the folder beside it does not count. */
+        assert_loads(config_load_profile("mine", NULL, &profile, &err));
+        assert_int_equal(profile.model[0], i == 0 ? 'a' : 'c');
+        unlink(unlinked[i]);
+    }
+    assert_int_equal(config_load_profile("mine", beside, &profile, &err), SH_EINPUT);
+    assert_string_equal(err.text, "no head profile \"mine\"; allowed wrong");
+    assert_int_equal(config_load_profile("wrong", beside, &profile, &err), SH_EINPUT);
+    static const char unknown[] =
+        "config/heads/wrong.yaml:3: makers: unknown key, did you mean maker? allowed maker, model, ";
+    assert_int_equal(strncmp(err.text, unknown, sizeof unknown - 1), 0);
+    setenv("SCANHEAD_HEADS", "", 1); /* empty: as if it were not there */
+    copy_profile("config/heads/mine.yaml", "model: ", "model: c");
+    assert_loads(config_load_profile("mine", beside, &profile, &err));
+    snprintf(all, sizeof all, "%s", heads);
+    setenv("SCANHEAD_HEADS", all, 1);
+}
+
+static void expect_list(const char *where, int want, const char *first)
+{
+    char *text = NULL;
+    size_t len = 0;
+    FILE *out = open_memstream(&text, &len);
+    const int n = config_list_profiles(where, out, &err);
+    fclose(out);
+    if (n != want) fail_msg("%d: %s", n, err.text);
+    assert_int_equal(strncmp(want < 0 ? err.text : text, first, strlen(first)), 0);
+    free(text);
+}
+
+/* One folder is listed: the first that can be read. */
+static void one_folder_is_listed(void **state)
+{
+    (void)state;
+    char here[128];
+    snprintf(here, sizeof here, "%s/empty", dir);
+    copy_profile("empty/other.yaml", "model: ", "model: o");
+    setenv("SCANHEAD_HEADS", here, 1);
+    expect_list(NULL, 1, "other: scanhead oany rate\n");
+    expect_list("config/heads", SH_EINPUT, "config/heads/wrong.yaml:3: makers: unknown key");
+    unlink("config/heads/wrong.yaml");
+    expect_list("config/heads", 1, "mine: scanhead cany rate\n");
+    unlink("empty/other.yaml");
+    expect_list(NULL, 0, "");
+    setenv("SCANHEAD_HEADS", "/nonexistent", 1);
+    expect_list(NULL, 1, "mine: scanhead c");
+    expect_list("/nonexistent", SH_EINPUT, "/nonexistent: cannot be read; a directory of head profiles is needed");
+    assert_int_equal(chdir("empty"), 0);
+    expect_list(NULL, SH_EINPUT, "no directory of head profiles found; set SCANHEAD_HEADS");
+    assert_int_equal(chdir(".."), 0);
+    setenv("SCANHEAD_HEADS", heads, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -114,6 +205,8 @@ int main(void)
         cmocka_unit_test(names_are_sorted_and_stand_once),
         cmocka_unit_test(a_name_is_found_in_the_folder),
         cmocka_unit_test(an_unknown_scenario_gets_the_names),
+        cmocka_unit_test(the_first_folder_that_has_a_profile),
+        cmocka_unit_test(one_folder_is_listed),
     };
     return cmocka_run_group_tests_name("shared files", tests, go_there, go_back);
 }
