@@ -375,6 +375,17 @@ static void each_number_of_a_pose_has_its_unit(void **state)
         }
 }
 
+/* The fewest digits that read back as the same number: 1, 15, 16 or 17. */
+static void a_place_has_the_fewest_digits(void **state)
+{
+    (void)state;
+    static const struct command_place place = {{0.009, 123456.789012345, 2.0 / 3.0, 0.1 + 0.2, -7, 1e-9}};
+    struct command_device dev = command_test_device();
+    dev.limits.n_stations = 1;
+    dev.place = &place;
+    expect(&dev, "SITE:POSE? 1", "0.009,123456.789012345,0.6666666666666666,0.30000000000000004,-7,1e-09");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -393,6 +404,7 @@ int main(void)
         cmocka_unit_test(peers_have_the_numbers_of_their_sessions),
         cmocka_unit_test(each_number_of_a_pose_has_its_limits),
         cmocka_unit_test(each_number_of_a_pose_has_its_unit),
+        cmocka_unit_test(a_place_has_the_fewest_digits),
     };
     return cmocka_run_group_tests_name("parts of a command", tests, NULL, NULL);
 }
