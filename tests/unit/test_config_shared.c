@@ -6,6 +6,10 @@
 #include "firmware_sim/config/shared.h"
 #include "tests/unit/config_rig.h"
 
+#include <fcntl.h>
+#include <sys/sendfile.h>
+#include <sys/wait.h>
+
 static char top[512]; /* where the test began */
 
 /* Makes ./config/faults with two scenarios, a hidden file and one that is none, and goes there. */
@@ -198,8 +202,85 @@ static void one_folder_is_listed(void **state)
     setenv("SCANHEAD_HEADS", heads, 1);
 }
 
-int main(void)
+/* ---- beside the program */
+
+static const char *own_name; /* argv[0] */
+
+/* Copies this program to `to`, and runs it there to find a shared file. Returns what it printed; free it. */
+static char *find_beside(const char *to, const char *name)
 {
+    int out[2], status;
+    size_t len = 0;
+    char *text = NULL;
+    const int from = open("/proc/self/exe", O_RDONLY), copy = open(to, O_WRONLY | O_CREAT | O_TRUNC, 0700);
+    assert_true(from >= 0 && copy >= 0);
+    while (sendfile(copy, from, NULL, 1 << 20) > 0)
+        continue;
+    close(from);
+    close(copy);
+    assert_int_equal(pipe(out), 0);
+    const pid_t pid = fork();
+    if (pid == 0) {
+        dup2(out[1], STDOUT_FILENO);
+        setenv("TEST_FIND", name, 1);
+        execl(to, own_name, (char *)NULL);
+        _exit(127);
+    }
+    close(out[1]);
+    FILE *in = fdopen(out[0], "r");
+    assert_true(in != NULL && getdelim(&text, &len, '\0', in) > 0);
+    fclose(in);
+    assert_int_equal(waitpid(pid, &status, 0), pid);
+    assert_int_equal(status, 0);
+    unlink(to);
+    return text;
+}
+
+static void expect_beside(const char *name, const char *want)
+{
+    char program[128], path[256];
+    snprintf(program, sizeof program, "%s/bin/program", dir);
+    snprintf(path, sizeof path, "%s/bin/%s", dir, want);
+    char *text = find_beside(program, name);
+    assert_string_equal(text, want[0] == '.' ? path : want);
+    free(text);
+}
+
+/* An installed program has its files in ../share/scanhead, one in a build folder in ../config. The working directory's
+ * folder config comes last. */
+static void a_program_finds_what_is_beside_it(void **state)
+{
+    (void)state;
+    assert_int_equal(mkdir("bin", 0700), 0);
+    assert_int_equal(mkdir("share", 0700), 0);
+    assert_int_equal(mkdir("share/scanhead", 0700), 0);
+    assert_int_equal(mkdir("share/scanhead/faults", 0700), 0);
+    write_in("share/scanhead/faults/a.yaml", "");
+    expect_beside("faults/a.yaml", "../share/scanhead/faults/a.yaml");
+    expect_beside("faults/two.yaml", "../config/faults/two.yaml");
+    expect_beside("faults/none.yaml", "config/faults/none.yaml: not found");
+    unlink("share/scanhead/faults/a.yaml");
+    expect_beside("faults/a.yaml", "../config/faults/a.yaml");
+    rmdir("share/scanhead/faults");
+    rmdir("share/scanhead");
+    rmdir("share");
+    rmdir("bin");
+}
+
+/* The copy of this program: prints the path of the file. */
+static int find_and_print(const char *name)
+{
+    char path[CONFIG_PATH_LEN];
+    const int found = cfg_find_shared(name, path);
+    printf("%s%s", path, found ? "" : ": not found");
+    return 0;
+}
+
+int main(int argc, char **argv)
+{
+    (void)argc;
+    own_name = argv[0];
+    if (getenv("TEST_FIND") != NULL) return find_and_print(getenv("TEST_FIND"));
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_yaml_file_has_a_name_before_its_ending),
         cmocka_unit_test(names_are_sorted_and_stand_once),
@@ -207,6 +288,7 @@ int main(void)
         cmocka_unit_test(an_unknown_scenario_gets_the_names),
         cmocka_unit_test(the_first_folder_that_has_a_profile),
         cmocka_unit_test(one_folder_is_listed),
+        cmocka_unit_test(a_program_finds_what_is_beside_it),
     };
     return cmocka_run_group_tests_name("shared files", tests, go_there, go_back);
 }
