@@ -135,6 +135,8 @@ static void samples_of_waveforms(void **state)
         {VZ, "waveform: {echoes: model}\n", "waveform: {echoes: fraction}\n", "waveform.echoes"},
         {VZ, "noise: {range: on}\n" ON "echoes: model}\n", "noise: {range: on}\n" ON "echoes: threshold}\n",
          "noise.range"},
+        /* a window that can't be read is not looked at */
+        {VZ, ON "far_m: 0}\n", ON "far_m: x, near_m: 9}\n", "waveform.far_m"},
         /* without waveforms, windows are not looked at */
         {VZ, "waveform: {before_ns: 4000}\n", ON "before_ns: 4000}\n", "waveform.before_ns"},
     };
@@ -309,13 +311,40 @@ static void figures_of_a_profile(void **state)
     }
 }
 
+/* A pulse has a width of 0.01 ns or more, or a table. */
+static void a_pulse_has_a_width(void **state)
+{
+    (void)state;
+    static const char *const widths[] = {"0.01", "0.0099", "0"}, *const more[] = {ON "}\n", "waveform: {}\n",
+                                                                                  ON "pulse: table, pulse_file: a}\n"};
+    for (int w = 0; w < 3; w++)
+        for (int m = 0; m < 3; m++) {
+            char with[64], want[200];
+            char *text = read_source("config/heads/any-rate.yaml");
+            snprintf(with, sizeof with, "pulse_width_ns: { value: %s,", widths[w]);
+            char *changed = replaced(text, "pulse_width_ns: { value: 4,", with);
+            write_in("heads/mine.yaml", changed);
+            free(text);
+            free(changed);
+            const int code = load_with_head("mine", "", more[m]);
+            if ((code == SH_OK) != (w == 0 || m > 0)) fail_msg("%s ns: %s", widths[w], err.text);
+            if (code == SH_OK) continue;
+            snprintf(
+                want, sizeof want,
+                "waveform.send: pulse_width_ns of head profile mine is %s; required is 0.01 or more, or waveform.pulse: "
+                "table",
+                widths[w]);
+            assert_says(want);
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(settings_of_the_head), cmocka_unit_test(noise_signal_and_surfaces),
         cmocka_unit_test(samples_of_waveforms), cmocka_unit_test(platforms_and_time),
         cmocka_unit_test(outputs_and_links),    cmocka_unit_test(injected_faults),
-        cmocka_unit_test(figures_of_a_profile),
+        cmocka_unit_test(figures_of_a_profile), cmocka_unit_test(a_pulse_has_a_width),
     };
     return cmocka_run_group_tests_name("bounds", tests, set_up, tear_down);
 }

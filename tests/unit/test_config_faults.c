@@ -143,6 +143,14 @@ static void a_fifo_or_a_device_is_refused(void **state)
     remove(fifo_obj);
 }
 
+/* A file that can be opened, and not read: the memory of this process has nothing at its beginning. */
+static void a_file_that_cannot_be_read_is_refused(void **state)
+{
+    (void)state;
+    assert_int_equal(config_load("/proc/self/mem", NULL, 0, cfg, &err), SH_EINPUT);
+    assert_string_equal(err.text, "/proc/self/mem: cannot be read: Input/output error; a YAML file is needed");
+}
+
 /* Returns the lowest free descriptor. */
 static int lowest_free(void)
 {
@@ -181,6 +189,7 @@ int main(void)
         cmocka_unit_test(twenty_are_kept_and_all_are_counted),
         cmocka_unit_test(many_faults_end),
         cmocka_unit_test(a_fifo_or_a_device_is_refused),
+        cmocka_unit_test(a_file_that_cannot_be_read_is_refused),
         cmocka_unit_test(no_file_stays_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -211,6 +211,15 @@ static void sections_of_a_scanner(void **state)
         if (cfg_is_of_scanner(not_its[i])) fail_msg("%s", not_its[i]);
 }
 
+/* A section has no value that a text could be. */
+static void a_section_takes_no_text(void **state)
+{
+    (void)state;
+    assert_int_equal(cfg_store(&rd, &keys[HEAD], 0, 4, "x", ""), SH_EINPUT);
+    expect_last("shelf.yaml:4: head: \"x\" is not what belongs here; allowed a section with keys");
+    assert_int_equal(rd.bad[HEAD][0], 1);
+}
+
 static void the_folder_of_a_path(void **state)
 {
     (void)state;
@@ -236,6 +245,7 @@ int main(void)
         EACH(a_dropped_value_was_never_given),
         EACH(a_scanner_takes_keys_over),
         EACH(sections_of_a_scanner),
+        EACH(a_section_takes_no_text),
         EACH(the_folder_of_a_path),
     };
     return cmocka_run_group_tests_name("rows of a table", tests, NULL, NULL);
