@@ -375,6 +375,32 @@ static void each_number_of_a_pose_has_its_unit(void **state)
         }
 }
 
+/* A number of a pose may have 63 characters: zeros at its beginning, here. */
+static void numbers_of_a_pose_have_a_longest_length(void **state)
+{
+    (void)state;
+    struct command_device dev = command_test_device();
+    char line[128];
+    dev.step_allowed = dev.pose_allowed = 1;
+    dev.pose_reach_m = 100.0;
+    snprintf(line, sizeof line, "SITE:POSE %063d,DEF", 2);
+    expect(&dev, line, "OK");
+    assert_true(result.station == 2 && result.to_first == 1);
+    snprintf(line, sizeof line, "SITE:POSE %064d,DEF", 2);
+    expect_error(&dev, 1, line, CMD_E_DATA_TYPE, "SITE:POSE: station is not a number: '0000");
+    snprintf(line, sizeof line, "SITE:POSE 1,%063d,0,0,0,0,0", 7);
+    expect(&dev, line, "OK");
+    assert_true(result.place.v[0] == 7.0 && result.to_first == 0);
+    snprintf(line, sizeof line, "SITE:POSE 1,%064d,0,0,0,0,0", 7);
+    expect(&dev, line, "ERR -222,\"Data out of range; SITE:POSE: x has 64 characters, allowed up to 63\"");
+    snprintf(line, sizeof line, "TIME:STEP 1,0,0,0,0,0,%064d", 7);
+    expect(&dev, line, "ERR -222,\"Data out of range; TIME:STEP: heading has 64 characters, allowed up to 63\"");
+    snprintf(line, sizeof line, "SCAN:REPLay %063d", 0);
+    expect(&dev, line, "OK");
+    snprintf(line, sizeof line, "SCAN:REPLay 1,%064d", 0);
+    expect(&dev, line, "ERR -222,\"Data out of range; SCAN:REPLay: a value has 64 characters, allowed up to 63\"");
+}
+
 /* The fewest digits that read back as the same number: 1, 15, 16 or 17. */
 static void a_place_has_the_fewest_digits(void **state)
 {
@@ -404,6 +430,7 @@ int main(void)
         cmocka_unit_test(peers_have_the_numbers_of_their_sessions),
         cmocka_unit_test(each_number_of_a_pose_has_its_limits),
         cmocka_unit_test(each_number_of_a_pose_has_its_unit),
+        cmocka_unit_test(numbers_of_a_pose_have_a_longest_length),
         cmocka_unit_test(a_place_has_the_fewest_digits),
     };
     return cmocka_run_group_tests_name("parts of a command", tests, NULL, NULL);

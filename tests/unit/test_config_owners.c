@@ -4,6 +4,8 @@
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
+#define N_OF(array) (sizeof(array) / sizeof(array)[0])
+
 struct owned {
     const char *key, *value;
     const char *kinds; /* a letter for each kind that has the key */
@@ -18,25 +20,45 @@ static void list_of(const struct owned *keys, size_t n, char kind, const char *b
             used += (size_t)snprintf(list + used, 512 - used, "%s%s", used > 0 ? ", " : "", keys[i].key);
 }
 
-/* Whether one of the diagnostics is this one; else whether one says that a key is not there. */
-static int is_said(const char *text)
+/* Returns how many of the diagnostics say this. */
+static int n_said(const char *text)
 {
     int said = 0;
-    for (uint32_t i = 0; i < diagnostics.n && i < CONFIG_MAX_DIAGNOSTICS; i++) {
-        if (strstr(diagnostics.err[i].text, text) == NULL) continue;
-        said++;
-    }
+    for (uint32_t i = 0; i < diagnostics.n && i < CONFIG_MAX_DIAGNOSTICS; i++)
+        said += strstr(diagnostics.err[i].text, text) != NULL;
     return said;
 }
 
-/* Expects that a key is refused by exactly the kinds that don't have it. */
-static void expect_owner(const char *path, const struct owned *key, char kind, const char *owner, const char *allowed)
+/* Writes "key: value, key: value" of the keys that a kind has, or of those that it lacks. */
+static void write_keys(const struct owned *keys, size_t n, char kind, int has, char text[1024])
 {
-    char want[800];
-    const int has = strchr(key->kinds, kind) != NULL;
-    snprintf(want, sizeof want, ": %s.%s: %s has no such key; allowed %s", path, key->key, owner, allowed);
-    if (!has && is_said(want) != 1) fail_msg("\"%s\", not \"%s\"", err.text, want);
-    if (is_said("has no such key") != !has) fail_msg("%s of %s: %s", key->key, owner, err.text);
+    size_t used = 0;
+    text[0] = '\0';
+    for (size_t i = 0; i < n; i++)
+        if ((strchr(keys[i].kinds, kind) != NULL) == has)
+            used += (size_t)snprintf(text + used, 1024 - used, ", %s: %s", keys[i].key, keys[i].value);
+}
+
+/* Loads an edit of base, "BEGINNING, key: value, ...END", with the keys that a kind has, none of which is refused, and
+ * with those that it lacks, each of which is. */
+static void expect_owners(const char *old, const char *begin, const char *end, const char *path,
+                          const struct owned *keys, size_t n, char kind, const char *owner, const char *allowed)
+{
+    char text[1024], with[1400], want[800];
+    for (int has = 1; has >= 0; has--) {
+        int lacks = 0;
+        write_keys(keys, n, kind, has, text);
+        snprintf(with, sizeof with, "%s%s%s", begin, text, end);
+        load_edited(old, with);
+        for (size_t i = 0; i < n && !has; i++) {
+            if (strchr(keys[i].kinds, kind) != NULL) continue;
+            snprintf(want, sizeof want, ": %s.%s: %s has no such key; allowed %s", path, keys[i].key, owner, allowed);
+            if (n_said(want) != 1) fail_msg("\"%s\" is not said of %s", want, with);
+            lacks++;
+        }
+        snprintf(want, sizeof want, ": %s has no such key", owner);
+        if (n_said(want) != lacks) fail_msg("%s: %s", with, err.text);
+    }
 }
 
 /* ---- platforms: static, trajectory, live, stops (p) */
@@ -63,16 +85,13 @@ static void platforms(void **state)
                                         {"address", "127.0.0.1", "l"},
                                         {"port", "9", "l"}};
     static const char *const kinds[] = {"static", "trajectory", "live", "stops"};
-    enum { N = sizeof keys / sizeof keys[0] };
-    for (int k = 0; k < 4; k++)
-        for (size_t i = 0; i < N; i++) {
-            char with[128], owner[32], allowed[512];
-            snprintf(with, sizeof with, "platform: {kind: %s, %s: %s}\noutput:", kinds[k], keys[i].key, keys[i].value);
-            snprintf(owner, sizeof owner, "a %s platform", kinds[k]);
-            list_of(keys, N, "stlp"[k], "kind", allowed);
-            load_edited("output:", with);
-            expect_owner("platform", &keys[i], "stlp"[k], owner, allowed);
-        }
+    for (int k = 0; k < 4; k++) {
+        char begin[64], owner[32], allowed[512];
+        snprintf(begin, sizeof begin, "platform: {kind: %s", kinds[k]);
+        snprintf(owner, sizeof owner, "a %s platform", kinds[k]);
+        list_of(keys, N_OF(keys), "stlp"[k], "kind", allowed);
+        expect_owners("output:", begin, "}\noutput:", "platform", keys, N_OF(keys), "stlp"[k], owner, allowed);
+    }
 }
 
 /* ---- links: null, file, pty, tcp, usb (s), udp (u), web */
@@ -80,8 +99,7 @@ static void platforms(void **state)
 static void links(void **state)
 {
     (void)state;
-    static const struct owned keys[] = {{"type", "", "nfptsuw"},
-                                        {"protocol", "native", "nfptsuw"},
+    static const struct owned keys[] = {{"protocol", "native", "nfptsuw"},
                                         {"dialect", "any", "nfptsuw"},
                                         {"path", "a", "fps"},
                                         {"baud", "9600", "p"},
@@ -103,21 +121,14 @@ static void links(void **state)
                                         {"serial", "a", "s"}};
     static const char *const types[] = {"\"null\"", "file", "pty", "tcp", "usb", "udp", "web"};
     static const char ours[] = "  - type: tcp\n    port: 0\n";
-    enum { N = sizeof keys / sizeof keys[0] };
-    for (int k = 0; k < 7; k++)
-        for (size_t i = 1; i < N; i++) {
-            char with[128], owner[32], allowed[512];
-            /* A key of another back end is the business of the test below. */
-            const char *backend = k != 4                             ? ""
-                                  : strcmp(keys[i].key, "udc") == 0  ? ", backend: functionfs"
-                                  : strcmp(keys[i].key, "path") == 0 ? ", backend: usbredir"
-                                                                     : "";
-            snprintf(with, sizeof with, "  - {type: %s%s, %s: %s}\n", types[k], backend, keys[i].key, keys[i].value);
-            snprintf(owner, sizeof owner, "a %.*s link", (int)strcspn(types[k] + (k == 0), "\""), types[k] + (k == 0));
-            list_of(keys, N, "nfptsuw"[k], "", allowed);
-            load_edited(ours, with);
-            expect_owner("links[0]", &keys[i], "nfptsuw"[k], owner, allowed);
-        }
+    for (int k = 0; k < 7; k++) {
+        char begin[64], owner[32], allowed[512];
+        const char *type = types[k] + (k == 0);
+        snprintf(begin, sizeof begin, "  - {type: %s", types[k]);
+        snprintf(owner, sizeof owner, "a %.*s link", (int)strcspn(type, "\""), type);
+        list_of(keys, N_OF(keys), "nfptsuw"[k], "type", allowed);
+        expect_owners(ours, begin, "}\n", "links[0]", keys, N_OF(keys), "nfptsuw"[k], owner, allowed);
+    }
 }
 
 /* ---- back ends of USB links: usbip, usbredir, functionfs */
@@ -130,15 +141,13 @@ static void back_ends(void **state)
         {"udc", "a", "f"},         {"speed", "high", "irf"},       {"vid", "0x1", "irf"}, {"serial", "a", "irf"},
         {"latency_ms", "1", "irf"}};
     static const char *const backends[] = {"usbip", "usbredir", "functionfs"};
-    for (int k = 0; k < 3; k++)
-        for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
-            char with[128], owner[40];
-            snprintf(with, sizeof with, "  - {type: usb, backend: %s, %s: %s}\n", backends[k], keys[i].key,
-                     keys[i].value);
-            snprintf(owner, sizeof owner, "the back end %s", backends[k]);
-            load_edited("  - type: tcp\n    port: 0\n", with);
-            expect_owner("links[0]", &keys[i], "irf"[k], owner, "without it");
-        }
+    for (int k = 0; k < 3; k++) {
+        char begin[64], owner[40];
+        snprintf(begin, sizeof begin, "  - {type: usb, backend: %s", backends[k]);
+        snprintf(owner, sizeof owner, "the back end %s", backends[k]);
+        expect_owners("  - type: tcp\n    port: 0\n", begin, "}\n", "links[0]", keys, N_OF(keys), "irf"[k], owner,
+                      "without it");
+    }
 }
 
 /* ---- anchors: none (n), explicit (x), ifc, utm, ecef, geotiff */
@@ -158,29 +167,30 @@ static void anchors(void **state)
                   {"utm_zone", "u", "allowed a whole number, 0 to 60"},
                   {"hemisphere", "u", "allowed south, north"}};
     static const char *const sources[] = {"none", "explicit", "ifc", "utm", "ecef", "geotiff"};
-    enum { N = sizeof keys / sizeof keys[0] };
-    for (int k = 0; k < 6; k++)
-        for (size_t i = 0; i <= N; i++) {
-            char with[128], owner[48], allowed[512], want[200];
-            const char letter = "nxiueg"[k];
-            snprintf(with, sizeof with, "  anchor: {source: %s%s%s%s%s}\nstations:", sources[k], i < N ? ", " : "",
-                     i < N ? keys[i].key : "", i < N ? ": " : "", i < N ? keys[i].value : "");
-            snprintf(owner, sizeof owner, "an anchor of source %s", sources[k]);
-            list_of(keys, N, letter, "", allowed);
-            if (allowed[0] == '\0') strcpy(allowed, "source alone");
-            load_edited("stations:", with);
-            if (i < N) expect_owner("scene.anchor", &keys[i], letter, owner, allowed);
-            int n = 0;
-            for (size_t m = 0; m < sizeof needed / sizeof needed[0]; m++) {
-                if (strchr(needed[m].kinds, letter) == NULL) continue;
-                if (i < N && strcmp(keys[i].key, needed[m].key) == 0) continue;
-                snprintf(want, sizeof want, "scene.anchor.%s: missing, and the anchor's source is %s; required, %s",
-                         needed[m].key, sources[k], needed[m].allowed);
-                if (is_said(want) != 1) fail_msg("%s is not said of \"%s\"", want, with);
-                n++;
-            }
-            assert_int_equal(is_said("missing, and the anchor's source"), n);
+    for (int k = 0; k < 6; k++) {
+        char begin[64], owner[48], allowed[512], want[200];
+        const char letter = "nxiueg"[k];
+        snprintf(begin, sizeof begin, "  anchor: {source: %s", sources[k]);
+        snprintf(owner, sizeof owner, "an anchor of source %s", sources[k]);
+        list_of(keys, N_OF(keys), letter, "", allowed);
+        if (allowed[0] == '\0') strcpy(allowed, "source alone");
+        expect_owners("stations:", begin, "}\nstations:", "scene.anchor", keys, N_OF(keys), letter, owner, allowed);
+        /* The keys that it lacks are given, and those that it needs are not. */
+        int n = 0;
+        for (size_t m = 0; m < N_OF(needed); m++) {
+            if (strchr(needed[m].kinds, letter) == NULL) continue;
+            snprintf(want, sizeof want, "scene.anchor.%s: missing, and the anchor's source is %s; required, %s",
+                     needed[m].key, sources[k], needed[m].allowed);
+            if (n_said(want) != 1) fail_msg("%s is not said", want);
+            n++;
         }
+        assert_int_equal(n_said("missing, and the anchor's source"), n);
+        load_edited("stations:", letter == 'x'
+                                     ? "  anchor: {source: explicit, lat_deg: 1, lon_deg: 2, height_m: 3}\nstations:"
+                                 : letter == 'u' ? "  anchor: {source: utm, utm_zone: 0, hemisphere: south}\nstations:"
+                                                 : "stations:");
+        assert_int_equal(n_said("missing, and the anchor's source"), 0);
+    }
 }
 
 int main(void)
