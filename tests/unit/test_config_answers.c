@@ -269,6 +269,39 @@ static void stops_go_through_the_stations(void **state)
     assert_true(config_serves(cfg, 1));
 }
 
+/* Some keys count only where they are given, also with the value that they have otherwise. */
+static void what_is_given_is_noted(void **state)
+{
+    (void)state;
+    const struct {
+        const char *key, *value, *with; /* with: what else the key needs */
+        const int *member;
+    } keys[] = {
+        {"output.layout", "polar", NULL, &cfg->output.layout_given},
+        {"output.colour_limits", "[1, 2]", "output.colour=range", &cfg->output.colour_limited},
+        {"scene.anchor.height_m", "0", "scene.anchor.source=ifc", &cfg->scene.anchor.height_given},
+        {"optics.depth", "1", NULL, &cfg->optics.depth_given},
+        {"signal.extinction_1_km", "0", NULL, &cfg->signal.has_extinction},
+        {"platform.end_s", "5", "platform={kind: trajectory, file: a}", &cfg->platform.has_end},
+        {"platform.last_frame", "5", "platform={kind: stops, file: a, frames_per_s: 1, frame_step: 1}",
+         &cfg->platform.has_end},
+        {"stations[0].instrument_height_m", "0", NULL, &cfg->station[0].has_instrument_height},
+        {"stations[0].tripod.leg_m", "1", NULL, &cfg->station[0].tripod.given},
+    };
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++)
+        for (int given = 0; given < 2; given++) {
+            char set[64];
+            snprintf(set, sizeof set, "%s=%s", keys[i].key, keys[i].value);
+            const char *const sets[] = {keys[i].with != NULL ? keys[i].with : "head.frames=1", set};
+            write_file(config_path, base, strlen(base));
+            load_sets(sets, 1 + given);
+            if (*keys[i].member != given) fail_msg("%s: %d; %s", keys[i].key, *keys[i].member, err.text);
+        }
+    assert_loads(load_text(base));
+    assert_int_equal(cfg->station[0].has_position, 1);
+    assert_int_equal(cfg->station[0].place, PLACE_NONE);
+}
+
 /* ---- files */
 
 struct files {
@@ -373,6 +406,7 @@ int main(void)
         cmocka_unit_test(pulses_outside_the_window_are_not_cast),
         cmocka_unit_test(threads_are_as_given_or_one_per_processor),
         cmocka_unit_test(stops_go_through_the_stations),
+        cmocka_unit_test(what_is_given_is_noted),
         cmocka_unit_test(each_file_has_its_key),
         cmocka_unit_test(the_signal_of_a_program),
         cmocka_unit_test(steps_are_divided),

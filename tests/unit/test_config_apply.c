@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Settings that a client has changed become the configuration's: ranges of all programs, noise, steps. */
+/* Settings that a client has changed become the configuration's: ranges of all programs, noise, steps; and the schedule of
+ * a head with these settings. */
 #include "tests/unit/config_rig.h"
 
 #include <math.h>
@@ -65,11 +66,40 @@ static void a_step_is_applied_to_planes_and_spheres(void **state)
     assert_int_equal(config_apply_settings(cfg, &s, &err), SH_EINPUT);
 }
 
+static void a_schedule_has_the_settings(void **state)
+{
+    (void)state;
+    const struct head_settings s = {.prr_uhz = 1,
+                                    .lines_uhz = 2,
+                                    .pan_udeg_s = 3,
+                                    .line_start_udeg = 4,
+                                    .line_stop_udeg = 5,
+                                    .pan_start_udeg = 6,
+                                    .pan_stop_udeg = 7,
+                                    .frames = 8};
+    struct schedule_spec spec;
+    assert_loads(load_with_head("riegl-vz400i", "", ""));
+    config_fill_spec(&cfg->profile, &s, &spec);
+    assert_true(spec.prr_uhz == 1 && spec.lines_uhz == 2 && spec.pan_udeg_s == 3 && spec.frames == 8);
+    assert_true(spec.line_start_udeg == 4 && spec.line_stop_udeg == 5);
+    assert_true(spec.pan_start_udeg == 6 && spec.pan_stop_udeg == 7);
+    /* facets 3, gain 2: 240 deg of a sweep, which begins with the field of view */
+    assert_true(spec.fov_min_udeg == -40000000 && spec.sweep_udeg == 240000000 && spec.emitter == NULL);
+    assert_loads(load_with_head("velodyne-vlp16", "", ""));
+    config_fill_spec(&cfg->profile, &s, &spec);
+    assert_true(spec.fov_min_udeg == 0 && spec.sweep_udeg == 360000000 && spec.emitter == &cfg->profile.emitter);
+    /* 1024 steps, the 384th of which is ahead: the first one is at -135 deg */
+    assert_loads(load_with_head("hokuyo-urg-04lx", "", ""));
+    config_fill_spec(&cfg->profile, &s, &spec);
+    assert_true(spec.fov_min_udeg == -135000000 && spec.sweep_udeg == 360000000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(settings_are_applied_whole),
         cmocka_unit_test(a_step_is_applied_to_planes_and_spheres),
+        cmocka_unit_test(a_schedule_has_the_settings),
     };
     return cmocka_run_group_tests_name("settings applied", tests, set_up, tear_down);
 }
