@@ -75,6 +75,13 @@ static void the_place_of_a_diagnostic(void **state)
     assert_int_equal(found.err[4].code, SH_ENOMEM);
 }
 
+static void a_diagnostic_is_one_line(void **state)
+{
+    (void)state;
+    cfg_fail(&rd, 1, "a\nb", "c\x1f\x7f~ %s", "d\t");
+    expect_last("shelf.yaml:1: a?b: c??~ d?");
+}
+
 /* The file's key contradicts one of the scanner's. */
 static void the_scanner_of_a_diagnostic(void **state)
 {
@@ -163,7 +170,7 @@ static void what_is_shown_fits_a_line(void **state)
 {
     (void)state;
     char buf[CFG_SHOW_MAX], text[80];
-    assert_string_equal(cfg_show("a\nb\x1f\x7f~ c", buf), "a?b??~ c");
+    assert_string_equal(cfg_show("", buf), "");
     memset(text, 'x', sizeof text);
     text[60] = '\0';
     assert_string_equal(cfg_show(text, buf), text);
@@ -184,6 +191,7 @@ int main(void)
         EACH(a_diagnostic_reaches_sections_and_elements),
         EACH(a_key_has_one_diagnostic),
         EACH(the_place_of_a_diagnostic),
+        EACH(a_diagnostic_is_one_line),
         EACH(the_scanner_of_a_diagnostic),
         EACH(diagnostics_are_in_order),
         EACH(an_unknown_key_gets_the_nearest_one),
