@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* HELP? of every command, whole: kind, unit, limits, default, step, states and values, worked out by hand from the limits
- * of command_device.c. A head with fixed pulse rates has them for HEAD:PRR, and no other setting has. */
+/* HELP? of every command, whole: kind, unit, limits, default, step, states and values, worked out by hand from the
+ * limits of command_device.c. A head with fixed pulse rates has them for HEAD:PRR, and no other setting has. */
 #include "tests/unit/command_device.h"
 
 #define ALL   "\"all\""

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The parts of a command line, called by themselves: splitting, fields, patterns, decimal numbers, what errors quote; and
- * the limits of each number of a pose. */
+/* The parts of a command line, called by themselves: splitting, fields, patterns, decimal numbers, what errors quote;
+ * and the limits of each number of a pose. */
 #include "firmware_sim/command/decimal.h"
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/step.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Questions about a loaded configuration, which the site and the loop ask: what moves, what is modelled, how many pulses
- * are cast, which files it names. */
+/* Questions about a loaded configuration, which the site and the loop ask: what moves, what is modelled, how many
+ * pulses are cast, which files it names. */
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/check_links.h"
 #include "firmware_sim/config/files.h"

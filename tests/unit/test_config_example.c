@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The reference and the example, line by line: indents by the depth of a key, texts wrapped within 100 columns, values that
- * are defaults or figures of the profile, and the few keys that are not commented out. */
+/* The reference and the example, line by line: indents by the depth of a key, texts wrapped within 100 columns, values
+ * that are defaults or figures of the profile, and the few keys that are not commented out. */
 #include "firmware_sim/config/keys.h"
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/reference.h"
@@ -23,8 +23,8 @@ static const char *next_line(void)
     return line;
 }
 
-/* Expects a text in lines that begin with blanks and a mark. A line ends where the next word would not fit; the end of the
- * line before it counts as a column. */
+/* Expects a text in lines that begin with blanks and a mark. A line ends where the next word would not fit; the end of
+ * the line before it counts as a column. */
 static void expect_wrapped(const char *text, int indent, const char *mark)
 {
     char start[64];

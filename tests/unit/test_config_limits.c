@@ -143,8 +143,8 @@ static const struct limits {
     {"optics.depth", 0, 4},
 };
 
-/* Their least is 1: what is counted from one, and what is divided by. Every other least number is 0, the negative of the
- * largest, a fraction, or 10 and more. */
+/* Their least is 1: what is counted from one, and what is divided by. Every other least number is 0, the negative of
+ * the largest, a fraction, or 10 and more. */
 static const char *const from_one[] = {
     "faults[].every", "faults[].from", "head.mta_zones", "platform.reach_m", "programs[].prr_hz", "programs[].used_hz",
     "prr_min_hz",     "prr_max_hz",    "steps_per_turn", "threshold_snr",    "time.ptp.max_ppm",

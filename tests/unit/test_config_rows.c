@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The rows of a table by their paths, and a reader that knows where each was given: members, lines, defaults, values that
- * are dropped. */
+/* The rows of a table by their paths, and a reader that knows where each was given: members, lines, defaults, values
+ * that are dropped. */
 #include "firmware_sim/config/limits.h"
 #include "firmware_sim/config/table/forget.h"
 #include "firmware_sim/config/table/given.h"

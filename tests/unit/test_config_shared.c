@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that come with the program, found from the working directory: scenarios and head profiles by name, and names of a
- * folder's files. */
+/* Files that come with the program, found from the working directory: scenarios and head profiles by name, and names of
+ * a folder's files. */
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/config/shared.h"
