@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of tables: a table of a few rows, and a reader that fills its struct. */
+/* For tests of tables, this is a table of a few rows with a reader that fills its struct. */
 #ifndef TESTS_UNIT_SHELF_RIG_H
 #define TESTS_UNIT_SHELF_RIG_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The system's clocks: each reading lies between two of the test's own, by clock_gettime. */
+/* Each reading of the system's clocks lies between two of the test's own, by clock_gettime. */
 #include "firmware_sim/base/clock.h"
 
 #include <pthread.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* HELP? of every command, whole: kind, unit, limits, default, step, states and values, worked out by hand from the
- * limits of command_device.c. A head with fixed pulse rates has them for HEAD:PRR, and no other setting has. */
+/* HELP? of every command is compared whole: kind, unit, limits, default, step, states and values were worked out by
+ * hand from the limits of command_device.c. A head with fixed pulse rates has them for HEAD:PRR, and no other
+ * setting has. */
 #include "tests/unit/command_device.h"
 
 #define ALL   "\"all\""
@@ -83,7 +84,7 @@ static void every_setting_is_described_whole(void **state)
     assert_int_equal(n, 22);
 }
 
-/* A number that a head with fixed rates takes for each setting but the pulse rate: none of those rates. */
+/* A head with fixed rates takes for each setting but the pulse rate a number that is none of those rates. */
 static void other_settings_take_any_value(void **state)
 {
     (void)state;
@@ -101,7 +102,7 @@ static void other_settings_take_any_value(void **state)
     expect(&dev, "HEAD:PRR 1001", "ERR -222,\"Data out of range; HEAD:PRR 1001, allowed 1000, 300000, 1200000 Hz\"");
 }
 
-/* TIME:SERVer at its limits, and beyond each. */
+/* TIME:SERVer takes each value at its limit, and none beyond it. */
 static void a_time_server_has_limits(void **state)
 {
     (void)state;
@@ -129,7 +130,7 @@ static void a_time_server_has_limits(void **state)
     expect(&dev, "TIME:SERVer? STATe", "SET,1,-2,3,4,5,6");
 }
 
-/* 145 years either way. */
+/* A clock can be shifted by 145 years either way. */
 static void a_shift_has_limits(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The parts of a command line, called by themselves: splitting, fields, patterns, decimal numbers, what errors quote;
- * and the limits of each number of a pose. */
+/* The parts of a command line are called by themselves: splitting, fields, patterns, decimal numbers, what errors
+ * quote. Each number of a pose is tried at its limits. */
 #include "firmware_sim/command/decimal.h"
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/step.h"
@@ -401,7 +401,7 @@ static void numbers_of_a_pose_have_a_longest_length(void **state)
     expect(&dev, line, "ERR -222,\"Data out of range; SCAN:REPLay: a value has 64 characters, allowed up to 63\"");
 }
 
-/* The fewest digits that read back as the same number: 1, 15, 16 or 17. */
+/* A place is written with the fewest digits that read back as the same number: 1, 15, 16 or 17. */
 static void a_place_has_the_fewest_digits(void **state)
 {
     (void)state;

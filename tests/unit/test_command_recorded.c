@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Commands to a recording: settings keep their values, scans begin and end at any time; and ranges of settings that
- * follow from others. */
+/* In a recording settings keep their values, and scans begin and end at any time. Settings that follow from others have
+ * ranges of their own. */
 #include "tests/unit/command_device.h"
 
 #define CONFLICT "ERR -221,\"Settings conflict; "
@@ -42,7 +42,7 @@ static void a_recording_keeps_its_settings(void **state)
     }
 }
 
-/* Its recording does not have the value: neither of 64 bits, nor of 32. */
+/* A recording may lack a value, be it of 64 bits or of 32. */
 static void a_value_may_be_unknown(void **state)
 {
     (void)state;
@@ -63,7 +63,7 @@ static void a_value_may_be_unknown(void **state)
     expect(&dev, "SCAN:STEP:LINE?", CONFLICT "SCAN:STEP:LINE: the recording does not have this value\"");
 }
 
-/* Its head's state does not matter, whatever it was. */
+/* The state of the recorded head does not matter. */
 static void it_is_played_and_stopped_in_any_state(void **state)
 {
     (void)state;
@@ -100,7 +100,7 @@ static void stations_of_others_are_no_limits(void **state)
     expect(&dev, "HEAD:STATION? MAX", "5");
 }
 
-/* Lines of 100 pulses: the pulse rate has one value, and a line rate has its own limits. */
+/* With lines of 100 pulses the pulse rate has one value, and a line rate has its own limits. */
 static void a_rate_may_follow_from_the_lines(void **state)
 {
     (void)state;
@@ -119,7 +119,7 @@ static void a_rate_may_follow_from_the_lines(void **state)
     expect(&dev, "HEAD:PRR MAX", "OK");
 }
 
-/* 300 kHz over a turn: 1 line/s has steps of 0.0012 deg, and 2000 lines/s of 2.4. The pan has up to 60 deg/s, so both
+/* At 300 kHz over a turn 1 line/s has steps of 0.0012 deg, and 2000 lines/s of 2.4. The pan has up to 60 deg/s, so both
  * steps are the same up to sqrt(60 * 360 / 300000) = 0.26832816 deg. */
 static void a_step_of_both_has_its_reason(void **state)
 {

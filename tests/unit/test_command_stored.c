@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Settings that a head keeps: the lines that are stored, and lines that are carried out again, in whatever order they
- * stand. */
+/* A head keeps its settings as lines, which are carried out again in whatever order they stand. */
 #include "firmware_sim/command/stored.h"
 #include "tests/unit/command_device.h"
 
@@ -54,7 +53,7 @@ static void what_differs_is_stored(void **state)
     assert_int_equal(command_stored_text(&dev, &configured, text, sizeof want - 1), -1);
 }
 
-/* A step is stored where it is a setting of its own: of a sphere. */
+/* A step is stored where it is a setting of its own, as on a sphere. */
 static void a_sphere_keeps_its_step(void **state)
 {
     (void)state;
@@ -74,7 +73,7 @@ static void lines_are_carried_out_in_an_order_that_works(void **state)
     (void)state;
     struct command_device dev = command_test_device();
     const struct head_settings before = dev.settings;
-    /* The line's end comes first, which lies below its present start; and a line that is set already. */
+    /* The line's end comes first, and lies below its present start. The pulse rate is set already. */
     assert_int_equal(apply(&dev, "SCAN:LINE:STOP -35\nSCAN:LINE:STARt -38\nHEAD:PRR 300000\nHEAD:LIN 50\n"), 0);
     assert_string_equal(done, "SCAN:LINE:STARt -38\nHEAD:LIN 50\nSCAN:LINE:STOP -35\n");
     assert_memory_equal(&dev.settings, &before, sizeof before); /* `set` is what carries them out */
@@ -107,7 +106,7 @@ static void lines_that_can_not_be_are_refused(void **state)
     }
 }
 
-/* 32 lines of 256 bytes. */
+/* The text may have 32 lines of 256 bytes. */
 static void there_is_room_for_32_lines(void **state)
 {
     (void)state;

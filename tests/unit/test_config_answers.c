@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Questions about a loaded configuration, which the site and the loop ask: what moves, what is modelled, how many
- * pulses are cast, which files it names. */
+/* The site and the loop ask a loaded configuration these questions: what moves, what is modelled, how many pulses are
+ * cast, which files it names. */
 #include "firmware_sim/config/check_head.h"
 #include "firmware_sim/config/check_links.h"
 #include "firmware_sim/config/files.h"
@@ -12,7 +12,7 @@
 
 #include "drivers/protocol/protocol.h"
 
-/* A configuration of two meshes and two stations, in which nothing moves. */
+/* Loads a configuration of two meshes and two stations, in which nothing moves. */
 static void begin(void)
 {
     assert_loads(load_text(base));
@@ -30,7 +30,7 @@ static void expect_answer(const char *got, const char *want)
         assert_string_equal(got, want);
 }
 
-/* Sets a number of the configuration to 1, asks whether beams move, and then whether rays do. */
+/* Sets a number of the configuration to -1, asks whether beams and rays move, and sets it back. */
 static void expect_moves(double *figure, const char *beam, const char *rays)
 {
     const double before = *figure;
@@ -215,7 +215,7 @@ static void pulses_outside_the_window_are_not_cast(void **state)
     assert_true(fabs(cfg_used_share(&cfg->profile) - 100.0 / 240.0) < 1e-12);
     assert_loads(load_with_head("riegl-vz400i", "  prr_hz: 300000\n  line_start_deg: -10\n  line_stop_deg: 14\n", ""));
     assert_true(fabs(config_cast_hz(cfg) - 30000.0) < 1e-6);
-    /* A window across azimuth 0, of 20 deg; and the whole ring, from 0 to 360. */
+    /* The whole ring goes from 0 to 360 deg; a window across azimuth 0 has 20 deg. */
     assert_loads(load_with_head("sphere", "  step_deg: 1\n  lines_hz: 10\n", ""));
     assert_true(fabs(config_cast_hz(cfg) - 3600.0) < 1e-9);
     assert_loads(
@@ -253,7 +253,7 @@ static void stops_go_through_the_stations(void **state)
     }
     cfg->n_stations = 1; /* it has all stops of a trajectory */
     assert_int_equal(cfg_station_at(cfg, 5), 0);
-    /* Stations without scanners, or a head at none of them: all are served. */
+    /* A head that is at none of the stations serves all of them. */
     cfg->n_stations = 2;
     cfg->platform.kind = PLATFORM_STATIC;
     cfg->station[0].scanner = 1;

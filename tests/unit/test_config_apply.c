@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Settings that a client has changed become the configuration's: ranges of all programs, noise, steps; and the schedule
- * of a head with these settings. */
+/* Settings that a client has changed become the configuration's: ranges of all programs, noise, steps. A schedule takes
+ * the settings of its head. */
 #include "tests/unit/config_rig.h"
 
 #include <math.h>

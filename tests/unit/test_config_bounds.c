@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks between keys at exactly their bounds: what is at the bound loads, and what is just beyond it gives one error
- * of this key. The texts of these errors are in test_config_messages.c. */
+/* Checks between keys are tried at exactly their bounds: what is at the bound loads, and what is just beyond it gives
+ * one error of this key. The texts of these errors are in test_config_messages.c. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
@@ -35,7 +35,7 @@ static void check_all(const struct bound *bounds, size_t n)
     }
 }
 
-/* Settings of the head: the two columns are settings, not sections. */
+/* The two columns are settings of the head, not sections. */
 static void settings_of_the_head(void **state)
 {
     (void)state;
@@ -105,8 +105,8 @@ static void noise_signal_and_surfaces(void **state)
     ALL(bounds);
 }
 
-/* 4096 samples at most: half of them around an echo, all but one in a gate. Light goes 0.149896229 m back and forth in
- * 1 ns. */
+/* There are 4096 samples at most: half of them around an echo, all but one in a gate. Light goes 0.149896229 m back and
+ * forth in 1 ns. */
 static void samples_of_waveforms(void **state)
 {
     (void)state;
@@ -243,7 +243,6 @@ static void injected_faults(void **state)
     ALL(bounds);
 }
 
-/* Figures of a head profile. */
 static void figures_of_a_profile(void **state)
 {
     (void)state;

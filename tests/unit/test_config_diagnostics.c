@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Diagnostics of a table's rows: their places, texts and order, and the values that they make unsound. */
+/* Diagnostics of a table's rows have places, texts and an order, and make values unsound. */
 #include "firmware_sim/config/table/diagnostics.h"
 #include "firmware_sim/config/table/given.h"
 #include "tests/unit/shelf_rig.h"
@@ -30,7 +30,7 @@ static void a_diagnostic_reaches_sections_and_elements(void **state)
     assert_true(!is_sound("head.high_m", 0) && !is_sound("head.high_m", 3) && is_sound("tins", 0));
 }
 
-/* One diagnostic for a key: those that follow may be its consequence. */
+/* A key gets one diagnostic, since those that follow may be its consequence. */
 static void a_key_has_one_diagnostic(void **state)
 {
     (void)state;

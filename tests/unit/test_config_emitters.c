@@ -333,7 +333,7 @@ static void the_most_beams(void **state)
     assert_says(": beams: 129 elements are too many; allowed a list of 0 to 128");
 }
 
-/* Clockwise unless the profile says otherwise, seen from above. */
+/* Seen from above, a rotor turns clockwise unless the profile says otherwise. */
 static void a_rotor_turns_as_its_profile_says(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The reference and the example, line by line: indents by the depth of a key, texts wrapped within 100 columns, values
- * that are defaults or figures of the profile, and the few keys that are not commented out. */
+/* The reference and the example are read line by line: indents follow the depth of a key, texts are wrapped within 100
+ * columns, values are defaults or figures of the profile, and few keys are not commented out. */
 #include "firmware_sim/config/keys.h"
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/reference.h"
@@ -135,7 +135,7 @@ static void print_example(FILE *out)
     assert_int_equal(config_print_example(out, &err), SH_OK);
 }
 
-/* Sections and elements that a key is in: each adds two blanks. */
+/* Returns in how many sections and elements a key is. */
 static int depth_of(const char *path)
 {
     int depth = 0;
@@ -155,7 +155,7 @@ static const char *expect_line(const struct cfg_key *key, const char *mark)
     return line + strlen(start);
 }
 
-/* The value of a figure in the profile that the example names. */
+/* Returns the value of a figure in the profile that the example names. */
 static double figure_of(const char *profile, const char *key)
 {
     char start[64];
@@ -174,7 +174,7 @@ static void expect_written(const struct cfg_key *key, const char *value, const c
     }
     const char *want = key->def != NULL && key->def[0] != '\0' ? key->def : key->example;
     if (want == NULL) want = "";
-    /* Files that come with the program have their own path; names that YAML would take for something else are quoted. */
+    /* Files that come with the program have their own path. Names that YAML would misread have quotes. */
     const size_t n = strlen(value), n_want = strlen(want);
     const int is_quoted = value[0] == '"' && n == n_want + 2 && strncmp(value + 1, want, n_want) == 0;
     const int is_path = key->type == CFG_PATH && value[0] == '/' && n > n_want && strcmp(value + n - n_want, want) == 0;

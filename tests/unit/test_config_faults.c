@@ -143,7 +143,7 @@ static void a_fifo_or_a_device_is_refused(void **state)
     remove(fifo_obj);
 }
 
-/* A file that can be opened, and not read: the memory of this process has nothing at its beginning. */
+/* The memory of this process can be opened as a file, and has nothing at its beginning that could be read. */
 static void a_file_that_cannot_be_read_is_refused(void **state)
 {
     (void)state;

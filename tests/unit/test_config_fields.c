@@ -91,7 +91,7 @@ static void keys_make_shapes(void **state)
     assert_int_equal(made.field[0].shape.kind, COLA_SHAPE_NONE);
 }
 
-/* The whole of each field, as its keys say; in micrometres, 1e-4 degrees, nanoseconds and turns. */
+/* Each field has all that its keys say, in micrometres, nanoseconds and turns. */
 static void all_that_keys_say_is_there(void **state)
 {
     (void)state;
@@ -126,8 +126,7 @@ static void all_that_keys_say_is_there(void **state)
         assert_int_equal(made.field[i].shape.kind, COLA_SHAPE_NONE);
 }
 
-/* Limits of shapes: equal radii, no width and a whole turn are allowed; corners that enclose half a square micrometre
- * are not. */
+/* Equal radii, no width and a whole turn are allowed; corners that enclose less than half a square micrometre are not. */
 static void shapes_have_limits(void **state)
 {
     (void)state;

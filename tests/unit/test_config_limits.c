@@ -143,7 +143,7 @@ static const struct limits {
     {"optics.depth", 0, 4},
 };
 
-/* Their least is 1: what is counted from one, and what is divided by. Every other least number is 0, the negative of
+/* These keys are counted from one, or something is divided by them. Every other least number is 0, the negative of
  * the largest, a fraction, or 10 and more. */
 static const char *const from_one[] = {
     "faults[].every", "faults[].from", "head.mta_zones", "platform.reach_m", "programs[].prr_hz", "programs[].used_hz",
@@ -173,7 +173,7 @@ static int is_number(const struct cfg_key *key)
            key->type == CFG_PAIR;
 }
 
-/* Whether it is 0 or a power of ten, with either sign. */
+/* Returns whether it is 0 or a power of ten, with either sign. */
 static int is_round(double value)
 {
     char text[32];

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A configuration of links, loop and faults alone, as a replay has it: its defaults, and errors word for word. */
+/* A replay has a configuration of links, loop and faults alone. Its defaults are those of a whole one, and its errors
+ * are compared word for word. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Keys that only some kinds of platform, link, back end or anchor have: each key with each kind. The tables below were
- * written by hand from the help of the keys. */
+/* Some keys belong to some kinds of platform, link, back end or anchor alone: each key is tried with each kind. The
+ * tables below were written by hand from the help of the keys. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
@@ -11,7 +11,7 @@ struct owned {
     const char *kinds; /* a letter for each kind that has the key */
 };
 
-/* The allowed keys of a kind, in the order of the table. */
+/* Writes the allowed keys of a kind, in the order of the table. */
 static void list_of(const struct owned *keys, size_t n, char kind, const char *before, char list[512])
 {
     size_t used = (size_t)snprintf(list, 512, "%s", before);
@@ -193,13 +193,38 @@ static void anchors(void **state)
     }
 }
 
+/* ---- coordinate systems of the output: heights above the geoid, and a zone */
+
+static void coordinate_systems(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *crs;
+        int has_heights, has_zone;
+    } systems[] = {{"local", 0, 0}, {"ecef", 0, 0}, {"utm", 1, 1}, {"geodetic", 1, 0}};
+    for (size_t i = 0; i < N_OF(systems); i++)
+        for (int given = 0; given < 2; given++) {
+            char with[96];
+            snprintf(with, sizeof with, "  crs: %s\n%s", systems[i].crs,
+                     given ? "  heights: geoid\n  utm_zone: 32\n" : "  heights: ellipsoid\n  utm_zone: 0\n");
+            load_edited("  crs: local\n", with);
+            assert_int_equal(
+                n_said(":18: output.heights: geoid, but output.crs has no heights; allowed only with crs: utm, "
+                       "geodetic"),
+                given && !systems[i].has_heights);
+            assert_int_equal(
+                n_said(":19: output.utm_zone: a zone, but output.crs is not utm; allowed only with crs: utm"),
+                given && !systems[i].has_zone);
+            assert_int_equal(n_said(": output."), given * (2 - systems[i].has_heights - systems[i].has_zone));
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(platforms),
-        cmocka_unit_test(links),
-        cmocka_unit_test(back_ends),
-        cmocka_unit_test(anchors),
+        cmocka_unit_test(platforms),          cmocka_unit_test(links),
+        cmocka_unit_test(back_ends),          cmocka_unit_test(anchors),
+        cmocka_unit_test(coordinate_systems),
     };
     return cmocka_run_group_tests_name("owners of keys", tests, set_up, tear_down);
 }

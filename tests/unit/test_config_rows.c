@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The rows of a table by their paths, and a reader that knows where each was given: members, lines, defaults, values
- * that are dropped. */
+/* A table finds its rows by their paths. Its reader knows where each was given, fills in defaults and drops values. */
 #include "firmware_sim/config/limits.h"
 #include "firmware_sim/config/table/forget.h"
 #include "firmware_sim/config/table/given.h"
@@ -179,7 +178,7 @@ static void a_dropped_value_was_never_given(void **state)
     assert_true(rd.line[HEAD][0] == 0 && rd.line[HIGH][0] == 0 && rd.bad[LOCKED][0] == 0 && rd.line[TINS][0] == 3);
 }
 
-/* A scanner's value replaces the file's; a list as a whole, and once. */
+/* A scanner's value replaces the file's. A list is replaced as a whole, and once. */
 static void a_scanner_takes_keys_over(void **state)
 {
     (void)state;

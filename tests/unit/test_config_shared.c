@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Files that come with the program, found from the working directory: scenarios and head profiles by name, and names of
- * a folder's files. */
+/* Files that come with the program are found from the working directory and beside the program: scenarios and head
+ * profiles by name, and the names of a folder's files. */
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/config/shared.h"
@@ -179,7 +179,7 @@ static void expect_list(const char *where, int want, const char *first)
     free(text);
 }
 
-/* One folder is listed: the first that can be read. */
+/* Only the first folder that can be read is listed. */
 static void one_folder_is_listed(void **state)
 {
     (void)state;
@@ -267,7 +267,7 @@ static void a_program_finds_what_is_beside_it(void **state)
     rmdir("bin");
 }
 
-/* The copy of this program: prints the path of the file. */
+/* As a copy of this program: prints the path of the file. */
 static int find_and_print(const char *name)
 {
     char path[CONFIG_PATH_LEN];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Texts of one character, and the longest: each is as much a text as any other. Paths in --set stay as they are. */
+/* A text of one character, and the longest, is as much a text as any other. Paths in --set stay as they are. */
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
@@ -72,7 +72,7 @@ static void names_and_numbers_of_one_character_are_kept(void **state)
     assert_string_equal(cfg->link[0].whose, ""); /* its serial is its own */
 }
 
-/* As many bytes as the error says, and no more. A path of a file counts with its folder. */
+/* A text may have as many bytes as the error says, and no more. A path of a file counts with its folder. */
 static void the_longest_texts(void **state)
 {
     (void)state;
@@ -113,7 +113,7 @@ static void the_longest_texts(void **state)
     }
 }
 
-/* The path of the configuration itself: /////...z */
+/* The path of the configuration itself, /////...z, has up to 511 bytes. */
 static void the_longest_path_of_a_configuration(void **state)
 {
     (void)state;

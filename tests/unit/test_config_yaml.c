@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Files at their limits: bytes, depth, digits; and the lines that errors name, also of what is missing. */
+/* Files have limits of bytes, depth and digits. Errors name lines, also of what is missing. */
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/config/table/value.h"
 #include "tests/unit/config_rig.h"
@@ -77,7 +77,7 @@ static void a_number_has_up_to_30_digits(void **state)
     assert_true(value == 15);
 }
 
-/* A hint on tabs only where the line has one before its text. */
+/* An error hints at tabs only where the line has one before its text. */
 static void a_tab_in_the_indent_is_named(void **state)
 {
     (void)state;
@@ -153,7 +153,7 @@ static void what_is_missing_has_a_line(void **state)
     }
 }
 
-/* A key that is unknown, given twice or no word has its own line, the value its own. */
+/* A key that is unknown, given twice or no word has its own line, and a value has its own. */
 static void keys_and_values_have_their_lines(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The service manager's socket: a path and an abstract name, which the test listens on; names that are none; nobody. */
+/* The test listens as the service manager does, on a path and on an abstract name. Names that are none are refused. */
 #include "firmware_sim/base/notify.h"
 
 #include <setjmp.h>

@@ -181,7 +181,7 @@ static void a_slow_program_has_slow_lines(void **state)
     }
 }
 
-/* Any rate within its limits, of a head without programs. */
+/* A head without programs has any rate within its limits. */
 static void the_rate_below_any_rate_is_itself(void **state)
 {
     (void)state;

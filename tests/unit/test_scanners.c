@@ -138,8 +138,8 @@ static void lists_are_replaced(void **state)
     assert_true(own.surface[0].surface.mirror == 0.5 && own.surface[0].surface.glass != own.surface[0].surface.glass);
 }
 
-/* What a command changes after the load holds for all scanners: output and loop. The tolerance of positions comes from
- * each scanner's plan. */
+/* A command may change output and loop after the load, for all scanners. The tolerance of positions comes from each
+ * scanner's plan. */
 static void changes_of_output_and_loop_hold_for_all(void **state)
 {
     (void)state;
