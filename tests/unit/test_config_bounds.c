@@ -64,6 +64,8 @@ static void settings_of_the_head(void **state)
         {"sphere", "  ring_start_deg: 10\n  ring_stop_deg: 10\n", "  ring_start_deg: 10\n  ring_stop_deg: 9.999999\n",
          "head.ring_stop_deg"},
         {"sphere", "  ring_start_deg: 10\n", "  ring_start_deg: 90.000001\n", "head.ring_start_deg"},
+        /* a pulse rate that follows from a wrong line rate is no second error */
+        {"sphere", "  step_deg: 10\n  lines_hz: 1000\n", "  step_deg: 10\n  lines_hz: 1001\n", "head.lines_hz"},
         {"velodyne-vlp16", "  phase_lock: on\n  lines_hz: 9\n", "  phase_lock: on\n  lines_hz: 9.000001\n",
          "head.phase_lock"},
         {"hokuyo-urg-04lx", "  prr_hz: 10240\n", "  prr_hz: 10240.000001\n", "head.prr_hz"},
