@@ -173,6 +173,25 @@ static void the_same_settings_are_one_scanner(void **state)
     assert_false(cfg->scene.shared_textures); /* nothing is made for scanners that aren't there */
 }
 
+/* A scanner with the file's profile is the file's scanner, whatever lay in the memory that a load used: values are the
+ * same, and so are the bytes between them. */
+static void no_profile_differs_from_itself(void **state)
+{
+    (void)state;
+    static const char *const profiles[] = {"any-rate",        "riegl-vz400i", "riegl-vz600i", "velodyne-vlp16",
+                                           "hokuyo-urg-04lx", "sick-lms111",  "sphere",       "leica-rtc360"};
+    for (size_t i = 0; i < sizeof profiles / sizeof *profiles; i++) {
+        char text[512];
+        snprintf(
+            text, sizeof text,
+            "head: {profile: %s}\nstations:\n  - {position_m: [0, 0, 1]}\n"
+            "  - {position_m: [1, 0, 1], scanner: {head: {profile: %s}}}\n  - {position_m: [1, 1, 1], scanner: {}}\n",
+            profiles[i], profiles[i]);
+        assert_loads(load_text(with_scene(text)));
+        if (!config_is_alone(cfg)) fail_msg("%s: %u %u", profiles[i], cfg->station[1].scanner, cfg->station[2].scanner);
+    }
+}
+
 static void wrong_ones_are_refused(void **state)
 {
     (void)state;
@@ -333,6 +352,7 @@ int main(void)
         cmocka_unit_test(lists_are_replaced),
         cmocka_unit_test(changes_of_output_and_loop_hold_for_all),
         cmocka_unit_test(the_same_settings_are_one_scanner),
+        cmocka_unit_test(no_profile_differs_from_itself),
         cmocka_unit_test(wrong_ones_are_refused),
         cmocka_unit_test(faults_of_all_are_told_once),
         cmocka_unit_test(each_has_the_faults),
