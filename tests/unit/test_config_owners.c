@@ -193,6 +193,30 @@ static void anchors(void **state)
     }
 }
 
+/* Points have the number of a frame where the head goes along a file. */
+static void colours_of_frames(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *kind, *rest;
+        int has_frames;
+    } kinds[] = {
+        {"static", "", 0}, {"live", "", 0}, {"trajectory", ", file: a", 1}, {"stops", ", file: a, step_s: 1", 1}};
+    for (size_t i = 0; i < N_OF(kinds); i++) {
+        char with[128], want[160];
+        snprintf(with, sizeof with, "  crs: local\n  colour: frame\nplatform: {kind: %s%s}\n", kinds[i].kind,
+                 kinds[i].rest);
+        snprintf(
+            want, sizeof want,
+            ":18: output.colour: frame, but points have no frame scalar: platform.kind is %s; allowed with trajectory, "
+            "stops",
+            kinds[i].kind);
+        load_edited("  crs: local\n", with);
+        assert_int_equal(n_said(want), !kinds[i].has_frames);
+        assert_int_equal(diagnostics.n, !kinds[i].has_frames);
+    }
+}
+
 /* ---- coordinate systems of the output: heights above the geoid, and a zone */
 
 static void coordinate_systems(void **state)
@@ -222,9 +246,9 @@ static void coordinate_systems(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(platforms),          cmocka_unit_test(links),
-        cmocka_unit_test(back_ends),          cmocka_unit_test(anchors),
-        cmocka_unit_test(coordinate_systems),
+        cmocka_unit_test(platforms),         cmocka_unit_test(links),
+        cmocka_unit_test(back_ends),         cmocka_unit_test(anchors),
+        cmocka_unit_test(colours_of_frames), cmocka_unit_test(coordinate_systems),
     };
     return cmocka_run_group_tests_name("owners of keys", tests, set_up, tear_down);
 }
