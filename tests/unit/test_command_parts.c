@@ -375,6 +375,27 @@ static void each_number_of_a_pose_has_its_unit(void **state)
         }
 }
 
+static void an_azimuth_has_six_decimals(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t edge_udeg;
+        const char *text;
+    } edges[] = {{0, "FREE,0.000000"},
+                 {1, "FREE,0.000001"},
+                 {999999, "FREE,0.999999"},
+                 {90 * MICRO, "FREE,90.000000"},
+                 {359999999, "FREE,359.999999"}};
+    struct command_device dev = command_test_device();
+    expect(&dev, "HEAD:PHASe:EDGE?", "NONE");
+    for (size_t i = 0; i < N_OF(edges); i++) {
+        dev.phase = (struct command_phase){1, 0, edges[i].edge_udeg};
+        expect(&dev, "HEAD:PHASe:EDGE?", edges[i].text);
+    }
+    dev.phase.is_held = 1;
+    expect(&dev, "HEAD:PHASe:EDGE?", "LOCKED,359.999999");
+}
+
 /* A number of a pose may have 63 characters: zeros at its beginning, here. */
 static void numbers_of_a_pose_have_a_longest_length(void **state)
 {
@@ -430,6 +451,7 @@ int main(void)
         cmocka_unit_test(peers_have_the_numbers_of_their_sessions),
         cmocka_unit_test(each_number_of_a_pose_has_its_limits),
         cmocka_unit_test(each_number_of_a_pose_has_its_unit),
+        cmocka_unit_test(an_azimuth_has_six_decimals),
         cmocka_unit_test(numbers_of_a_pose_have_a_longest_length),
         cmocka_unit_test(a_place_has_the_fewest_digits),
     };
