@@ -33,8 +33,8 @@ static void find_scanner(struct cfg_reader *rd, struct config *cfg, uint32_t sta
 static void read_scanner(struct cfg_reader *rd, struct cfg_document *doc, const char *const *sets, int n_sets)
 {
     if (rd->scanner < 0) return;
-    cfg_read_scanner(rd, doc);
     rd->in_scanner = 1;
+    cfg_read_scanner(rd, doc);
     cfg_apply_sets(rd, doc, sets, n_sets);
     rd->in_scanner = 0;
     cfg_end_scanner(rd);

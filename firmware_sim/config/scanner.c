@@ -34,14 +34,15 @@ int config_is_alone(const struct config *cfg)
 
 #define IS_SAME(a, b, member) (memcmp(&(a)->member, &(b)->member, sizeof(a)->member) == 0)
 
-/* Compares all that a section `scanner` may change. */
+/* Compares all that a section `scanner` may change. The values of the profile follow from its file and from these
+ * settings. They are not compared: the bytes between them are arbitrary. */
 static int is_same_scanner(const struct config *a, const struct config *b)
 {
     struct config_head head[2] = {a->head, b->head};
     head[0].settings.station = head[1].settings.station = 0;
-    return memcmp(&head[0], &head[1], sizeof head[0]) == 0 && IS_SAME(a, b, profile_file) && IS_SAME(a, b, profile) &&
-           IS_SAME(a, b, beam) && IS_SAME(a, b, cast) && IS_SAME(a, b, plan) && IS_SAME(a, b, noise) &&
-           IS_SAME(a, b, signal) && IS_SAME(a, b, surface) && a->n_surfaces == b->n_surfaces && IS_SAME(a, b, optics) &&
+    return memcmp(&head[0], &head[1], sizeof head[0]) == 0 && IS_SAME(a, b, profile_file) && IS_SAME(a, b, beam) &&
+           IS_SAME(a, b, cast) && IS_SAME(a, b, plan) && IS_SAME(a, b, noise) && IS_SAME(a, b, signal) &&
+           IS_SAME(a, b, surface) && a->n_surfaces == b->n_surfaces && IS_SAME(a, b, optics) &&
            IS_SAME(a, b, instrument);
 }
 

@@ -217,6 +217,11 @@ static void how_much_is_seen(void **state)
     has(on_err,
         "--grid 3: no place to stand: no floor there has 4.7 m of room above it; allowed is another grid, --height "
         "or --at\n");
+    /* Rays 30 degrees apart are 15, 43 and 69 degrees above the horizon. */
+    write_text("l.yaml", "head: {profile: riegl-vz400i, line_start_deg: 46, line_stop_deg: 60}\n"
+                         "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 2]}]\n");
+    does(&app_coverage, "l.yaml --quiet --grid 3 --step-deg 30", 2);
+    has(on_err, "--step-deg 30: no ray lies within the head's field of view; allowed is a smaller step\n");
 }
 
 static void a_first_configuration(void **state)

@@ -305,6 +305,50 @@ static void a_planar_head_has_its_geometries(void **state)
         check_wrong(&wrong[i]);
 }
 
+/* There is room for 128 beams, and all of them arrive. */
+static void the_most_beams(void **state)
+{
+    (void)state;
+    char text[16384], *whole = read_source("config/heads/velodyne-vlp16.yaml");
+    for (int n = EMITTER_MAX_BEAMS; n <= EMITTER_MAX_BEAMS + 1; n++) {
+        size_t len = (size_t)snprintf(text, sizeof text, "%.*sfiring_ns: {value: 55296, from: assumed}\nbeams:\n",
+                                      (int)(strstr(whole, "firing_ns:") - whole), whole);
+        for (int i = 0; i < n; i++)
+            len += (size_t)snprintf(text + len, sizeof text - len,
+                                    "  - {elevation_deg: %d, azimuth_deg: %d, offset_ns: %d, from: assumed}\n",
+                                    i % 60 - 30, i % 5, 400 * i);
+        snprintf(text + len, sizeof text - len, "%s", strstr(whole, "lines_min_hz:"));
+        write_in("heads/mine.yaml", text);
+        const int code = load_with_head("mine", "", "");
+        if (n > EMITTER_MAX_BEAMS) break;
+        assert_loads(code);
+        assert_int_equal(cfg->profile.emitter.n_beams, n);
+        for (int i = 0; i < n; i++) {
+            const struct config_profile_beam *beam = &cfg->profile.arrangement.beam[i];
+            assert_true(beam->elevation_udeg == (i % 60 - 30) * 1000000 && beam->azimuth_udeg == i % 5 * 1000000);
+            assert_true(beam->offset_ns == (uint32_t)(400 * i));
+        }
+    }
+    free(whole);
+    assert_says(": beams: 129 elements are too many; allowed a list of 0 to 128");
+}
+
+/* Seen from above, a rotor turns clockwise unless the profile says otherwise. */
+static void a_rotor_turns_as_its_profile_says(void **state)
+{
+    (void)state;
+    static const char against[] = "step_direction: { value: counter-clockwise, from: quoted }";
+    assert_loads(load_changed("velodyne-vlp16", "emitter: beams", "emitter: beams"));
+    assert_int_equal(cfg->profile.emitter.turn, 1);
+    assert_loads(load_changed("velodyne-vlp16", "emitter: beams",
+                              "emitter: beams\nstep_direction: { value: counter-clockwise, from: quoted }"));
+    assert_int_equal(cfg->profile.emitter.turn, -1);
+    assert_loads(load_changed("hokuyo-urg-04lx", against, against));
+    assert_int_equal(cfg->profile.emitter.turn, -1);
+    assert_loads(load_changed("hokuyo-urg-04lx", against, "step_direction: { value: clockwise, from: quoted }"));
+    assert_int_equal(cfg->profile.emitter.turn, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -317,6 +361,8 @@ int main(void)
         cmocka_unit_test(a_bad_value_in_a_list_is_one_fault),
         cmocka_unit_test(a_step_that_leaves_no_line_rate_is_refused),
         cmocka_unit_test(a_planar_head_has_its_geometries),
+        cmocka_unit_test(the_most_beams),
+        cmocka_unit_test(a_rotor_turns_as_its_profile_says),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

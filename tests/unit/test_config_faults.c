@@ -4,6 +4,8 @@
 #include "firmware_sim/config/load.h"
 #include "tests/unit/config_rig.h"
 
+#include <fcntl.h>
+
 /* The errors are these, in this order. Each begins with PATH:LINE: KEY, or with the text here. */
 static void assert_faults(const char *const *starts, uint32_t n)
 {
@@ -83,6 +85,10 @@ static void faults_of_the_profile_come_last(void **state)
     snprintf(name, sizeof name, "%s/heads/mine.yaml:", dir);
     assert_int_equal(load_edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  frames: x"), SH_EINPUT);
     ASSERT_FAULTS("3: head.frames: ", name, name);
+    /* Those of --set stand between the file and its profile. */
+    const char *const sets[] = {"gnss.quality=3", "links.0.port=x"};
+    assert_int_equal(load_sets(sets, 2), SH_EINPUT);
+    ASSERT_FAULTS("3: head.frames: ", "--set links[0].port: ", "--set gnss.quality: ", name, name);
 }
 
 static void twenty_are_kept_and_all_are_counted(void **state)
@@ -141,6 +147,43 @@ static void a_fifo_or_a_device_is_refused(void **state)
     remove(fifo_obj);
 }
 
+/* The memory of this process can be opened as a file, and has nothing at its beginning that could be read. */
+static void a_file_that_cannot_be_read_is_refused(void **state)
+{
+    (void)state;
+    assert_int_equal(config_load("/proc/self/mem", NULL, 0, cfg, &err), SH_EINPUT);
+    assert_string_equal(err.text, "/proc/self/mem: cannot be read: Input/output error; a YAML file is needed");
+}
+
+/* Returns the lowest free descriptor. */
+static int lowest_free(void)
+{
+    const int fd = open("/dev/null", O_RDONLY);
+    assert_true(fd >= 0);
+    close(fd);
+    return fd;
+}
+
+static void no_file_stays_open(void **state)
+{
+    (void)state;
+    struct fault fault;
+    struct config_profile profile;
+    const int before = lowest_free();
+    write_in("test.yaml", "faults: [{kind: drop}]\n");
+    assert_int_equal(config_load(config_path, NULL, 0, cfg, &err), SH_EINPUT);
+    assert_int_equal(config_add_scenario(cfg, config_path, &diagnostics), SH_OK);
+    write_in("test.yaml", "faults: [{kind: x}]\n");
+    assert_int_equal(config_add_scenario(cfg, config_path, &diagnostics), SH_EINPUT);
+    assert_loads(load_edited("      up: z\n", "      up: z\n      copies: cube.obj\n"));
+    assert_int_equal(config_read_fault(cfg, "{kind: drop}", &fault, &err), SH_OK);
+    assert_int_equal(load_edited("any-rate", "cube.obj"), SH_EINPUT);
+    assert_int_equal(load_edited("cube.obj", "dir.obj"), SH_EINPUT);
+    assert_int_equal(load_changed("leica-rtc360", "max_echoes: { value: 1,", "max_echoes: { value: x,"), SH_EINPUT);
+    assert_int_equal(config_load_profile("any-rate", NULL, &profile, &err), SH_OK);
+    assert_int_equal(lowest_free(), before);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -150,6 +193,8 @@ int main(void)
         cmocka_unit_test(twenty_are_kept_and_all_are_counted),
         cmocka_unit_test(many_faults_end),
         cmocka_unit_test(a_fifo_or_a_device_is_refused),
+        cmocka_unit_test(a_file_that_cannot_be_read_is_refused),
+        cmocka_unit_test(no_file_stays_open),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

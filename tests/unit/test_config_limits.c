@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The limits of the configuration's numbers, from where they come: geometry, standards, the width of a field. All others
- * are round, with one digit that is not 0, so that a slip in the table shows. Each limit itself is allowed, and nothing
- * beyond it. */
+ * are 0 or a power of ten, so that a slip in the table shows. Each limit itself is allowed, and nothing beyond it. */
 #include "firmware_sim/config/keys.h"
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/table/reader.h"
@@ -120,7 +119,43 @@ static const struct limits {
     {"saturation_db", 0, 90},
     {"lines_min_hz", 0.25, 10000},
     {"lines_max_hz", 0.25, 10000},
+    /* arrays of 8; a LIDAR's colours; inputs and outputs of a scanner; ten minutes; half the room of a window */
+    {"geometries", 0, 8},
+    {"programs", 0, 8},
+    {"reaches", 0, 8},
+    {"links", 0, 8},
+    {"faults[].link", 0, 8},
+    {"links[].max_sessions", 1, 8},
+    {"wavelength_nm", 400, 2000},
+    {"inputs[].input", 1, 4},
+    {"fields[].output", 0, 3},
+    {"boot_s", 0, 600},
+    {"spin_up_s", 0, 600},
+    {"spin_down_s", 0, 600},
+    {"waveform.before_ns", 0, 4000},
+    {"waveform.after_ns", 0, 4000},
+    {"waveform.skew", 1, 3},
+    {"waveform.keep_db", -60, 60},
+    {"faults[].loss_db", 0, 60},
+    {"faults[].factor", 0.01, 2},
+    {"links[].baud", 0, 4e6},
+    {"gnss.nmea_late_ms", 0, 5000},
+    {"optics.depth", 0, 4},
 };
+
+/* These keys are counted from one, or something is divided by them. Every other least number is 0, the negative of
+ * the largest, a fraction, or 10 and more. */
+static const char *const from_one[] = {
+    "faults[].every", "faults[].from", "head.mta_zones", "platform.reach_m", "programs[].prr_hz", "programs[].used_hz",
+    "prr_min_hz",     "prr_max_hz",    "steps_per_turn", "threshold_snr",    "time.ptp.max_ppm",
+};
+
+static int is_from_one(const char *path)
+{
+    for (size_t i = 0; i < sizeof from_one / sizeof *from_one; i++)
+        if (strcmp(from_one[i], path) == 0) return 1;
+    return 0;
+}
 
 static const struct limits *limits_of(const char *path)
 {
@@ -138,12 +173,12 @@ static int is_number(const struct cfg_key *key)
            key->type == CFG_PAIR;
 }
 
-/* Whether it has one digit that is not 0. */
+/* Returns whether it is 0 or a power of ten, with either sign. */
 static int is_round(double value)
 {
     char text[32];
-    snprintf(text, sizeof text, "%.0e", value);
-    return strtod(text, NULL) == value;
+    snprintf(text, sizeof text, "%.0e", fabs(value));
+    return strtod(text, NULL) == fabs(value) && (text[0] == '0' || text[0] == '1');
 }
 
 static void expect_limits(const struct cfg_key *key)
@@ -155,6 +190,7 @@ static void expect_limits(const struct cfg_key *key)
     if (want != NULL || key->min_key != NULL || key->max_key != NULL) return;
     if (!is_round(key->min) || (!is_round(key->max) && key->max != any))
         fail_msg("%s: %.17g to %.17g is not round", key->path, key->min, key->max);
+    if ((key->min == 1) != is_from_one(key->path)) fail_msg("%s begins at %.17g", key->path, key->min);
     if (key->min < 0 && key->min != -key->max) fail_msg("%s: %.17g is not the other side", key->path, key->min);
 }
 

@@ -103,6 +103,90 @@ static void so_many_beams_fire_so_often(void **state)
     }
 }
 
+/* Velodyne's packets have 16 beams. */
+static void a_protocol_has_its_beams(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"links=[{type: udp, port: 1, protocol: velodyne}]"};
+    char text[8448], *whole = read_source("config/heads/velodyne-vlp16.yaml");
+    snprintf(
+        text, sizeof text,
+        "%.*sfiring_ns: {value: 55296, from: assumed}\nbeams:\n"
+        "  - {elevation_deg: 0, offset_ns: 0, from: assumed}\n  - {elevation_deg: 1, offset_ns: 9, from: assumed}\n%s",
+        (int)(strstr(whole, "firing_ns:") - whole), whole, strstr(whole, "lines_min_hz:"));
+    write_in("heads/mine.yaml", text);
+    free(whole);
+    assert_loads(load_with_head("mine", "", ""));
+    assert_int_equal(load_sets(sets, 1), SH_EINPUT);
+    expect_only("--set ", "links[0].protocol",
+                "velodyne has 16 beams, but head profile mine (line 2) has 2; allowed 16");
+}
+
+/* ---- the file's name and path */
+
+static void the_file_names_the_profile(void **state)
+{
+    (void)state;
+    static const char ascii[] = ": the file's name is the name of the profile; allowed printable ASCII";
+    static const char length[] = ": the file's name is the name of the profile; allowed 1 to 31 characters and .yaml";
+    static const struct {
+        const char *name, *says; /* NULL: it loads */
+    } names[] = {{"0123456789012345678901234567890", NULL},
+                 {"01234567890123456789012345678901", length},
+                 {"~!", NULL},
+                 {"a b", ascii},
+                 {"a\xc3\xa4", ascii}};
+    char *text = read_source("config/heads/any-rate.yaml");
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        char file[64], head[80], path[160];
+        snprintf(file, sizeof file, "heads/%s.yaml", names[i].name);
+        snprintf(head, sizeof head, "\"%s\"", file);
+        snprintf(path, sizeof path, "%s/%s", dir, file);
+        write_in(file, text);
+        const int code = load_with_head(head, "", "");
+        remove(path);
+        if (names[i].says == NULL) {
+            assert_loads(code);
+            assert_string_equal(cfg->profile.name, names[i].name);
+            continue;
+        }
+        assert_int_equal(code, SH_EINPUT);
+        assert_int_equal(strncmp(err.text, path, strlen(path)), 0);
+        assert_string_equal(err.text + strlen(path), names[i].says);
+    }
+    free(text);
+}
+
+/* The path of a profile is as long as that of another file, with the folder of the configuration. */
+static void the_longest_path_of_a_profile(void **state)
+{
+    (void)state;
+    static const char file[] = "/any.yaml";
+    char *text = read_source("config/heads/any-rate.yaml"), head[CONFIG_PATH_LEN + 2];
+    write_in("heads/any.yaml", text);
+    free(text);
+    for (size_t more = 0; more <= 1; more++) {
+        const size_t len = CONFIG_PATH_LEN - 1 + more - (strlen(dir) + 1);
+        memset(head, '/', len);
+        memcpy(head, "heads", 5);
+        strcpy(head + len - (sizeof file - 1), file);
+        char *whole = replaced(base, "any-rate\n" PRR LINES, "@\n"), *named = replaced(whole, "@", head);
+        const int code = load_text(named);
+        free(whole);
+        free(named);
+        if (more == 0) {
+            assert_loads(code);
+            assert_int_equal(strlen(cfg->profile_file), CONFIG_PATH_LEN - 1);
+        } else {
+            assert_int_equal(code, SH_EINPUT);
+            assert_says(":2: head.profile: its path is too long; allowed up to 511 bytes");
+        }
+    }
+    char path[128];
+    snprintf(path, sizeof path, "%s/heads/any.yaml", dir);
+    remove(path);
+}
+
 /* ---- keys of --set: the place of another key is its line, or that it is set, too */
 
 static void sets_are_refused_word_by_word(void **state)
@@ -206,9 +290,9 @@ static void values_are_shown_safe_and_short(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(profiles_are_refused_word_by_word),
-        cmocka_unit_test(so_many_beams_fire_so_often),
-        cmocka_unit_test(values_are_shown_safe_and_short),
+        cmocka_unit_test(profiles_are_refused_word_by_word), cmocka_unit_test(so_many_beams_fire_so_often),
+        cmocka_unit_test(a_protocol_has_its_beams),          cmocka_unit_test(the_file_names_the_profile),
+        cmocka_unit_test(the_longest_path_of_a_profile),     cmocka_unit_test(values_are_shown_safe_and_short),
         cmocka_unit_test(sets_are_refused_word_by_word),
     };
     return cmocka_run_group_tests_name("messages of head profiles", tests, set_up, tear_down);

@@ -230,6 +230,25 @@ static void a_full_disk_is_said_once_and_counted(void **state)
     assert_int_equal(lost, 501);
 }
 
+/* Once the file has refused a line, each further one is refused at once. */
+static void after_an_error_no_line_is_taken(void **state)
+{
+    (void)state;
+    struct line_writer *writer = open_writer(open("/dev/full", O_WRONLY));
+    int rc = SH_OK;
+    uint64_t n = 0;
+    while (rc != SH_EIO) {
+        rc = put(writer, LINE_PLAIN, 0);
+        n++;
+        sched_yield();
+    }
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(put(writer, i == 0 ? LINE_REMARK : LINE_PLAIN, 0), SH_EIO);
+    assert_int_equal(line_writer_is_filling(writer), 0);
+    assert_int_equal(line_writer_close(writer, NULL, NULL), SH_EIO);
+    assert_int_equal(lost, n + 3);
+}
+
 static int ignore_pipe(void **state)
 {
     (void)state;
@@ -245,6 +264,7 @@ int main(void)
         cmocka_unit_test(the_end_does_not_wait_for_ever),
         cmocka_unit_test(remarks_leave_room_for_the_others),
         cmocka_unit_test(a_full_disk_is_said_once_and_counted),
+        cmocka_unit_test(after_an_error_no_line_is_taken),
     };
     return cmocka_run_group_tests_name("line_writer", tests, ignore_pipe, NULL);
 }

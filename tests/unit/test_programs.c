@@ -133,6 +133,10 @@ static void tables_that_do_not_fit_are_refused(void **state)
         {"lines_min_hz: { value: 3, from: assumed }\nlines_max_hz: { value: 200,",
          "lines_min_hz: { value: 9000, from: assumed }\nlines_max_hz: { value: 200,", 5, "lines_min_hz",
          "allowed at most 200"},
+        {"prr_min_hz: { value: 100000, from: quoted }\n"
+         "prr_max_hz: { value: 400000, from: quoted }\n",
+         "prr_min_hz: { value: 1, from: quoted }\nprr_max_hz: { value: 2, from: quoted }\n", 0, "prr_max_hz",
+         "less than a pulse per line; allowed at least 3"},
         {"facets: { value: 3, from: assumed }", "facets: { value: 3, from: assumed }\nemitter: planar", 0, "programs",
          "allowed only with emitter: line"},
     };
@@ -148,6 +152,48 @@ static void tables_that_do_not_fit_are_refused(void **state)
         if (!found) fail_msg("%s: not \"%s...%s\" but %s", wrong[i].with, start, wrong[i].fragment, err.text);
         if (wrong[i].line != 0 && diagnostics.n != 1) fail_msg("%s: also %s", wrong[i].with, diagnostics.err[1].text);
     }
+}
+
+/* The slowest program fires once a line, and not less. */
+static void a_slow_program_has_slow_lines(void **state)
+{
+    (void)state;
+    static const char used[] = "    used_hz: { value: 42000, from: assumed }\n";
+    for (int rate = 3; rate >= 2; rate--) {
+        char min[64], first[64];
+        snprintf(min, sizeof min, "prr_min_hz: { value: %d,", rate);
+        snprintf(first, sizeof first, "  - prr_hz: { value: %d,", rate);
+        char *text = replaced(head, "prr_min_hz: { value: 100000,", min);
+        char *second = replaced(text, "  - prr_hz: { value: 100000,", first), *whole = replaced(second, used, "");
+        write_in("heads/mine.yaml", whole);
+        free(text);
+        free(second);
+        free(whole);
+        const int code = load_with_head("mine", "", "");
+        if (rate == 3) {
+            assert_loads(code);
+            continue;
+        }
+        assert_int_equal(code, SH_EINPUT);
+        assert_says(
+            "heads/mine.yaml:17: programs[0].prr_hz: less than a pulse per line; allowed at least 3 Hz, lines_min_hz");
+        assert_int_equal(diagnostics.n, 1);
+    }
+}
+
+/* A head without programs has any rate within its limits. */
+static void the_rate_below_any_rate_is_itself(void **state)
+{
+    (void)state;
+    assert_loads(load_text(base));
+    const struct config_profile *p = &cfg->profile;
+    assert_int_equal(p->n_programs, 0);
+    assert_true(config_rate_below(p, 123456789012) == 123456789012);
+    assert_true(config_rate_below(p, 100000000000) == 100000000000 &&
+                config_rate_below(p, 99999999999) == 100000000000);
+    assert_true(config_rate_below(p, 1200000000000) == 1200000000000);
+    assert_true(config_rate_below(p, 1200000000001) == 1200000000000);
+    assert_int_equal(config_program_of(p, 123456789012), 0);
 }
 
 static void programs_without_any_reach_are_refused(void **state)
@@ -319,6 +365,8 @@ int main(void)
         cmocka_unit_test(what_the_file_leaves_out_is_the_heads),
         cmocka_unit_test(reaches_may_be_the_heads),
         cmocka_unit_test(tables_that_do_not_fit_are_refused),
+        cmocka_unit_test(a_slow_program_has_slow_lines),
+        cmocka_unit_test(the_rate_below_any_rate_is_itself),
         cmocka_unit_test(programs_without_any_reach_are_refused),
         cmocka_unit_test(only_rates_of_programs_are_taken),
         cmocka_unit_test(widths_become_full_ones_at_1_e2),

@@ -71,6 +71,15 @@ static void with_a_profile_of_its_own_it_begins_anew(void **state)
     assert_true(own.noise.range == RANGE_NOISE_ON);
     /* 16 pulses in 55.296 us, by the manual. */
     assert_true(llabs(own.head.settings.prr_uhz - 289351851852) < 1000000);
+    /* Nor does it take what has no default. The file's head keeps all of it. */
+    const char *const sets[] = {"head={profile: sphere, step_deg: 2, name: N, settings_file: f}",
+                                "instrument.pan_index_deg=1"};
+    assert_loads(load_second("{head: {profile: velodyne-vlp16}}", sets, 2));
+    assert_true(strcmp(cfg->head.name, "N") == 0 && strcmp(cfg->head.settings_file, "f") == 0);
+    assert_true(cfg->instrument.pan_index_deg == 1.0 && cfg->head.step_udeg == 2000000);
+    load_own(2);
+    assert_true(own.head.name[0] == '\0' && own.head.settings_file[0] == '\0' && own.head.step_udeg == 0);
+    assert_true(own.instrument.pan_index_deg == 0.0);
 }
 
 static void head_station_says_whose_configuration_it_is(void **state)
@@ -129,6 +138,27 @@ static void lists_are_replaced(void **state)
     assert_true(own.surface[0].surface.mirror == 0.5 && own.surface[0].surface.glass != own.surface[0].surface.glass);
 }
 
+/* A command may change output and loop after the load, for all scanners. The tolerance of positions comes from each
+ * scanner's plan. */
+static void changes_of_output_and_loop_hold_for_all(void **state)
+{
+    (void)state;
+    assert_loads(load_second("{plan: {tolerance_m: 0.02}}", NULL, 0));
+    assert_true(cfg->output.tolerance_m == 1e-6 && cfg->scene.shared_textures == 0);
+    cfg->loop.threads = 3;
+    cfg->loop.pace = PACE_FAST;
+    cfg->loop.tick_hz = 500.0;
+    cfg->output.layout = LINE_GEO;
+    cfg->output.attributes = 1;
+    cfg->scene.shared_textures = 1;
+    load_own(2);
+    assert_memory_equal(&own.loop, &cfg->loop, sizeof own.loop);
+    assert_true(own.output.layout == LINE_GEO && own.output.attributes == 1 && own.output.tolerance_m == 2e-5);
+    assert_true(own.scene.shared_textures == 1 && own.scenario_file[0] == '\0');
+    for (uint32_t i = 0; i < 3; i++)
+        assert_int_equal(own.station[i].scanner, cfg->station[i].scanner);
+}
+
 static void the_same_settings_are_one_scanner(void **state)
 {
     (void)state;
@@ -141,6 +171,25 @@ static void the_same_settings_are_one_scanner(void **state)
     assert_loads(load_second("{}", NULL, 0));
     assert_true(config_is_alone(cfg));
     assert_false(cfg->scene.shared_textures); /* nothing is made for scanners that aren't there */
+}
+
+/* A scanner with the file's profile is the file's scanner, whatever lay in the memory that a load used: values are the
+ * same, and so are the bytes between them. */
+static void no_profile_differs_from_itself(void **state)
+{
+    (void)state;
+    static const char *const profiles[] = {"any-rate",        "riegl-vz400i", "riegl-vz600i", "velodyne-vlp16",
+                                           "hokuyo-urg-04lx", "sick-lms111",  "sphere",       "leica-rtc360"};
+    for (size_t i = 0; i < sizeof profiles / sizeof *profiles; i++) {
+        char text[512];
+        snprintf(
+            text, sizeof text,
+            "head: {profile: %s}\nstations:\n  - {position_m: [0, 0, 1]}\n"
+            "  - {position_m: [1, 0, 1], scanner: {head: {profile: %s}}}\n  - {position_m: [1, 1, 1], scanner: {}}\n",
+            profiles[i], profiles[i]);
+        assert_loads(load_text(with_scene(text)));
+        if (!config_is_alone(cfg)) fail_msg("%s: %u %u", profiles[i], cfg->station[1].scanner, cfg->station[2].scanner);
+    }
 }
 
 static void wrong_ones_are_refused(void **state)
@@ -301,7 +350,9 @@ int main(void)
         cmocka_unit_test(stops_have_the_scanner_of_their_station),
         cmocka_unit_test(sets_reach_the_file_or_one_scanner),
         cmocka_unit_test(lists_are_replaced),
+        cmocka_unit_test(changes_of_output_and_loop_hold_for_all),
         cmocka_unit_test(the_same_settings_are_one_scanner),
+        cmocka_unit_test(no_profile_differs_from_itself),
         cmocka_unit_test(wrong_ones_are_refused),
         cmocka_unit_test(faults_of_all_are_told_once),
         cmocka_unit_test(each_has_the_faults),

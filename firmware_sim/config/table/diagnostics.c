@@ -146,11 +146,8 @@ int cfg_fail_key(struct cfg_reader *rd, const char *path, const char *fmt, ...)
 
 const char *cfg_show(const char *text, char *buf)
 {
-    size_t n = 0;
-    for (; text[n] != '\0' && n < CFG_SHOW_MAX - 4; n++) {
-        unsigned char c = (unsigned char)text[n];
-        buf[n] = c < 0x20 || c == 0x7f ? '?' : (char)c;
-    }
+    size_t n = strnlen(text, CFG_SHOW_MAX - 4);
+    memcpy(buf, text, n);
     if (text[n] != '\0') {
         while (n > 0 && ((unsigned char)text[n] & 0xc0) == 0x80)
             n--; /* not within a UTF-8 character */

@@ -18,7 +18,7 @@ int cfg_open_file(struct cfg_reader *rd, struct cfg_document **doc);
 /* Does the same with a text in memory. */
 int cfg_open_text(struct cfg_reader *rd, const unsigned char *bytes, size_t len, struct cfg_document **doc);
 void cfg_close_file(struct cfg_document *doc);
-/* Reads the section `scanner` of rd->scanner over the values that were read before. */
+/* Reads the section `scanner` of rd->scanner over the values that were read before. rd->in_scanner has to be 1. */
 void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc);
 /* Applies the values of --set for the file's own keys or, where rd->in_scanner is 1, those for the scanner's. The
  * others are skipped. doc: the file's document. A value of --set that is YAML is parsed, and stored in doc. */

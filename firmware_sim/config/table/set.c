@@ -121,8 +121,6 @@ static int take_name(struct cfg_reader *rd, const char *text, const char *equals
                         NAME_MAX_LEN);
     snprintf(set->name, sizeof set->name, "%.*s", (int)(equals - text), text);
     to_generic(set);
-    for (char *p = set->name; *p != '\0'; p++)
-        if ((unsigned char)*p < 0x20 || *p == 0x7f) *p = '?';
     if (strstr(set->name, "[]") != NULL)
         return cfg_fail(rd, CFG_FROM_SET, set->name, "no index; allowed as in links[0].type");
     return SH_OK;

@@ -418,7 +418,5 @@ void cfg_read_scanner(struct cfg_reader *rd, struct cfg_document *doc)
     const yaml_node_t *node = doc->scanner[rd->scanner];
     if (node == NULL) return;
     begin_walk(&w, rd, doc->scanner_of[rd->scanner], doc);
-    rd->in_scanner = 1;
     read_map(&w, node, "", 0);
-    rd->in_scanner = 0;
 }
