@@ -42,6 +42,7 @@ static struct scene *load_all(int own_surfaces)
     if (scene_load(spec, 3, 1e-3, NULL, &scene, &err) != SH_OK) fail_msg("%s", err.text);
     for (int i = 0; i < 3; i++)
         unlink(file[i]);
+    assert_int_equal(scene->n_meshes, 5); /* each copy is one */
     return scene;
 }
 
