@@ -233,12 +233,30 @@ static void the_fullest_cell_is_taken(void **state)
         }
 }
 
+/* Cells lie along both axes: 6 by 3 of 10 m here. The tile of the second row is by itself. */
+static void cells_lie_along_both_axes(void **state)
+{
+    (void)state;
+    for (int turned = 0; turned < 2; turned++) {
+        static const double at[4][2] = {{0, 0}, {31, 2}, {1, 12}, {59.5, 29}}, high_m[4] = {3, 2, 2, 0.1};
+        double low[2], high[2];
+        for (int k = 0; k < 4; k++)
+            add_tile(at[k][turned], at[k][!turned], high_m[k]);
+        narrow(40, low, high);
+        expect("west", low[0], 0);
+        expect("east", high[0], 0.5);
+        expect("south", low[1], 0);
+        expect("north", high[1], 0);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plate_is_looked_at_straight), cmocka_unit_test(the_view_limits_the_elevation),
         cmocka_unit_test(the_front_is_liked_best),       cmocka_unit_test(the_distance_fits_scene_and_head),
         cmocka_unit_test(the_view_holds_the_bounds),     cmocka_unit_test(the_fullest_cell_is_taken),
+        cmocka_unit_test(cells_lie_along_both_axes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
