@@ -7,6 +7,7 @@
 #include "core/angle.h"
 #include "core/studio/viewpoint/survey.h"
 #include "tests/common/made.h"
+#include "tests/common/thorough.h"
 
 enum { MOST = 16 };
 
@@ -89,11 +90,12 @@ static void expect_direction(const struct viewpoint *at, double azimuth_deg, dou
 static void a_plate_is_looked_at_straight(void **state)
 {
     (void)state;
-    for (int k = 0; k < 8; k++)
-        for (int e = -20; e <= 70; e += 10) {
-            add_plate(45 * k, e);
+    static const int up_deg[] = {-20, 20, 30, 70};
+    for (int k = 0; k < 8; k += SANITIZED ? 3 : 1)
+        for (int e = 0; e < 4; e++) {
+            add_plate(45 * k, up_deg[e]);
             const struct viewpoint at = find(&VIEW);
-            expect_direction(&at, 45 * k, e < 25 ? 8 : 35);
+            expect_direction(&at, 45 * k, up_deg[e] < 25 ? 8 : 35);
         }
 }
 
