@@ -238,6 +238,9 @@ static void nothing_is_read_beyond_the_file(void **state)
         {"\"componentType\":5126,\"count\":4,\"type\":\"VEC3\",\"sparse\":{\"count\":1,\"indices\":{\"bufferView\":2,"
          "\"componentType\":5126},\"values\":{\"bufferView\":0}}",
          "accessors[3].sparse has 1 indices of type 5126 for 4 elements"},
+        {"\"componentType\":5126,\"count\":4,\"type\":\"VEC3\",\"sparse\":{\"count\":1,\"indices\":{\"bufferView\":2},"
+         "\"values\":{\"bufferView\":0}}",
+         "accessors[3].sparse has 1 indices of type 0 for 4 elements"},
     };
     for (size_t i = 0; i < sizeof tries / sizeof tries[0]; i++) {
         char rest[2048];

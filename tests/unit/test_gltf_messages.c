@@ -132,6 +132,11 @@ static void buffers_are_named(void **state)
                 "a.gltf: buffers[0] is cut off: 3 bytes of 36");
     refuse_text(BUFFERS("{\"byteLength\":4,\"uri\":\"data:;base64,AAAA\"}", "\"buffer\":0,"),
                 "a.gltf: buffers[0] is cut off: 3 bytes of 4");
+    refuse_text("{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":3,\"uri\":\"data:;base64,AAAA\"}],"
+                "\"bufferViews\":[{\"buffer\":0}]," NODE
+                "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+                "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]}",
+                "accessors[0]: 3 elements from byte 0 on go beyond bufferViews[0], which has 0 bytes");
     /* A buffer without a length may be of any; what the view says is looked at. */
     refuse_text(BUFFERS("{\"uri\":\"data:;base64,\"}", "\"buffer\":0,"),
                 "bufferViews[0]: bytes 0 to 36 go beyond buffers[0], which has 0");
