@@ -108,6 +108,7 @@ static void cut_files_are_named(void **state)
         {GLB("\14"), 12, "a.glb: it has no JSON in it"},
         {GLB("\23") CHUNK("\0", "JSO"), 19, "a.glb: the chunk at byte 12 goes beyond its end, byte 19"},
         {GLB("\24") CHUNK("\1", "JSON"), 20, "a.glb: the chunk at byte 12 goes beyond its end, byte 20"},
+        {GLB("\31") CHUNK("\4", "JSON") "{}  x", 25, "a.glb: the chunk at byte 24 goes beyond its end, byte 25"},
         {GLB("\40") CHUNK("\4", "JSOX") "{}  " CHUNK("\1", "JSON"), 32,
          "a.glb: the chunk at byte 24 goes beyond its end, byte 32"},
         {GLB("\30") CHUNK("\4", "JSOX") "{}  ", 24, "a.glb: it has no JSON in it"},

@@ -122,6 +122,9 @@ static void an_image_may_have_no_holes(void **state)
     assert_null(mask_of((const uint8_t(*)[4])rgba, 1, 0.99, 0));
     memset(rgba, 0, sizeof rgba);
     assert_null(mask_of((const uint8_t(*)[4])rgba, 1, 0.0, 0));
+    assert_null(mask_of((const uint8_t(*)[4])rgba, 0, 0.5, 0)); /* no alpha */
+    assert_null(mask_of(NULL, 1, 0.5, 0));                      /* not decoded */
+    assert_null(mask_of(NULL, 0, 0.5, 1));
 }
 
 int main(void)
