@@ -199,7 +199,7 @@ static struct scene *full_scene(void)
     assert_non_null(s->texture);
     s->texture[0].raw_width = 1, s->texture[0].raw_height = 2;
     s->texture[0].wrap[0] = TEXTURE_DECAL, s->texture[0].wrap[1] = TEXTURE_MIRROR;
-    s->texture[1] = (struct scene_texture){.file = strdup("some/holes.png")};
+    s->texture[1] = (struct scene_texture){.file = strdup("some/b.png"), .bytes = copy_of("x", 1), .n_bytes = 1};
     s->n_textures = 2;
     s->surface[0].opacity = 2;
     s->surface[0].clear = 0.125f;
