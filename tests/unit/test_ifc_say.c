@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/import/ifc/ifc_product.h"
 #include "core/import/ifc/ifc_read.h"
-#include "core/import/ifc/ifc_records.h"
 #include "tests/common/cases.h"
 
 enum { MANY = 130 };
@@ -23,7 +23,7 @@ static void keep(void *ctx, const char *text)
 
 static const struct sh_report report = {.warn = keep};
 static struct ifc_product product[MANY];
-static struct ifc_records records = {.product = product};
+static size_t n_products;
 static struct scene_build b = {.name = "house.ifc", .report = &report};
 static struct sh_err err;
 
@@ -37,7 +37,7 @@ static void begin(size_t n)
         snprintf(guids[i], sizeof guids[i], "0123456789abcdefgh%04zu", i);
         product[i] = (struct ifc_product){.id = i, .type = {"IFCWALLX", 7}, .name = names[i], .guid = guids[i]};
     }
-    records.n_products = n;
+    n_products = n;
     warnings[0] = '\0';
     n_warnings = 0;
 }
@@ -52,14 +52,14 @@ static void findings_are_grouped(void **state)
     product[1].finding = product[4].finding = IFC_OPEN;
     product[3].finding = IFC_LOST;
     product[5].finding = IFC_ONLY_LITE;
-    assert_int_equal(ifc_say_findings(&b, &records, false, &err), SH_OK);
+    assert_int_equal(ifc_say_findings(&b, product, n_products, false, &err), SH_OK);
     assert_string_equal(
         warnings, "house.ifc: 1 product: its records have a body, but neither reader makes one, so it is not in the "
                   "scene: " WALL(3) "\nhouse.ifc: 1 product: only ifc-lite makes a body, and this body is used: " WALL(
                       5) "\nhouse.ifc: 2 products: the body is open: " WALL(1) ", " WALL(4) "\n");
     begin(3);
-    assert_int_equal(ifc_say_findings(&b, &records, false, &err), SH_OK);
-    assert_int_equal(ifc_say_findings(&b, &records, true, &err), SH_OK);
+    assert_int_equal(ifc_say_findings(&b, product, n_products, false, &err), SH_OK);
+    assert_int_equal(ifc_say_findings(&b, product, n_products, true, &err), SH_OK);
     assert_int_equal(n_warnings, 0);
 }
 
@@ -72,7 +72,7 @@ static void strict_files_are_refused(void **state)
         product[2].finding = f;
         const int doubtful = f != IFC_AGREED && f != IFC_OPEN;
         assert_int_equal(ifc_is_doubtful((enum ifc_finding)f), doubtful);
-        assert_int_equal(ifc_say_findings(&b, &records, true, &err), doubtful ? SH_EINPUT : SH_OK);
+        assert_int_equal(ifc_say_findings(&b, product, n_products, true, &err), doubtful ? SH_EINPUT : SH_OK);
         assert_int_equal(n_warnings, f == IFC_OPEN);
         char want[512];
         snprintf(want, sizeof want, "house.ifc: 1 product: %s: " WALL(2) "; allowed none (scene.ifc_strict)",
@@ -81,7 +81,7 @@ static void strict_files_are_refused(void **state)
     }
     begin(5);
     product[4].finding = product[3].finding = IFC_UNCUT;
-    assert_int_equal(ifc_say_findings(&b, &records, true, &err), SH_EINPUT);
+    assert_int_equal(ifc_say_findings(&b, product, n_products, true, &err), SH_EINPUT);
     assert_string_equal(err.text, "house.ifc: 2 products: no IfcRelVoidsElement says what it opens, so it opens "
                                   "nothing: " WALL(3) " and others; allowed none (scene.ifc_strict)");
 }
@@ -106,7 +106,7 @@ static void many_names_take_lines(void **state)
         begin(n[k]);
         for (size_t i = 0; i < n[k]; i++)
             product[i].is_coarse = true;
-        ifc_say_coarse(&b, &records);
+        ifc_say_coarse(&b, product, n_products);
         char head[160];
         snprintf(head, sizeof head,
                  "house.ifc: %zu product%s: curved, with the body of ifc-lite, whose facets don't keep "
@@ -135,16 +135,16 @@ static void known_errors_of_assimp(void **state)
 {
     (void)state;
     begin(4);
-    assert_int_equal(ifc_say_assimp(&b, &records, true, "no reader is there", &err), SH_OK);
+    assert_int_equal(ifc_say_assimp(&b, product, n_products, true, "no reader is there", &err), SH_OK);
     product[0].assimp_wrong = product[1].assimp_wrong = (struct text_span){"IFCREVOLVED,", 10};
     product[3].assimp_wrong = (struct text_span){"IFCSWEPT", 8};
     product[0].is_air = true;
     assert_int_equal(n_warnings, 0);
-    assert_int_equal(ifc_say_assimp(&b, &records, false, "no reader is there", &err), SH_OK);
+    assert_int_equal(ifc_say_assimp(&b, product, n_products, false, "no reader is there", &err), SH_OK);
     assert_string_equal(warnings,
                         "house.ifc: 2 products: Assimp is known to read their shapes wrong, without a message: " WALL(
                             1) ", " WALL(3) "\n");
-    assert_int_equal(ifc_say_assimp(&b, &records, true, "no reader is there", &err), SH_EINPUT);
+    assert_int_equal(ifc_say_assimp(&b, product, n_products, true, "no reader is there", &err), SH_EINPUT);
     assert_string_equal(
         err.text, "house.ifc: no reader is there, and Assimp is known to read IFCREVOLVE wrong, which 2 products use, "
                   "the first 'w1' 0123456789abcdefgh0001; scene.ifc_reader: assimp reads them in spite of that");
