@@ -57,26 +57,34 @@ static void of_maps(void **state)
     map_free(map);
 }
 
+static const struct view_spec good_view = {{{1, 2, 3}, {4, 5, 6}, 1, 640, 480}, 0.01, 1};
+
 static void of_views(void **state)
 {
     (void)state;
-    static const struct view_spec good = {{{1, 2, 3}, {4, 5, 6}, 1, 640, 480}, 0.01, 1};
     struct view *view;
     for (int axis = 0; axis < 6; axis++) {
-        struct view_spec spec = good;
+        struct view_spec spec = good_view;
         char want[80];
         *(axis < 3 ? &spec.camera.eye_m[axis] : &spec.camera.look_at_m[axis - 3]) =
             axis % 2 == 0 ? (double)NAN : (double)INFINITY;
         snprintf(want, sizeof want, "view: %c of the eye or of its target is not finite", "xyz"[axis % 3]);
         said(view_create(&spec, &view, &err), want);
     }
-    struct view_spec spec = good;
+    struct view_spec spec = good_view;
     memcpy(spec.camera.look_at_m, spec.camera.eye_m, sizeof spec.camera.eye_m);
     said(view_create(&spec, &view, &err), "view: the eye is at its target");
+}
+
+static void of_points_in_views(void **state)
+{
+    (void)state;
+    struct view_spec spec;
+    struct view *view;
     static const double points[][2] = {{-1, 1}, {2e9, 1}, {0.5, 0}, {0.5, 33}};
     for (int i = 0; i < 4; i++) {
         char want[160];
-        spec = good;
+        spec = good_view;
         spec.point_m = points[i][0];
         spec.point_px = points[i][1];
         snprintf(want, sizeof want,
@@ -86,16 +94,23 @@ static void of_views(void **state)
     }
     static const double ends[2][2] = {{0, 0.5}, {1e9, 32}}; /* these are allowed */
     for (int i = 0; i < 2; i++) {
-        spec = good;
+        spec = good_view;
         spec.point_m = ends[i][0];
         spec.point_px = ends[i][1];
         assert_int_equal(view_create(&spec, &view, &err), SH_OK);
         view_free(view);
     }
+}
+
+static void of_sizes_of_views(void **state)
+{
+    (void)state;
+    struct view_spec spec;
+    struct view *view;
     static const uint32_t size[][2] = {{15, 480}, {640, 15}, {8193, 16}, {16, 8193}, {8192, 2049}};
     for (int i = 0; i < 5; i++) {
         char want[120];
-        spec = good;
+        spec = good_view;
         spec.camera.width = size[i][0];
         spec.camera.height = size[i][1];
         snprintf(want, sizeof want, "view: %u x %u pixels; allowed are 16 to 8192 a side, and 16777216 in all",
@@ -105,7 +120,7 @@ static void of_views(void **state)
     static const double fov[2][2] = {{0.0099, 0.01}, {2.81, 2.8}};
     for (int i = 0; i < 2; i++) {
         char want[80];
-        spec = good;
+        spec = good_view;
         spec.camera.fov_rad = fov[i][0];
         snprintf(want, sizeof want, "view: field of view %g rad; allowed are 0.01 to 2.8", fov[i][0]);
         said(view_create(&spec, &view, &err), want);
@@ -208,8 +223,9 @@ static void of_viewpoints(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(of_maps), cmocka_unit_test(of_views),
-                                       cmocka_unit_test(of_meshes), cmocka_unit_test(of_scenes),
-                                       cmocka_unit_test(of_viewpoints)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(of_maps),           cmocka_unit_test(of_views),  cmocka_unit_test(of_points_in_views),
+        cmocka_unit_test(of_sizes_of_views), cmocka_unit_test(of_meshes), cmocka_unit_test(of_scenes),
+        cmocka_unit_test(of_viewpoints)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
