@@ -233,10 +233,7 @@ static int read_library(struct obj *o, struct sh_err *err)
 {
     if (!grow(&o->library, &o->cap_libraries, o->n_libraries + 1, sizeof *o->library))
         return build_fail(o->b, SH_ENOMEM, err, "no memory for names of libraries");
-    o->t.continued = false; /* a backslash there may be a path's */
-    const uint64_t line = o->t.line;
-    o->library[o->n_libraries++] = (struct mtl_line){text_rest(&o->t), line};
-    o->t.continued = true;
+    o->library[o->n_libraries++] = (struct mtl_line){text_rest(&o->t), o->t.line};
     return SH_OK;
 }
 

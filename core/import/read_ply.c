@@ -173,7 +173,6 @@ static int begin_element(void *ply, struct sh_err *err)
 {
     struct ply *y = ply;
     const struct ply_element *e = y->r.element;
-    y->b->line = 0;
     ply_begin_colours(y);
     const int rc = build_weld_flush(y->b, &y->weld, err);
     if (rc != SH_OK) return rc;
@@ -186,7 +185,6 @@ static int read_body(struct ply *y, struct sh_err *err)
     const struct ply_user user = {y, begin_element, use_row, y->b->report, .has_faces = true};
     int rc = ply_begin_textures(y, err);
     if (rc == SH_OK) rc = ply_walk(&y->r, &user, err);
-    y->b->line = 0;
     if (rc == SH_OK) rc = build_weld_flush(y->b, &y->weld, err);
     if (rc == SH_OK) put_away_lost(y);
     if (rc == SH_OK && y->r.is_single) rc = note_rounding(y, err);

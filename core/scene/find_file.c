@@ -103,7 +103,7 @@ char *build_find_file(const struct text_span *folder, size_t n, struct text_span
 char *scene_find_file(const char *const *folder, size_t n, const char *name)
 {
     struct text_span in[4];
-    for (size_t i = 0; i < n && i < 4; i++)
+    for (size_t i = 0; i < n; i++)
         in[i] = (struct text_span){folder[i], strlen(folder[i])};
-    return build_find_file(in, n < 4 ? n : 4, (struct text_span){name, strlen(name)});
+    return build_find_file(in, n, (struct text_span){name, strlen(name)});
 }

@@ -186,7 +186,7 @@ static void test_pcd_runs(void **state)
 {
     (void)state;
     static float value[9] = {1, 2, 3, 4, 5, 6, 7, 8, 0}; /* x x x y y y z z z */
-    char text[512], big[20000];
+    char text[512], big[2048];
     uint8_t bytes[36], packed[64] = {0};
     memset(bytes, 0, sizeof bytes);
     memcpy(bytes, value, sizeof value);
@@ -207,21 +207,25 @@ static void test_pcd_runs(void **state)
     memcpy(&last, bytes + 32, 4);
     const double three[3][3] = {{1, 4, 7}, {2, 5, 8}, {3, 6, (double)last}};
     expect(text, len + n, 3, three, 0);
-    /* 700 points of zeros: one literal, then copies of 264 bytes, the longest, from one byte back. */
-    len = put_header(big, XYZ, 700, "binary_compressed");
+    /* The x of 80 points as literals; y and z are copies of up to 264 bytes, the longest, from 320 bytes back. */
+    static double same[80][3];
+    len = put_header(big, XYZ, 80, "binary_compressed");
     n = len + 8;
-    big[n++] = 0;
-    big[n++] = 0;
-    for (int left = 8400 - 1; left > 0; left -= 264) {
-        const int run = left < 264 ? left : 264; /* 8399 is 31 times 264, and 215 */
-        big[n++] = (char)0xe0;
-        big[n++] = (char)(run - 9);
-        big[n++] = 0;
+    for (int i = 0; i < 80; i++) {
+        const float x = 1.5f + (float)i;
+        if (i % 8 == 0) big[n++] = 31;
+        memcpy(big + n, &x, 4);
+        n += 4;
+        same[i][0] = same[i][1] = same[i][2] = (double)x;
+    }
+    for (int left = 640; left > 0; left -= 264) {
+        big[n++] = (char)(0xe0 | 319 >> 8);
+        big[n++] = (char)((left < 264 ? left : 264) - 9);
+        big[n++] = 319 & 255;
     }
     le_put32((uint8_t *)big + len, (uint32_t)(n - len - 8));
-    le_put32((uint8_t *)big + len + 4, 8400);
-    static const double zero[700][3];
-    expect(big, n, 700, zero, 0);
+    le_put32((uint8_t *)big + len + 4, 960);
+    expect(big, n, 80, same, 0);
 }
 
 /* A position is three finite numbers, or NaN three times. Each point of each form is looked at. */

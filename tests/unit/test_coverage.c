@@ -43,7 +43,12 @@ static void test_area_is_kept(void **state)
         struct cover *c = cover_open(cover_box(LO, HI), cells_m[i], 1);
         struct coverage_sums sums;
         double low[3], high[3];
+        memset(&sums, 0, sizeof sums);
         sums_of(c, &sums);
+        const struct coverage_spread *const unknown[] = {&sums.density_1_m2, &sums.incidence_rad, &sums.range_m};
+        for (int k = 0; k < 3; k++) /* of cells that no station sees there are no figures */
+            assert_true(isnan(unknown[k]->mean) && isnan(unknown[k]->p05) && isnan(unknown[k]->p50) &&
+                        isnan(unknown[k]->p95));
         assert_near("area", sums.area_m2, BOX_M2, 1e-11);
         assert_near("seen by none", sums.none_m2, BOX_M2, 1e-11);
         struct cover_cell *cell = cells_of(c, WITHIN, 1.0, NULL);

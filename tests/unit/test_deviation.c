@@ -123,6 +123,27 @@ static void counts_and_bounds(void **state)
     assert_true(isinf(deviation_bound_m(&head, 100.0)));
 }
 
+/* Each effect alone leaves no bound. The largest factor of a ball counts, on whichever axis; the file's counts add to
+ * the stream's. */
+static void bounds_by_each_effect(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 3; k++) {
+        struct deviation_head head = ideal_head();
+        struct detect_ball ball = {.radius_m = 0.01, .factor = {1, 1, 1}, .per_distance_1_m = 0.01};
+        const struct cast_detect detect = {.ball = &ball};
+        head.count_m = 2e-3;
+        head.file_count_m = 1e-3;
+        near_to(deviation_bound_m(&head, 100.0), 0.5 * sqrt(3.0) * 3e-3);
+        ball.factor[k] = 3;
+        head.setup.detect = &detect;
+        near_to(deviation_bound_m(&head, 100.0), 0.5 * sqrt(3.0) * 3e-3 + 0.01 * 2 * 3);
+        if (k == 2) head.has_instrument_errors = 1;
+        if (k < 2) head.angle_sigma_rad[k] = 1e-9;
+        assert_true(isinf(deviation_bound_m(&head, 100.0)));
+    }
+}
+
 /* The figures for clients, put into the formulas of core/studio/deviation.h, give what the function gives. */
 static void terms_give_the_same_sigma(void **state)
 {
@@ -231,6 +252,7 @@ int main(void)
         cmocka_unit_test(sigma_of_angles),
         cmocka_unit_test(sigma_of_a_ball),
         cmocka_unit_test(counts_and_bounds),
+        cmocka_unit_test(bounds_by_each_effect),
         cmocka_unit_test(terms_give_the_same_sigma),
         cmocka_unit_test_setup_teardown(deviations_along_the_beam, make_folder, remove_folder),
     };

@@ -10,8 +10,8 @@
 #include "tests/common/cases.h"
 
 static char dir[] = "/tmp/scanhead-find-XXXXXX", first[64], second[64];
-static const char *const made[] = {"a/Wood.PNG", "a/sub/Stone.png", "b/wood.png",    "b/tex/x.png",
-                                   "b/Same.png", "b/SAME.png",      "b/tex/Tile.JPG"};
+static const char *const made[] = {"a/Wood.PNG", "a/sub/Stone.png", "b/wood.png",     "b/tex/x.png",
+                                   "b/Same.png", "b/SAME.png",      "b/tex/Tile.JPG", "b/x.png"};
 
 static void path_of(char path[128], const char *name)
 {
@@ -80,8 +80,11 @@ static void names_are_searched_in_order(void **state)
                                           {"/home/other/tile.jpg", NULL}, /* tex is not named */
                                           {"TEX/tile.jpg", "b/tex/Tile.JPG"},
                                           {"other/WOOD.png", "a/Wood.PNG"},
-                                          {"same.png", "b/SAME.png"}, /* the first in byte order */
-                                          {"dir.png", NULL},          /* a folder is no file */
+                                          {"same.png", "b/SAME.png"},   /* the first in byte order */
+                                          {"tex/x.png", "b/tex/x.png"}, /* before b/x.png */
+                                          {"TEX/X.png", "b/tex/x.png"},
+                                          {"no/x.png", "b/x.png"},
+                                          {"dir.png", NULL}, /* a folder is no file */
                                           {"sub", NULL},
                                           {"stone", NULL},
                                           {"Stone.png", NULL},
@@ -91,6 +94,9 @@ static void names_are_searched_in_order(void **state)
     const char *const swapped[2] = {second, first};
     expect(swapped, 2, "WOOD.png", "b/wood.png");
     expect(both, 1, "x.png", NULL);
+    const char *const four[4] = {first, first, first, second};
+    expect(four, 3, "x.png", NULL);
+    expect(four, 4, "x.png", "b/x.png");
     expect(both, 0, "Wood.PNG", NULL);
 }
 

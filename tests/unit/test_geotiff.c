@@ -265,6 +265,26 @@ static void odd_heights_are_doubted(void **state)
     struct scene *s = read_tif(&t);
     assert_non_null(strstr(warnings, "from -9999 to 100 m; if -9999 marks cells without height"));
     scene_free(s);
+    static const struct {
+        double value;
+        int is_odd;
+    } at[] = {{-11500, 0}, {-11501, 1}, {9000, 0}, {9001, 1}};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
+        char want[64];
+        value[7] = at[i].value;
+        s = read_tif(&t);
+        snprintf(want, sizeof want, " m; if %g marks cells without height", at[i].value);
+        assert_int_equal(strstr(warnings, want) != NULL, at[i].is_odd);
+        scene_free(s);
+    }
+    struct tif scaled = t; /* the file's own number is named: 100 m - 0.5 m 32768 */
+    scaled.metadata = "<GDALMetadata><Item name=\"OFFSET\" sample=\"0\" role=\"offset\">100</Item>"
+                      "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.5</Item></GDALMetadata>";
+    value[7] = -32768;
+    s = read_tif(&scaled);
+    assert_non_null(strstr(warnings, "its heights go from -16284 to "));
+    assert_non_null(strstr(warnings, " m; if -32768 marks cells without height, add that to the file with "));
+    scene_free(s);
     for (int i = 0; i < 20; i++)
         value[i] = 100.0; /* a plain */
     s = read_tif(&t);

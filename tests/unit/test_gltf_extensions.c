@@ -27,6 +27,9 @@ static void required_and_unknown(void **state)
     assert_non_null(
         strstr(warnings, "2 extensions are unknown but not required; they are not read: VENDOR_a, VENDOR_b"));
     scene_free(s);
+    s = gltf_load("\"extensionsUsed\":[\"VENDOR_c\"]," ONE_NODE "\"materials\":[{}]," PLAIN_MESH);
+    assert_non_null(strstr(warnings, "1 extensions are unknown but not required; they are not read: VENDOR_c\n"));
+    scene_free(s);
 }
 
 /* Lights, gloss and metadata do not change a laser's view. */

@@ -92,6 +92,59 @@ static void versions_and_data_are_named(void **state)
     refuse_text(DATA("data:application/octet-stream,AAAA"), "buffers[0].uri must have its data in base64");
 }
 
+/* The header of a .glb, 12 bytes, and of a chunk, 8 bytes; lengths are little-endian. */
+#define GLB(length)         "glTF\2\0\0\0" length "\0\0\0"
+#define CHUNK(length, type) length "\0\0\0" type
+
+static void cut_files_are_named(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *file;
+        size_t size;
+        const char *says;
+    } row[] = {
+        {GLB("\100"), 12, "a.glb: cut off: it has 12 bytes, but its header says 64"},
+        {GLB("\14"), 12, "a.glb: it has no JSON in it"},
+        {GLB("\23") CHUNK("\0", "JSO"), 19, "a.glb: the chunk at byte 12 goes beyond its end, byte 19"},
+        {GLB("\24") CHUNK("\1", "JSON"), 20, "a.glb: the chunk at byte 12 goes beyond its end, byte 20"},
+        {GLB("\31") CHUNK("\4", "JSON") "{}  x", 25, "a.glb: the chunk at byte 24 goes beyond its end, byte 25"},
+        {GLB("\40") CHUNK("\4", "JSOX") "{}  " CHUNK("\1", "JSON"), 32,
+         "a.glb: the chunk at byte 24 goes beyond its end, byte 32"},
+        {GLB("\30") CHUNK("\4", "JSOX") "{}  ", 24, "a.glb: it has no JSON in it"},
+        {GLB("\30") CHUNK("\4", "JSON") "[]  ", 24, "a.glb: its JSON is not an object"},
+    };
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++)
+        refuse("a.glb", row[i].file, row[i].size, row[i].says);
+}
+
+static void buffers_are_named(void **state)
+{
+    (void)state;
+#define BUFFERS(buffers, view)                                                                                       \
+    "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[" buffers "],\"bufferViews\":[{" view "\"byteLength\":36}]," NODE \
+    "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"                                             \
+    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]}"
+    refuse_text(BUFFERS("{\"byteLength\":36}", "\"buffer\":0,"), "a.gltf: buffers[0] has no data");
+    refuse_text(BUFFERS("{},{\"byteLength\":36}", "\"buffer\":1,"), "a.gltf: buffers[1] has no data");
+    refuse_text(BUFFERS("{},{}", "\"buffer\":2,"), "buffers[2] is missing: there are 2");
+    refuse_text(BUFFERS("{}", ""), "a buffer view names no buffer");
+    refuse_text(BUFFERS("{\"byteLength\":36,\"uri\":\"data:;base64,AAAA\"}", "\"buffer\":0,"),
+                "a.gltf: buffers[0] is cut off: 3 bytes of 36");
+    refuse_text(BUFFERS("{\"byteLength\":4,\"uri\":\"data:;base64,AAAA\"}", "\"buffer\":0,"),
+                "a.gltf: buffers[0] is cut off: 3 bytes of 4");
+    refuse_text("{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":3,\"uri\":\"data:;base64,AAAA\"}],"
+                "\"bufferViews\":[{\"buffer\":0}]," NODE
+                "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+                "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]}",
+                "accessors[0]: 3 elements from byte 0 on go beyond bufferViews[0], which has 0 bytes");
+    /* A buffer without a length may be of any; what the view says is looked at. */
+    refuse_text(BUFFERS("{\"uri\":\"data:;base64,\"}", "\"buffer\":0,"),
+                "bufferViews[0]: bytes 0 to 36 go beyond buffers[0], which has 0");
+    refuse_text(BUFFERS("{\"byteLength\":3,\"uri\":\"data:;base64,AAAA\"}", "\"buffer\":0,"),
+                "bufferViews[0]: bytes 0 to 36 go beyond buffers[0], which has 3");
+}
+
 static void expect_warning(const char *rest, const char *says)
 {
     struct scene *s = gltf_load(rest);
@@ -125,10 +178,9 @@ static void what_is_left_out_is_counted(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(contradictions_are_named),
-        cmocka_unit_test(views_beyond_their_buffer_are_named),
-        cmocka_unit_test(versions_and_data_are_named),
-        cmocka_unit_test(what_is_left_out_is_counted),
+        cmocka_unit_test(contradictions_are_named),    cmocka_unit_test(views_beyond_their_buffer_are_named),
+        cmocka_unit_test(versions_and_data_are_named), cmocka_unit_test(cut_files_are_named),
+        cmocka_unit_test(buffers_are_named),           cmocka_unit_test(what_is_left_out_is_counted),
     };
     return cmocka_run_group_tests_name("messages of glTF", tests, make_folder, remove_folder);
 }

@@ -109,6 +109,17 @@ static void units_are_read(void **state)
     }
 }
 
+static void turned_solids_are_marked(void **state)
+{
+    (void)state;
+    for (int i = 0; i < IFC_SHAPES; i++) {
+        ifc_write_text(text, "IFC4", NULL, NULL, &ifc_shapes[i], 1, NULL);
+        assert_int_equal(open_text(), SH_OK);
+        assert_int_equal(records.product[0].is_turned, strstr(ifc_shapes[i].records, "=IFCREVOLVED") != NULL);
+        ifc_records_close(&records);
+    }
+}
+
 static void products_are_found(void **state)
 {
     (void)state;
@@ -421,6 +432,7 @@ int main(void)
         cmocka_unit_test(texts_are_whole),
         cmocka_unit_test(units_are_read),
         cmocka_unit_test(products_are_found),
+        cmocka_unit_test(turned_solids_are_marked),
         cmocka_unit_test(styles_are_found),
         cmocka_unit_test(heights_are_no_radii),
         cmocka_unit_test(openings_without_a_wall_are_found),

@@ -199,7 +199,7 @@ static struct scene *full_scene(void)
     assert_non_null(s->texture);
     s->texture[0].raw_width = 1, s->texture[0].raw_height = 2;
     s->texture[0].wrap[0] = TEXTURE_DECAL, s->texture[0].wrap[1] = TEXTURE_MIRROR;
-    s->texture[1] = (struct scene_texture){.file = strdup("some/holes.png")};
+    s->texture[1] = (struct scene_texture){.file = strdup("some/b.png"), .bytes = copy_of("x", 1), .n_bytes = 1};
     s->n_textures = 2;
     s->surface[0].opacity = 2;
     s->surface[0].clear = 0.125f;
@@ -330,6 +330,42 @@ static void wrong_values_are_named(void **state)
         assert_int_equal(read_result(bytes, n, &b, &err), SH_EINPUT);
         if (strstr(err.text, part[k]) == NULL) fail_msg("%d: '%s' without '%s'", k, err.text, part[k]);
         build_release(&b);
+        /* As the second file of a scene it has the same numbers. */
+        uint8_t good[4096];
+        const size_t n_good = write_result(good, sizeof good);
+        assert_int_equal(read_result(good, n_good, &b, &err), SH_OK);
+        assert_int_equal(read_more(bytes, n, &b, &err), SH_EINPUT);
+        if (strstr(err.text, part[k]) == NULL) fail_msg("%d, second: '%s' without '%s'", k, err.text, part[k]);
+        build_release(&b);
+    }
+}
+
+/* Bytes are changed where they lie: 8 of the magic, counts from byte 8 on, and the texture's path with its length, 64
+ * bits, before its own figures. */
+static void wrong_bytes_are_named(void **state)
+{
+    (void)state;
+    static const char *const says[] = {
+        "the header is wrong at byte 0; ", "texture coordinates: 2; ", "colours: 2; ",
+        "the path of texture 0; ",         "the name of texture 0; ",  "the name of texture 0; ",
+        "the size of texture 0; "};
+    static uint8_t bytes[4096];
+    for (int k = 0; k < 7; k++) {
+        struct scene_build b;
+        struct sh_err err = {0};
+        char want[160];
+        const size_t n = write_result(bytes, sizeof bytes);
+        uint8_t *name = memmem(bytes, n, "some/a.dae*0", 12), *const length = name - 32, *const size = name - 24;
+        if (k == 0) bytes[7] = 'x';
+        if (k == 1 || k == 2) bytes[8 + 4 * (4 + k)] = 2;
+        if (k == 3) name[3] = 'x';
+        if (k == 4) name[7] = 0;
+        if (k == 5) *length = 0;
+        if (k == 6) size[2] = 1;
+        assert_int_equal(read_result(bytes, n, &b, &err), SH_EINPUT);
+        snprintf(want, sizeof want, "some/a.dae: the reader's result is inconsistent: %sthe file is broken", says[k]);
+        assert_string_equal(err.text, want);
+        build_release(&b);
     }
 }
 
@@ -402,7 +438,7 @@ int main(void)
         cmocka_unit_test(result_comes_back),      cmocka_unit_test(broken_result_is_refused),
         cmocka_unit_test(names_have_an_end),      cmocka_unit_test(each_field_comes_back),
         cmocka_unit_test(wrong_values_are_named), cmocka_unit_test(counts_beyond_the_size),
-        cmocka_unit_test(long_results_come_back),
+        cmocka_unit_test(long_results_come_back), cmocka_unit_test(wrong_bytes_are_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -22,6 +22,11 @@ static void strips_are_triangles(void **state)
     for (uint32_t i = 0; i < 4; i++)
         assert_memory_equal(s->triangle[i], want[i], sizeof want[i]);
     scene_free(s);
+    s = load_text("a.ply", VERTICES("3") "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+                                         "0 0 0\n1 0 0\n0 1 0\n6 -1 0 1 2 -1 -1\n"); /* empty ones around it */
+    assert_int_equal(s->n_triangles, 1);
+    assert_memory_equal(s->triangle[0], want[0], sizeof want[0]);
+    scene_free(s);
 }
 
 /* Vertices that are not finite, in any axis, don't matter where no face uses them: neither where vertices are shared nor

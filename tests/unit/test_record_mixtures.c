@@ -255,7 +255,8 @@ static void test_rows_of_beams(void **state)
     }
 }
 
-/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. */
+/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. An eleventh is not, also after the
+ * descriptor and what belongs to it were repeated. */
 static void test_lines_of_rings(void **state)
 {
     (void)state;
@@ -267,16 +268,21 @@ static void test_lines_of_rings(void **state)
                                      .sequence_ns_den = 1,
                                      .first_ring_udeg = -90000000};
     const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
-    rig_begin();
-    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
-    put_emitter(&e, NULL);
-    rig_anchor(&a);
-    rig_points(0, 0, 0, &one, 1);
-    rig_points(9, 90, 90, &one, 1);
-    char *text = rig_record_bytes("a.ptx", (struct recorder_options){0}, NULL);
-    assert_memory_equal(text, "10\n1\n", 5);
-    assert_null(strstr(rig_notes, "grids begun"));
-    free(text);
+    for (int eleven = 0; eleven < 2; eleven++) {
+        rig_begin();
+        for (int flags = 0; flags <= (eleven ? NATIVE_REPEAT : 0); flags += NATIVE_REPEAT) {
+            rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, flags));
+            rig_put(out, native_encode_emitter(out, sizeof out, &e, NULL, 0, flags));
+            rig_put(out, native_encode_anchor(out, sizeof out, &a, 0, flags));
+            if (flags == 0) rig_points(0, 0, 0, &one, 1);
+        }
+        rig_points(9, 90, 90, &one, 1);
+        if (eleven) rig_points(10, 100, 100, &one, 1);
+        char *text = rig_record_bytes("a.ptx", (struct recorder_options){0}, NULL);
+        assert_memory_equal(text, "10\n1\n", 5);
+        assert_int_equal(strstr(rig_notes, "1 additional grids begun") != NULL, eleven);
+        free(text);
+    }
 }
 
 /* A head of several rings, and one that pans, have sweeps. Others have lines of one grid. */

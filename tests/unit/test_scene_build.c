@@ -99,6 +99,10 @@ static void single_precision(void **state)
          "dir/house.obj: read in single precision, with errors up to 1.3e-06 m: coordinates go up to 123.5\n", NULL},
         {1.0, 5e4, 1e-3, 1, 1e-3,
          "dir/house.obj: read in single precision, with errors up to 0.001 m: coordinates go up to 50000\n", NULL},
+        {1.0, 5e4, 1.1e-3, 1, 1.1e-3,
+         "dir/house.obj: read in single precision, with errors up to 0.0011 m: coordinates go up to 50000; move it near "
+         "its origin, then export it again\n",
+         NULL},
         {2.0, 5e4, 1.5e-3, 1, 3e-3,
          "dir/house.obj: read in single precision, with errors up to 0.003 m: coordinates go up to 50000; move it near "
          "its origin, then export it again\n",

@@ -2,6 +2,7 @@
 /* Objects of a scene and their figures (core/scene_objects.h), on bodies whose figures are known. */
 #include <math.h>
 
+#include "core/body.h"
 #include "core/scene_objects.h"
 #include "core/vec3.h"
 #include "tests/unit/scene_files.h"
@@ -122,6 +123,28 @@ static void a_small_hole_is_open(void **state)
         0, SCENE_OBJECT_OPEN, 4, 52 - 1e-6, 0);
 }
 
+/* A slit over the whole top counts from a mean width of half of 1e-5 of the body on. Its area is what the sums over its
+ * own edges say, which grows with its width; the width comes from the edges without a counterpart: the slit's sides of
+ * 3 m, and twice an edge of 2 m beside two of 1 m. The volume lacks a pyramid on the slit, 2 m high. */
+static void a_slit_counts_by_its_width(void **state)
+{
+    (void)state;
+    const double min[3] = {0, 0, 0}, max[3] = {2, 3, 4}, thin_m = 1e-4;
+    const double slit[4][3] = {{1, 0, 4}, {1, 3, 4}, {1 + thin_m, 3, 4}, {1 + thin_m, 0, 4}};
+    struct body_sum sum;
+    body_begin(&sum, min, max);
+    for (int i = 0; i < 4; i++)
+        body_add_edge(&sum, slit[i], slit[(i + 1) % 4]);
+    const double limit_m = 0.5e-5 * vec3_distance(min, max) * (2 * 3 + 2 * 4) / (body_open_m2(&sum) / thin_m);
+    for (int open = 0; open < 2; open++) {
+        const double width_m = (open ? 1.05 : 0.95) * limit_m;
+        char text[1024];
+        snprintf(text, sizeof text, BOX "v 1 0 4\nv 1 3 4\nv %.17g 0 4\nv %.17g 3 4\nf 5 9 10 8\nf 11 6 7 12\n",
+                 1 + width_m, 1 + width_m);
+        one(text, 0, open ? SCENE_OBJECT_OPEN : SCENE_OBJECT_CLOSED, open ? 8 : 0, 52 - 3 * width_m, 24 - 2 * width_m);
+    }
+}
+
 /* Objects are known by name, whatever their materials and order. */
 static void surfaces_of_a_name_are_one_object(void **state)
 {
@@ -177,7 +200,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_judged),    cmocka_unit_test(corners_of_faces_are_joined),
         cmocka_unit_test(a_small_hole_is_open), cmocka_unit_test(surfaces_of_a_name_are_one_object),
-        cmocka_unit_test(copies_count),
+        cmocka_unit_test(copies_count),         cmocka_unit_test(a_slit_counts_by_its_width),
     };
     return cmocka_run_group_tests_name("scene_objects", tests, make_folder, remove_folder);
 }

@@ -344,6 +344,25 @@ static void test_stl_facets(void **state)
     refuse("a.stl", far, sizeof far - 1, "a.stl, line 7: ");
 }
 
+/* What is said of a whole file names no line of it. */
+static void whole_files_have_no_line(void **state)
+{
+    (void)state;
+    static const char *const file[][2] = {
+        {"a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\np 1\nf 1 2 3\n"},
+        {"a.stl",
+         "solid a\nfacet normal 0 0 1\nouter loop\nendloop\nendfacet\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n"
+         "vertex 1 0 0\nvertex 2 0 0\nendloop\nendfacet\nendsolid a\n"},
+        {"a.ply",
+         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+         "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n2 0 0\n2 0 1\n3 0 1 2\n"}};
+    for (int i = 0; i < 3; i++) {
+        char want[160];
+        snprintf(want, sizeof want, "%s: it has no triangles (1 without area, 1 points and lines)", file[i][0]);
+        refuse(file[i][0], file[i][1], strlen(file[i][1]), want);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -360,6 +379,7 @@ int main(void)
         cmocka_unit_test(stl_words_stand_in_any_lines),
         cmocka_unit_test(test_stl_facets),
         cmocka_unit_test(stl_may_be_large),
+        cmocka_unit_test(whole_files_have_no_line),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

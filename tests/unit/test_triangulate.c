@@ -61,6 +61,25 @@ static void polygons_keep_their_area(void **state)
     }
 }
 
+/* A square with a square hole that a slit joins to its corner: both ends of the slit are twice among the corners. It is
+ * begun at each corner, and laid in each of eight ways. */
+static void keyholes_keep_their_area(void **state)
+{
+    (void)state;
+    static const double keyhole[10][2] = {{0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1},
+                                          {1, 1}, {0, 0}, {3, 0}, {3, 3}, {0, 3}};
+    for (int first = 0; first < 10; first++)
+        for (int way = 0; way < 8; way++) {
+            double uv[10][2];
+            for (int i = 0; i < 10; i++)
+                for (int k = 0; k < 2; k++) {
+                    const double at = keyhole[(first + i) % 10][way & 4 ? 1 - k : k];
+                    uv[i][k] = way >> k & 1 ? 3 - at : at;
+                }
+            check_polygon((const double(*)[2])uv, 10, false);
+        }
+}
+
 static void crossing_polygon_is_told(void **state)
 {
     (void)state;
@@ -95,6 +114,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(polygons_keep_their_area),
+        cmocka_unit_test(keyholes_keep_their_area),
         cmocka_unit_test(crossing_polygon_is_told),
         cmocka_unit_test(corners_have_a_limit),
     };

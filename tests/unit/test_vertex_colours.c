@@ -146,6 +146,24 @@ static void a_little_above_one(void **state)
     }
 }
 
+/* One number beyond 1, whichever it is, makes all of them numbers of 0 to 255. */
+static void each_number_decides(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 9; k++) {
+        static const char *const place[] = {"0 0 0", "1 0 0", "0 1 0"};
+        char text[512] = HEAD RGB("float", "") FACE "end_header\n";
+        for (int i = 0; i < 9; i++)
+            sprintf(text + strlen(text), "%s %d%s", i % 3 == 0 ? place[i / 3] : "", i == k ? 2 : 1,
+                    i % 3 == 2 ? "\n" : "");
+        strcat(text, "3 0 1 2\n");
+        struct scene *s = take("a.ply", text, 1);
+        for (int i = 0; i < 9; i++)
+            assert_int_equal(s->rgb[0][i / 3][i % 3], i == k ? 2 : 1);
+        scene_free(s);
+    }
+}
+
 /* Linear light as sRGB: 0.2158605 is 128 of 255. */
 static void gltf_is_linear(void **state)
 {
@@ -344,6 +362,7 @@ int main(void)
         cmocka_unit_test(ply_of_any_type),
         cmocka_unit_test(ply_with_a_vertex_for_each_corner),
         cmocka_unit_test(ply_by_face),
+        cmocka_unit_test(each_number_decides),
         cmocka_unit_test(obj_of_two_ranges),
         cmocka_unit_test(a_little_above_one),
         cmocka_unit_test(gltf_is_linear),

@@ -119,7 +119,7 @@ static int put_sparse(struct gltf *g, const json_t *sparse, const char *at, cons
     const struct gltf_at at_index = gltf_at("%.70s.sparse.indices", at), at_value = gltf_at("%.70s.sparse.values", at);
     const json_t *indices = json_object_get(sparse, "indices");
     uint64_t component = 0;
-    struct gltf_view index = {.n_components = 1}, value = {.n_components = v->n_components};
+    struct gltf_view index = {0}, value = {0};
     int rc = gltf_index(g, sparse, "count", at, &index.count);
     if (rc == SH_OK) rc = gltf_whole(g, indices, "componentType", at_index.text, &component);
     if (rc != SH_OK) return rc;

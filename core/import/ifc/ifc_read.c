@@ -190,8 +190,9 @@ static int read_by_two(struct reading *r)
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
     if (rc == SH_OK) rc = add_products(r);
     if (rc == SH_OK) rc = say_facets(r, &fineness);
-    if (rc == SH_OK) ifc_say_coarse(r->b, &r->records);
-    if (rc == SH_OK) rc = ifc_say_findings(r->b, &r->records, r->limits.ifc_strict, r->err);
+    if (rc == SH_OK) ifc_say_coarse(r->b, r->records.product, r->records.n_products);
+    if (rc == SH_OK)
+        rc = ifc_say_findings(r->b, r->records.product, r->records.n_products, r->limits.ifc_strict, r->err);
     if (rc == SH_OK) rc = build_single(r->b, r->largest_m, BUILD_SINGLE_ROUNDING * r->largest_m, true, r->err);
     return rc;
 }
@@ -203,7 +204,7 @@ static int read_by_assimp(struct reading *r, const char *why)
         return build_fail(r->b, SH_EINPUT, r->err,
                           "%s, so nothing is cross-checked, but scene.ifc_strict demands both readers", why);
     if (!asked) build_warn(r->b, "%s: Assimp reads it", why);
-    const int rc = ifc_say_assimp(r->b, &r->records, !asked, why, r->err);
+    const int rc = ifc_say_assimp(r->b, r->records.product, r->records.n_products, !asked, why, r->err);
     return rc == SH_OK ? import_apart(r->b, r->err) : rc;
 }
 

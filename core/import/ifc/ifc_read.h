@@ -7,7 +7,7 @@
 #include "core/import/ifc/ifc_choose.h"
 #include "core/scene/build.h"
 
-struct ifc_records;
+struct ifc_product;
 
 /* ---- ifc_apart.c */
 
@@ -40,12 +40,13 @@ void ifc_readings_free(struct ifc_readings *r);
 
 /* Warns of the products' findings, and names up to 100 products for each, several in a line. With strict, the first
  * line of the first doubtful finding is an error instead. */
-int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, bool strict, struct sh_err *err);
+int ifc_say_findings(struct scene_build *b, const struct ifc_product *product, size_t n_products, bool strict,
+                     struct sh_err *err);
 /* Names the curved products whose facets follow no tolerance. */
-void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records);
+void ifc_say_coarse(struct scene_build *b, const struct ifc_product *product, size_t n_products);
 /* Names the products that Assimp may read wrongly, in a warning or, with refuse, in an error. why: the reason that no
  * other reader is there. */
-int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
-                   struct sh_err *err);
+int ifc_say_assimp(struct scene_build *b, const struct ifc_product *product, size_t n_products, bool refuse,
+                   const char *why, struct sh_err *err);
 
 #endif

@@ -3,7 +3,7 @@
 #include <stdio.h>
 
 #include "core/import/ifc/ifc_read.h"
-#include "core/import/ifc/ifc_records.h"
+#include "core/import/ifc/ifc_product.h"
 
 enum { MAX_NAMED = 100, LINE_ROOM = 420 /* the rest of a line has room for ", and N more" */ };
 
@@ -13,7 +13,8 @@ enum { COARSE = IFC_FINDINGS, MISREAD };
 /* The products of a group are named line by line. */
 struct lines {
     struct scene_build *b;
-    const struct ifc_records *records;
+    const struct ifc_product *product; /* [n_products] */
+    size_t n_products;
     int group; /* a finding, COARSE or MISREAD */
     const char *text;
     size_t n;        /* products of the group */
@@ -55,9 +56,9 @@ static bool is_in_group(const struct lines *l, const struct ifc_product *p)
 static const struct ifc_product *count_group(struct lines *l)
 {
     const struct ifc_product *first = NULL;
-    for (size_t i = l->records->n_products; i-- > 0;)
-        if (is_in_group(l, &l->records->product[i])) {
-            first = &l->records->product[i];
+    for (size_t i = l->n_products; i-- > 0;)
+        if (is_in_group(l, &l->product[i])) {
+            first = &l->product[i];
             l->n++;
         }
     return first;
@@ -65,18 +66,19 @@ static const struct ifc_product *count_group(struct lines *l)
 
 static void say_group(struct lines *l)
 {
-    for (size_t i = 0; i < l->records->n_products; i++)
-        if (is_in_group(l, &l->records->product[i])) add_name(l, &l->records->product[i]);
+    for (size_t i = 0; i < l->n_products; i++)
+        if (is_in_group(l, &l->product[i])) add_name(l, &l->product[i]);
     if (l->n_listed > MAX_NAMED)
         l->len +=
             (size_t)snprintf(l->line + l->len, sizeof l->line - l->len, ", and %zu more", l->n_listed - MAX_NAMED);
     end_line(l);
 }
 
-int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, bool strict, struct sh_err *err)
+int ifc_say_findings(struct scene_build *b, const struct ifc_product *product, size_t n_products, bool strict,
+                     struct sh_err *err)
 {
     for (int f = IFC_AGREED + 1; f < IFC_FINDINGS; f++) {
-        struct lines l = {b, records, f, .text = ifc_finding_text((enum ifc_finding)f)};
+        struct lines l = {b, product, n_products, f, .text = ifc_finding_text((enum ifc_finding)f)};
         const struct ifc_product *first = count_group(&l);
         if (first == NULL) continue;
         if (strict && ifc_is_doubtful((enum ifc_finding)f))
@@ -88,18 +90,19 @@ int ifc_say_findings(struct scene_build *b, const struct ifc_records *records, b
     return SH_OK;
 }
 
-void ifc_say_coarse(struct scene_build *b, const struct ifc_records *records)
+void ifc_say_coarse(struct scene_build *b, const struct ifc_product *product, size_t n_products)
 {
-    struct lines l = {b, records, COARSE,
+    struct lines l = {b, product, n_products, COARSE,
                       .text = "curved, with the body of ifc-lite, whose facets don't keep scene.tolerance_m"};
     count_group(&l);
     say_group(&l);
 }
 
-int ifc_say_assimp(struct scene_build *b, const struct ifc_records *records, bool refuse, const char *why,
-                   struct sh_err *err)
+int ifc_say_assimp(struct scene_build *b, const struct ifc_product *product, size_t n_products, bool refuse,
+                   const char *why, struct sh_err *err)
 {
-    struct lines l = {b, records, MISREAD, .text = "Assimp is known to read their shapes wrong, without a message"};
+    struct lines l = {b, product, n_products, MISREAD,
+                      .text = "Assimp is known to read their shapes wrong, without a message"};
     const struct ifc_product *first = count_group(&l);
     if (first != NULL && refuse)
         return build_fail(

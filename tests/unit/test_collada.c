@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+/* Materials of meshes that Assimp reads, on Collada: where texture coordinates lie, colours,
+ * transparency, and what is said of the rest. */
+#include <math.h>
+
+#include "tests/unit/scene_files.h"
+
+/* A square of two triangles, z up, which Assimp turns to y up. Slots: the diffuse part, and the rest of the effect. */
+static const char DAE[] =
+    "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+    "<asset><unit meter=\"1\"/><up_axis>Z_UP</up_axis></asset>"
+    "<library_images><image id=\"i\"><init_from>m.png</init_from></image></library_images>"
+    "<library_effects><effect id=\"e\"><profile_COMMON>"
+    "<newparam sid=\"s\"><surface type=\"2D\"><init_from>i</init_from></surface></newparam>"
+    "<newparam sid=\"p\"><sampler2D><source>s</source></sampler2D></newparam>"
+    "<technique sid=\"c\"><lambert><diffuse>%s</diffuse>%s</lambert></technique></profile_COMMON></effect>"
+    "</library_effects>"
+    "<library_materials><material id=\"m\" name=\"paint\"><instance_effect url=\"#e\"/></material></library_materials>"
+    "<library_geometries><geometry id=\"g\"><mesh>"
+    "<source id=\"gp\"><float_array id=\"gpa\" count=\"12\">0 0 0 1 0 0 1 1 0 0 1 0</float_array>"
+    "<technique_common><accessor source=\"#gpa\" count=\"4\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
+    "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source>"
+    "<source id=\"gu\"><float_array id=\"gua\" count=\"8\">0 0 1 0 1 1 0 1</float_array>"
+    "<technique_common><accessor source=\"#gua\" count=\"4\" stride=\"2\"><param name=\"S\" type=\"float\"/>"
+    "<param name=\"T\" type=\"float\"/></accessor></technique_common></source>"
+    "<vertices id=\"gv\"><input semantic=\"POSITION\" source=\"#gp\"/></vertices>"
+    "<triangles count=\"2\" material=\"m\"><input semantic=\"VERTEX\" source=\"#gv\" offset=\"0\"/>"
+    "<input semantic=\"TEXCOORD\" source=\"#gu\" offset=\"0\" set=\"0\"/><p>0 1 2 0 2 3</p></triangles>"
+    "</mesh></geometry></library_geometries>"
+    "<library_visual_scenes><visual_scene id=\"v\"><node id=\"n\"><instance_geometry url=\"#g\"><bind_material>"
+    "<technique_common><instance_material symbol=\"m\" target=\"#m\"><bind_vertex_input semantic=\"UV\" "
+    "input_semantic=\"TEXCOORD\" input_set=\"0\"/></instance_material></technique_common></bind_material>"
+    "</instance_geometry></node></visual_scene></library_visual_scenes>"
+    "<scene><instance_visual_scene url=\"#v\"/></scene></COLLADA>";
+
+#define TEXTURE(more) "<texture texture=\"p\" texcoord=\"UV\">" more "</texture>"
+#define MAYA(lay)     "<extra><technique profile=\"MAYA\">" lay "</technique></extra>"
+
+static struct scene *load_dae(const char *diffuse, const char *rest)
+{
+    static char text[8192];
+    struct scene *scene;
+    struct sh_err err;
+    snprintf(text, sizeof text, DAE, diffuse, rest);
+    const struct scene_mesh_spec spec = {
+        .file = write_text("m.dae", text), .up = SCENE_UP_Y, .scale = 1, .textures = 1};
+    if (load_spec(&spec, 1, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    unlink(path);
+    assert_int_equal(scene->n_triangles, 2);
+    return scene;
+}
+
+/* Each coordinate is scaled, then shifted. */
+static void expect_uv(const struct scene *s, double scale_x, double scale_y, double shift_x, double shift_y)
+{
+    for (uint32_t i = 0; i < 2; i++)
+        for (int c = 0; c < 3; c++) {
+            const double *v = s->vertex_m[s->triangle[i][c]];
+            assert_true(fabs((double)s->uv[i][c][0] - (scale_x * v[0] + shift_x)) < 1e-6);
+            assert_true(fabs((double)s->uv[i][c][1] - (scale_y * v[1] + shift_y)) < 1e-6);
+        }
+}
+
+static void coordinates_are_scaled_and_shifted(void **state)
+{
+    (void)state;
+    struct scene *s = load_dae(TEXTURE(""), "");
+    assert_int_equal(s->surface[0].texture, 1);
+    expect_uv(s, 1, 1, 0, 0);
+    scene_free(s);
+    s = load_dae(TEXTURE(MAYA("<repeatU>2</repeatU><repeatV>0.5</repeatV>"
+                              "<offsetU>0.25</offsetU><offsetV>0.125</offsetV>")),
+                 "");
+    expect_uv(s, 2, 0.5, 0.25, 0.125);
+    assert_null(strstr(warnings, "rotated"));
+    scene_free(s);
+    s = load_dae(TEXTURE(MAYA("<repeatU>2</repeatU><rotateUV>30</rotateUV>")), "");
+    assert_non_null(
+        strstr(warnings, "m.dae: the textures of 1 meshes are rotated: they are read without the rotation"));
+    scene_free(s);
+}
+
+/* Colours of Collada are sRGB. A colour with a part beyond 1 is left out. */
+static void colours_and_transparency(void **state)
+{
+    (void)state;
+    struct scene *s = load_dae("<color>0.25 0.5 0.75 1</color>", "");
+    assert_string_equal(s->surface[0].material, "paint");
+    assert_int_equal(s->surface[0].has_colour, 1);
+    assert_true(s->surface[0].colour[0] == 0.25f && s->surface[0].colour[1] == 0.5f &&
+                s->surface[0].colour[2] == 0.75f);
+    assert_true(s->surface[0].clear == 0);
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
+    s = load_dae("<color>1 1 1 1</color>", "<transparent opaque=\"A_ONE\"><color>1 1 1 1</color></transparent>"
+                                           "<transparency><float>0.25</float></transparency>");
+    assert_true(fabs((double)s->surface[0].clear - 0.75) < 1e-6); /* A_ONE: 1 is opaque */
+    scene_free(s);
+    static const char *const beyond[] = {"<color>1.5 0 0 1</color>", "<color>0 1.5 0 1</color>",
+                                         "<color>0 0 -0.5 1</color>"};
+    for (int k = 0; k < 3; k++) {
+        s = load_dae(beyond[k], "");
+        assert_int_equal(s->surface[0].has_colour, 0);
+        assert_non_null(
+            strstr(warnings, "m.dae: 1 material with a colour beyond 0 to 1, which is left out; the first is 'paint'"));
+        assert_int_equal(n_warnings, 1);
+        scene_free(s);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(coordinates_are_scaled_and_shifted),
+        cmocka_unit_test(colours_and_transparency),
+    };
+    return cmocka_run_group_tests_name("collada", tests, make_folder, remove_folder);
+}

@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: MIT */
+/* Numbers of accessors by the table of glTF 2.0 (3.11, "Animations": normalized integers), and matrices of nodes. */
+#include <math.h>
+#include <string.h>
+
+#include "core/import/gltf/gltf_accessor.h"
+#include "core/import/gltf/gltf_matrix.h"
+#include "tests/common/cases.h"
+
+/* Bytes of elements lie in two components each, little-endian, with a gap after each element. */
+static void numbers_of_each_type(void **state)
+{
+    (void)state;
+    static const struct {
+        enum gltf_component component;
+        size_t size;
+        uint64_t bits[4];
+        double plain[4], normalized[4], step;
+    } rows[] = {
+        {GLTF_I8, 1, {0x80, 0x81, 0, 0x7f}, {-128, -127, 0, 127}, {-1, -1, 0, 1}, 1 / 127.0},
+        {GLTF_U8, 1, {0, 51, 128, 255}, {0, 51, 128, 255}, {0, 0.2, 128 / 255.0, 1}, 1 / 255.0},
+        {GLTF_I16, 2, {0x8000, 0x8001, 1, 0x7fff}, {-32768, -32767, 1, 32767}, {-1, -1, 1 / 32767.0, 1}, 1 / 32767.0},
+        {GLTF_U16, 2, {0, 13107, 0x8000, 0xffff}, {0, 13107, 32768, 65535}, {0, 0.2, 32768 / 65535.0, 1}, 1 / 65535.0},
+        {GLTF_U32,
+         4,
+         {0, 858993459, 1, 0xffffffff},
+         {0, 858993459, 1, 4294967295},
+         {0, 0.2, 1 / 4294967295.0, 1},
+         1 / 4294967295.0},
+        {GLTF_F32, 4, {0x3f800000, 0xbf000000, 0, 0x42280000}, {1, -0.5, 0, 42}, {1, -0.5, 0, 42}, 0},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        uint8_t data[40];
+        struct gltf_view v = {.data = data,
+                              .stride = 2 * rows[i].size + 3,
+                              .count = 2,
+                              .n_components = 2,
+                              .component = rows[i].component};
+        memset(data, 0xee, sizeof data);
+        for (size_t k = 0; k < 4; k++)
+            memcpy(data + k / 2 * v.stride + k % 2 * rows[i].size, &rows[i].bits[k], rows[i].size);
+        for (int normalized = 0; normalized < 2; normalized++) {
+            v.is_normalized = normalized;
+            for (uint32_t k = 0; k < 4; k++) {
+                const double want = (normalized ? rows[i].normalized : rows[i].plain)[k],
+                             got = gltf_value(&v, k / 2, k % 2);
+                if (!(fabs(got - want) < 1e-15)) fail_msg("%zu, %d, %u: %.17g, not %.17g", i, normalized, k, got, want);
+            }
+            assert_true(gltf_step(&v) == (normalized || rows[i].step == 0 ? rows[i].step : 1));
+        }
+        v.data = NULL;
+        assert_true(gltf_value(&v, 1, 1) == 0);
+    }
+}
+
+/* A quarter turn about z, after a scale, before a shift: by hand. */
+static void matrices_of_nodes(void **state)
+{
+    (void)state;
+    static const double shift[3] = {10, 20, 30}, scale[3] = {2, 3, 4}, v[3] = {1, 1, 1};
+    static const double none[4] = {0, 0, 0, 0}, large[4] = {0, 0, 3, 3};
+    static const double turn[3][4] = {
+        {0, 0, M_SQRT1_2, M_SQRT1_2}, {M_SQRT1_2, 0, 0, M_SQRT1_2}, {0, M_SQRT1_2, 0, M_SQRT1_2}};
+    static const double want[3][3] = {{10 - 3, 20 + 2, 30 + 4}, {10 + 2, 20 - 4, 30 + 3}, {10 + 4, 20 + 3, 30 - 2}};
+    gltf_matrix m, n, both;
+    double out[3], twice[3];
+    for (int axis = 0; axis < 3; axis++) {
+        assert_true(gltf_compose(shift, turn[axis], scale, m));
+        gltf_apply((const double(*)[4])m, v, out);
+        for (int k = 0; k < 3; k++)
+            assert_true(fabs(out[k] - want[axis][k]) < 1e-12);
+    }
+    assert_false(gltf_compose(shift, none, scale, m));
+    assert_true(gltf_compose(shift, large, scale, m)); /* quaternions need no length of 1 */
+    gltf_apply((const double(*)[4])m, v, out);
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(out[k] - want[0][k]) < 1e-12);
+    assert_true(gltf_compose(scale, turn[1], shift, n));
+    gltf_multiply((const double(*)[4])n, (const double(*)[4])m, both); /* m first */
+    gltf_apply((const double(*)[4])n, out, twice);
+    gltf_apply((const double(*)[4])both, v, out);
+    for (int k = 0; k < 3; k++)
+        assert_true(fabs(out[k] - twice[k]) < 1e-10);
+    gltf_multiply((const double(*)[4])n, (const double(*)[4])m, n); /* in place */
+    assert_memory_equal(n, both, sizeof both);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_each_type), cmocka_unit_test(matrices_of_nodes)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
