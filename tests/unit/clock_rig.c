@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+#include "tests/unit/clock_rig.h"
+
+#include "firmware_sim/base/clock.h"
+
+int64_t clock_rig_ns;
+
+int64_t clock_now_ns(void)
+{
+    return clock_rig_ns;
+}
+
+void clock_sleep_until_ns(int64_t t_ns)
+{
+    if (t_ns > clock_rig_ns) clock_rig_ns = t_ns;
+}
