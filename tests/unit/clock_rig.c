@@ -3,11 +3,12 @@
 
 #include "firmware_sim/base/clock.h"
 
-int64_t clock_rig_ns;
+int64_t clock_rig_ns, clock_rig_each_ns;
 
 int64_t clock_now_ns(void)
 {
-    return clock_rig_ns;
+    clock_rig_ns += clock_rig_each_ns;
+    return clock_rig_ns - clock_rig_each_ns;
 }
 
 void clock_sleep_until_ns(int64_t t_ns)

@@ -7,5 +7,6 @@
 #include <stdint.h>
 
 extern int64_t clock_rig_ns;
+extern int64_t clock_rig_each_ns; /* each reading lets so much time pass after it; 0 at first */
 
 #endif
