@@ -60,7 +60,8 @@ static void say_lock(int held)
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len)
 {
     const struct turn *turn = take_turn();
-    if (err_len != 256 || err == NULL) say("LEN ");
+    (void)err; /* nobody reads why the head is not there */
+    (void)err_len;
     say("open:%s=%d ", source, turn->rc);
     if (turn->rc == SCANHEAD_OK) *out = handle;
     return turn->rc;
