@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 extern int64_t clock_rig_ns;
+extern double clock_rig_cpu_s;    /* what clock_cpu_s says */
 extern int64_t clock_rig_each_ns; /* each reading lets so much time pass after it; 0 at first */
 
 #endif
