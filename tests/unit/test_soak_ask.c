@@ -14,6 +14,7 @@
 #include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/command/head.h"
 #include "tests/unit/clock_rig.h"
+#include "tests/unit/lock_rig.h"
 
 #define MS INT64_C(1000000)
 
@@ -38,8 +39,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
     assert_int_equal(reply_len, SOAK_REPLY_LEN);
     assert_int_equal(link.ask.active, 1);
     assert_true(link.ask.n == 0 && link.ask.echoes == 0 && link.ask.others == 0 && link.ask.bad_bytes == 0);
-    assert_int_equal(pthread_mutex_trylock(&link.lock), 0); /* faults are noted meanwhile */
-    pthread_mutex_unlock(&link.lock);
+    assert_int_equal(lock_rig_held, 0); /* faults are noted meanwhile */
     if (n_asked == 0) {
         memcpy(link.ask.note, notes, sizeof notes);
         link.ask.n = n_notes;
@@ -73,13 +73,6 @@ static void begin(int rc, const char *reply, int64_t after_ns)
     n_asked = 0;
 }
 
-static void lock_is_free(void)
-{
-    assert_int_equal(pthread_mutex_trylock(&link.lock), 0);
-    pthread_mutex_unlock(&link.lock);
-    assert_int_equal(link.ask.active, 0);
-}
-
 static void again(int rc, const char *reply)
 {
     n_asked = 0;
@@ -89,8 +82,8 @@ static void again(int rc, const char *reply)
 
 static void ask(void)
 {
-    soak_ask_next(&link);
-    lock_is_free();
+    TAKES(2, (soak_ask_next(&link), 0));
+    assert_int_equal(link.ask.active, 0);
 }
 
 static void expect_counts(unsigned n, unsigned answered, unsigned timeouts, unsigned wrong, unsigned odd)
@@ -183,8 +176,8 @@ static void a_scan_is_started(void **unused)
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         begin(SCANHEAD_OK, rows[i].state, 0);
         script[1] = (struct answer_is){SCANHEAD_OK, rows[i].answer, 0};
-        soak_ask_scan(&link);
-        lock_is_free();
+        TAKES(4, (soak_ask_scan(&link), 0));
+        assert_int_equal(link.ask.active, 0);
         snprintf(expected, sizeof expected, "HEAD:STATe? %s", rows[i].then);
         assert_string_equal(asked, expected);
         assert_string_equal(state, rows[i].state);
