@@ -192,6 +192,7 @@ int soak_clients_open(struct soak *of, const struct loop *on, uint32_t only, str
         of->link[i].usable = i == 0;
     if (on != loop) say("CLIENTS ");
     if (only != 0) say("only%u_", only);
+    if (of->faults.n != 0) say("faults%u_", of->faults.n);
     return call("clients", err);
 }
 

@@ -209,6 +209,22 @@ static void a_laser_that_is_off(void **state)
     assert_int_equal(at->row[FAULT_LASER_OFF].noticed, 1);
 }
 
+/* Points and the follower's states say nothing of other faults. */
+static void other_faults(void **state)
+{
+    const struct scanhead_frame ptp = {.type = SCANHEAD_EVENT, .event = SCANHEAD_EV_PTP, .t_ns = 20 * MS};
+    static const enum fault_kind kinds[] = {FAULT_SELF_TEST, FAULT_CLOCK_JUMP, FAULT_PPS_LOST};
+    (void)state;
+    points(5);
+    for (int i = 0; i < 3; i++) {
+        fault_is(&(struct fault){.kind = kinds[i]}, 10, 0);
+        points(15);
+        soak_saw_inside(at, &ptp);
+        assert_int_equal(at->row[kinds[i]].noticed, 0);
+        assert_int_equal(at->n_moments, i + 1);
+    }
+}
+
 /* A scan that begins anew shows that power was away. */
 static void pulses_begin_anew(void **state)
 {
@@ -238,6 +254,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(rates, make, end),
         cmocka_unit_test_setup_teardown(scans_that_begin_with_a_fault, make, end),
         cmocka_unit_test_setup_teardown(a_laser_that_is_off, make, end),
+        cmocka_unit_test_setup_teardown(other_faults, make, end),
         cmocka_unit_test_setup_teardown(pulses_begin_anew, make, end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -189,6 +189,10 @@ static void wrong_use(void **state)
     assert_string_equal(on_err, "scanhead: no link 3\n");
     does(&app_soak, "c.yaml --link 2 --duration 0.1 --quiet", 0);
     has(trace, " only2_clients ");
+    make_soak_run(NULL);
+    write_text("f.yaml", "faults: [{kind: drop, at: 5}, {kind: drop, at: 7}]\n");
+    does(&app_soak, "c.yaml --scenario f.yaml --duration 0.1 --quiet", 0);
+    has(trace, " faults2_clients ");
 }
 
 int main(void)
