@@ -384,6 +384,27 @@ static void a_head_that_is_gone(void **state)
     expect("HEAD:STAT?@0 prepare0@0 SCAN:STAR@0 reattach@1001 reattach@2001 ");
 }
 
+/* A scan counts as broken once, however often the head was away in it. */
+static void scans_that_are_broken(void **state)
+{
+    static const struct turn script[] = {POINTS(1, 1), {.rc = SCANHEAD_ELOST}, {.rc = SCANHEAD_ELOST}, POINTS(1, 2),
+                                         OVER(1),      POINTS(1, 1),           {.rc = SCANHEAD_ELOST}, OVER(1),
+                                         LAST};
+    static const struct reply_is some[] = {{"HEAD:STAT?", "idle", 0},     {"HEAD:STAT?", "scanning", 0},
+                                           {"HEAD:STAT?", "scanning", 0}, {"HEAD:STAT?", "idle", 0},
+                                           {"HEAD:STAT?", "scanning", 0}, {NULL, NULL, 0}};
+    (void)state;
+    turns = script;
+    replies = some;
+    options.first_station = 1;
+    options.last_station = 2;
+    options.replug_s = 5;
+    options.second = NULL;
+    back_ms = 1;
+    run_it(SH_OK);
+    assert_true(result.replugs == 3 && result.broken_scans == 2 && result.counts.scans == 2);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -399,6 +420,7 @@ int main(void)
         cmocka_unit_test_setup(shares, make_recording),
         cmocka_unit_test_setup(a_listener, make_recording),
         cmocka_unit_test_setup(a_head_that_is_gone, make_recording),
+        cmocka_unit_test_setup(scans_that_are_broken, make_recording),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
