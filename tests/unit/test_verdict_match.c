@@ -228,6 +228,9 @@ static void test_rounding(void **state)
         {{{1.23457, 12.3457, -123.457}, {0.123457, 2, 3}}, 1e-3}, /* %g has six digits */
         {{{5.0, 6.0, 7.0}, {8.0, 9.0, 4.0}}, 1.0},
         {{{0.0, 0.0, 0.0}, {NAN, NAN, NAN}}, 1.0},
+        {{{1.2345, 2.0, 3.0}, {4.0, 5.0, 6.0}}, 1e-4}, /* any of them has the most digits */
+        {{{1.0, 2.0, 3.25}, {4.0, 5.0, 6.0}}, 1e-2},
+        {{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.125}}, 1e-3},
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         double points[2][3];
@@ -237,6 +240,12 @@ static void test_rounding(void **state)
         cloud.is_text = 0;
         cloud.count_m = 2e-6;
         assert_true(fabs(match_unit_m(&cloud, 1e3) - 2e-6) <= 0.0);
+    }
+    for (int i = 0; i < 6; i++) { /* the largest coordinate, of whichever point, has 2^-14 m as its last place */
+        double points[2][3] = {{1, 2, 3}, {4, 5, 6}};
+        points[i / 3][i % 3] = i % 2 == 0 ? 1000.0 : -1000.0;
+        const struct cloud cloud = {.n = 2, .xyz_m = points, .is_single = 1};
+        assert_true(fabs(match_unit_m(&cloud, 1e3) / (2.0 / 16384.0) - 1.0) < 0.03); /* 1000 is not quite 2^10 */
     }
 }
 
