@@ -21,34 +21,14 @@
 struct record_job job;
 struct config *cfg;
 struct sh_err err;
-char trace[1024], warned[512], *said;
-const char *fails, *stations, *order;
+char warned[512], *said;
+const char *stations, *order;
 struct recording_result gets;
 int recording_rc, is_complete, open_rc, appears_ms, stop_ms, is_stopped, is_recording, gave_up;
 
 static struct scanhead *const handle = (struct scanhead *)&job;
 static struct site_station stations_of[3];
 static struct site site = {.n_stations = 3, .station = stations_of};
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
-static int call(struct sh_err *e, const char *format, ...)
-{
-    char name[64];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(name, sizeof name, format, args);
-    va_end(args);
-    say("%s ", name);
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(e, SH_EIO, "%s failed", name) : SH_OK;
-}
 
 /* ---- the program around it */
 

@@ -6,12 +6,12 @@
 
 #include "firmware_sim/app/studio/record/job.h"
 #include "firmware_sim/config/config.h"
+#include "tests/unit/trace_rig.h"
 
 extern struct record_job job;
 extern struct config *cfg;
 extern struct sh_err err;
-extern char trace[1024], warned[512];
-extern const char *fails;            /* the call that fails; NULL: none */
+extern char warned[512];
 extern struct recording_result gets; /* what the recording has in the end */
 extern int recording_rc, is_complete;
 extern int open_rc, appears_ms; /* of the source, before it appears */

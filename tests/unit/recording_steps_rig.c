@@ -20,7 +20,7 @@ const struct reply_is *replies;
 struct recording_options options;
 struct recording_result result;
 struct sh_err err;
-char trace[4096], warned[512], progress[512];
+char warned[512], progress[512];
 struct scanhead_stats stats;
 struct scanhead_info info;
 int stop_ms, back_ms, rings;
@@ -28,20 +28,6 @@ double scan_s;
 
 static struct scanhead *const handle = (struct scanhead *)&options;
 static int used[16]; /* replies, by their place */
-
-static void add_to(char *to, size_t cap, const char *format, va_list args)
-{
-    const size_t n = strlen(to);
-    vsnprintf(to + n, cap - n, format, args);
-}
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    add_to(trace, sizeof trace, format, args);
-    va_end(args);
-}
 
 static int now(void)
 {

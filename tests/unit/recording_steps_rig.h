@@ -5,6 +5,7 @@
 #define TESTS_UNIT_RECORDING_STEPS_RIG_H
 
 #include "firmware_sim/app/studio/record/recording.h"
+#include "tests/unit/trace_rig.h"
 
 /* The next wait for a frame takes ms, and gives rc and the frame. */
 struct turn {
@@ -22,7 +23,7 @@ extern const struct reply_is *replies;
 extern struct recording_options options;
 extern struct recording_result result;
 extern struct sh_err err;
-extern char trace[4096], warned[512], progress[512];
+extern char warned[512], progress[512];
 extern struct scanhead_stats stats;
 extern struct scanhead_info info;
 extern int stop_ms, back_ms; /* a signal comes; a head that is gone is back; 0: never */

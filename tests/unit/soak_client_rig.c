@@ -21,18 +21,8 @@ struct config cfg;
 struct soak soak;
 struct soak_link *const at = &soak.link[0];
 struct scanhead *const handle = (struct scanhead *)&cfg;
-char trace[2048];
 const struct turn *turns;
 uint64_t frames_in_stats, reader_lost, top;
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
 
 static int64_t now_ms(void)
 {

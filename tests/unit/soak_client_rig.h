@@ -11,6 +11,7 @@
 #include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/config/config.h"
+#include "tests/unit/trace_rig.h"
 
 #define MS INT64_C(1000000)
 
@@ -18,7 +19,6 @@ extern struct config cfg;
 extern struct soak soak;
 extern struct soak_link *const at; /* the first link */
 extern struct scanhead *const handle;
-extern char trace[2048];
 
 /* A call of scanhead_open, scanhead_reattach, scanhead_next or soak_datagrams_step takes ms, and gives rc. Then `after`
  * happens, unless it is NULL. type: of the frame. rc 1: the soak is over. */

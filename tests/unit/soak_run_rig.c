@@ -19,8 +19,6 @@
 
 #define MS INT64_C(1000000)
 
-char trace[2048];
-const char *fails;
 struct times when;
 int is_bad;
 
@@ -31,24 +29,9 @@ static struct device *const device = (struct device *)&site;
 static struct loop *const loop = (struct loop *)&soak;
 static struct fault_board *const board = (struct fault_board *)&trace;
 
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
 static int now(void)
 {
     return (int)(clock_rig_ns / MS);
-}
-
-static int call(const char *name, struct sh_err *err)
-{
-    say("%s ", name);
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(err, SH_EIO, "%s failed", name) : SH_OK;
 }
 
 int poll(struct pollfd *fds, nfds_t n, int timeout_ms)
@@ -73,13 +56,13 @@ int site_load(const struct config *of, const struct sh_report *report, struct si
     if (report != &app_report_stderr || of->head.settings.frames != 7) say("LOAD ");
     cfg = of;
     *out = &site;
-    return call("site", err);
+    return call(err, "site");
 }
 
 int site_open_sights(struct site *of, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err)
 {
     if (of != &site || first != 0 || n != 3 || report != &app_report_stderr) say("SIGHTS ");
-    return call("sights", err);
+    return call(err, "sights");
 }
 
 void site_free(struct site *of)
@@ -91,7 +74,7 @@ int device_create(const struct site *of, const struct device_options *o, struct 
 {
     if (of != &site || o->report != &app_report_stderr || cfg->head.settings.frames != 0) say("DEVICE ");
     say("%s%s", o->start ? "starting_" : "", o->truth != NULL ? "truth_" : "");
-    const int rc = call("device", err);
+    const int rc = call(err, "device");
     if (rc == SH_OK) *out = device;
     return rc;
 }
@@ -109,7 +92,7 @@ struct fault_board *device_faults(const void *of)
 int device_close_journal(void *of, struct sh_err *err)
 {
     if (of != device) say("JOURNAL ");
-    return call("journal", err);
+    return call(err, "journal");
 }
 
 void fault_board_listen(struct fault_board *of, void (*heard)(void *ctx, const struct fault_note *note), void *ctx)
@@ -128,7 +111,7 @@ int loop_create(const struct site *of, struct device *on, const struct loop_opti
 {
     if (of != &site || on != device || o->extra != &soak->clean.link || !o->hash) say("LOOP ");
     if (o->report != &app_report_stderr) say("REPORT ");
-    const int rc = call("loop", err);
+    const int rc = call(err, "loop");
     if (rc == SH_OK) *out = loop;
     return rc;
 }
@@ -136,7 +119,7 @@ int loop_create(const struct site *of, struct device *on, const struct loop_opti
 int loop_start(struct loop *of, struct sh_err *err)
 {
     if (of != loop) say("START ");
-    return call("run", err);
+    return call(err, "run");
 }
 
 void loop_end(struct loop *of)
@@ -161,13 +144,13 @@ int soak_clean_open(struct soak *of, struct sh_err *err)
     soak = of;
     pthread_mutex_init(&soak->clean.lock, NULL);
     if (cfg->n_links != of->n_links) say("beside:%u ", cfg->n_links - of->n_links);
-    return call("clean", err);
+    return call(err, "clean");
 }
 
 int soak_clean_start(struct soak *of, struct sh_err *err)
 {
     if (of != soak) say("CLEAN ");
-    return call("read", err);
+    return call(err, "read");
 }
 
 void soak_clean_join(struct soak *of)
@@ -193,13 +176,13 @@ int soak_clients_open(struct soak *of, const struct loop *on, uint32_t only, str
     if (on != loop) say("CLIENTS ");
     if (only != 0) say("only%u_", only);
     if (of->faults.n != 0) say("faults%u_", of->faults.n);
-    return call("clients", err);
+    return call(err, "clients");
 }
 
 int soak_clients_start(struct soak *of, struct sh_err *err)
 {
     if (of != soak) say("CLIENTS ");
-    return call("connect", err);
+    return call(err, "connect");
 }
 
 void soak_clients_join(struct soak *of)

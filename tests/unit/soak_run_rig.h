@@ -5,6 +5,8 @@
 #ifndef TESTS_UNIT_SOAK_RUN_RIG_H
 #define TESTS_UNIT_SOAK_RUN_RIG_H
 
+#include "tests/unit/trace_rig.h"
+
 enum { NOT_EVER = 1000000000 };
 
 /* When, in ms: the head scans; all clients are done; they have seen the head's faults; the clean reader answers, or
@@ -13,8 +15,6 @@ struct times {
     int scans, done, seen, answers, breaks;
 };
 
-extern char trace[2048];
-extern const char *fails; /* the call that fails; NULL: none */
 extern struct times when;
 extern int is_bad; /* the verdict */
 

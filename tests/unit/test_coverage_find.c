@@ -15,6 +15,7 @@
 #include "core/pose.h"
 #include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/config/profile.h"
+#include "tests/unit/trace_rig.h"
 
 enum { MOST = 8 };
 
@@ -29,22 +30,12 @@ static struct coverage *const coverage = (struct coverage *)&result;
 static const struct sh_report report;
 
 static double estimate_m2[MOST], front[MOST], gain_m2[MOST]; /* by place; the last one: of a scan */
-static char trace[1024];
-static uint32_t looked; /* the place of the scan that waits */
+static uint32_t looked;                                      /* the place of the scan that waits */
 static int gains_fail, look_fails_at, n_looks;
 static double turned[3]; /* the last direction of the last estimate */
 static const struct cast_tripod *tripod;
 static struct cast_tripod seen_tripod;
 static double rotation[9];
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
 
 const struct config_profile *site_profile(const struct site *of)
 {

@@ -16,6 +16,7 @@
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/site/placement.h"
+#include "tests/unit/trace_rig.h"
 
 static struct config *cfg;
 static struct site site;
@@ -31,14 +32,8 @@ static struct config_station placed; /* as the place was looked for */
 static struct emitter emitter;       /* of the schedule; kind EMITTER_LINE: none */
 static uint64_t n_pulses;
 static struct site_tripod tripod; /* as the place has it */
-static const char *fails;
 static int serves, n_freed;
 static uint32_t n_cells;
-
-static int call(const char *name)
-{
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(&err, SH_EIO, "%s failed", name) : SH_OK;
-}
 
 struct site *sites_of(const struct sites *sites, uint32_t station)
 {
@@ -56,7 +51,7 @@ int config_apply_settings(struct config *to, const struct head_settings *setting
 {
     assert_true(to != cfg && e == &err);
     applied = *settings;
-    return call("settings");
+    return attempt(e, "settings");
 }
 
 void site_fill_spec(const struct site *of, const struct head_settings *settings, struct schedule_spec *spec)
@@ -82,7 +77,7 @@ int placement_find(const struct config *of, uint32_t i, const struct placement_a
     assert_true(of != cfg && i == 1 && anchor->known == site.anchor.known && bvh == site.bvh && e == &err);
     placed = of->station[1];
     *out = (struct placement){.position_m = {100, 200, 300}, .rotation = {1, 2, 3, 4, 5, 6, 7, 8, 9}};
-    return call("place");
+    return attempt(e, "place");
 }
 
 int site_tripod_at(const struct site *of, uint32_t station, const double position_m[3], struct site_tripod *out,
@@ -90,7 +85,7 @@ int site_tripod_at(const struct site *of, uint32_t station, const double positio
 {
     assert_true(of != &site && station == 1 && position_m[2] == 300 && e == &err);
     *out = tripod;
-    return call("tripod");
+    return attempt(e, "tripod");
 }
 
 void site_free_tripod(struct site_tripod *of)
@@ -115,7 +110,7 @@ int coverage_look(struct coverage *of, const struct coverage_scan *scan, const c
     scan->take(scan->take_ctx, hits, 2);
     scan->take(scan->take_ctx, hits + 2, 1);
     *pulses = (struct coverage_pulses){.cast = 11, .met = 12, .hits = 13, .front = 14};
-    return call("scan");
+    return attempt(e, "scan");
 }
 
 uint32_t coverage_cells(const struct coverage *of)

@@ -15,6 +15,7 @@
 #include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/app/studio/preview/inside.h"
 #include "firmware_sim/config/profile.h"
+#include "tests/unit/trace_rig.h"
 
 enum { PLACES = 4 };
 
@@ -28,26 +29,9 @@ static uint64_t cells[2][2];
 static struct coverage *const coverage = (struct coverage *)&scene;
 static struct web_body body;
 static struct sh_err err;
-static char trace[512];
-static const char *fails;
 static uint32_t n_cells, n_rounds;
 static double front[PLACES], grid_m;
 static struct coverage_pulses sum;
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
-static int call(const char *name, struct sh_err *e)
-{
-    say("%s ", name);
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(e, SH_EIO, "%s failed", name) : SH_OK;
-}
 
 const struct config_profile *site_profile(const struct site *site)
 {
@@ -93,7 +77,7 @@ int coverage_gains(const struct coverage *of, const struct coverage_directions *
     atomic_store(&places->cells[0], UINT64_C(1) << place);
     atomic_store(&places->cells[1], UINT64_C(16) << place);
     *gain = (struct coverage_gain){.gain_m2 = 1, .front = front[place]};
-    return call("gain", e);
+    return call(e, "gain");
 }
 
 int preview_site_open(const struct preview_work *of, const struct preview_request *r, struct preview_site **out,
@@ -104,7 +88,7 @@ int preview_site_open(const struct preview_work *of, const struct preview_reques
     assert_non_null(*out);
     (*out)->site.scene = &scene;
     (*out)->site.n_stations = 2;
-    return call("site", e);
+    return call(e, "site");
 }
 
 int coverage_next_open(const struct coverage_next_options *o, const struct coverage_result *result,
@@ -126,7 +110,7 @@ int coverage_next_open(const struct coverage_next_options *o, const struct cover
     assert_true(next->place != NULL && next->round != NULL);
     for (int i = 0; i < PLACES; i++)
         next->place[i] = (struct coverage_next_place){.position_m = {i, 10, 20}, .heading_deg = 30 + i};
-    return call("open", e);
+    return call(e, "open");
 }
 
 int coverage_next_find(struct coverage_finder *finder, struct coverage *of, struct sh_err *e)
@@ -135,7 +119,7 @@ int coverage_next_find(struct coverage_finder *finder, struct coverage *of, stru
     finder->next->n_rounds = n_rounds;
     finder->next->round[0] = (struct coverage_next_round){
         .n_tried = 2, .tried = {{.place = 2, .gain_m2 = 7.5}, {.place = 3, .gain_m2 = 4}}, .none_m2 = 1.25};
-    return call("find", e);
+    return call(e, "find");
 }
 
 void coverage_next_free(struct coverage_next *next, struct coverage_finder *finder)

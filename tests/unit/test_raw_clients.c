@@ -18,31 +18,17 @@
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/record/raw_talk.h"
 #include "tests/unit/clock_rig.h"
+#include "tests/unit/trace_rig.h"
 
 #define MS INT64_C(1000000)
 
 enum { MOST = 16 };
 
 static struct raw r;
-static char trace[1024], warned[512];
-static const char *fails;
+static char warned[512];
 static int n_clients, n_connected, appears_ms, stop_ms, open_rc, work_rc;
 static struct talk *talks[MOST + 4];
 static int n_talks;
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
-static int call(const char *name, struct sh_err *err)
-{
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(err, SH_EIO, "%s failed", name) : SH_OK;
-}
 
 static void warn(void *ctx, const char *text)
 {
@@ -87,7 +73,7 @@ void stamped_enable(int fd)
 int socket_open(const struct socket_place *place, int *fd, char *name, size_t name_len, struct sh_err *err)
 {
     say("listen:%s:%s:%d ", place->what, place->host, place->port);
-    *fd = call("listen", err) == SH_OK ? 77 : -1;
+    *fd = attempt(err, "listen") == SH_OK ? 77 : -1;
     snprintf(name, name_len, "127.0.0.1:9000");
     return *fd >= 0 ? SH_OK : SH_EIO;
 }
@@ -127,7 +113,7 @@ int capture_add_interface(struct capture *capture, const char *name, const char 
 {
     assert_true(capture == &r.capture && strcmp(name, "tcp:there") == 0);
     assert_string_equal(comment, "TCP connections that scanhead had, as rebuilt frames; times are the kernel's.");
-    return call("interface", err);
+    return attempt(err, "interface");
 }
 
 /* ---- connections */
@@ -156,7 +142,7 @@ int talk_wait_for(const struct talk *talk, struct pollfd *fds, int *timeout_ms)
 int talk_push(struct talk *talk, struct sh_err *err)
 {
     say("push%d ", talk->end[1].fd);
-    return call("push", err);
+    return attempt(err, "push");
 }
 
 int raw_pass_in_order(struct raw_input *const *input, int n, int most, struct sh_err *err)
@@ -172,7 +158,7 @@ int raw_pass_in_order(struct raw_input *const *input, int n, int most, struct sh
 int talk_finish(struct talk *talk, struct sh_err *err)
 {
     say("finish%d ", talk->end[1].fd);
-    return call("finish", err);
+    return attempt(err, "finish");
 }
 
 void talk_close(struct talk *talk)

@@ -15,12 +15,11 @@
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/record/raw.h"
 #include "tests/unit/clock_rig.h"
+#include "tests/unit/trace_rig.h"
 
 #define MS INT64_C(1000000)
 
 static struct raw r;
-static char trace[1024];
-static const char *fails;
 static int n_open, appears_ms, stop_ms;
 static int64_t utc_ns;
 
@@ -29,20 +28,6 @@ static int64_t times[2][4];
 static int n_taken[2];
 static uint64_t dropped[2];
 static uint32_t dropped_before[2]; /* the next datagram */
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
-static int call(const char *name, struct sh_err *err)
-{
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(err, SH_EIO, "%s failed", name) : SH_OK;
-}
 
 int app_interrupted(void)
 {
@@ -70,7 +55,7 @@ int stamped_open(const char *host, int port, struct stamped_socket *out, struct 
     say("open:%d ", port);
     if (port != 0) out->fd = 100 + n_open++;
     out->own_len = (socklen_t)port;
-    return port != 0 ? call("open", err) : SH_OK;
+    return port != 0 ? attempt(err, "open") : SH_OK;
 }
 
 void stamped_close(struct stamped_socket *socket)
@@ -88,7 +73,7 @@ int stamped_take(const struct stamped_socket *socket, void *buf, size_t room, st
 {
     const int k = socket->fd - 100;
     assert_int_equal(room, 65536);
-    if (times[k][n_taken[k]] == 0) return call("take", err);
+    if (times[k][n_taken[k]] == 0) return attempt(err, "take");
     *out = (struct stamped_datagram){
         .t_ns = times[k][n_taken[k]], .len = (size_t)(10 * ++n_taken[k]), .dropped = dropped_before[k]};
     out->from.ss_family = (sa_family_t)(1 + k);
@@ -122,7 +107,7 @@ int raw_write(struct raw *of, const struct capture_frame *f, size_t payload, str
     assert_true(of == &r && f->len == 42 + payload);
     say("%u:%c,%d>%d@%lld+%zu", f->interface, f->bytes[0], f->bytes[1], f->bytes[2], (long long)f->t_ns, payload);
     say(f->lost != 0 ? "-%llu " : " ", (unsigned long long)f->lost);
-    return call("write", err);
+    return attempt(err, "write");
 }
 
 int capture_add_interface(struct capture *capture, const char *name, const char *comment, struct sh_err *err)
@@ -130,7 +115,7 @@ int capture_add_interface(struct capture *capture, const char *name, const char 
     assert_string_equal(comment, "Datagrams that scanhead received, with rebuilt headers; times are the kernel's.");
     say("%s ", name);
     capture->n_interfaces++;
-    return call("interface", err);
+    return attempt(err, "interface");
 }
 
 int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t lost,
@@ -138,7 +123,7 @@ int capture_add_statistics(struct capture *capture, uint32_t interface, int64_t 
 {
     assert_ptr_equal(capture, &r.capture);
     say("%u@%lld:%llu-%llu ", interface, (long long)t_ns, (unsigned long long)received, (unsigned long long)lost);
-    return call("statistics", err);
+    return attempt(err, "statistics");
 }
 
 static void expect(const char *expected)

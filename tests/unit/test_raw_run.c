@@ -18,34 +18,19 @@
 #include "firmware_sim/app/studio/record/raw.h"
 #include "tests/unit/clock_rig.h"
 #include "tests/unit/output_rig.h"
+#include "tests/unit/trace_rig.h"
 
 #define MS INT64_C(1000000)
 
 static struct raw r;
-static char trace[4096], stats[512], progress[512], ready[128];
-static const char *fails; /* the call that fails */
+static char stats[512], progress[512], ready[128];
 static int packets_at[8]; /* ms, ended by 0: when packets come */
 static int n_came, stop_ms, over_ms, busy, poll_fails, shorter_ms;
 static uint64_t dropped;
 
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
 static int now(void)
 {
     return (int)(clock_rig_ns / MS);
-}
-
-static int call(const char *name, struct sh_err *err)
-{
-    say("%s ", name);
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(err, SH_EIO, "%s failed", name) : SH_OK;
 }
 
 /* ---- what surrounds the recording */
@@ -78,14 +63,14 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
 {
     assert_string_equal(path, "stats.json");
     keep_json(stats, sizeof stats, put, ctx);
-    return call("stats", err);
+    return call(err, "stats");
 }
 
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)
 {
     assert_int_equal(fd, 9);
     keep_json(ready, sizeof ready, put, ctx);
-    return call("ready", err);
+    return call(err, "ready");
 }
 
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err)
@@ -114,26 +99,26 @@ void stamped_close(struct stamped_socket *keeper)
 int capture_open(struct capture *capture, const char *path, struct sh_err *err)
 {
     assert_true(capture == &r.capture && strcmp(path, "a.pcapng") == 0);
-    return call("file", err);
+    return call(err, "file");
 }
 
 int capture_add(struct capture *capture, const struct capture_frame *frame, struct sh_err *err)
 {
     assert_int_equal(frame->len, 3);
     capture->packets++;
-    return call("add", err);
+    return call(err, "add");
 }
 
 int capture_save(struct capture *capture, struct sh_err *err)
 {
     assert_ptr_equal(capture, &r.capture);
-    return call("save", err);
+    return call(err, "save");
 }
 
 int capture_close(struct capture *capture, int keep, struct sh_err *err)
 {
     assert_ptr_equal(capture, &r.capture);
-    return call(keep ? "keep" : "drop", err);
+    return call(err, keep ? "keep" : "drop");
 }
 
 int poll(struct pollfd *fds, nfds_t n, int timeout_ms)
@@ -151,7 +136,7 @@ static int ops_open(struct raw *of, struct sh_err *err)
 {
     assert_ptr_equal(of, &r);
     strcpy(r.endpoint, "udp:here");
-    return call("open", err);
+    return call(err, "open");
 }
 
 static int ops_wait_for(struct raw *of, struct pollfd *fds, int *timeout_ms)
@@ -164,7 +149,7 @@ static int ops_wait_for(struct raw *of, struct pollfd *fds, int *timeout_ms)
 
 static int ops_work(struct raw *of, struct sh_err *err)
 {
-    if (call("work", err) != SH_OK) return SH_EIO;
+    if (call(err, "work") != SH_OK) return SH_EIO;
     if (over_ms != 0 && now() >= over_ms) r.over = 1;
     int n = 0;
     for (; packets_at[n_came] != 0 && packets_at[n_came] <= now(); n_came++, n++) {
@@ -180,13 +165,13 @@ static int ops_work(struct raw *of, struct sh_err *err)
 static int ops_finish(struct raw *of, struct sh_err *err)
 {
     assert_ptr_equal(of, &r);
-    return call("finish", err);
+    return call(err, "finish");
 }
 
 static int ops_check(const struct raw *of, struct sh_err *err)
 {
     assert_ptr_equal(of, &r);
-    return call("check", err);
+    return call(err, "check");
 }
 
 static void ops_put(struct json *json, const struct raw *of)

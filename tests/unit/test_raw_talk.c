@@ -15,6 +15,7 @@
 #include "drivers/socket/socket.h"
 #include "firmware_sim/app/studio/record/raw_talk.h"
 #include "tests/unit/clock_rig.h"
+#include "tests/unit/trace_rig.h"
 
 #define MS INT64_C(1000000)
 
@@ -22,7 +23,6 @@ enum { CLIENT, DEVICE };
 
 static struct raw r;
 static struct talk talk;
-static char trace[1024];
 static int64_t utc_ns;
 static int fails_at, n_written; /* the frame of that number, from 1, can't be written */
 
@@ -33,15 +33,6 @@ static struct end_is {
     ssize_t room[8];
     int writes;
 } ends[2];
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
 
 static void expect(const char *expected)
 {

@@ -16,6 +16,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 #include "tests/unit/clock_rig.h"
+#include "tests/unit/trace_rig.h"
 
 /* The scanners of five stations. A is that of the head. */
 static const char SCANNERS[] = "ABBAC";
@@ -24,29 +25,8 @@ enum { N = 5 };
 static struct config cfg;
 static struct heads *heads;
 static struct site site_of[3];
-static char trace[2048], progress[256];
-static const char *fails; /* the call that fails */
+static char progress[256];
 static int n_seconds;
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
-static int call(struct sh_err *err, const char *format, ...)
-{
-    char name[96];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(name, sizeof name, format, args);
-    va_end(args);
-    say("%s ", name);
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(err, SH_EIO, "%s failed", name) : SH_OK;
-}
 
 /* The number of a head, by its configuration, site or offline head. */
 static int of_cfg(const struct config *of)

@@ -18,11 +18,12 @@
 #include "drivers/record/outfile.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/record/files.h"
+#include "tests/unit/trace_rig.h"
 
 static struct record_files files;
 static struct sh_err err;
-static char trace[1024], warned[256];
-static const char *fails, *fails_too, *left; /* calls that fail; the file that an earlier recording left */
+static char warned[256];
+static const char *left; /* the file that an earlier recording left */
 static int n_spools;
 static double lows[4], highs[4];
 
@@ -38,28 +39,6 @@ static const struct recorder_ops OPS[] = {{.ending = ".ply", .track = {.wants_co
                                           {.ending = ".obj"},
                                           {.ending = ".las", .repair = is_repaired},
                                           {.ending = ".ptx", .repair = is_repaired}};
-
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
-static int call(struct sh_err *e, const char *format, ...)
-{
-    char name[400];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(name, sizeof name, format, args);
-    va_end(args);
-    say("%s ", name);
-    const int is_bad =
-        (fails != NULL && strcmp(fails, name) == 0) || (fails_too != NULL && strcmp(fails_too, name) == 0);
-    return is_bad ? sh_fail(e, SH_EIO, "%s failed", name) : SH_OK;
-}
 
 const struct recorder_ops *recorder_find(const char *path, struct sh_err *e)
 {

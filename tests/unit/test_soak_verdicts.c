@@ -11,10 +11,10 @@
 
 #include "firmware_sim/app/studio/verdict/verdict.h"
 #include "firmware_sim/config/config.h"
+#include "tests/unit/trace_rig.h"
 
 extern const struct app_command app_soak;
 
-static char trace[2048];
 static int n_runs, fails_at, fails_with; /* the run of that number, from 1; 0: none */
 static uint32_t found_in;                /* runs that have a finding: bit per number */
 
@@ -31,13 +31,11 @@ static const char *or_none(const char *text)
 /* All checks are passed but the first, which is not judged, and the last, which may be found. */
 int verdict_run(struct config *cfg, const struct verdict_options *o, struct verdict *v, struct sh_err *err)
 {
-    const size_t n = strlen(trace);
     n_runs++;
-    snprintf(trace + n, sizeof trace - n,
-             "%s: %s, file %s, folder %s, truth %s, %g s, %g s, %g s, %g m, link %u, "
-             "allowed %x, %u faults\n",
-             v->scenario, o->command, or_none(o->file), or_none(o->folder), or_none(o->truth), o->duration_s,
-             o->limit_s, o->grace_s, o->match_m, o->link, o->allowed, cfg->faults.n);
+    say("%s: %s, file %s, folder %s, truth %s, %g s, %g s, %g s, %g m, link %u, "
+        "allowed %x, %u faults\n",
+        v->scenario, o->command, or_none(o->file), or_none(o->folder), or_none(o->truth), o->duration_s, o->limit_s,
+        o->grace_s, o->match_m, o->link, o->allowed, cfg->faults.n);
     if (n_runs == fails_at) return sh_fail(err, fails_with, "the run failed");
     for (int i = 1; i < VERDICT_N_CHECKS; i++)
         v->check[i].state = VERDICT_PASSED;

@@ -26,8 +26,8 @@ struct config cfg;
 struct verdict_options options;
 struct verdict verdict;
 struct plan_of_run plan;
-char trace[2048], warned[512];
-const char *fails, *protocol, *short_of;
+char warned[512];
+const char *protocol, *short_of;
 struct checks seen;
 uint32_t must_ask;
 double match_m;
@@ -43,25 +43,9 @@ static struct loop *const loop = (struct loop *)&plan;
 static struct fault_board *const board = (struct fault_board *)&trace;
 static double xyz_m[9][3];
 
-static void say(const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    const size_t n = strlen(trace);
-    vsnprintf(trace + n, sizeof trace - n, format, args);
-    va_end(args);
-}
-
 static int now(void)
 {
     return (int)(clock_rig_ns / MS) - START_MS;
-}
-
-/* Says the call, and whether it is the one that fails. */
-static int call(const char *name, struct sh_err *err)
-{
-    say("%s ", name);
-    return fails != NULL && strcmp(fails, name) == 0 ? sh_fail(err, SH_EIO, "%s failed", name) : SH_OK;
 }
 
 static void warn(void *ctx, const char *text)
@@ -94,14 +78,14 @@ int site_load(const struct config *of, const struct sh_report *report, struct si
 {
     if (of != &cfg || report != &app_report_stderr || cfg.head.settings.frames != 7) say("LOAD ");
     *out = &site;
-    return call("site", err);
+    return call(err, "site");
 }
 
 int site_open_sights(struct site *of, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err)
 {
     if (of != &site || first != 0 || n != 3 || report != &app_report_stderr) say("SIGHTS ");
     if (cfg.head.settings.frames != 7) say("FRAMES ");
-    return call("sights", err);
+    return call(err, "sights");
 }
 
 void site_free(struct site *of)
@@ -114,7 +98,7 @@ int device_create(const struct site *of, const struct device_options *o, struct 
     if (of != &site || o->report != &app_report_stderr || o->truth != options.truth) say("DEVICE ");
     if (cfg.head.settings.frames != 0) say("FRAMES ");
     say(o->start ? "starting_" : "");
-    const int rc = call("device", err);
+    const int rc = call(err, "device");
     if (rc == SH_OK) *out = device;
     return rc;
 }
@@ -132,7 +116,7 @@ int64_t device_tick_ns(const void *of)
 int device_close_journal(void *of, struct sh_err *err)
 {
     if (of != device) say("JOURNAL ");
-    return call("journal", err);
+    return call(err, "journal");
 }
 
 struct fault_board *device_faults(const void *of)
@@ -156,7 +140,7 @@ int loop_create(const struct site *of, struct device *on, const struct loop_opti
 {
     if (of != &site || on != device || o->extra != &stream->link || o->observer != &watch->observer) say("LOOP ");
     if (o->report != &app_report_stderr) say("REPORT ");
-    const int rc = call("loop", err);
+    const int rc = call(err, "loop");
     if (rc == SH_OK) *out = loop;
     return rc;
 }
@@ -178,7 +162,7 @@ int loop_get_counts(const struct loop *of, uint32_t i, struct link_counts *count
 int loop_start(struct loop *of, struct sh_err *err)
 {
     if (of != loop) say("START ");
-    return call("run", err);
+    return call(err, "run");
 }
 
 void loop_end(struct loop *of)
@@ -204,13 +188,13 @@ int own_stream_open(struct own_stream *of, struct sh_err *err)
 {
     stream = of;
     say(of->keeps ? "keeping_" : "");
-    return call("stream", err);
+    return call(err, "stream");
 }
 
 int own_stream_start(struct own_stream *of, struct sh_err *err)
 {
     if (of != stream) say("STREAM ");
-    return call("read", err);
+    return call(err, "read");
 }
 
 void own_stream_join(struct own_stream *of)
@@ -290,7 +274,7 @@ int client_start(struct client *client, const char *line, const char *log, const
     client->started_ns = clock_rig_ns;
     client->pid = 5;
     if (client_does != NULL) client_does();
-    return call("client", err);
+    return call(err, "client");
 }
 
 int client_has_ended(struct client *client)
@@ -332,7 +316,7 @@ int cloud_read_positions(const char *path, const struct sh_report *report, struc
     if (report != &app_report_quiet) say("CLOUD ");
     *out = (struct cloud){.n = 9, .xyz_m = xyz_m};
     say("read:%s ", path);
-    return call("cloud", err);
+    return call(err, "cloud");
 }
 
 void cloud_free(struct cloud *cloud)
@@ -346,7 +330,7 @@ int match_points(const struct match_input *in, struct match *match, struct sh_er
     if (in->report != &app_report_stderr) say("REPORT ");
     match_m = in->match_m;
     *match = (struct match){.n = n_matched, .first_unknown = first_unknown};
-    return call("match", err);
+    return call(err, "match");
 }
 
 /* ---- the run */

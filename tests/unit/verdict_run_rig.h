@@ -10,6 +10,7 @@
 #include "firmware_sim/app/studio/verdict/match.h"
 #include "firmware_sim/app/studio/verdict/verdict.h"
 #include "firmware_sim/config/config.h"
+#include "tests/unit/trace_rig.h"
 
 #define MS INT64_C(1000000)
 
@@ -28,8 +29,7 @@ extern struct config cfg;
 extern struct verdict_options options;
 extern struct verdict verdict;
 extern struct plan_of_run plan;
-extern char trace[2048], warned[512];
-extern const char *fails;    /* the call that fails; NULL: none */
+extern char warned[512];
 extern const char *protocol; /* of the client's link */
 extern struct checks seen;   /* as the checks got it */
 extern uint32_t must_ask;
