@@ -55,6 +55,24 @@ static void several_stations(void **state)
         "HEAD:STAT?@0 prepare2@0 HEAD:STATION 2@0 SCAN:FRAM 4@0 SCAN:STAR@0 HEAD:STAT?@100 prepare3@100 HEAD:STATION "
         "3@100 SCAN:FRAM 4@100 SCAN:STAR@100 ");
     assert_true(result.counts.scans == 2 && result.sha256[0] == '\0');
+    /* Each scan has a start of its own: the second one is 5 s later, as its points say. */
+    static const struct turn halves[] = {
+        START,
+        POINTS(100, 500),
+        OVER(0),
+        {.ms = 100, .frame = {.type = SCANHEAD_POINTS, .t_ns = AT(5100), .scan_t0_ns = 100 * MS}},
+        {.ms = 100, .frame = {.type = SCANHEAD_POINTS, .t_ns = AT(5500), .scan_t0_ns = 500 * MS}},
+        OVER(0),
+        LAST};
+    make_recording(NULL);
+    turns = halves;
+    options.first_station = 2;
+    options.last_station = 3;
+    options.duration_s = 0.5;
+    run_it(SH_OK);
+    assert_non_null(strstr(trace, "SCAN:STOP@100 "));
+    assert_null(strstr(trace, "SCAN:STOP@200 "));
+    assert_non_null(strstr(trace, "SCAN:STOP@300 "));
 }
 
 /* It waits for 30 s until the head is idle, and takes what comes meanwhile. */

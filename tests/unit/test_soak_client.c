@@ -10,6 +10,7 @@
 #include <cmocka.h>
 
 #include "firmware_sim/app/studio/soak/client.h"
+#include "tests/unit/lock_rig.h"
 #include "tests/unit/soak_client_rig.h"
 
 enum { LINE_END = SCANHEAD_LINE_END, POINTS = SCANHEAD_POINTS };
@@ -111,6 +112,14 @@ static void it_stops_trying_at_the_end(void **unused)
     assert_string_equal(trace, "open:tcp:x=0 listen opened:0 saw_open@1000 points@1001 inside ");
 }
 
+/* The locks that the client's thread has taken so far: two as it opened the head, then one for each note. */
+static int n_locks;
+
+static void count_locks(void)
+{
+    n_locks = lock_rig_taken;
+}
+
 static void get_no_frames(void)
 {
     frames_in_stats = 0;
@@ -125,9 +134,9 @@ static void get_frames(void)
 static void frames_are_refused(void **unused)
 {
     static const struct turn script[] = {
-        {SCANHEAD_OK, 0, 0, NULL},      {SCANHEAD_EFORMAT, 1, 0, get_frames},
-        {SCANHEAD_EFORMAT, 1, 0, NULL}, {SCANHEAD_EFORMAT, 1, 0, get_no_frames},
-        {SCANHEAD_OK, 7, 0, NULL},      LAST,
+        {SCANHEAD_OK, 0, 0, NULL},        {SCANHEAD_EFORMAT, 1, 0, get_frames},
+        {SCANHEAD_EFORMAT, 1, 0, NULL},   {SCANHEAD_EFORMAT, 1, 0, get_no_frames},
+        {SCANHEAD_OK, 7, 0, count_locks}, LAST,
     };
     (void)unused;
     run(script, "tcp");
@@ -135,6 +144,7 @@ static void frames_are_refused(void **unused)
                                "opened:7 saw_open@1010 scan@1010 ");
     assert_int_equal(at->refused_frames, 2);
     assert_int_equal(at->refused_now, 2);
+    assert_int_equal(n_locks, 2 + 2);
 }
 
 static void other_errors_end_the_client(void **unused)
@@ -186,7 +196,7 @@ static void it_is_done(void **unused)
                                          {SCANHEAD_ETIMEOUT, 300, 0, have_session}, /* points are too old */
                                          {SCANHEAD_ETIMEOUT, 200, 0, NULL},
                                          {SCANHEAD_OK, 0, POINTS, NULL}, /* 1700: done */
-                                         {SCANHEAD_OK, 300, POINTS, NULL},
+                                         {SCANHEAD_OK, 300, POINTS, count_locks},
                                          LAST};
     static const struct turn just[] = {
         {SCANHEAD_OK, 0, 0, NULL}, {SCANHEAD_OK, 0, POINTS, drain_early}, {SCANHEAD_ETIMEOUT, 499, 0, get_last}, LAST};
@@ -194,6 +204,7 @@ static void it_is_done(void **unused)
     run(script, "tcp");
     assert_string_equal(trace, "open:tcp:x=0 listen opened:0 saw_open@1000 points@1000 inside ask@1000 ask@1200 "
                                "ask@1500 scan@1700 points@1700 inside points@2000 inside ");
+    assert_int_equal(n_locks, 2 + 5); /* it looked five times whether it was done */
     make_soak(NULL);
     run(just, "tcp");
     assert_string_equal(trace, "open:tcp:x=0 listen opened:0 saw_open@1000 points@1000 inside ask@1000 ");
