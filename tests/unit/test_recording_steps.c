@@ -136,6 +136,7 @@ static void scans_without_an_end(void **state)
     static const struct turn gives_up[] = {STATE(HEAD_IDLE, HEAD_SPIN_UP), LAST},
                              later[] = {STATE(HEAD_SCANNING, HEAD_SPIN_UP), POINTS(1, 1),
                                         STATE(HEAD_IDLE, HEAD_SPIN_UP), OVER(1), LAST},
+                             begun[] = {START, STATE(HEAD_IDLE, HEAD_SPIN_UP), POINTS(1, 1), OVER(1), LAST},
                              off[] = {POINTS(1, 1), STATE(HEAD_OFF, HEAD_SCANNING), LAST},
                              full[] = {POINTS(1, 1), {.frame = {.type = SCANHEAD_LINE_END, .flags = 99}}, LAST},
                              closed[] = {POINTS(1, 1), {.rc = SCANHEAD_ECLOSED}, LAST};
@@ -145,6 +146,9 @@ static void scans_without_an_end(void **state)
     assert_string_equal(err.text, "the head ended the scan before its first pulse");
     make_recording(NULL);
     turns = later;
+    run_it(SH_OK);
+    make_recording(NULL);
+    turns = begun;
     run_it(SH_OK);
     make_recording(NULL);
     turns = off;
