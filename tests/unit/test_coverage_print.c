@@ -253,11 +253,37 @@ static void nothing_left_to_gain(void **state)
     free(text);
 }
 
+/* Labels stand by their unseen area, the largest first, and of equal ones as they are numbered. Neither the whole area
+ * nor the seen one gives this order. */
+static void the_order_of_labels(void **state)
+{
+    static const struct {
+        struct coverage_of_label label[3];
+        int order[3];
+    } rows[] = {{{{10, 9, 0, 1}, {5, 0, 0, 0}, {8, 3, 0, 1}}, {1, 2, 0}},
+                {{{6, 2, 0, 1}, {30, 29, 0, 1}, {20, 15, 0, 1}}, {2, 0, 1}},
+                {{{1, 1, 0, 1}, {2, 2, 0, 1}, {3, 3, 0, 1}}, {0, 1, 2}}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct coverage_of_label some[3];
+        memcpy(some, rows[i].label, sizeof some);
+        result.label = some;
+        char *text = printed(0), *from = text;
+        for (int k = 0; k < 3; k++) {
+            from = strstr(from, surface[rows[i].order[k]].object);
+            if (from == NULL) fail_msg("row %zu: label %d is not in its place: %s", i, rows[i].order[k], text);
+        }
+        free(text);
+    }
+    result.label = label;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_key),          cmocka_unit_test(keys_that_are_not_there), cmocka_unit_test(each_line),
-        cmocka_unit_test(each_line_of_next), cmocka_unit_test(nothing_left_to_gain),
+        cmocka_unit_test(the_order_of_labels),     cmocka_unit_test(each_key),
+        cmocka_unit_test(keys_that_are_not_there), cmocka_unit_test(each_line),
+        cmocka_unit_test(each_line_of_next),       cmocka_unit_test(nothing_left_to_gain),
     };
     return cmocka_run_group_tests(tests, name_them, NULL);
 }

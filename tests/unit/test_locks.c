@@ -2,8 +2,6 @@
 /* Threads of links, casters and the player call these at any time, so each of them works on the shared state with its
  * lock held. Two threads that meet without it rarely show that. So the test counts: how often a call takes a lock, and
  * that it has none left at its end. */
-#include <dlfcn.h>
-
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/device/settings_file.h"
@@ -12,36 +10,7 @@
 #include "firmware_sim/replay/replay_state.h"
 #include "tests/unit/device_rig.h"
 #include "tests/unit/event_recording.h"
-
-static _Thread_local int n_taken, n_held;
-
-static int call_next(const char *name, pthread_mutex_t *mutex)
-{
-    int (*next)(pthread_mutex_t *);
-    void *found = dlsym(RTLD_NEXT, name);
-    memcpy(&next, &found, sizeof next);
-    return next(mutex);
-}
-
-int pthread_mutex_lock(pthread_mutex_t *mutex)
-{
-    n_taken++;
-    n_held++;
-    return call_next("pthread_mutex_lock", mutex);
-}
-
-int pthread_mutex_unlock(pthread_mutex_t *mutex)
-{
-    n_held--;
-    return call_next("pthread_mutex_unlock", mutex);
-}
-
-#define TAKES(n, call)                                                                                    \
-    do {                                                                                                  \
-        n_taken = n_held = 0;                                                                             \
-        (void)(call);                                                                                     \
-        if (n_taken != (n) || n_held != 0) fail_msg("%s: %d times, %d are held", #call, n_taken, n_held); \
-    } while (0)
+#include "tests/unit/lock_rig.h"
 
 /* ---- the device */
 

@@ -139,6 +139,21 @@ static const struct lines_row RAW[] = {
     {"--send : it is empty", {"record --raw tcp:a:1 -o a.pcapng --send="}},
 };
 
+/* Each option goes with each format that has it: then all that is wrong is that there is no such configuration. */
+static const struct lines_row GOOD[] = {
+    {"scanhead: none.yaml: cannot be opened: No such file or directory; a YAML file is needed",
+     {"record none.yaml -o a.ply --empty-shots", "record none.yaml -o a.e57 --empty-shots",
+      "record none.yaml -o a.las -o a.e57 --empty-shots", "record none.yaml -o a.ply --ascii --ply-names cloudcompare",
+      "record none.yaml -o a.ply --ply-columns range", "record none.yaml -o a.las --las-version 1.2",
+      "record none.yaml -o a.las --las-version 1.4 --wdp", "record none.yaml -o a.ply -o a.las --wdp --ascii"}},
+};
+
+static void that_go(void **state)
+{
+    (void)state;
+    lines_expect(GOOD, sizeof GOOD / sizeof GOOD[0]);
+}
+
 static void of_points(void **state)
 {
     (void)state;
@@ -153,6 +168,7 @@ static void of_raw_data(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(of_points), cmocka_unit_test(of_raw_data)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(of_points), cmocka_unit_test(of_raw_data),
+                                       cmocka_unit_test(that_go)};
     return cmocka_run_group_tests_name("command lines of record", tests, NULL, NULL);
 }

@@ -72,8 +72,25 @@ static void test_end_lost(void **state)
     }
 }
 
+/* Without the end of a scan its pulses are those that came, that the head lost and that it left out. */
+static void test_counts_without_an_end(void **state)
+{
+    struct recording_counts c = {0};
+    (void)state;
+    event(&c, SCANHEAD_EV_SCAN_START, 1, 0, 0);
+    points(&c, 100);
+    event(&c, SCANHEAD_EV_OVERRUN, 60, 10, 3);
+    event(&c, SCANHEAD_EV_OVERRUN, 70, 20, 3);
+    event(&c, SCANHEAD_EV_READER_LOST, 3, 50, 7);
+    assert_int_equal(event(&c, SCANHEAD_EV_SCAN_START, 2, 0, 0), RECORDING_END_LOST);
+    assert_true(c.scans == 1 && c.fired == 0 && c.cast == 180 && c.lost == 30 && c.left_out == 50 && c.missing == 50);
+    recording_count_end(&c);
+    assert_int_equal(c.scans, 1); /* nothing of the second one has come */
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_left_out), cmocka_unit_test(test_end_lost)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_left_out), cmocka_unit_test(test_end_lost),
+                                       cmocka_unit_test(test_counts_without_an_end)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

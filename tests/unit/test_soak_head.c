@@ -293,10 +293,13 @@ static void states_show_boots(void **state)
     expect(FAULT_SLOW_BOOT, 1, 1, NULL);
     begin(FAULT_SLOW_BOOT, 1, 500);
     soak_saw_state(at, "scanning");
+    soak_saw_state(at, "fault");
+    assert_int_equal(at->row[FAULT_SLOW_BOOT].noticed, 0);
     soak_saw_state(at, "boot"); /* as the client asked for it */
     expect(FAULT_SLOW_BOOT, 1, 1, NULL);
     begin(FAULT_SELF_TEST, 1, 0);
     soak_saw_state(at, "boot");
+    assert_int_equal(at->row[FAULT_SELF_TEST].noticed, 0);
     soak_saw_state(at, "fault");
     expect(FAULT_SELF_TEST, 1, 1, NULL);
     begin(FAULT_SLOW_BOOT, 1, 500);

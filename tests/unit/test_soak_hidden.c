@@ -98,6 +98,29 @@ static void faults_beside_a_drop(void **state)
     }
 }
 
+/* A frame that the library refuses for its content is one, too. Without a fault that destroys it, a missing frame is a finding. */
+static void faults_beside_a_refused_frame(void **state)
+{
+    static const struct {
+        enum fault_kind kind;
+        const char *why;
+    } rows[] = {{FAULT_DUPLICATE, "no copy of the frame was right"},
+                {FAULT_REORDER, "the frame was destroyed besides"}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        for (int is_refused = 0; is_refused < 2; is_refused++) {
+            struct soak *soak = soak_rig_make();
+            const struct soak_row *row = inject(soak, rows[i].kind, 1, 0, "");
+            const struct fault_note flip = note_of(FAULT_FLIP, 1, 0, "resealed");
+            if (is_refused) soak_heard(soak, &flip);
+            notice(soak, SCANHEAD_NOTICE_GAP, HIT, 1);
+            assert_int_equal(finish(soak) == 0, is_refused);
+            if (is_refused) expect_hidden(row, 1, rows[i].why);
+            if (!is_refused) assert_true(row->missed == 1 && row->hidden == 0);
+            soak_rig_end(soak);
+        }
+}
+
 /* One frame was to overtake another. Where the overtaking frame is dropped, or held back itself, the order stays. */
 static void nothing_overtakes(void **state)
 {
@@ -219,6 +242,7 @@ int main(void)
         cmocka_unit_test(faults_that_change_nothing),
         cmocka_unit_test(a_fault_without_a_place),
         cmocka_unit_test(faults_beside_a_drop),
+        cmocka_unit_test(faults_beside_a_refused_frame),
         cmocka_unit_test(nothing_overtakes),
         cmocka_unit_test(what_came_last),
         cmocka_unit_test(acts_after_the_end_of_a_session),

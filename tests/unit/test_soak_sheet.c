@@ -9,7 +9,9 @@
 #include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/app/studio/soak/sheet.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/fault/board.h"
 #include "tests/unit/host_rig.h"
+#include "tests/unit/output_rig.h"
 
 static struct soak soak;
 
@@ -121,6 +123,47 @@ static void each_line(void **state)
         fault_names[FAULT_N_KINDS - 1]);
     assert_string_equal(text, expected);
     free(text);
+}
+
+/* Without a failure the verdict is good, and has the number of accepted frames. */
+static void a_good_verdict(void **state)
+{
+    char *text;
+    size_t len;
+    (void)state;
+    fill();
+    soak.n_failures = 0;
+    FILE *file = open_memstream(&text, &len);
+    soak_print(&soak, file);
+    assert_int_equal(fclose(file), 0);
+    const char *verdict = strstr(text, "verdict: ");
+    assert_non_null(verdict);
+    assert_string_equal(verdict, "verdict: good; frames wrongly accepted: 16, all of them resealed flips\n");
+    free(text);
+}
+
+static void progress(void **state)
+{
+    static const struct fault_list none;
+    const struct fault_note note = {.fault = 1, .number = 1};
+    _Atomic uint64_t lost = 0;
+    struct output output;
+    struct sh_err err;
+    (void)state;
+    fill();
+    soak.link[1].frames = 4;
+    soak.link[1].row[FAULT_N_KINDS - 1].missed = 3;
+    for (int i = 0; i < 2; i++)
+        pthread_mutex_init(&soak.link[i].lock, NULL);
+    assert_int_equal(fault_board_create(&none, NULL, &lost, &soak.board, &err), SH_OK);
+    for (int i = 0; i < 7; i++)
+        fault_board_note(soak.board, &note);
+    output_take(&output, stderr);
+    soak_say_progress(&soak, 8.6);
+    char *said = output_give(&output);
+    assert_string_equal(said, "scanhead: soak: 9 s, 7 faults injected, 45 frames received, 17 faults not noticed\n");
+    free(said);
+    fault_board_free(soak.board);
 }
 
 /* ---- the verdict */
@@ -341,6 +384,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_key),
         cmocka_unit_test(each_line),
+        cmocka_unit_test(a_good_verdict),
+        cmocka_unit_test(progress),
         cmocka_unit_test(limits_are_good),
         cmocka_unit_test(each_reason_is_enough),
         cmocka_unit_test(open_acts_are_missed),

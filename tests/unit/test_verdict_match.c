@@ -168,6 +168,56 @@ static void test_frames(void **state)
     assert_int_equal(m.unknown, 0);
 }
 
+/* The client's points, as the head of test_frames has them. */
+static void turn_to_head(void)
+{
+    for (int i = 0; i < N; i++) {
+        theirs[i][0] = xyz[i][1] + 2.0;
+        theirs[i][1] = 3.0 - xyz[i][0];
+        theirs[i][2] = xyz[i][2] - 1.5;
+    }
+}
+
+/* A head that moves, or stood in several places, has no frame of its own; a CRS has no other frame beside it. */
+static void test_frames_that_are_not_tried(void **state)
+{
+    static const struct {
+        int geo, moving, is_moved, crs;
+        const char *frame;
+        int head_is_known; /* the client may use the head's frame */
+    } rows[] = {{1, 0, 0, 0, "scene", 1},
+                {1, 1, 0, 0, "scene", 0},
+                {1, 0, 1, 0, "scene", 0},
+                {1, 0, 0, 1, "the stream's CRS", 0},
+                {0, 1, 0, 0, "scene", 0}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        begin();
+        stream.info.geo = rows[i].geo;
+        stream.info.moving = rows[i].moving;
+        stream.info.crs = rows[i].crs;
+        stream.is_moved = rows[i].is_moved;
+        const struct cloud cloud = cloud_of(0, N);
+        struct match m = try(&cloud, 1e-5);
+        assert_string_equal(m.frame, rows[i].frame);
+        assert_int_equal(m.unknown, 0);
+        turn_to_head();
+        m = try(&cloud, 1e-5);
+        assert_int_equal(m.unknown == 0, rows[i].head_is_known);
+    }
+    begin();
+    stream.info.geo = 0;
+    stream.is_moved = 1;
+    const struct cloud cloud = cloud_of(0, N);
+    assert_string_equal(try(&cloud, 1e-5).frame, "head");
+    for (int i = 0; i < N; i++) { /* in the scene */
+        theirs[i][0] = 3.0 - xyz[i][1];
+        theirs[i][1] = -2.0 + xyz[i][0];
+        theirs[i][2] = 1.5 + xyz[i][2];
+    }
+    assert_true(try(&cloud, 1e-5).unknown > N / 2);
+}
+
 static void test_rounding(void **state)
 {
     (void)state;
@@ -178,6 +228,9 @@ static void test_rounding(void **state)
         {{{1.23457, 12.3457, -123.457}, {0.123457, 2, 3}}, 1e-3}, /* %g has six digits */
         {{{5.0, 6.0, 7.0}, {8.0, 9.0, 4.0}}, 1.0},
         {{{0.0, 0.0, 0.0}, {NAN, NAN, NAN}}, 1.0},
+        {{{1.2345, 2.0, 3.0}, {4.0, 5.0, 6.0}}, 1e-4}, /* any of them has the most digits */
+        {{{1.0, 2.0, 3.25}, {4.0, 5.0, 6.0}}, 1e-2},
+        {{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.125}}, 1e-3},
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         double points[2][3];
@@ -187,6 +240,12 @@ static void test_rounding(void **state)
         cloud.is_text = 0;
         cloud.count_m = 2e-6;
         assert_true(fabs(match_unit_m(&cloud, 1e3) - 2e-6) <= 0.0);
+    }
+    for (int i = 0; i < 6; i++) { /* the largest coordinate, of whichever point, has 2^-14 m as its last place */
+        double points[2][3] = {{1, 2, 3}, {4, 5, 6}};
+        points[i / 3][i % 3] = i % 2 == 0 ? 1000.0 : -1000.0;
+        const struct cloud cloud = {.n = 2, .xyz_m = points, .is_single = 1};
+        assert_true(fabs(match_unit_m(&cloud, 1e3) / (2.0 / 16384.0) - 1.0) < 0.03); /* 1000 is not quite 2^10 */
     }
 }
 
@@ -250,15 +309,11 @@ static void test_a_stop(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_right_client),
-        cmocka_unit_test(test_unknown_and_empty),
-        cmocka_unit_test(test_repeated),
-        cmocka_unit_test(test_dense_points),
-        cmocka_unit_test(test_frames),
-        cmocka_unit_test(test_rounding),
-        cmocka_unit_test(test_a_huge_coordinate),
-        cmocka_unit_test(test_exact_points),
-        cmocka_unit_test(test_a_stop),
+        cmocka_unit_test(test_a_right_client), cmocka_unit_test(test_unknown_and_empty),
+        cmocka_unit_test(test_repeated),       cmocka_unit_test(test_dense_points),
+        cmocka_unit_test(test_frames),         cmocka_unit_test(test_frames_that_are_not_tried),
+        cmocka_unit_test(test_rounding),       cmocka_unit_test(test_a_huge_coordinate),
+        cmocka_unit_test(test_exact_points),   cmocka_unit_test(test_a_stop),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

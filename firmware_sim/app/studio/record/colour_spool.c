@@ -117,5 +117,4 @@ void colour_spool_close(struct colour_spool *spool)
     if (spool->file != NULL) fclose(spool->file);
     track_free(&spool->track);
     free(spool->path);
-    memset(spool, 0, sizeof *spool);
 }

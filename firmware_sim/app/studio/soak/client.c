@@ -139,11 +139,10 @@ static void began(struct recorder *r)
 static void open_head(struct recorder *r)
 {
     struct soak_link *link = r->link;
-    char why[256];
     while (atomic_load(&link->soak->phase) != SOAK_ENDS) {
         const int64_t from_ns = clock_now_ns();
         const int rc =
-            link->sh == NULL ? scanhead_open(link->source, &link->sh, why, sizeof why) : scanhead_reattach(link->sh, 0);
+            link->sh == NULL ? scanhead_open(link->source, &link->sh, NULL, 0) : scanhead_reattach(link->sh, 0);
         if (rc == SCANHEAD_OK) {
             scanhead_on_notice(link->sh, soak_saw_notice, link);
             const double opened_ms = 1e-6 * (double)(clock_now_ns() - from_ns);

@@ -255,7 +255,6 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     link->frames++;
     link->bytes += frame->raw_len;
     link->last = seq;
-    link->last_t_ns = frame->t_ns;
     if (fact != NULL) {
         if (fact->got++ == 0) fact->digest = soak_digest(frame);
         fact->after_ns = now_ns - frame->t_ns;

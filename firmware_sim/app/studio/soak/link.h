@@ -58,7 +58,6 @@ struct soak_link {
     int have_pulse;
     uint64_t pulse0;   /* of the last points frame */
     double usual_rate; /* of the mirror, rad/s; 0: not known */
-    int64_t last_t_ns; /* device time of the last frame */
     int64_t offset_ns; /* the smallest time from a frame's own to its arrival */
     int have_offset;
     struct soak_ask ask;
