@@ -231,6 +231,8 @@ static void casters_get_what_is_set(void **state)
     assert_true(setup.layout == LINE_POLAR && setup.tripod == &s->tripod.cast && setup.echoes == BEAM_ALL);
     assert_true(setup.range_scale_m == 1e-6 && setup.colour == &s->colour && setup.detect == NULL);
     assert_memory_equal(setup.xyz_scale, s->scale, sizeof setup.xyz_scale);
+    assert_true(fabs(setup.pulse_m - 0.149896229 * cfg->profile.pulse_width_ns) < 1e-12 && setup.pulse_m > 0.1);
+    assert_true(setup.n_movers == 0 && setup.n_knots == 0 && setup.disturbance == NULL && setup.scan_key == 0);
     const uint64_t key = setup.noise_key;
     site_cast_setup(site, 0, &setup);
     assert_true(setup.tripod == NULL && setup.noise_key == key && setup.station_m[2] == 2);
