@@ -68,18 +68,19 @@ static void expect_warnings(const char *const *says)
     assert_string_equal(warned, want);
 }
 
-/* Three surfaces: one has a colour, one none, one has colours at some of its corners. */
+/* Four surfaces: one has a colour, two have none, one has colours at some of its corners. */
 static void surfaces_without_colours_are_counted(void **state)
 {
     (void)state;
     write_in("some.mtl", "newmtl red\nKd 1 0 0\nnewmtl none\nnewmtl part\n");
     write_in("some.obj", "mtllib some.mtl\no a\nusemtl red\nv -50 -50 0\nv 50 -50 0\nv 50 50 0\nf 1 2 3\n"
                          "o b\nusemtl none\nv -50 50 0\nv -50 -50 0\nv 50 50 0\nf 4 5 6\n"
-                         "o c\nusemtl part\nv 9 9 1 1 0 0\nv 8 9 1 0 1 0\nv 9 8 1 0 0 1\nv 7 7 1\nf 7 8 9\nf 8 9 10\n");
+                         "o c\nusemtl none\nf 5 4 6\n"
+                         "o d\nusemtl part\nv 9 9 1 1 0 0\nv 8 9 1 0 1 0\nv 9 8 1 0 0 1\nv 7 7 1\nf 7 8 9\nf 8 9 10\n");
     if (load("some.obj", "", "colour: texture") != SH_OK) fail_msg("%s", err.text);
     expect_warnings((const char *const[]){
-        "texture, but 1 of 3 surfaces have neither texture nor colour: their points are grey",
-        "texture, but 1 of 3 surfaces have colours at only some of their corners: points of triangles without colours "
+        "texture, but 2 of 4 surfaces have neither texture nor colour: their points are grey",
+        "texture, but 1 of 4 surfaces have colours at only some of their corners: points of triangles without colours "
         "are grey",
         NULL});
     if (load("some.obj", "", "colour: range") != SH_OK) fail_msg("%s", err.text);

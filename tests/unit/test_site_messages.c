@@ -252,6 +252,21 @@ static void casters_get_what_is_set(void **state)
     assert_true(setup.mirror_counts == 4294967296.0 && setup.pan_counts == 4294967296.0); /* ideal encoders */
 }
 
+/* Where a run may cast footprints, surfaces of different reflectances are told apart for their outlines. */
+static void footprints_have_kinds_of_surfaces(void **state)
+{
+    (void)state;
+#define LIT "signal: {model: on}\nsurfaces: [{reflectance: 0.5}]\n"
+    static const char *const beams[] = {SINGLE, "beam: {mode: rings}\n", "beam: {mode: adaptive}\n",
+                                        "beam: {mode: auto}\n"};
+    char rest[256];
+    for (int i = 0; i < 4; i++) {
+        snprintf(rest, sizeof rest, STATION "%s" LIT, beams[i]);
+        assert_int_equal(load("profile: riegl-vz400i", 1, rest), SH_OK);
+        assert_int_equal(site->detect.kind != NULL, i > 0);
+    }
+}
+
 /* The noise of a head has a part that grows with the range. */
 static void casters_get_the_noise_of_the_head(void **state)
 {
@@ -292,6 +307,7 @@ int main(void)
         cmocka_unit_test(warnings_have_their_numbers),           cmocka_unit_test(refusals_have_their_numbers),
         cmocka_unit_test(mirrors_that_face_each_other_are_told), cmocka_unit_test(casters_get_what_is_set),
         cmocka_unit_test(casters_get_the_noise_of_a_ball),       cmocka_unit_test(casters_get_the_noise_of_the_head),
+        cmocka_unit_test(footprints_have_kinds_of_surfaces),
     };
     return cmocka_run_group_tests_name("messages of a site", tests, site_rig_setup, tear_down);
 }
