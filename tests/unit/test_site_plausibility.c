@@ -187,14 +187,15 @@ static void a_window_between_two_pulses(void **state)
     (void)state;
     write_box(0, 10);
     load("0, 0, 1.7", 1, ", pan_deg_s: 100, line_start_deg: 0.001, line_stop_deg: 0.03", "");
-    says("360 of 360 lines cast no pulse: the window is 0.029 deg wide, and pulses are 0.04 deg apart");
+    says("360 of 360 lines cast no pulse: the window is 0.029 deg wide, and pulses are 0.04 deg apart (head.prr_hz, "
+         "lines_hz)\n");
     load("0, 0, 1.7", 1, ", pan_deg_s: 100, line_start_deg: 0.001, line_stop_deg: 0.041", "");
     says_nothing();
     write_in("test.yaml",
              "head: {profile: sphere, step_deg: 1, line_start_deg: 0.2, line_stop_deg: 0.7}\n"
              "scene: {meshes: [{file: mesh.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 1.7]}]\n");
     load_file(config_path);
-    says("the window is 0.5 deg wide, and pulses are 1 deg apart (head.step_deg)");
+    says("the window is 0.5 deg wide, and pulses are 1 deg apart (head.step_deg)\n");
 }
 
 static void attributes_that_nothing_fills(void **state)
