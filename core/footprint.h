@@ -182,7 +182,9 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
  * reach, and the nearest of them. Constant after it is made; any thread. */
 struct beam_outlines;
 
-/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they hit. */
+enum { BEAM_PROBE_MOST = 1024 };
+/* Casts rays from the station: unit directions -> ranges, NaN for none, and the kinds of surfaces that they hit.
+ * n is at most BEAM_PROBE_MOST. */
 struct beam_probe {
     void (*cast)(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind);
     void *ctx;

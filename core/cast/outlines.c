@@ -7,28 +7,24 @@ struct prober {
     struct caster *caster;
     const struct bvh *bvh;
     const struct beam_outlines_spec *spec;
-    uint32_t triangle[2048];
+    uint32_t triangle[BEAM_PROBE_MOST];
 };
 
 static void outlines_probe(void *ctx, uint32_t n, const struct vec3_in *dir, double *range_m, uint16_t *kind)
 {
     struct prober *prober = ctx;
     const struct beam_outlines_spec *spec = prober->spec;
-    const uint32_t most = sizeof prober->triangle / sizeof prober->triangle[0];
-    for (uint32_t at = 0, part; at < n; at += part) {
-        part = n - at < most ? n - at : most;
-        const struct bvh_rays rays = {.n = part,
-                                      .from.at_m = {spec->station_m[0], spec->station_m[1], spec->station_m[2]},
-                                      .dir = VEC3_IN(*dir, at),
-                                      .range_max_m = spec->range_max_m,
-                                      .range_m = range_m + at,
-                                      .triangle = prober->triangle};
-        caster_hits(prober->caster, prober->bvh, &rays);
-        for (uint32_t i = 0; i < part; i++)
-            kind[at + i] = spec->kind != NULL && prober->triangle[i] != BVH_NO_TRIANGLE
-                               ? spec->kind[spec->scene->label[prober->triangle[i]]]
-                               : 0;
-    }
+    const struct bvh_rays rays = {.n = n,
+                                  .from.at_m = {spec->station_m[0], spec->station_m[1], spec->station_m[2]},
+                                  .dir = *dir,
+                                  .range_max_m = spec->range_max_m,
+                                  .range_m = range_m,
+                                  .triangle = prober->triangle};
+    caster_hits(prober->caster, prober->bvh, &rays);
+    for (uint32_t i = 0; i < n; i++)
+        kind[i] = spec->kind != NULL && prober->triangle[i] != BVH_NO_TRIANGLE
+                      ? spec->kind[spec->scene->label[prober->triangle[i]]]
+                      : 0;
 }
 
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,

@@ -197,6 +197,5 @@ int beam_cut(const struct beam *beam, const struct beam_pattern *fine, const str
     parts->n = 0;
     parts->centre = BEAM_MAX_PARTS;
     if (n <= 2 && cut_caps(beam, line, n, spreads, parts)) return 0;
-    parts->n = 0;
     return add_places(fine, line, n, spreads, parts);
 }

@@ -42,7 +42,7 @@ struct outline_stretch {
 };
 
 /* probe.c: looks along both sides of a piece of an edge. */
-enum { PROBE_MOST = 512 };
+enum { PROBE_MOST = BEAM_PROBE_MOST / 2 };
 struct outline_prober {
     const struct beam_probe *probe; /* NULL: everything counts */
     const struct beam *beam;

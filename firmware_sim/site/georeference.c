@@ -179,13 +179,15 @@ static void warn_of_coarse_counts(const struct site *site, const struct sh_repor
         FINEST_M * MOST_RANGE_COUNTS / (polar ? 1.0 : 2.0));
 }
 
+/* Points reach as far as for scale_station: within a longer reach the same count would seem too long. */
 static double count_m(const struct site *site, const struct site_station *s)
 {
     double most_m = 0.0;
-    if (s->on_stretch == NULL) return georef_count_m(s->georef, reach_m(site, NULL), s->scale);
+    const double range_m = longest_m(site);
+    if (s->on_stretch == NULL) return georef_count_m(s->georef, range_m + site->live_reach_m, s->scale);
     for (size_t i = 0; i < site->n_stretches; i++)
-        most_m = fmax(
-            most_m, georef_count_m(s->on_stretch[i].georef, reach_m(site, &site->stretch[i]), s->on_stretch[i].scale));
+        most_m = fmax(most_m, georef_count_m(s->on_stretch[i].georef, range_m + site->stretch[i].reach_m,
+                                             s->on_stretch[i].scale));
     return most_m;
 }
 

@@ -30,9 +30,12 @@ static int take_power(struct pulse_table *table, const struct csv *csv, const ch
     if (!(power >= 0.0))
         return sh_fail(err, SH_EINPUT, "%s:%llu: a power of %.10g; allowed is 0 or more", path, line, power);
     if (table->n == 0) table->t0_ns = t_ns;
+    if (table->n == 1 && !(t_ns > table->t0_ns))
+        return sh_fail(err, SH_EINPUT, "%s:%llu: t_ns is %.10g; allowed is more than %.10g", path, line, t_ns,
+                       table->t0_ns);
     if (table->n == 1) table->step_ns = t_ns - table->t0_ns;
     const double want_ns = table->t0_ns + table->n * table->step_ns;
-    if (table->n > 0 && !(table->step_ns > 0.0 && fabs(t_ns - want_ns) <= 0.01 * table->step_ns))
+    if (table->n > 1 && !(fabs(t_ns - want_ns) <= 0.01 * table->step_ns))
         return sh_fail(err, SH_EINPUT, "%s:%llu: t_ns is %.10g; allowed are times that rise by one step, here %.10g",
                        path, line, t_ns, want_ns);
     table->power[table->n++] = power;

@@ -321,13 +321,74 @@ static void no_number_of_plates_hides_a_wall(void **state)
     scene_free(scene);
 }
 
+enum { WALLS = 4 };
+
+/* Wall k is 4 + 9 k km to the east. From the middle it takes a part of its own of the directions to the north of
+ * east. */
+static struct scene *walls(void)
+{
+    static double v[4 * WALLS][3];
+    static uint32_t t[2 * WALLS][3];
+    for (uint32_t k = 0; k < WALLS; k++) {
+        const double x = 4000.0 + 9000.0 * k;
+        for (uint32_t c = 0; c < 4; c++)
+            memcpy(v[4 * k + c], ((const double[3]){x, x * (0.1 * k + (c & 1 ? 0.09 : 0.0)), x * (c & 2 ? 0.1 : -0.1)}),
+                   sizeof v[0]);
+        memcpy(t[2 * k], ((const uint32_t[3]){4 * k, 4 * k + 1, 4 * k + 3}), sizeof t[0]);
+        memcpy(t[2 * k + 1], ((const uint32_t[3]){4 * k, 4 * k + 3, 4 * k + 2}), sizeof t[0]);
+    }
+    return made_scene(
+        &(struct scene_arrays){(const double(*)[3])v, 4 * WALLS, (const uint32_t(*)[3])t, 2 * WALLS, NULL, NULL, 0});
+}
+
+/* Float rays are 8 km long, so that each ray to a farther wall is cast in pieces, while others of its packet have hit.
+ * Ranges end exactly at range_max_m. From the origin, or each from a point of its own, 30 km of a double are 4e-12 m. */
+static void rays_go_on_beyond_their_first_piece(void **state)
+{
+    (void)state;
+    static const double most_m[] = {1e5, 25000.0, 9000.0};
+    static struct fan fan;
+    static double px[RAYS], py[RAYS], pz[RAYS];
+    struct scene *scene = walls();
+    struct bvh *bvh = made_bvh(scene);
+    struct bvh_work *work = made_bvh_work();
+    for (uint32_t i = 0; i < RAYS; i++) {
+        set_ray(&fan, i, 1.0, 0.1 * (i % (WALLS + 1)) + 0.045, 0.0003 * (double)i - 0.08);
+        px[i] = -0.1 * (i % 7), py[i] = 0.2 * (i % 3), pz[i] = 0.01 * i;
+    }
+    for (size_t m = 0; m < sizeof most_m / sizeof *most_m; m++)
+        for (int own = 0; own < 2; own++) {
+            struct bvh_rays rays = {.n = RAYS,
+                                    .dir = {fan.x, fan.y, fan.z},
+                                    .range_max_m = most_m[m],
+                                    .range_m = fan.range_m,
+                                    .triangle = fan.triangle,
+                                    .label = fan.label};
+            if (own) rays.from.own = (struct vec3_in){px, py, pz};
+            bvh_hits(work, bvh, &rays);
+            for (uint32_t i = 0; i < RAYS; i++) {
+                const uint32_t wall = i % (WALLS + 1);
+                const double want_m = (4000.0 + 9000.0 * wall - (own ? px[i] : 0.0)) / fan.x[i];
+                if (wall == WALLS || want_m > most_m[m]) {
+                    assert_true(isnan(fan.range_m[i]) && fan.triangle[i] == BVH_NO_TRIANGLE);
+                    continue;
+                }
+                assert_true(fan.triangle[i] / 2 == wall && fan.label[i] == 0);
+                assert_true(fabs(fan.range_m[i] - want_m) < 1e-9);
+            }
+        }
+    bvh_work_free(work);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_small_sheet_at_a_large_one),     cmocka_unit_test(sheets_that_cross_at_a_slant),
         cmocka_unit_test(a_sheet_along_the_ray_is_not_met), cmocka_unit_test(nobody_meets_what_he_stands_on),
         cmocka_unit_test(what_a_ray_begins_on_is_not_met),  cmocka_unit_test(both_triangles_of_an_edge_agree),
-        cmocka_unit_test(no_number_of_plates_hides_a_wall),
+        cmocka_unit_test(no_number_of_plates_hides_a_wall), cmocka_unit_test(rays_go_on_beyond_their_first_piece),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

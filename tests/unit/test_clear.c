@@ -46,6 +46,19 @@ static void rules_fit_their_names_alone(void **state)
     }
 }
 
+/* Less than a hundredth may be a rounding of the file. */
+static void hardly_clear_surfaces_are_not_offered(void **state)
+{
+    (void)state;
+    static const double clear[] = {0.0, 0.0099, 0.0101, 0.5};
+    for (int i = 0; i < 4; i++) {
+        struct site_clear c = {0};
+        const struct scene_surface s = named("pane", "", clear[i]);
+        site_clear_add(&c, &s, NULL, 0);
+        assert_int_equal(c.n, i >= 2);
+    }
+}
+
 /* The first rule whose patterns fit decides, as in a scan. */
 static void what_a_rule_decides_is_not_offered(void **state)
 {
@@ -99,6 +112,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rules_fit_their_names_alone),
+        cmocka_unit_test(hardly_clear_surfaces_are_not_offered),
         cmocka_unit_test(what_a_rule_decides_is_not_offered),
         cmocka_unit_test(each_rule_is_offered_once_as_far_as_there_is_room),
     };

@@ -131,6 +131,31 @@ static void a_scan_is_stopped_first(void **state)
     cola_expect("sMN mLMPsetscancfg" FAST, "sFA 4");
 }
 
+/* The answer has the form of its request, CoLa-B too, though it comes later. So has a refusal. */
+static void a_late_answer_has_the_form_of_its_request(void **state)
+{
+    (void)state;
+#define FAST_B "\0\0\x13\x88\0\1\0\0\x13\x88\xff\xf9\x22\x30\0\x22\x55\x10"
+    static const char request[] = "sMN mLMPsetscancfg " FAST_B, answer[] = "sAN mLMPsetscancfg \0" FAST_B;
+    open_lms();
+    for (int refused = 0; refused < 2; refused++) {
+        uint8_t frame[64];
+        is_set("scanning", "25", "0.25");
+        head[SET_STEP].error = refused ? -221 : 0;
+        protocol_rig_clear(&cola);
+        cola_input(frame, cola_frame_b(frame, request, sizeof request - 1));
+        assert_int_equal(cola.n_units, 0);
+        is_set("spin-down", "50", "0.5");
+        cola.ops->time(cola.protocol, 1000000);
+        assert_int_equal(cola.n_units, 1);
+        const size_t len = refused ? cola_frame_b(frame, "sFA\0\4", 5) : cola_frame_b(frame, answer, sizeof answer - 1);
+        assert_int_equal(cola.len, len);
+        assert_memory_equal(cola.bytes, frame, len);
+        cola.ops->time(cola.protocol, 2000000); /* once */
+        assert_int_equal(cola.n_units, 1);
+    }
+}
+
 /* A range that was written with the old step stays valid on the new grid. */
 static void the_range_stays_on_the_new_grid(void **state)
 {
@@ -148,8 +173,12 @@ int main(void)
 {
 #define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
-        CASE(a_resting_head_says_how_it_is_set), CASE(other_pairs_are_refused),         CASE(a_resting_head_is_set),
-        CASE(a_scan_is_stopped_first),           CASE(the_range_stays_on_the_new_grid),
+        CASE(a_resting_head_says_how_it_is_set),
+        CASE(other_pairs_are_refused),
+        CASE(a_resting_head_is_set),
+        CASE(a_scan_is_stopped_first),
+        CASE(the_range_stays_on_the_new_grid),
+        CASE(a_late_answer_has_the_form_of_its_request),
     };
     return cmocka_run_group_tests_name("cola geometry", tests, NULL, NULL);
 }

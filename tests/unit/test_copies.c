@@ -204,6 +204,40 @@ static void the_first_of_equal_copies_is_hit(void **state)
     close_pair(&p);
 }
 
+/* Rays in the plane of the crown's lower edge pass it without any rounding. Each such pair of ray and triangle is
+ * counted, in a copy as in a mesh. */
+static void pairs_at_edges_are_counted(void **state)
+{
+    (void)state;
+    static const double here[3] = {0, 0, 0};
+    struct scene_place place = {.at_m = {8, 4, 0}, .scale = 1};
+    struct pair p;
+    uint64_t decided[2];
+    open_pair(&p, &place, 1, 0, here);
+    for (int i = 0; i < 64; i++) {
+        const double d[3] = {(i - 32) / 64.0, 3.5, 0}, length = vec3_length(d);
+        dx[i] = d[0] / length, dy[i] = d[1] / length, dz[i] = 0;
+    }
+    for (int k = 0; k < 2; k++) {
+        struct bvh_work *work = made_bvh_work();
+        struct bvh_rays rays = {.n = 64,
+                                .from.at_m = {8, 0, 2},
+                                .dir = {dx, dy, dz},
+                                .range_max_m = 1000,
+                                .range_m = range_m[k],
+                                .triangle = triangle[k]};
+        bvh_hits(work, p.bvh[k], &rays);
+        decided[k] = bvh_work_counters(work)->decided;
+        assert_true(bvh_work_counters(work)->leaves >= 1 && bvh_work_counters(work)->leaves <= 64 * 26);
+        for (int i = 0; i < 64; i++)
+            assert_true(fabs(range_m[k][i] * dy[i] - 3.5) < 1e-12);
+        bvh_work_free(work);
+    }
+    for (int k = 0; k < 2; k++) /* each ray with one triangle at least, and with all of both meshes at most */
+        assert_true(decided[k] >= 64 && decided[k] <= 64 * 26);
+    close_pair(&p);
+}
+
 /* A copy turns in the same sense as a body that turns. */
 static void a_copy_turns_clockwise(void **state)
 {
@@ -330,6 +364,7 @@ int main(void)
         cmocka_unit_test(copies_are_what_they_are_written_out),
         cmocka_unit_test(incidence_is_the_same),
         cmocka_unit_test(the_first_of_equal_copies_is_hit),
+        cmocka_unit_test(pairs_at_edges_are_counted),
         cmocka_unit_test(a_copy_turns_clockwise),
         cmocka_unit_test(bounds_are_exact),
         cmocka_unit_test(planes_of_copies),

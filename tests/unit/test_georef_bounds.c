@@ -21,13 +21,13 @@ static struct georef *make_tilted(enum georef_crs crs, double lat_deg, double ti
 
 /* Points are on the edges of the cylinder. Degrees are converted by the ellipsoid's least radius, so that errors are
  * not overestimated. */
-static double largest_error_m(struct georef *georef, enum georef_method method, double lat_deg)
+static double largest_error_m(struct georef *georef, enum georef_method method, double lat_deg, double radius_m)
 {
     const double degree_m = angle_rad(6335000.0);
     double largest_m = 0;
     for (int i = 0; i < POINTS; i++) {
         const double turn = 2 * PI * i / POINTS;
-        const double d[3] = {RADIUS_M * cos(turn), RADIUS_M * sin(turn), i % 2 ? HEIGHT_M : -HEIGHT_M};
+        const double d[3] = {radius_m * cos(turn), radius_m * sin(turn), i % 2 ? HEIGHT_M : -HEIGHT_M};
         double exact[3], got[3];
         assert_int_equal(georef_set_method(georef, GEOREF_EXACT, NULL), SH_OK);
         forward_one(georef, d, exact);
@@ -52,7 +52,7 @@ static void test_tilted(void **state)
         const double lat = lat_deg[i / 2 % 3], tilt = tilt_deg[i / 6];
         struct georef *georef = make_tilted(crs, lat, tilt);
         for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER3; m++) {
-            const double error_m = largest_error_m(georef, m, lat),
+            const double error_m = largest_error_m(georef, m, lat, RADIUS_M),
                          bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
             if (!(error_m <= bound_m))
                 fail_msg("latitude %g, tilted by %g, EPSG %d, order %d: off by %.3g m, bound %.3g m", lat, tilt,
@@ -82,7 +82,7 @@ static void test_polar_grids(void **state)
         if (rc == SH_OK) rc = georef_create(&spec, &georef, &err);
         if (rc != SH_OK) fail_msg("%s", err.text);
         for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER3; m++) {
-            const double error_m = largest_error_m(georef, m, at.lat_deg),
+            const double error_m = largest_error_m(georef, m, at.lat_deg, RADIUS_M),
                          bound_m = georef_bound_m(georef, m, RADIUS_M, HEIGHT_M);
             assert_true(isfinite(bound_m));
             if (!(error_m <= bound_m))
@@ -93,8 +93,40 @@ static void test_polar_grids(void **state)
     }
 }
 
+/* A scene in a UTM grid, in the grid of the next zone: heights are the same, and order 5 is there, too. Its error is
+ * seen where the scene is large. */
+static void test_next_grid(void **state)
+{
+    (void)state;
+    static const double lat_deg[] = {5, 48, -60}, radius_m[] = {2000, 20000};
+    for (int i = 0; i < 12; i++) {
+        const struct georef_place at = {lat_deg[i % 3], i / 6 ? 11.5 : 6.5, 100};
+        const double radius = radius_m[i / 3 % 2];
+        struct geoframe frame;
+        struct georef_spec spec = {.crs = GEOREF_UTM, .utm_zone = i / 6 ? 33 : 31};
+        struct georef *georef = NULL;
+        struct sh_err err = {0, ""};
+        double p[3], before_m = INFINITY;
+        int rc = geoframe_set_grid(&frame, 32, at.lat_deg > 0, &err);
+        if (rc == SH_OK) rc = geoframe_find(&frame, &at, p, &err);
+        if (rc == SH_OK) rc = geoframe_fill(&frame, p, &spec, &err);
+        if (rc == SH_OK) rc = georef_create(&spec, &georef, &err);
+        if (rc != SH_OK) fail_msg("%s", err.text);
+        for (enum georef_method m = GEOREF_ORDER1; m <= GEOREF_ORDER5; m++) {
+            const double error_m = largest_error_m(georef, m, at.lat_deg, radius),
+                         bound_m = georef_bound_m(georef, m, radius, HEIGHT_M);
+            if (!(error_m <= bound_m && bound_m <= before_m))
+                fail_msg("latitude %g, %g m, method %d: off by %.3g m, bound %.3g m", at.lat_deg, radius, (int)m,
+                         error_m, bound_m);
+            before_m = bound_m;
+        }
+        georef_free(georef);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tilted), cmocka_unit_test(test_polar_grids)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_tilted), cmocka_unit_test(test_polar_grids),
+                                       cmocka_unit_test(test_next_grid)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

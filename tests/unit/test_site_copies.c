@@ -244,6 +244,9 @@ static void faults_of_a_file_say_where(void **state)
         assert_int_equal(site_load(cfg, NULL, &site, &err), SH_EINPUT);
         assert_says(fault[i].says);
     }
+    /* Limits themselves are allowed. */
+    write_in("trees.csv", "x_m,y_m,z_m,turn_deg,scale\n1,2,3,360,1000\n1,2,3,-360,0.001\n");
+    site_free(load_site(text_of("", "copies: trees.csv", ""), 0));
     write_in("trees.csv", PLACES);
 }
 

@@ -47,6 +47,7 @@ static void extinction_replaces_that_of_the_days_air(void **state)
     snprintf(text, sizeof text, ", extinction_1_km: %.17g", day_1_km);
     assert_true(fabs(amplitude(text) / as_quoted - 1.0) < 1e-13);
     assert_true(fabs(amplitude(", visibility_m: 23000") / as_quoted - 1.0) < 1e-13);
+    assert_true(amplitude(", visibility_m: 0.5") < 1e-100 * as_quoted); /* exp(-6259), as near 0 as floats go */
     const double ratio = exp(-2.0 * 0.4 * (0.5 - day_1_km));
     assert_true(fabs(amplitude(", extinction_1_km: 0.5") / as_quoted / ratio - 1.0) < 1e-13);
 }

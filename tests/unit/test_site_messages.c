@@ -24,21 +24,27 @@ static int load(const char *head, double scale, const char *rest)
     return site_load(cfg, &report, &site, &err);
 }
 
-/* Writes a head whose range needs more than 32 bits of 1e-6 m. */
-static void write_far_head(void)
+/* Writes a head like one of the tree's, with another text in place of `was`. */
+static void write_head(const char *name, const char *like, const char *was, const char *is)
 {
-    static const char near[] = "range_max_m: { value: 2500,";
     char *text = NULL, changed[16384];
     size_t size = 0;
-    FILE *file = fopen("config/heads/riegl-vz2000i.yaml", "r");
+    FILE *file = fopen(like, "r");
     assert_non_null(file);
     assert_true(getdelim(&text, &size, '\0', file) > 0);
     fclose(file);
-    const char *at = strstr(text, near);
+    const char *at = strstr(text, was);
     assert_non_null(at);
-    snprintf(changed, sizeof changed, "%.*srange_max_m: { value: 5000,%s", (int)(at - text), text, at + strlen(near));
-    write_in("far.yaml", changed);
+    snprintf(changed, sizeof changed, "%.*s%s%s", (int)(at - text), text, is, at + strlen(was));
+    write_in(name, changed);
     free(text);
+}
+
+/* Its range needs more than 32 bits of 1e-6 m. */
+static void write_far_head(void)
+{
+    write_head("far.yaml", "config/heads/riegl-vz2000i.yaml", "range_max_m: { value: 2500,",
+               "range_max_m: { value: 5000,");
 }
 
 /* FILE stands for the configuration's path. */
@@ -231,6 +237,8 @@ static void casters_get_what_is_set(void **state)
     assert_true(setup.layout == LINE_POLAR && setup.tripod == &s->tripod.cast && setup.echoes == BEAM_ALL);
     assert_true(setup.range_scale_m == 1e-6 && setup.colour == &s->colour && setup.detect == NULL);
     assert_memory_equal(setup.xyz_scale, s->scale, sizeof setup.xyz_scale);
+    assert_true(fabs(setup.pulse_m - 0.149896229 * cfg->profile.pulse_width_ns) < 1e-12 && setup.pulse_m > 0.1);
+    assert_true(setup.n_movers == 0 && setup.n_knots == 0 && setup.disturbance == NULL && setup.scan_key == 0);
     const uint64_t key = setup.noise_key;
     site_cast_setup(site, 0, &setup);
     assert_true(setup.tripod == NULL && setup.noise_key == key && setup.station_m[2] == 2);
@@ -242,6 +250,32 @@ static void casters_get_what_is_set(void **state)
     site_cast_setup(site, 0, &setup);
     assert_true(!setup.noise_on && setup.noise_key != key && setup.colour == NULL && setup.echoes == BEAM_LAST);
     assert_true(setup.mirror_counts == 4294967296.0 && setup.pan_counts == 4294967296.0); /* ideal encoders */
+}
+
+/* Where a run may cast footprints, surfaces of different reflectances are told apart for their outlines. */
+static void footprints_have_kinds_of_surfaces(void **state)
+{
+    (void)state;
+#define LIT "signal: {model: on}\nsurfaces: [{reflectance: 0.5}]\n"
+    static const char *const beams[] = {SINGLE, "beam: {mode: rings}\n", "beam: {mode: adaptive}\n"};
+    char rest[256];
+    for (int i = 0; i < 3; i++) {
+        snprintf(rest, sizeof rest, STATION "%s" LIT, beams[i]);
+        assert_int_equal(load("profile: riegl-vz400i", 1, rest), SH_OK);
+        assert_int_equal(site->detect.kind != NULL, i > 0);
+    }
+}
+
+/* The noise of a head has a part that grows with the range. */
+static void casters_get_the_noise_of_the_head(void **state)
+{
+    (void)state;
+    struct cast_setup setup;
+    write_head("noisy.yaml", "config/heads/full-sweep.yaml", "range_sigma_ppm: { value: 0,",
+               "range_sigma_ppm: { value: 25,");
+    assert_int_equal(load("profile: noisy.yaml", 1, STATION "noise: {range: on}\n"), SH_OK);
+    site_cast_setup(site, 0, &setup);
+    assert_true(setup.noise_on && setup.range_sigma_m == 0.003 && setup.range_sigma_ppm == 25.0);
 }
 
 static void casters_get_the_noise_of_a_ball(void **state)
@@ -271,7 +305,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(warnings_have_their_numbers),           cmocka_unit_test(refusals_have_their_numbers),
         cmocka_unit_test(mirrors_that_face_each_other_are_told), cmocka_unit_test(casters_get_what_is_set),
-        cmocka_unit_test(casters_get_the_noise_of_a_ball),
+        cmocka_unit_test(casters_get_the_noise_of_a_ball),       cmocka_unit_test(casters_get_the_noise_of_the_head),
+        cmocka_unit_test(footprints_have_kinds_of_surfaces),
     };
     return cmocka_run_group_tests_name("messages of a site", tests, site_rig_setup, tear_down);
 }

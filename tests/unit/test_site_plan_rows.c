@@ -194,6 +194,59 @@ static void a_pulse_costs_all_that_it_meets(void **state)
     assert_true(fabs(site_planned_ns(site) - plain_ns - wave_ns) < 1e-6);
 }
 
+/* All beams are in the row, the chosen one and those left out, with the costs of their 70 ns a ray (cost.h). */
+static void all_beams_are_compared(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"beam.mode=auto"};
+    static const struct {
+        const char *method;
+        double cost_ns; /* NaN: by the scene */
+    } beams[] = {{"single", 0},
+                 {"adaptive", NAN},
+                 {"rings 1 (7 rays)", 490},
+                 {"rings 2 (19 rays)", 1330},
+                 {"rings 3 (37 rays)", 2590},
+                 {"rings 4 (61 rays)", 4270},
+                 {"rings 6 (127 rays)", 8890},
+                 {"rings 8 (217 rays)", 15190},
+                 {"rings 12 (469 rays)", 32830}};
+    enum { BEAMS = sizeof beams / sizeof beams[0] };
+    plan_with("profile: riegl-vz400i", STATION, sets, 1);
+    const struct plan_row *row = row_of("beam");
+    assert_int_equal(row->n_left, BEAMS - 1);
+    for (int i = 0; i < BEAMS; i++) {
+        int found = strcmp(row->method, beams[i].method) == 0;
+        for (uint32_t k = 0; k < row->n_left; k++) {
+            if (strcmp(row->left[k].method, beams[i].method) != 0) continue;
+            found++;
+            if (!isnan(beams[i].cost_ns)) assert_true(row->left[k].cost_ns == beams[i].cost_ns);
+        }
+        if (found != 1) fail_msg("%s is there %d times", beams[i].method, found);
+    }
+}
+
+/* 100 of 240 deg are cast, so 0.125 of 0.3 million pulses/s. The figures follow from the cost that was measured, to the
+ * three digits that are printed. The errors are those of the other rows. */
+static void the_total_is_measured(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"loop.threads=1"};
+    double million_s = 0, percent = 0;
+    plan_with("profile: riegl-vz400i, prr_hz: 300000", STATION, sets, 1);
+    const struct plan_row *row = row_of("total");
+    assert_string_equal(row->method, "measured");
+    assert_true(isnan(row->error_m) && isnan(row->echo_share) && row->cost_ns > 0.0);
+    if (sscanf(
+            row->why,
+            "1 processor computes %lf million pulses/s; the configuration has 0.3 million/s; 0.125 million of them are "
+            "cast and need %lf %% of the processor time",
+            &million_s, &percent) != 2)
+        fail_msg("%s", row->why);
+    assert_true(fabs(million_s * row->cost_ns / 1e3 - 1.0) < 0.01);
+    assert_true(fabs(percent / (100.0 * 125e3 * 1e-9 * row->cost_ns) - 1.0) < 0.01);
+}
+
 static void a_slow_scan_has_a_likely_cause(void **state)
 {
     (void)state;
@@ -235,6 +288,8 @@ int main(void)
         cmocka_unit_test(a_tripod_has_a_row),
         cmocka_unit_test(a_pulse_costs_all_that_it_meets),
         cmocka_unit_test(a_slow_scan_has_a_likely_cause),
+        cmocka_unit_test(the_total_is_measured),
+        cmocka_unit_test(all_beams_are_compared),
     };
     return cmocka_run_group_tests_name("rows of a plan", tests, site_rig_setup, tear_down);
 }

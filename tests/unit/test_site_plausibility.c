@@ -108,6 +108,38 @@ static void within_a_slab(void **state)
     says("hit something nearer than range_min_m, 1.5 m: the station may be inside an object");
 }
 
+/* The head is 0.1 m from two walls and 5 m below the roof. Three quarters of its directions go to a wall. */
+static void in_a_corner(void **state)
+{
+    (void)state;
+    write_box(0, 10);
+    load("29.9, -29.9, 5", 1, "", "");
+    says("hit something nearer than range_min_m, 1.5 m: the station may be inside an object");
+    load("29.9, -5, 5", 1, "", ""); /* one wall is less than half of them */
+    says_nothing();
+}
+
+/* A mesh that moves may fill the view and be the floor, so that only the reach is checked. */
+static void beside_a_mesh_that_moves(void **state)
+{
+    (void)state;
+    static const char *const roofs[] = {"", "    - {file: mesh.obj, up: z, scale: 0.1, move_m_s: [0, 0, 1]}\n"};
+    write_box(0, 10);
+    for (int moves = 0; moves < 2; moves++)
+        for (int far = 0; far < 2; far++) {
+            char text[512];
+            snprintf(text, sizeof text,
+                     "head: {profile: any-rate, prr_hz: 600000, lines_hz: 100}\n"
+                     "scene:\n  meshes:\n    - {file: mesh.obj, up: z, scale: 1}\n%s"
+                     "stations: [{position_m: [0, 0, %d]}]\n",
+                     roofs[moves], far ? -900 : -2);
+            write_in("test.yaml", text);
+            load_file(config_path);
+            assert_int_equal(strstr(warned, "it may be under the floor") != NULL, !moves);
+            assert_int_equal(strstr(warned, "no surface within range_max_m, 800 m") != NULL, far);
+        }
+}
+
 /* A planar head looks along its plane alone. Over a slab it sees nothing, where another head sees the slab. In a room
  * whose walls are 30 m away all that it sees is beyond its 20 m. */
 static void a_planar_head_sees_only_its_plane(void **state)
@@ -156,14 +188,14 @@ static void a_window_between_two_pulses(void **state)
     write_box(0, 10);
     load("0, 0, 1.7", 1, ", pan_deg_s: 100, line_start_deg: 0.001, line_stop_deg: 0.03", "");
     says("360 of 360 lines cast no pulse: the window is 0.029 deg wide, and pulses are 0.04 deg apart (head.prr_hz, "
-         "lines_hz)");
+         "lines_hz)\n");
     load("0, 0, 1.7", 1, ", pan_deg_s: 100, line_start_deg: 0.001, line_stop_deg: 0.041", "");
     says_nothing();
     write_in("test.yaml",
              "head: {profile: sphere, step_deg: 1, line_start_deg: 0.2, line_stop_deg: 0.7}\n"
              "scene: {meshes: [{file: mesh.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 1.7]}]\n");
     load_file(config_path);
-    says("the window is 0.5 deg wide, and pulses are 1 deg apart (head.step_deg)");
+    says("the window is 0.5 deg wide, and pulses are 1 deg apart (head.step_deg)\n");
     /* A planar head fires at angles of its own: no key changes them. */
     write_in("test.yaml",
              "head: {profile: sick-lms111, line_start_deg: 0.1, line_stop_deg: 0.2}\n"
@@ -229,6 +261,8 @@ int main(void)
         cmocka_unit_test(copies_out_of_reach),
         cmocka_unit_test(under_the_floor),
         cmocka_unit_test(within_a_slab),
+        cmocka_unit_test(in_a_corner),
+        cmocka_unit_test(beside_a_mesh_that_moves),
         cmocka_unit_test(a_planar_head_sees_only_its_plane),
         cmocka_unit_test(a_scan_that_is_mostly_empty),
         cmocka_unit_test(a_scale_that_is_a_thousand_times_off),

@@ -98,7 +98,8 @@ static void faults_beside_a_drop(void **state)
     }
 }
 
-/* A frame that the library refuses for its content is one, too. Without a fault that destroys it, a missing frame is a finding. */
+/* A frame that the library refuses for its content is hidden, too. Without a fault that destroys it, a missing frame is
+ * a finding. */
 static void faults_beside_a_refused_frame(void **state)
 {
     static const struct {

@@ -179,6 +179,7 @@ static void wrong_targets_are_refused(void **state)
         {"{objects: [\"*Fl?\"]}", "similar ones are \"flag\""},
         {"{objects: [hoXY]}", "similar ones are \"house\""},
         {"{objects: [caree]}", "similar ones are \"tree\", \"car\""},
+        {"{objects: [hoXYZ]}", "5 objects, as \"house\""}, /* three letters are not similar */
         {"{objects: [treehouse]}", "5 objects, as \"house\", \"tree\", \"cube\""},
         {"{objects: [flag]}", "none of them stands still; allowed with an object that does, or with others: hide"},
         {"{others: hide}", "scene.target.others: given, but there are no scene.target.objects"},

@@ -237,6 +237,7 @@ static void legs_hide_what_is_behind_them(void **state)
     }
     assert_true(on_legs > 300 && on_ground > 5000 && grazing < 5);
     assert_int_equal(counted.hidden, 0);
+    assert_int_equal(site->station[0].tripod.legs->label0, site->legs_label);
     assert_string_equal(site_surface(site, site->legs_label)->object, "tripod");
     assert_string_equal(site_surface(site, site->legs_label)->material, "leg");
     site_free(site);
