@@ -73,6 +73,24 @@ static void values_of_all_kinds(void **state)
     }
 }
 
+/* However short a damaged telegram is, its last byte is taken as the check byte or ETX, and is not changed. */
+static void the_last_byte_stays(void **state)
+{
+    (void)state;
+    static uint8_t unit[4096], mask[4096];
+    for (int is_b = 0; is_b < 2; is_b++) {
+        const size_t len = telegram("sWN LMDscandatacfg 3 0 1 0 0 1 0 0 0 0 1 1", is_b, unit);
+        int n_cut_in_values = 0;
+        for (size_t n = 1; n <= len; n++) {
+            memset(mask, 0, sizeof mask);
+            cola.ops->content(unit, n, mask);
+            assert_int_equal(mask[n - 1], 0);
+            n_cut_in_values += n < len && memchr(mask, 0xff, n) != NULL;
+        }
+        assert_true(!is_b || n_cut_in_values > 0);
+    }
+}
+
 /* Other telegrams have no measured values. Their check byte is made right, too. */
 static void answers_keep_their_check_byte(void **state)
 {
@@ -95,6 +113,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(values_of_all_kinds),
+        cmocka_unit_test(the_last_byte_stays),
         cmocka_unit_test(answers_keep_their_check_byte),
     };
     return cmocka_run_group_tests(tests, NULL, cola_teardown);

@@ -45,7 +45,7 @@ static void test_rows(void **state)
     }
 }
 
-/* At 100 lines a second a pan of 18 degrees a second has 2000 lines a turn. */
+/* At 100 lines a second a pan of 18 degrees a second has 2000 lines a turn, and one of half a degree 72000. */
 static void test_lines(void **state)
 {
     (void)state;
@@ -53,6 +53,7 @@ static void test_lines(void **state)
         int kind, moving;
         double pan_deg_s, lines;
     } rows[] = {{SCANHEAD_EMIT_LINE, 0, 18, 2000},
+                {SCANHEAD_EMIT_LINE, 0, 0.5, 72000},
                 {SCANHEAD_EMIT_LINE, 0, 0, 0},
                 {SCANHEAD_EMIT_LINE, 1, 18, 0},
                 {SCANHEAD_EMIT_SPHERE, 0, 18, 0}};
