@@ -253,7 +253,7 @@ static void test_rows_of_beams(void **state)
     }
 }
 
-/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. */
+/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. A line beyond begins another. */
 static void test_lines_of_rings(void **state)
 {
     (void)state;
@@ -265,16 +265,21 @@ static void test_lines_of_rings(void **state)
                                      .sequence_ns_den = 1,
                                      .first_ring_udeg = -90000000};
     const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
-    rig_begin();
-    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
-    put_emitter(&e, NULL);
-    rig_anchor(&a);
-    rig_points(0, 0, 0, &one, 1);
-    rig_points(9, 90, 90, &one, 1);
-    char *text = rig_record_bytes("a.ptx", (struct recorder_options){0}, NULL);
-    assert_memory_equal(text, "10\n1\n", 5);
-    assert_null(strstr(rig_notes, "grids begun"));
-    free(text);
+    for (int order = 0; order < 2; order++)
+        for (uint32_t last = 9; last <= 10; last++) {
+            rig_begin();
+            rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+            if (order == 1) rig_anchor(&a); /* the emitter comes first or last */
+            put_emitter(&e, NULL);
+            if (order == 0) rig_anchor(&a);
+            if (order == 0) rig_anchor(&a);
+            rig_points(0, 0, 0, &one, 1);
+            rig_points(last, 10 * last, 10 * last, &one, 1);
+            char *text = rig_record_bytes("a.ptx", (struct recorder_options){0}, NULL);
+            assert_memory_equal(text, last == 9 ? "10\n1\n" : "1\n1\n", last == 9 ? 5 : 4);
+            assert_int_equal(strstr(rig_notes, "grids begun") != NULL, last == 10);
+            free(text);
+        }
 }
 
 /* A head of several rings, and one that pans, have sweeps. Others have lines of one grid. */
