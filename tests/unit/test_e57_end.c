@@ -9,7 +9,8 @@
 
 /* ---- replacements of libc's: the first call of one kind fails, and the file at its first synchronisation is kept */
 
-static enum { NOTHING, CUT, SYNC } failing;
+enum { NOTHING, CUT, SYNC };
+static int failing;
 static int n_syncs;
 static uint8_t synced[1 << 16];
 static ssize_t synced_len;

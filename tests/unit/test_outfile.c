@@ -149,8 +149,6 @@ static void test_full(void **state)
 /* ---- room for the file's end */
 
 static int n_reserved; /* reservations that were asked for */
-static int limit_unknown;
-static rlim_t limit = RLIM_INFINITY; /* of files, whatever the process has */
 static off_t reserved_at, reserved_len;
 static int reserve_error; /* 0: the file system keeps room */
 
@@ -166,20 +164,24 @@ int fallocate(int fd, int mode, off_t at, off_t len)
     return -1;
 }
 
-int getrlimit(__rlimit_resource_t kind, struct rlimit *to)
+/* Sets the process' limit on files, and returns the one before. */
+static struct rlimit set_limit(rlim_t most)
 {
-    assert_int_equal(kind, RLIMIT_FSIZE);
-    *to = (struct rlimit){limit, RLIM_INFINITY};
-    return limit_unknown ? -1 : 0;
+    struct rlimit before;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    if (most > before.rlim_max) skip();
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &(struct rlimit){most, before.rlim_max}), 0);
+    return before;
 }
 
 /* Without a limit on files, room is reserved beyond any recording, and freed as a whole. With a limit there is none, as
- * it would lie beyond the limit; where the limit isn't known there is none either. */
+ * it would lie beyond the limit. */
 static void test_room_and_limits(void **state)
 {
     enum { ROOM = 1 << 20 };
     struct outfile file;
     (void)state;
+    const struct rlimit before = set_limit(RLIM_INFINITY);
     begin(&file, 0);
     n_reserved = 0;
     assert_int_equal(outfile_reserve(&file, ROOM, &err), SH_OK);
@@ -187,12 +189,9 @@ static void test_room_and_limits(void **state)
     const off_t at = reserved_at;
     outfile_release(&file);
     assert_true(n_reserved == 1 && reserved_at == at && reserved_len <= -ROOM);
-    limit = 1 << 26;
+    set_limit(1 << 26);
     assert_int_equal(outfile_reserve(&file, ROOM, &err), SH_OK);
-    limit = RLIM_INFINITY;
-    limit_unknown = 1;
-    assert_int_equal(outfile_reserve(&file, ROOM, &err), SH_OK);
-    limit_unknown = 0;
+    set_limit(before.rlim_cur);
     assert_int_equal(n_reserved, 1);
     assert_int_equal(outfile_close(&file, OUTFILE_DROP, &err), 0);
 }
@@ -203,6 +202,7 @@ static void test_no_reserve(void **state)
     struct outfile file;
     char want[200];
     (void)state;
+    const struct rlimit before = set_limit(RLIM_INFINITY);
     begin(&file, 0);
     reserve_error = EOPNOTSUPP;
     assert_int_equal(outfile_reserve(&file, 1, &err), SH_OK);
@@ -211,6 +211,7 @@ static void test_no_reserve(void **state)
     snprintf(want, sizeof want, "%s.part: cannot write: No space left on device", path);
     assert_string_equal(err.text, want);
     reserve_error = 0;
+    set_limit(before.rlim_cur);
     assert_int_equal(outfile_close(&file, OUTFILE_DROP, &err), 0);
 }
 
