@@ -147,7 +147,6 @@ void native_parser_resume(struct native_parser *parser)
     end_bad(parser, 1);
     native_sequence_resume(&parser->sequence);
     parser->start = parser->end = 0;
-    parser->lent = NULL;
     parser->finished = 0;
     parser->in_step = 1;
 }

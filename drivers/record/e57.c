@@ -5,7 +5,7 @@
  *
  * A binary section is a header and packets (e57_packet.h). The XML section, which says where everything is, comes last.
  * Then headers are overwritten, the file's own as the last: a file with a header is whole. Until then a note before
- * each scan (e57_note.h) has what a repair needs. A packet ends after 0.1 s of device time, but not before it has 8
+ * each scan (e57_note.h) has what a repair needs. A packet ends after 0.1 s of device time, with the next multiple of 8
  * records. So little is missing at any moment, and the same stream still gives the same bytes. */
 #include <math.h>
 #include <stdio.h>
@@ -42,11 +42,11 @@ static int e57_begin(void *rec, struct sh_err *err)
     return e57_put(&e->pages, blank, sizeof blank, err);
 }
 
-/* Writes the first n of the records gathered so far as a packet. */
-static int put_packet(struct e57 *e, unsigned n, struct sh_err *err)
+/* Writes the records gathered so far as a packet. */
+static int put_packet(struct e57 *e, struct sh_err *err)
 {
     size_t len;
-    const uint8_t *packet = e57_packet_make(&e->gathered, &e->facts, n, &len);
+    const uint8_t *packet = e57_packet_make(&e->gathered, &e->facts, &len);
     e57_packet_count(packet, len, &e->facts, e->scan);
     return e57_put(&e->pages, packet, len, err);
 }
@@ -54,8 +54,7 @@ static int put_packet(struct e57 *e, unsigned n, struct sh_err *err)
 static int end_scan(struct e57 *e, struct sh_err *err)
 {
     if (e->scan == NULL) return 0;
-    const unsigned n = e->gathered.n;
-    int rc = n > 0 || e->scan->n_records == 0 ? put_packet(e, n, err) : 0;
+    int rc = e->gathered.n > 0 || e->scan->n_records == 0 ? put_packet(e, err) : 0;
     e->scan->section_len = e57_logical(&e->pages) - e->scan->section;
     e->scan = NULL;
     return rc;
@@ -135,7 +134,7 @@ static int fail_far(const struct e57 *e, const double p[3], struct sh_err *err)
  * streams have whole bytes. */
 static int is_due(const struct e57 *e, unsigned n, int64_t t_ns)
 {
-    return n >= 8 && native_since_ns(t_ns, e->t0_ns) >= PACKET_NS;
+    return n > 0 && n % 8 == 0 && native_since_ns(t_ns, e->t0_ns) >= PACKET_NS;
 }
 
 VEC_CLONES static int64_t find_latest(const int64_t *restrict t_ns, int n)
@@ -164,7 +163,7 @@ static int put_run(struct e57 *e, int i, int n, struct sh_err *err)
 {
     double far_m[3];
     if (e57_records_put(&e->gathered, &e->facts, &e->base.track, i, n, far_m) != 0) return fail_far(e, far_m, err);
-    return e->gathered.n == e->gathered.most ? put_packet(e, e->gathered.n, err) : 0;
+    return e->gathered.n == e->gathered.most ? put_packet(e, err) : 0;
 }
 
 static int e57_points(void *rec, int n, struct sh_err *err)
@@ -173,7 +172,7 @@ static int e57_points(void *rec, int n, struct sh_err *err)
     int rc = find_start(e, err);
     for (int i = 0, run; rc == 0 && i < n; i += run) {
         const int64_t t_ns = e->base.track.points.t_ns[i];
-        if (is_due(e, e->gathered.n, t_ns)) rc = put_packet(e, e->gathered.n & ~7u, err);
+        if (is_due(e, e->gathered.n, t_ns)) rc = put_packet(e, err);
         if (e->gathered.n == 0) e->t0_ns = t_ns;
         run = count_run(e, i, n - i);
         if (rc == 0) rc = put_run(e, i, run, err);

@@ -70,36 +70,31 @@ VEC_CLONES static void pack(const uint8_t *restrict v, unsigned bits, size_t n_e
             le_put32(out + 4 * i, (uint32_t)pack_eight(le_get64(v + 8 * i), 4));
 }
 
-/* Puts the first n records of a stream into the packet at `at`. */
-static void put_stream(struct e57_packet *packet, int s, unsigned n, uint8_t *at)
+/* Puts the records of a stream into the packet at `at`. */
+static void put_stream(struct e57_packet *packet, int s, uint8_t *at)
 {
+    const unsigned n = packet->n;
     uint8_t *stream = packet->stream[s];
     if (stream_bits[s] >= 8) {
         if (at != stream) memcpy(at, stream, stream_len(s, n));
         return;
     }
-    if (n == packet->n) memset(stream + n, 0, 8); /* else n is a multiple of 8 */
+    memset(stream + n, 0, 8);
     pack(stream, stream_bits[s], (n + 7) / 8, at);
 }
 
-static void keep_rest(struct e57_packet *packet, int s, unsigned n)
+const uint8_t *e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, size_t *len)
 {
-    const size_t width = stream_bits[s] < 8 ? 1 : stream_bits[s] / 8;
-    memmove(packet->stream[s], packet->stream[s] + n * width, (packet->n - n) * width);
-}
-
-const uint8_t *e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, unsigned n, size_t *len)
-{
+    const unsigned n = packet->n;
     const uint16_t n_streams = count_streams(facts);
     uint8_t *out = n == packet->most ? packet->full : packet->part;
     uint8_t *len_at = out + E57_PACKET_HEADER_LEN, *at = len_at + 2 * n_streams;
     for (int s = 0; s < E57_N_STREAMS; s++) {
         if (!has_stream(facts, s)) continue;
-        put_stream(packet, s, n, at);
+        put_stream(packet, s, at);
         le_put16(len_at, (uint16_t)stream_len(s, n));
         len_at += 2;
         at += stream_len(s, n);
-        if (n < packet->n) keep_rest(packet, s, n);
     }
     while ((at - out) % 4 != 0)
         *at++ = 0;
@@ -108,7 +103,7 @@ const uint8_t *e57_packet_make(struct e57_packet *packet, const struct e57_facts
     out[1] = 0;
     le_put16(out + 2, (uint16_t)(*len - 1));
     le_put16(out + 4, n_streams);
-    packet->n -= n;
+    packet->n = 0;
     return out;
 }
 

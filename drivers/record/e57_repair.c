@@ -181,7 +181,7 @@ static int put_empty_packet(struct left *l, struct e57_pages *pages, struct sh_e
     if (none == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", l->repair->path);
     size_t len;
     e57_packet_begin(none, &l->facts);
-    const uint8_t *packet = e57_packet_make(none, &l->facts, 0, &len);
+    const uint8_t *packet = e57_packet_make(none, &l->facts, &len);
     e57_packet_count(packet, len, &l->facts, last);
     int rc = e57_put(pages, packet, len, err);
     free(none);

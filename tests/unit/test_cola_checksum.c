@@ -73,6 +73,51 @@ static void values_of_all_kinds(void **state)
     }
 }
 
+/* Just the values of the channels change, by COLA.md: 19 bytes from a channel's name on, then the number of values. */
+static void values_and_nothing_else(void **state)
+{
+    (void)state;
+    static const char *const cfg[] = {"sWN LMDscandatacfg 1 0 0 0 0 0 0 0 0 0 0 1",
+                                      "sWN LMDscandatacfg 3 0 1 0 0 1 0 0 0 0 1 1",
+                                      "sWN LMDscandatacfg 3 0 1 1 0 0 0 0 1 0 1 1"};
+    static const char *const name[] = {"DIST1", "DIST2", "RSSI1", "RSSI2"};
+    static const int n_channels[] = {1, 4, 4}, rssi_len[] = {0, 1, 2};
+    for (int i = 0; i < 3; i++) {
+        static uint8_t unit[4096];
+        uint8_t mask[4096] = {0}, want[4096] = {0};
+        const size_t len = telegram(cfg[i], 1, unit);
+        int n = 0;
+        for (int k = 0; k < 4; k++) {
+            const uint8_t *at = memmem(unit, len, name[k], 5);
+            if (at == NULL) continue;
+            assert_int_equal(at[19] << 8 | at[20], 12);
+            memset(want + (at - unit) + 21, 0xff, 12 * (size_t)(k < 2 ? 2 : rssi_len[i]));
+            n++;
+        }
+        assert_int_equal(n, n_channels[i]);
+        cola.ops->content(unit, len, mask);
+        assert_memory_equal(mask, want, len);
+    }
+}
+
+/* However short a damaged telegram is, its last byte is taken as the check byte or ETX, and is not changed. */
+static void the_last_byte_stays(void **state)
+{
+    (void)state;
+    static uint8_t unit[4096], mask[4096];
+    for (int is_b = 0; is_b < 2; is_b++) {
+        const size_t len = telegram("sWN LMDscandatacfg 3 0 1 0 0 1 0 0 0 0 1 1", is_b, unit);
+        int n_cut_in_values = 0;
+        for (size_t n = 1; n <= len; n++) {
+            memset(mask, 0, sizeof mask);
+            cola.ops->content(unit, n, mask);
+            assert_int_equal(mask[n - 1], 0);
+            n_cut_in_values += n < len && memchr(mask, 0xff, n) != NULL;
+        }
+        assert_true(!is_b || n_cut_in_values > 0);
+    }
+}
+
 /* Other telegrams have no measured values. Their check byte is made right, too. */
 static void answers_keep_their_check_byte(void **state)
 {
@@ -95,6 +140,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(values_of_all_kinds),
+        cmocka_unit_test(values_and_nothing_else),
+        cmocka_unit_test(the_last_byte_stays),
         cmocka_unit_test(answers_keep_their_check_byte),
     };
     return cmocka_run_group_tests(tests, NULL, cola_teardown);

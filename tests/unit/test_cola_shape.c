@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "drivers/protocol/cola_field.h"
 #include "drivers/protocol/cola_shape.h"
 #include "tests/common/cases.h"
 #include "tests/common/thorough.h"
@@ -233,6 +234,38 @@ static void an_outline_of_a_sector_has_two_arcs(void **state)
     assert_int_equal(cola_shape_outline(&s, at), 0);
 }
 
+/* Lengths of a record may be 0, and up to the reach of shapes; scale and offset are its own. */
+static void lengths_at_their_limits(void **state)
+{
+    (void)state;
+    const struct planar_head head = {.known = 1, .steps = 1080, .n = 811, .last = 810, .front = 405};
+    static const struct {
+        float scale, offset;
+        uint16_t counts;
+        int32_t um; /* -1: refused */
+    } rows[] = {{1, 0, 0, 0},
+                {1, -700, 700, 0},
+                {1, -700, 699, -1},
+                {2, 5, 100, 205000},
+                {20, 0, 50000, COLA_SHAPE_REACH_UM},
+                {20, 1, 50000, -1}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        const struct cola_record r = {.scale = rows[i].scale,
+                                      .offset = rows[i].offset,
+                                      .step_e4 = 3333,
+                                      .type = COLA_FIELD_RECTANGLE,
+                                      .is_rectangle = 1,
+                                      .distance = rows[i].counts,
+                                      .angle_e4 = 1800000,
+                                      .width_mm = 1000,
+                                      .length_mm = 2000};
+        struct cola_shape shape;
+        const enum cola_error error = cola_record_shape(&r, &head, 0, &shape);
+        assert_int_equal(error, rows[i].um >= 0 ? COLA_OK : COLA_INVALID_DATA);
+        if (error == COLA_OK) assert_int_equal(shape.corner[0].x_um, -rows[i].um);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -241,6 +274,7 @@ int main(void)
         cmocka_unit_test(concave_fields_and_heads_inside),
         cmocka_unit_test(sectors_have_their_limits),
         cmocka_unit_test(rectangles_turn_about_their_corner),
+        cmocka_unit_test(lengths_at_their_limits),
         cmocka_unit_test(points_are_rounded_to_a_micrometre),
         cmocka_unit_test(chains_join_their_links),
         cmocka_unit_test(an_outline_of_a_sector_has_two_arcs),

@@ -118,6 +118,10 @@ static void small_objects_are_blanked(void **state)
     fields_object(100, 10, 1.0);
     fields_turn();
     fields_expect("210");
+    fields_object(100, 10, 1.0);
+    fields_shot[50].range_m[0] = 0.5; /* a narrow object that is nearer, and before it in the turn */
+    fields_turn();
+    fields_expect("210");
     fields_object(801, 10, 1.0); /* to the last beam */
     fields_turn();
     fields_expect("210");

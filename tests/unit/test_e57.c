@@ -168,25 +168,57 @@ static void test_packets(void **state)
     }
 }
 
-/* A packet spans 0.1 s, or 8 records where these take longer. So little is missing at any moment. */
+/* A packet spans 0.1 s, up to the next multiple of 8 records. So little is missing at any moment, and a packet that ended
+ * late does not shorten the next one. */
 static void test_span_of_packets(void **state)
 {
     (void)state;
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
     static const struct {
         uint32_t ms;
-        size_t n; /* of 100 records: 12 packets of 8 and one of 4; or all within 0.1 s */
-    } cases[] = {{20, 13}, {50, 13}, {1, 1}};
+        size_t n_packets; /* of 100 records: of 8, of 16 where 10 take 0.1 s, or of all within 0.1 s */
+    } cases[] = {{20, 13}, {50, 13}, {10, 7}, {1, 1}};
     for (size_t c = 0; c < sizeof cases / sizeof cases[0]; c++) {
         rig_begin();
         rig_descriptor(1, 1);
         rig_anchor(&a);
         for (uint32_t line = 0; line < 100; line++)
-            rig_points(line, line * cases[c].ms, line * cases[c].ms, &points[0], 1);
+            rig_points(line, 500 + line * cases[c].ms, 500 + line * cases[c].ms, &points[0], 1);
         record_e57(0);
         e57rig_scan(0, 0, coloured);
         assert_int_equal(e57rig_n_records, 100);
-        assert_int_equal(e57rig_n_packets, cases[c].n);
+        assert_int_equal(e57rig_n_packets, cases[c].n_packets);
+    }
+}
+
+/* Records are a millisecond apart, 16 in a frame. Each packet has 104, the first multiple of 8 from 100 on. */
+static void test_packets_begin_within_frames(void **state)
+{
+    (void)state;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    static struct rig_point many[16];
+    for (int i = 0; i < 16; i++)
+        many[i] = (struct rig_point){3000, -4000, 12000, -1234, 7, 1, 1};
+    for (uint32_t n = 20 * 104; n <= 20 * 104 + 1; n++) {
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        for (uint32_t i = 0; i < n; i += 16)
+            rig_points(i / 16, i, i, many, n - i < 16 ? n - i : 16);
+        record_e57(0);
+        e57rig_scan(0, 0, coloured);
+        assert_int_equal(e57rig_n_records, n);
+        assert_int_equal(e57rig_n_packets, (n + 103) / 104);
+    }
+    for (uint32_t ms = 99; ms <= 100; ms++) { /* after eight records */
+        rig_begin();
+        rig_descriptor(1, 1);
+        rig_anchor(&a);
+        rig_points(0, 0, 0, many, 8);
+        rig_points(1, ms, ms, many, 1);
+        record_e57(0);
+        e57rig_scan(0, 0, coloured);
+        assert_int_equal(e57rig_n_packets, ms == 99 ? 1 : 2);
     }
 }
 
@@ -307,6 +339,7 @@ int main(void)
         cmocka_unit_test(test_packets),
         cmocka_unit_test(test_far_times),
         cmocka_unit_test(test_span_of_packets),
+        cmocka_unit_test(test_packets_begin_within_frames),
         cmocka_unit_test(test_no_points),
         cmocka_unit_test(test_same_bytes),
         cmocka_unit_test(test_disk_full),

@@ -324,6 +324,20 @@ static void test_lengths(void **state)
     assert_true(rig_uint(las + 100, 4) <= 2 + 255);
 }
 
+/* Windows wait for those of their last point. Meanwhile so much comes that the client's memory of frames is used anew. */
+static void test_long_wait(void **state)
+{
+    (void)state;
+    put_polar(&rig_12_bits, 4);
+    for (int i = 0; i < 40; i++)
+        rig_waves(0, 0, &rig_12_bits, &(struct rig_window){5, 1000, 4000, {0, 0, 0}}, 1);
+    record((struct recorder_options){0});
+    check_packet(0, &rig_12_bits, 0, 30, 8);
+    check_packet(1, &rig_12_bits, 1, 36, 12);
+    check_packet(4, &rig_12_bits, 2, 57, 8);
+    assert_non_null(strstr(rig_notes, "41 waveforms left out without a point in them"));
+}
+
 /* Formats without a place for waveforms say so. Lost samples and windows are counted. */
 static void test_unheld(void **state)
 {
@@ -424,10 +438,11 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_inside), cmocka_unit_test(test_outside),  cmocka_unit_test(test_colour),
-        cmocka_unit_test(test_8_bits), cmocka_unit_test(test_none),     cmocka_unit_test(test_no_wdp),
-        cmocka_unit_test(test_utm),    cmocka_unit_test(test_geodetic), cmocka_unit_test(test_lengths),
-        cmocka_unit_test(test_unheld), cmocka_unit_test(test_moving),   cmocka_unit_test(test_digitisers),
+        cmocka_unit_test(test_inside),     cmocka_unit_test(test_outside),   cmocka_unit_test(test_colour),
+        cmocka_unit_test(test_8_bits),     cmocka_unit_test(test_none),      cmocka_unit_test(test_no_wdp),
+        cmocka_unit_test(test_utm),        cmocka_unit_test(test_geodetic),  cmocka_unit_test(test_lengths),
+        cmocka_unit_test(test_unheld),     cmocka_unit_test(test_long_wait), cmocka_unit_test(test_moving),
+        cmocka_unit_test(test_digitisers),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Frames are encoded and decoded: every field is at its place, with extreme values. */
+#include <math.h>
+
 #include "tests/unit/native_rig.h"
 
 static uint8_t out[1 << 20];
@@ -324,6 +326,29 @@ static void test_poses(void **state)
     assert_int_equal(native_decode_poses(payload, 8 + 80, &n), SH_EFORMAT);
 }
 
+/* Each pose is a rotation, the first one, too, and later than the one before. */
+static void test_poses_refused(void **state)
+{
+    (void)state;
+    static const double norm2[] = {1 - 2e-9, 1 - 5e-10, 1 + 5e-10, 1 + 2e-9, 0, (double)NAN};
+    for (int k = 0; k < 3; k++) {
+        uint32_t n;
+        for (int i = 0; i < 6 + 3; i++) {
+            struct native_pose pose[3] = {{.t_ns = INT64_MIN, .quat = {0, 1, 0, 0}},
+                                          {.t_ns = 0, .quat = {0, 0, 1, 0}},
+                                          {.t_ns = INT64_MAX, .quat = {0.5, 0.5, 0.5, 0.5}}};
+            int is_right = i == 1 || i == 2;
+            for (int q = 0; q < 4 && i < 6; q++)
+                pose[k].quat[q] *= sqrt(norm2[i]);
+            if (i >= 6) pose[k].t_ns = (int64_t[]){INT64_MIN, 0, INT64_MAX}[i - 6];
+            if (i >= 6) is_right = k == i - 6;
+            const size_t len = native_encode_poses(out, sizeof out, pose, 3, 99, 0);
+            assert_int_equal(native_decode_poses(out + NATIVE_HEADER_LEN, len - NATIVE_HEADER_LEN, &n),
+                             is_right ? 0 : SH_EFORMAT);
+        }
+    }
+}
+
 /* DESCRIPTOR.md, 10 emitter: each field is where the table says; wrong ones are refused. */
 static void test_emitter(void **state)
 {
@@ -397,6 +422,7 @@ int main(void)
         cmocka_unit_test(test_event),          cmocka_unit_test(test_surfaces),
         cmocka_unit_test(test_surfaces_split), cmocka_unit_test(test_emitter),
         cmocka_unit_test(test_is_hashed),      cmocka_unit_test(test_poses),
+        cmocka_unit_test(test_poses_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -122,6 +122,42 @@ static void planar_heads(void **state)
     }
 }
 
+/* The heads that each protocol speaks for, and what it needs: config/links.md. 0: any head. */
+static void kinds_of_heads(void **state)
+{
+    (void)state;
+    enum { PLANAR = 1u << NATIVE_EMIT_PLANAR, BEAMS = 1u << NATIVE_EMIT_BEAMS };
+    static const struct {
+        const char *name;
+        uint32_t emitters, n_beams;
+        int needs_polar, needs_clock;
+    } rows[PROTOCOL_N] = {
+        [PROTOCOL_NATIVE] = {"native", 0, 0, 0, 0},
+        [PROTOCOL_NMEA] = {"nmea", 0, 0, 0, 1},
+        [PROTOCOL_SCIP] = {"scip", PLANAR, 0, 1, 0},
+        [PROTOCOL_COLA] = {"cola", PLANAR, 0, 1, 0},
+        [PROTOCOL_VELODYNE] = {"velodyne", BEAMS, 16, 1, 0},
+        [PROTOCOL_VELODYNE_POSITION] = {"velodyne-position", BEAMS, 16, 0, 0},
+        [PROTOCOL_VELODYNE_HTTP] = {"velodyne-http", BEAMS, 16, 0, 0},
+    };
+    for (int id = 0; id < PROTOCOL_N; id++) {
+        const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
+        if (id == PROTOCOL_CAPTURE) continue; /* it speaks for no head */
+        assert_string_equal(ops->name, rows[id].name);
+        assert_int_equal(ops->emitters, rows[id].emitters);
+        assert_int_equal(ops->n_beams, rows[id].n_beams);
+        assert_int_equal((ops->needs & PROTOCOL_NEEDS_POLAR) != 0, rows[id].needs_polar);
+        assert_int_equal((ops->needs & PROTOCOL_NEEDS_TIME) != 0, rows[id].needs_clock);
+        assert_int_equal((ops->needs & PROTOCOL_NEEDS_PLACE) != 0, rows[id].needs_clock);
+        assert_int_equal((ops->needs & PROTOCOL_NEEDS_LAST) != 0, id == PROTOCOL_VELODYNE);
+    }
+    for (uint32_t kind = 0; kind < 31; kind++)
+        assert_int_equal(protocol_ops_get(PROTOCOL_CAPTURE)->emitters >> kind & 1, 0);
+    assert_true(protocol_ops_get(PROTOCOL_CAPTURE)->emitters != 0);
+    assert_null(protocol_ops_get(PROTOCOL_N));
+    assert_null(protocol_ops_get((enum protocol_id) - 1));
+}
+
 /* Bytes of the longest unit, as COLA.md, SCIP.md and Velodyne's manual have them. */
 static void longest_units(void **state)
 {
@@ -134,6 +170,6 @@ static void longest_units(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(heads_of_velodyne), cmocka_unit_test(planar_heads),
-                                       cmocka_unit_test(longest_units)};
+                                       cmocka_unit_test(longest_units), cmocka_unit_test(kinds_of_heads)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

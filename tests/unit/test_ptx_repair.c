@@ -362,6 +362,44 @@ static void test_cell_that_goes_back(void **state)
     remove_state();
 }
 
+/* Where there is no room for the grid's text, both files stay, and a repair with room takes them. */
+static void test_full_disk(void **state)
+{
+    (void)state;
+    struct repair r;
+    struct sh_err err;
+    struct rlimit old;
+    char want[600], in[160], beside[160];
+    record_scans();
+    const struct state *s = &state_at[n_states - 1];
+    void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
+    write_state(s->text, s->text_len, s->grid, s->grid_len);
+    snprintf(in, sizeof in, "%s", rig_path(part));
+    snprintf(beside, sizeof beside, "%.*s.grid", (int)strlen(in) - 5, in);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &old), 0);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &(struct rlimit){s->text_len, old.rlim_max}), 0);
+    const int rc = killed_rig_repair(in, &r, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &old), 0);
+    signal(SIGXFSZ, was);
+    assert_int_equal(rc, SH_EIO);
+    snprintf(
+        want, sizeof want,
+        "%s: cannot be written together with the grid in %s: the grid's text needs as much room again on the disk; "
+        "nothing is lost: free some room and repeat the command",
+        in, beside);
+    assert_string_equal(err.text, want);
+    size_t len;
+    uint8_t *grid = rig_read(beside, &len), *text = rig_read(in, NULL);
+    assert_int_equal(len, s->grid_len);
+    assert_memory_equal(grid, s->grid, len);
+    assert_memory_equal(text, s->text, rig_uint(grid + 8, 8)); /* up to the grid's own text */
+    free(grid);
+    free(text);
+    if (killed_rig_repair(in, &r, &err) != 0) fail_msg("%s", err.text);
+    assert_int_equal(access(beside, F_OK), -1);
+    remove_state();
+}
+
 /* Lines of other programs may end with blanks, or with a carriage return. */
 static void test_line_ends(void **state)
 {
@@ -385,8 +423,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_killed),  cmocka_unit_test(test_completing), cmocka_unit_test(test_text_alone),
-        cmocka_unit_test(test_refused), cmocka_unit_test(test_line_ends),  cmocka_unit_test(test_cell_that_goes_back),
+        cmocka_unit_test(test_killed),    cmocka_unit_test(test_completing), cmocka_unit_test(test_text_alone),
+        cmocka_unit_test(test_refused),   cmocka_unit_test(test_line_ends),  cmocka_unit_test(test_cell_that_goes_back),
+        cmocka_unit_test(test_full_disk),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

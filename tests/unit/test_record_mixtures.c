@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams that change: the part that one file can hold, and its notes; rows and grids of heads that are no line heads;
- * parts of meshes. */
+/* Streams that change: the part that one file can hold, and its notes; rows and grids of heads that are no line heads. */
 #include "drivers/record/mesh_grid.h"
-#include "drivers/record/mesh_sparse.h"
 #include "tests/unit/e57_rig.h"
 
 static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};
@@ -285,6 +283,35 @@ static void test_lines_of_rings(void **state)
     }
 }
 
+/* A line beyond the rings begins another grid, whether the emitter comes before the anchor or after it. */
+static void test_a_line_beyond(void **state)
+{
+    (void)state;
+    static uint8_t out[1024];
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    const struct rig_point one = {0, 1000, 0, 0, 0, 1, 1};
+    const struct native_emitter e = {.firing = NATIVE_FIRING_SPHERE,
+                                     .step_udeg = 180000000,
+                                     .ring_step_udeg = 20000000,
+                                     .sequence_ns = 1,
+                                     .sequence_ns_den = 1,
+                                     .first_ring_udeg = -90000000};
+    const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
+    for (int emitter_first = 0; emitter_first < 2; emitter_first++) {
+        rig_begin();
+        rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+        if (!emitter_first) rig_anchor(&a);
+        put_emitter(&e, NULL);
+        if (emitter_first) rig_anchor(&a);
+        rig_points(0, 0, 0, &one, 1);
+        rig_points(10, 100, 100, &one, 1);
+        char *text = rig_record_bytes("a.ptx", (struct recorder_options){0}, NULL);
+        assert_memory_equal(text, "1\n1\n", 4);
+        assert_non_null(strstr(rig_notes, "grids begun"));
+        free(text);
+    }
+}
+
 /* A head of several rings, and one that pans, have sweeps. Others have lines of one grid. */
 static void test_sweeps(void **state)
 {
@@ -318,56 +345,6 @@ static void test_poles(void **state)
     assert_false(mesh_grid_is_pole(&g, 0));
 }
 
-/* Points spread over a triangle have the label of the corner with the largest weight. The corners here are where the
- * weights are x, y and the rest. */
-static void test_sparse_labels(void **state)
-{
-    (void)state;
-    static const double corner[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    static const uint32_t face[1][3] = {{0, 1, 2}};
-    struct mesh_points from = {0}, to = {0};
-    const struct mesh_sparse sparse = {.per_m2 = 200, .seed = 3};
-    const struct mesh_sparse_part part = {face, 1, 1, 1};
-    struct sh_err err = {0};
-    double area_m2 = 0;
-    int seen[3] = {0};
-    for (int k = 0; k < 3; k++) {
-        struct mesh_point p = {.label = (uint16_t)(10 * k), .station = 1, .rgb = {255, 0, 128}};
-        memcpy(p.xyz_m, corner[k], sizeof p.xyz_m);
-        assert_int_equal(mesh_points_add(&from, &p, &err), 0);
-    }
-    if (mesh_sparse_add(&sparse, &from, &part, &to, &area_m2, &err) != 0) fail_msg("%s", err.text);
-    assert_true(fabs(area_m2 - 0.5) < 1e-12);
-    assert_int_equal(to.n, 100);
-    for (uint32_t i = 0; i < to.n; i++) {
-        const double x = to.xyz_m[i][0], y = to.xyz_m[i][1], rest = 1 - x - y;
-        const int nearest = x > y && x > rest ? 1 : y > rest ? 2 : 0;
-        assert_int_equal(to.label[i], 10 * nearest);
-        assert_memory_equal(to.rgb[i], from.rgb[0], 3);
-        seen[nearest]++;
-    }
-    assert_true(seen[0] > 0 && seen[1] > 0 && seen[2] > 0);
-    mesh_points_free(&from);
-    mesh_points_free(&to);
-}
-
-/* The limit is that of the file, of all parts together. */
-static void test_sparse_limit(void **state)
-{
-    (void)state;
-    static double corner[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    static const uint32_t face[1][3] = {{0, 1, 2}};
-    const struct mesh_points from = {.xyz_m = corner, .n = 3};
-    struct mesh_points to = {.n = INT32_MAX - 99};
-    const struct mesh_sparse sparse = {.per_m2 = 200};
-    const struct mesh_sparse_part part = {face, 1, 1, 1};
-    struct sh_err err = {0};
-    double area_m2 = 7;
-    assert_int_equal(mesh_sparse_add(&sparse, &from, &part, &to, &area_m2, &err), SH_EINPUT);
-    assert_non_null(
-        strstr(err.text, "--sparse 200: 7.5 m2 of mesh would get 2.147e+09 points; a file holds 2147483647: give"));
-}
-
 static int tear_down(void **state)
 {
     e57rig_free();
@@ -377,11 +354,12 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads),  cmocka_unit_test(test_many_heads), cmocka_unit_test(test_header_of_part),
-        cmocka_unit_test(test_other_kinds),    cmocka_unit_test(test_same_kinds), cmocka_unit_test(test_sparse_limit),
-        cmocka_unit_test(test_ply_says),       cmocka_unit_test(test_floats),     cmocka_unit_test(test_rows_of_beams),
-        cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_sweeps),     cmocka_unit_test(test_poles),
-        cmocka_unit_test(test_sparse_labels),
+        cmocka_unit_test(test_several_heads),  cmocka_unit_test(test_many_heads),
+        cmocka_unit_test(test_header_of_part), cmocka_unit_test(test_other_kinds),
+        cmocka_unit_test(test_same_kinds),     cmocka_unit_test(test_ply_says),
+        cmocka_unit_test(test_floats),         cmocka_unit_test(test_rows_of_beams),
+        cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_a_line_beyond),
+        cmocka_unit_test(test_sweeps),         cmocka_unit_test(test_poles),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

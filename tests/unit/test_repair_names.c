@@ -267,6 +267,55 @@ static void test_stopped(void **state)
     }
 }
 
+static char warnings[1024];
+
+static void keep_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    const size_t at = strlen(warnings);
+    snprintf(warnings + at, sizeof warnings - at, "%s\n", text);
+}
+
+/* Bytes between the frames of a stream stay, and their number is said; those after the last frame are cut. */
+static void test_bytes_between_frames(void **state)
+{
+    (void)state;
+    static const int n_bad[] = {0, 1, 5};
+    const struct bytes *whole = &repair_whole[0];
+    const struct sh_report report = {.warn = keep_warning};
+    const size_t first = NATIVE_HEADER_LEN + rig_uint(whole->data + 4, 4); /* PROTOCOL.md: length of the payload */
+    for (int i = 0; i < 3; i++)
+        for (int cut = 0; cut < 2; cut++) {
+            struct repaired file;
+            const size_t n = (size_t)n_bad[i], len = whole->len + n + (size_t)cut;
+            uint8_t *bytes = malloc(len);
+            char want[300] = "";
+            memcpy(bytes, whole->data, first);
+            memset(bytes + first, 'x', n);
+            memcpy(bytes + first + n, whole->data + first, whole->len - first);
+            memset(bytes + whole->len + n, 'x', (size_t)cut);
+            repair_name("a.shs");
+            repair_write_file(repair_part, bytes, len);
+            warnings[0] = 0;
+            if (repair_file(repair_path, &report, &file, &repair_err) != SH_OK) fail_msg("%s", repair_err.text);
+            if (n > 0)
+                snprintf(want, sizeof want,
+                         "%s: %zu bytes between frames belong to no frame; they stay, and readers skip them\n",
+                         repair_part, n);
+            assert_string_equal(warnings, want);
+            assert_int_equal(file.cut_bytes, cut);
+            assert_int_equal(file.was_whole, !cut);
+            assert_string_equal(file.unit, "frames");
+            repair_free(&file);
+            struct bytes got = repair_slurp(repair_path);
+            assert_int_equal(got.len, len - (size_t)cut);
+            assert_memory_equal(got.data, bytes, got.len);
+            free(got.data);
+            free(bytes);
+            unlink(repair_path);
+        }
+}
+
 static void put_descriptor(uint32_t scan, int64_t t_s, int flags)
 {
     static uint8_t out[1024];
@@ -356,6 +405,7 @@ int main(void)
                                        cmocka_unit_test(test_full_for_a_while),
                                        cmocka_unit_test(test_broken_disk),
                                        cmocka_unit_test(test_stopped),
+                                       cmocka_unit_test(test_bytes_between_frames),
                                        cmocka_unit_test(test_several_blocks),
                                        cmocka_unit_test(test_large_capture),
                                        cmocka_unit_test(test_save),

@@ -219,6 +219,7 @@ static void bit_rate(void **state)
     scip_ask("SS115200\n", "SS115200\n00P\n\n");
     scip_ask("SS115200\n", "SS115200\n03S\n\n");
     scip_ask("SS115201\n", "SS115201\n02R\n\n");
+    scip_ask("SS000000\n", "SS000000\n02R\n\n");
     scip_ask("SS11520x\n", "SS11520x\n01Q\n\n");
     scip_ask("RS\n", "RS\n00P\n\n");
     scip_ask("SS019200\n", "SS019200\n03S\n\n");
@@ -316,6 +317,21 @@ static void reset_and_reboot(void **state)
     scip_ask("GD0000108001\nTM1\n", "GD0000108001\n10Q\n\nTM1\n00P\nm2@0?\n\n");
 }
 
+/* A client that closes before the reboot is due doesn't stop it; one that asked for none starts none (SCIP.md). */
+static void a_client_that_goes_reboots_at_once(void **state)
+{
+    (void)state;
+    for (int asks = 0; asks <= 2; asks++) {
+        scip_open("UTM-30LX");
+        for (int i = 0; i < asks; i++)
+            protocol_rig_input(&rig, "RB\n");
+        const uint32_t n_lines = rig.n_lines;
+        rig.ops->gone(rig.protocol);
+        assert_int_equal(rig.n_lines, n_lines + (asks == 2));
+        if (asks == 2) assert_string_equal(rig.line[n_lines], "HEAD:REBOOT");
+    }
+}
+
 /* After a reboot without a head all that a session had is as at power-up: time mode, sleep, bit rate, a scan that was
  * asked for, a malfunction. The reboot is over, too. */
 static void a_reboot_begins_anew(void **state)
@@ -384,6 +400,7 @@ int main(void)
         cmocka_unit_test(speed_is_reset),
         cmocka_unit_test(reset_and_reboot),
         cmocka_unit_test(a_reboot_begins_anew),
+        cmocka_unit_test(a_client_that_goes_reboots_at_once),
         cmocka_unit_test(heads_that_dont_fit),
     };
     return cmocka_run_group_tests(tests, NULL, scip_teardown);

@@ -112,6 +112,35 @@ static void left_is_left(void **state)
         assert_int_equal(got.range_mm[i - 100][0], i == 600 + 1440 / 4 ? 2000 : 5000);
 }
 
+/* A single scan is one that began with the laser on. To switch it on once more changes nothing. The head's 40 turns a
+ * second take 25 ms each. */
+static void a_single_scan_begins_with_the_laser(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *lines, *answer;
+        int has_scan; /* of the same turn */
+    } rows[] = {
+        {"BM\nGD0000108001\n", "BM\n00P\n\n", 0}, {"GD0000108001\n", "", 1}, {"BM\nGD0000108001\n", "BM\n02R\n\n", 1}};
+    scip_open("UTM-30LX");
+    scip_flat(1.0);
+    scip_turn(0);
+    protocol_rig_clear(&rig);
+    for (uint32_t i = 0; i < 3; i++) {
+        const uint32_t line = 2 * i + 1;
+        scip_part(line, 0, 500);
+        rig.ops->time(rig.protocol, (25 * (int64_t)line + 12) * 1000000);
+        scip_ask(rows[i].lines, rows[i].answer);
+        scip_part(line, 501, 1080);
+        scip_line_end(line, 0);
+        assert_int_equal(rig.n_units, rows[i].has_scan);
+        scip_turn(line + 1);
+        assert_int_equal(rig.n_units, 1);
+        scip_decode_only(&got, 3, 0);
+        assert_int_equal(got.n_steps, 1081);
+    }
+}
+
 /* A cluster has its least range, without errors. The cluster has an error where there is nothing else. */
 static void clusters(void **state)
 {
@@ -242,10 +271,15 @@ static void parameters(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bytes_by_hand),  cmocka_unit_test(ranges_to_the_millimetre),
-        cmocka_unit_test(without_end),    cmocka_unit_test(left_is_left),
-        cmocka_unit_test(clusters),       cmocka_unit_test(echoes_and_intensity),
-        cmocka_unit_test(marks_anywhere), cmocka_unit_test(codes_of_a_urg),
+        cmocka_unit_test(bytes_by_hand),
+        cmocka_unit_test(ranges_to_the_millimetre),
+        cmocka_unit_test(without_end),
+        cmocka_unit_test(left_is_left),
+        cmocka_unit_test(a_single_scan_begins_with_the_laser),
+        cmocka_unit_test(clusters),
+        cmocka_unit_test(echoes_and_intensity),
+        cmocka_unit_test(marks_anywhere),
+        cmocka_unit_test(codes_of_a_urg),
         cmocka_unit_test(parameters),
     };
     return cmocka_run_group_tests(tests, NULL, scip_teardown);

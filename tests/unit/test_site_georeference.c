@@ -92,7 +92,7 @@ static double bound_of(const struct site *site, size_t i, enum georef_method met
     const struct site_stretch *stretch = &site->stretch[i];
     const double reach_m = 1.01 * (1000 + stretch->reach_m), x_m = stretch->centre_m[0];
     const double radius_m = hypot(within(fmax(x_m + 50, 20 - x_m)), within(60));
-    return georef_bound_m(site->station[0].leg[i].georef, method, fmin(reach_m, radius_m), within(7));
+    return georef_bound_m(site->station[0].on_stretch[i].georef, method, fmin(reach_m, radius_m), within(7));
 }
 
 /* The stretch with the largest error is the path's, whether it comes first or last. The short stretch lies beside the
@@ -124,8 +124,8 @@ static void the_costliest_stretch_counts(void **state)
         const double errors_m[2] = {bound_of(site, 0, GEOREF_ORDER1), bound_of(site, 1, GEOREF_ORDER1)};
         const size_t far = errors_m[1] > errors_m[0];
         assert_true(errors_m[far] > 0.6 && errors_m[!far] < 0.6);
-        assert_int_equal(georef_method(s->leg[far].georef), GEOREF_ORDER2);
-        assert_int_equal(georef_method(s->leg[!far].georef), GEOREF_ORDER1);
+        assert_int_equal(georef_method(s->on_stretch[far].georef), GEOREF_ORDER2);
+        assert_int_equal(georef_method(s->on_stretch[!far].georef), GEOREF_ORDER1);
         assert_string_equal(s->plan.method, "order2");
         assert_true(fabs(s->plan.error_m - bound_of(site, far, GEOREF_ORDER2)) < 1e-12);
         assert_null(strstr(warned, "tolerance"));
