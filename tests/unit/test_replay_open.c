@@ -15,6 +15,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/replay/replay_state.h"
+#include "tests/unit/event_recording.h"
 #include "tests/unit/file_rig.h"
 
 #define S INT64_C(1000000000)
@@ -22,28 +23,24 @@
 /* ---- recordings */
 
 static FILE *file;
-static uint32_t next_seq;
 static uint8_t front[4096]; /* the descriptor, the emitter and the anchor that were written */
 static uint32_t front_len;
 static struct config *cfg;
 
 static void file_begin(void)
 {
-    file = fopen(file_path, "wb");
-    assert_non_null(file);
-    next_seq = front_len = 0;
+    file = recording_begin(file_path);
+    front_len = 0;
 }
 
 static void file_end(void)
 {
-    assert_int_equal(fclose(file), 0);
+    recording_end(file);
 }
 
 static void put(uint8_t *frame, size_t len)
 {
-    assert_true(len > 0);
-    native_finish_frame(frame, next_seq++);
-    assert_int_equal(fwrite(frame, 1, len, file), len);
+    recording_put(file, frame, len);
 }
 
 static void put_front(uint8_t *frame, size_t len)
@@ -122,6 +119,13 @@ static int teardown(void **state)
 
 static const struct replay_options plain = {.path = file_path, .speed = 1};
 
+static const char *said(struct replay *r, const char *line)
+{
+    static struct command_result result;
+    replay_source.command(r, 1, line, 0, &result);
+    return result.reply;
+}
+
 static struct replay *open_with(const struct replay_options *options)
 {
     struct replay *r;
@@ -153,6 +157,7 @@ static void links_learn_what_the_head_is(void **state)
     strcpy(cfg->link[1].serial, "given");
     cfg->link[2].type = LINK_TCP;
     cfg->link[2].own_serial = 1;
+    cfg->link[3].protocol = PROTOCOL_NMEA; /* there is no such link */
     struct replay *r = open_with(&(struct replay_options){.path = file_path, .speed = 2.5});
     assert_string_equal(cfg->profile.maker, "Maker");
     assert_string_equal(cfg->profile.model, "Model");
@@ -165,6 +170,7 @@ static void links_learn_what_the_head_is(void **state)
     assert_true(cfg->head.settings.prr_uhz == INT64_C(2500000000000));
     assert_true(cfg->head.settings.lines_uhz == 50000000);
     assert_true(cfg->output.attributes && cfg->output.colour == COLOUR_NONE);
+    assert_non_null(strstr(said(r, "HEAD:PRR 1 HZ"), "a recording is replayed; its settings are fixed"));
     assert_string_equal(cfg->profile.firmware, ""); /* the native protocol does not ask for it */
     replay_free(r);
 
@@ -231,6 +237,8 @@ static void it_describes_the_recorded_head(void **state)
         assert_memory_equal(tick.bytes, front, len);
         assert_string_equal(cfg->profile.maker, has_other ? "D" : "A");
         assert_true(r->cmd.settings.station == 3 && r->cmd.limits.n_stations == 3);
+        assert_int_equal(r->cmd.limits.emitter, has_other ? EMITTER_LINE : EMITTER_PLANAR);
+        assert_int_equal(r->cmd.limits.line_pulses, has_other ? 0 : 1440);
         replay_free(r);
     }
 }
@@ -270,15 +278,12 @@ static void talks_are_those_of_links(void **state)
     const struct talk one = {.n_requests = 1}, two = {.n_requests = 2};
     const struct talk *const talks[] = {&one, &two};
     const struct talk_options *options = NULL;
-    struct command_result result;
     cfg->n_links = 2;
     struct replay *r = open_with(&(struct replay_options){.path = file_path, .speed = 1, .talk = talks});
     assert_ptr_equal(replay_source.talk(r, 0, &options), &one);
     assert_ptr_equal(replay_source.talk(r, 1, &options), &two);
     assert_null(replay_source.talk(r, 2, &options));
-    replay_source.command(r, 1, "*IDN?", 0, &result);
-    assert_int_equal(result.error, 0);
-    assert_string_equal(result.reply, "");
+    assert_string_equal(said(r, "*IDN?"), "");
     replay_free(r);
 }
 
@@ -390,22 +395,15 @@ static void a_device_has_the_firmware_of_its_profile(void **state)
     free(profile);
 }
 
-static const char *said(struct replay *r, const char *line)
-{
-    static struct command_result result;
-    replay_source.command(r, 1, line, 0, &result);
-    return result.reply;
-}
-
 static void speeds_that_are_fixed(void **state)
 {
     (void)state;
     const struct native_descriptor d = descriptor_of("A,B,C,", "");
     file_begin();
-    put_descriptor(&d, 0);
-    put_anchor(50.0, 0);
-    put_telemetry(S, 0);
-    put_event(4 * S, 0);
+    put_descriptor(&d, 7 * S);
+    put_anchor(50.0, 7 * S);
+    put_telemetry(S, 7 * S);
+    put_event(11 * S, 0);
     file_end();
     struct replay *r = open_with(&(struct replay_options){.path = file_path, .speed = 1, .to_s = 2.5});
     assert_string_equal(said(r, "SCAN:REPL?"), "IDLE,0.000000,2.500000,1,OFF");

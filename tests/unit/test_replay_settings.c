@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The settings that a replay reports for its head follow from the recording, and so do its counts. */
+/* The settings that a replay reports for its head follow from the recording, and so do its counts and states. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
 
 /* A sphere's step is the turn divided by its steps. A firing sequence lasts num / den ns. An anchor gives the
@@ -156,6 +157,39 @@ static void states_are_taken(void **state)
     }
 }
 
+static const char *state_at(struct replay *r, uint64_t released)
+{
+    static struct command_result result;
+    replay_command(r, 1, "HEAD:STATE?", released, &result);
+    return result.reply;
+}
+
+/* A state holds once the tick that contains it is released: ticks 0 to n - 1 are when n are. */
+static void a_state_holds_from_its_tick_on(void **state)
+{
+    (void)state;
+    struct replay *r = calloc(1, sizeof *r);
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_true(r != NULL && cfg != NULL);
+    r->cfg = cfg;
+    pthread_mutex_init(&r->lock, NULL);
+    replay_open_commands(r);
+    assert_string_equal(state_at(r, 100), "idle"); /* nothing was said */
+    replay_set_state(r, 5, HEAD_SPIN_UP);
+    replay_set_state(r, 8, HEAD_SCANNING);
+    assert_string_equal(state_at(r, 5), "idle");
+    assert_string_equal(state_at(r, 6), "spin-up");
+    assert_string_equal(state_at(r, 8), "spin-up");
+    assert_string_equal(state_at(r, 9), "scanning");
+    for (uint64_t i = 0; i < 3 * REPLAY_CHANGES; i++) /* the oldest are forgotten */
+        replay_set_state(r, 10 + i, i % 2 == 0 ? HEAD_SPIN_DOWN : HEAD_IDLE);
+    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES - 1), "spin-down");
+    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES), "idle");
+    pthread_mutex_destroy(&r->lock);
+    free(cfg);
+    free(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -163,6 +197,7 @@ int main(void)
         cmocka_unit_test(a_descriptor_gives_settings_and_limits),
         cmocka_unit_test(frames_are_counted),
         cmocka_unit_test(states_are_taken),
+        cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

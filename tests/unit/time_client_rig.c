@@ -145,6 +145,15 @@ void kiss_with(const char *kiss)
 
 /* ---- a test */
 
+static int first_free; /* descriptor, before the test */
+
+static int find_free(void)
+{
+    const int fd = dup(STDIN_FILENO);
+    close(fd);
+    return fd;
+}
+
 int time_client_setup(void **state)
 {
     (void)state;
@@ -154,6 +163,7 @@ int time_client_setup(void **state)
     struct sh_err err;
     is_free = is_interrupted = has_no_way = has_no_descriptors = 0;
     now_ns = time_client_epoch_ns + S;
+    first_free = find_free();
     server_fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     inet_pton(AF_INET, "127.1.2.3", &at.sin_addr);
     if (bind(server_fd, (struct sockaddr *)&at, sizeof at) != 0 ||
@@ -179,7 +189,8 @@ int time_client_teardown(void **state)
     rig_close(rig);
     sem_destroy(&waits);
     sem_destroy(&goes);
-    return close(server_fd);
+    close(server_fd);
+    return find_free() == first_free ? 0 : -1; /* the client has closed what it opened */
 }
 
 void set_server(const char *role, int period_s, int zone_h)
