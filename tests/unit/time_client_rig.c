@@ -163,7 +163,6 @@ int time_client_setup(void **state)
     struct sh_err err;
     is_free = is_interrupted = has_no_way = has_no_descriptors = 0;
     now_ns = time_client_epoch_ns + S;
-    first_free = find_free();
     server_fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     inet_pton(AF_INET, "127.1.2.3", &at.sin_addr);
     if (bind(server_fd, (struct sockaddr *)&at, sizeof at) != 0 ||
@@ -171,6 +170,7 @@ int time_client_setup(void **state)
         return -1;
     snprintf(port, sizeof port, "ntp.port=%d", ntohs(at.sin_port));
     const char *const sets[] = {port, "ntp.max_offset_s=2", "ntp.address=127.1.2.3"};
+    first_free = find_free();
     sem_init(&waits, 0, 0);
     sem_init(&goes, 0, 0);
     rig = rig_open(NULL, sets, 3);
@@ -189,8 +189,8 @@ int time_client_teardown(void **state)
     rig_close(rig);
     sem_destroy(&waits);
     sem_destroy(&goes);
-    close(server_fd);
-    return find_free() == first_free ? 0 : -1; /* the client has closed what it opened */
+    assert_int_equal(find_free(), first_free); /* the client has closed what it opened */
+    return close(server_fd);
 }
 
 void set_server(const char *role, int period_s, int zone_h)
