@@ -220,9 +220,14 @@ static double loss(void *me)
 
 static void report(void *me, int number, const char *text)
 {
-    (void)me, (void)text;
-    assert_int_equal(number, CMD_E_READER);
-    note("report|");
+    assert_ptr_equal(me, &self);
+    note("report %s|", number == CMD_E_READER ? "reader" : number == CMD_E_REFUSED ? text : "?");
+}
+
+static void session_opened(void *me, uint32_t session, const char *who)
+{
+    assert_ptr_equal(me, &self);
+    note("session %u %s|", session, who);
 }
 
 uint64_t n_refused;
@@ -239,9 +244,15 @@ static void observe_session(void *ctx, uint32_t session, int begins, const char 
     (void)ctx, (void)session, (void)begins, (void)peer, (void)t_ns;
 }
 
+static void observe_heard(void *ctx, uint32_t session, const void *bytes, size_t len)
+{
+    (void)ctx;
+    note("heard %u %.*s|", session, (int)len, (const char *)bytes);
+}
+
 struct loop_source_ops own_source;
 static const struct loop_source source = {&own_source, &self};
-static const struct links_observer observer = {NULL, observe_session, NULL, observe_refused};
+static const struct links_observer observer = {NULL, observe_session, observe_heard, observe_refused};
 
 static void warn(void *ctx, const char *text)
 {
@@ -287,6 +298,7 @@ int session_setup(void **state)
                                           .store = store,
                                           .stored = give_stored,
                                           .window_loss_db = loss,
+                                          .session_opened = session_opened,
                                           .report = report};
     stream.counters = &counters;
     stream.tick_bytes = CAP;

@@ -96,7 +96,7 @@ static void ticks_come_in_order(void **state)
     next_seq = 17;
     release(1);
     assert_int_equal(session_write_protocol(&pump, s, 2), 0);
-    expect_log("gap 1|3|report|gap 5|frame 17 at 100|4|");
+    expect_log("gap 1|3|report reader|gap 5|frame 17 at 100|4|");
     assert_int_equal(s->cursor, 4);
     assert_int_equal(session_write_protocol(&pump, s, 2), 0);
     expect_log("");
@@ -309,7 +309,7 @@ static void ticks_are_shifted_and_overtaken(void **state)
     for (int i = 0; i < QUEUE + 4; i++)
         release(1);
     assert_int_equal(session_write_protocol(&pump, s, 2), 0);
-    assert_int_equal(strncmp(logged, "report|gap 8|frame 19 at 100|10|", 32), 0);
+    assert_int_equal(strncmp(logged, "report reader|gap 8|frame 19 at 100|10|", 39), 0);
     assert_int_equal(s->cursor, QUEUE + 5);
 }
 
