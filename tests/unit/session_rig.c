@@ -221,7 +221,7 @@ static double loss(void *me)
 static void report(void *me, int number, const char *text)
 {
     assert_ptr_equal(me, &self);
-    note("report %s|", number == CMD_E_READER ? "reader" : number == CMD_E_REFUSED ? text : "?");
+    note("report %s|", number == CMD_E_READER ? "reader" : text);
 }
 
 static void session_opened(void *me, uint32_t session, const char *who)
