@@ -140,6 +140,30 @@ static void frames_are_counted(void **state)
     free(r);
 }
 
+/* Settings are those of the last descriptor, emitter and anchor that went out. A new descriptor is that of a head whose
+ * mirror turns, until an emitter says otherwise. */
+static void settings_follow_the_frames(void **state)
+{
+    (void)state;
+    struct replay *r = calloc(1, sizeof *r);
+    const struct native_emitter e = {.kind = NATIVE_EMIT_PLANAR, .steps = 1440, .turn = 1, .sequence_ns_den = 1};
+    const struct native_anchor a = {.station = 4};
+    struct native_descriptor d = {.prr_uhz = 7, .range_scale_m = 1};
+    assert_non_null(r);
+    d.mirror_counts_per_turn = d.pan_counts_per_turn = 1000;
+    assert_true(native_encode_emitter(frame, sizeof frame, &e, NULL, 0, 0) > 0);
+    replay_note_frame(r, frame, 0);
+    assert_true(r->cmd.limits.emitter == EMITTER_PLANAR && r->cmd.limits.line_pulses == 1440);
+    assert_true(native_encode_anchor(frame, sizeof frame, &a, 0, 0) > 0);
+    replay_note_frame(r, frame, 0);
+    assert_int_equal(r->cmd.settings.station, 4);
+    assert_true(native_encode_descriptor(frame, sizeof frame, &d, 0, 0) > 0);
+    replay_note_frame(r, frame, 0);
+    assert_true(r->cmd.settings.prr_uhz == 7 && r->cmd.limits.emitter == EMITTER_LINE);
+    assert_true(r->cmd.limits.line_pulses == 0 && r->cmd.settings.station == 4 && r->frames == 3);
+    free(r);
+}
+
 /* States go out with their ticks; a device of another protocol scans all the time. An unknown state is none. */
 static void states_are_taken(void **state)
 {
@@ -193,11 +217,9 @@ static void a_state_holds_from_its_tick_on(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_settings),
-        cmocka_unit_test(a_descriptor_gives_settings_and_limits),
-        cmocka_unit_test(frames_are_counted),
-        cmocka_unit_test(states_are_taken),
-        cmocka_unit_test(a_state_holds_from_its_tick_on),
+        cmocka_unit_test(test_settings),      cmocka_unit_test(a_descriptor_gives_settings_and_limits),
+        cmocka_unit_test(frames_are_counted), cmocka_unit_test(settings_follow_the_frames),
+        cmocka_unit_test(states_are_taken),   cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
