@@ -275,6 +275,33 @@ static void a_session_that_ends_takes_nothing_more(void **state)
     assert_true(wire_is_empty(rig.wire));
 }
 
+/* The note of an act says how long it holds, whether it is a reset, and how many packets it makes short. */
+static void the_note_of_an_act_is_whole(void **state)
+{
+    (void)state;
+    static const struct {
+        enum fault_kind kind;
+        uint32_t n;
+        int reset;
+        uint64_t noted_n;
+        const char *text;
+    } rows[] = {{FAULT_SHORT_PACKETS, 3, 0, 3, ""}, {FAULT_DISCONNECT, 3, 1, 0, "reset"}};
+    for (int i = 0; i < 2; i++) {
+        f = fault_of_kind(rows[i].kind);
+        f.n = rows[i].n;
+        f.reset = rows[i].reset;
+        f.for_ms = 7.0;
+        rig_open(&f, 1, 1);
+        rig_frame(RIG_POINTS);
+        rig_drain();
+        assert_int_equal(rig.n_notes, 1);
+        assert_true(rig.note[0].kind == rows[i].kind && rig.note[0].n == rows[i].noted_n);
+        assert_true(rig.note[0].for_ms == 7.0 && rig.note[0].number == 1 && rig.note[0].link == 1);
+        assert_string_equal(rig.note[0].text, rows[i].text);
+        rig_close();
+    }
+}
+
 /* A frame is not written until all of its writes are out. A copy of it does not count. */
 static void what_is_not_written_is_counted(void **state)
 {
@@ -350,6 +377,7 @@ int main(void)
         cmocka_unit_test_teardown(a_damaged_datagram_is_not_sent, rig_teardown),
         cmocka_unit_test_teardown(garbage_stands_before_the_frame, rig_teardown),
         cmocka_unit_test_teardown(a_dropped_frame_is_hit_by_nothing_else, rig_teardown),
+        cmocka_unit_test(the_note_of_an_act_is_whole),
         cmocka_unit_test_teardown(a_session_that_ends_takes_nothing_more, rig_teardown),
         cmocka_unit_test_teardown(what_is_not_written_is_counted, rig_teardown),
         cmocka_unit_test_teardown(an_act_that_is_not_carried_out_does_not_count, rig_teardown),
