@@ -54,7 +54,7 @@ void open_session(void);
 extern uint32_t next_seq; /* of the next frame; a session begins with 10 */
 /* Releases a tick with n events, whose device times are 100 and so on. */
 void release(uint32_t n);
-/* The same of a recording, whose times are to be shifted. */
+/* Does the same with the tick of a recording, whose times are to be shifted. */
 void release_shifted(uint32_t n, int64_t shift_ns);
 /* The client sends a text, and nothing else waits. */
 void say(const char *text);

@@ -51,7 +51,7 @@ void kiss_with(const char *kiss);
 void expect_state(const char *state, int64_t offset_ns, int64_t delay_ns, int good, int refused, int none);
 /* Checks the next error of the queue. NULL: there is none. */
 void expect_error(const char *text);
-/* The scanner's clock, now. */
+/* Returns the scanner's clock, now. */
 int64_t date_ns(void);
 
 #endif

@@ -36,7 +36,7 @@ struct rig_write {
     enum wire_piece_kind kind;
     uint32_t act;
     size_t at, len; /* in rig.out */
-    uint32_t n;     /* of an act, and for_ms */
+    uint32_t n;     /* n and for_ms are those of an act */
     double for_ms;
 };
 
