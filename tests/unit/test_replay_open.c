@@ -284,6 +284,7 @@ static void talks_are_those_of_links(void **state)
     assert_ptr_equal(replay_source.talk(r, 1, &options), &two);
     assert_null(replay_source.talk(r, 2, &options));
     assert_string_equal(said(r, "*IDN?"), "");
+    assert_non_null(strstr(said(r, "HEAD:PRR 1 HZ"), "a recording is replayed; its settings are fixed"));
     replay_free(r);
 }
 

@@ -123,6 +123,7 @@ static void frames_are_counted(void **state)
     struct replay *r = calloc(1, sizeof *r);
     assert_non_null(r);
     note_event(r, NATIVE_EV_SCAN_START, 1, 0);
+    assert_int_equal(r->tick.scan, 0); /* a tick belongs to the scan of its points */
     note_points(r, 16, 5);
     note_points(r, 10, 0);
     assert_true(r->scans == 1 && r->tick.scan == 1 && r->frames == 3);
