@@ -148,13 +148,15 @@ static void the_truth_says_what_is_missing(void **state)
     assert_int_equal(truth_open(file.path, &lost, &truth, &err), SH_OK);
     memset(note.text, 'x', sizeof note.text - 1);
     assert_int_equal(truth_is_filling(truth), 0);
-    for (; lost < 100; all++)
+    while (atomic_load(&lost) < 100) {
         truth_write(truth, &note);
+        all++;
+    }
     assert_int_equal(truth_is_filling(truth), 1);
     reader_start();
-    for (uint64_t before = 0; before != lost; all++) {
+    for (uint64_t before = 0; before != atomic_load(&lost); all++) { /* until a line is taken again */
         sched_yield();
-        before = lost;
+        before = atomic_load(&lost);
         truth_write(truth, &note);
     }
     assert_int_equal(truth_close(truth, &err), SH_OK);
