@@ -87,7 +87,6 @@ static void do_dead(struct device *device, uint32_t session, const char *line, u
     cmd->faults = &fault_desk_queries; /* the copy must not change the device's own faults */
     command_execute(cmd, session, line, out);
     if (out->changes && out->effect != COMMAND_STEP) command_refuse(cmd, CMD_E_SETTINGS, "the head has no power", out);
-    out->took_control = 0;
     free(cmd);
 }
 

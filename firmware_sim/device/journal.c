@@ -30,7 +30,6 @@ struct journal {
 static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 {
     int n = 0;
-    text[0] = '\0';
     if (lost[LINE_REMARK] != 0)
         n = snprintf(text, LINE_GAP_BYTES, "# missing here: %" PRIu64 " remarks\n", lost[LINE_REMARK]);
     if (lost[LINE_PLAIN] != 0)

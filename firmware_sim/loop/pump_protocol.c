@@ -208,7 +208,6 @@ static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_
     s->hang_up = 0;
     if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK)
         return sh_fail(err, SH_ENOMEM, "no memory for a session");
-    unit_queue_clear(&s->units);
     return pump->protocol->create(&spec, &s->protocol, err);
 }
 

@@ -14,7 +14,7 @@
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/replay/capture.h"
 
-enum { FILE_ROOM = 1 << 16, MS = 1000000 };
+enum { FILE_ROOM = 1 << 18, MS = 1000000 };
 
 extern const struct ethernet_end DRIVER, DEVICE; /* ports 40000 and 2112 */
 

@@ -142,11 +142,46 @@ static void fixes_lie_at_their_times_of_utc(void **state)
     rig_close(rig);
 }
 
+/* Lets ticks pass until the event comes, and checks all that it says. */
+static void expect_event(struct rig *rig, enum native_event_code code, uint64_t a, uint64_t b, const char *text)
+{
+    const struct native_event *event = rig_wait(rig, code, 1000);
+    if (event->a != a || event->b != b || event->c != 0 || strcmp(event->text, text) != 0)
+        fail_msg("event %d: %d, %d, %d, %s", (int)code, (int)event->a, (int)event->b, (int)event->c, event->text);
+}
+
+static void states_and_control_are_events(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    expect_event(rig, NATIVE_EV_STATE, HEAD_BOOT, HEAD_OFF, "boot");
+    expect_event(rig, NATIVE_EV_STATE, HEAD_IDLE, HEAD_BOOT, "idle");
+    rig_tell(rig, "SYST:CONT:TAKE", rig->next);
+    expect_event(rig, NATIVE_EV_CONTROL, 1, 0, "taken");
+    rig_tell(rig, "SYST:CONT:REL", rig->next);
+    expect_event(rig, NATIVE_EV_CONTROL, 0, 0, "released");
+    device_session_opened(rig->device, 1, "tcp 127.0.0.1:5");
+    rig_tell(rig, "SCAN:STAR", rig->next);
+    expect_event(rig, NATIVE_EV_STATE, HEAD_SPIN_UP, HEAD_IDLE, "spin-up");
+    expect_event(rig, NATIVE_EV_STATE, HEAD_SCANNING, HEAD_SPIN_UP, "scanning");
+    rig_tell(rig, "SYST:CONT:REL", rig->next);
+    expect_event(rig, NATIVE_EV_CONTROL, 0, 0, "released");
+    rig_tell(rig, "SYST:CONT:TAKE", rig->next);
+    expect_event(rig, NATIVE_EV_CONTROL, 1, 0, "tcp 127.0.0.1:5");
+    rig_tell(rig, "SCAN:STOP", rig->next);
+    expect_event(rig, NATIVE_EV_STATE, HEAD_SPIN_DOWN, HEAD_SCANNING, "spin-down");
+    expect_event(rig, NATIVE_EV_STATE, HEAD_IDLE, HEAD_SPIN_DOWN, "idle");
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(control_is_given_back_at_once),   cmocka_unit_test(control_is_announced),
-        cmocka_unit_test(to_describe_it_changes_nothing),  cmocka_unit_test(no_time_no_fixes),
+        cmocka_unit_test(states_and_control_are_events),
+        cmocka_unit_test(control_is_given_back_at_once),
+        cmocka_unit_test(control_is_announced),
+        cmocka_unit_test(to_describe_it_changes_nothing),
+        cmocka_unit_test(no_time_no_fixes),
         cmocka_unit_test(fixes_lie_at_their_times_of_utc),
     };
     return cmocka_run_group_tests_name("device, other protocols", tests, make_folder, remove_folder);

@@ -103,10 +103,10 @@ static void a_path_ends_with_its_last_pose(void **state)
             rig_go_to(rig, rig->next + 2500);
         else
             assert_int_equal(rig_wait(rig, NATIVE_EV_SCAN_END, 2010)->b, 2 * 300000);
-        static const int64_t at_ns[] = {1999000000, 2000000000, 2400000000};
-        for (int i = 0; i < 3; i++) {
+        static const int64_t at_ns[] = {-1, 0, 500000000, 1999000000, 2000000000, 2400000000};
+        for (int i = 0; i < 6; i++) {
             assert_int_equal(device_head_pose(rig->device, t0_ns + at_ns[i], &pose), 1);
-            const double want_m = fmin(1e-9 * (double)at_ns[i], 2.0);
+            const double want_m = fmin(1e-9 * (double)(at_ns[i] > 0 ? at_ns[i] : 0), 2.0);
             assert_true(fabs(pose.position_m[1] - want_m) < 1e-6); /* a straight way at a constant speed */
         }
         rig_close(rig);

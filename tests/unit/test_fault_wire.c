@@ -275,6 +275,40 @@ static void a_session_that_ends_takes_nothing_more(void **state)
     assert_true(wire_is_empty(rig.wire));
 }
 
+/* The note of an act says how long it holds, whether it is a reset, and how many packets it makes short. The link gets
+ * its figures. Some acts end the session, and others let it go on. */
+static void an_act_has_its_figures(void **state)
+{
+    (void)state;
+    static const struct {
+        enum fault_kind kind;
+        int reset;
+        uint64_t noted_n;
+        const char *text;
+        uint32_t n, n_notes; /* two frames come, of which the second does not come after an end */
+    } rows[] = {{FAULT_SHORT_PACKETS, 0, 3, "", 3, 2}, {FAULT_DISCONNECT, 1, 0, "reset", 3, 1},
+                {FAULT_CABLE, 1, 0, "reset", 1, 2},    {FAULT_CABLE, 0, 0, "", 0, 2},
+                {FAULT_USB_RESET, 0, 0, "", 3, 1},     {FAULT_ENDPOINT_STALL, 0, 0, "", 3, 2},
+                {FAULT_UNPLUG, 0, 0, "", 3, 1}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        f = fault_of_kind(rows[i].kind);
+        f.n = 3;
+        f.reset = rows[i].reset;
+        f.for_ms = 7.0;
+        rig_open(&f, 1, 1);
+        rig_frame(RIG_POINTS);
+        rig_frame(RIG_POINTS);
+        rig_drain();
+        assert_int_equal(rig.n_notes, rows[i].n_notes);
+        assert_true(rig.note[0].kind == rows[i].kind && rig.note[0].n == rows[i].noted_n);
+        assert_true(rig.note[0].for_ms == 7.0 && rig.note[0].number == 1 && rig.note[0].link == 1);
+        assert_string_equal(rig.note[0].text, rows[i].text);
+        assert_true(rig.write[0].kind == WIRE_ACT && rig.write[0].act == (uint32_t)rows[i].kind);
+        assert_true(rig.write[0].n == rows[i].n && rig.write[0].for_ms == 7.0);
+        rig_close();
+    }
+}
+
 /* A frame is not written until all of its writes are out. A copy of it does not count. */
 static void what_is_not_written_is_counted(void **state)
 {
@@ -351,6 +385,7 @@ int main(void)
         cmocka_unit_test_teardown(a_damaged_datagram_is_not_sent, rig_teardown),
         cmocka_unit_test_teardown(garbage_stands_before_the_frame, rig_teardown),
         cmocka_unit_test_teardown(a_dropped_frame_is_hit_by_nothing_else, rig_teardown),
+        cmocka_unit_test(an_act_has_its_figures),
         cmocka_unit_test_teardown(a_session_that_ends_takes_nothing_more, rig_teardown),
         cmocka_unit_test_teardown(what_is_not_written_is_counted, rig_teardown),
         cmocka_unit_test_teardown(an_act_that_is_not_carried_out_does_not_count, rig_teardown),

@@ -3,6 +3,7 @@
 #include "tests/unit/device_rig.h"
 #include "tests/unit/plain_source.h"
 
+#include "drivers/usb/backend.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 
@@ -107,11 +108,57 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     rig_close(rig);
 }
 
+/* A USB link at full speed carries 19 packets of 64 bytes each ms (USB 2.0, table 5-9). The head fires 300 kHz in a turn
+ * of 360 deg by 3 facets with a gain of 2, and 100 deg of the 240 of a sweep are cast: 125,000 points a second. */
+static void what_a_link_carries_is_compared(void **state)
+{
+    (void)state;
+    static const struct {
+        int attributes;
+        enum colour_mode colour;
+        int bytes; /* of a point */
+        const char *advice;
+    } rows[] = {{0, COLOUR_NONE, 20, "lower head.prr_hz to 145920"},
+                {1, COLOUR_SOLID, 20 + NATIVE_ATTRIBUTE_LEN + NATIVE_COLOUR_LEN, "or leave out output.attributes"},
+                {0, COLOUR_SOLID, 20 + NATIVE_COLOUR_LEN, "or leave out output.colour"}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct rig *rig = rig_open(NULL, NULL, 0);
+        struct config *cfg = rig->cfg;
+        const struct loop_options options = {.report = &report};
+        struct loop *loop = NULL;
+        struct sh_err err = {0};
+        char text[128];
+        cfg->n_links = 1;
+        cfg->link[0] =
+            (struct link_spec){.type = LINK_USB, .backend = USB_BACKEND_USBIP, .speed = USB_RATE_FULL, .vid = 1};
+        cfg->output.attributes = rows[i].attributes;
+        cfg->output.colour = rows[i].colour;
+        assert_int_equal(loop_create(rig->site, rig->device, &options, &loop, &err), SH_EINPUT);
+        snprintf(text, sizeof text, ": the stream has %.2f MB/s, the link carries 1.22 MB/s; lower head.prr_hz to ",
+                 0.125 * rows[i].bytes);
+        if (strstr(err.text, text) == NULL || strstr(err.text, rows[i].advice) == NULL) fail_msg("%s", err.text);
+        assert_int_equal(strncmp(err.text, "link usbip:127.0.0.1:", 21), 0);
+        assert_null(loop);
+        if (i == 0) { /* no rate of the profile is low enough */
+            cfg->profile.prr_min_uhz = 200000000000;
+            assert_int_equal(loop_create(rig->site, rig->device, &options, &loop, &err), SH_EINPUT);
+            assert_non_null(strstr(err.text, "; no rate of the head is low enough; allowed is a faster link"));
+            assert_null(open_links(cfg, &err)); /* of a recording */
+            assert_non_null(strstr(err.text, "; allowed is 0.48 times this speed, or another link"));
+        }
+        cfg->link[0].protocol = PROTOCOL_NMEA; /* not compared */
+        need(loop_create(rig->site, rig->device, &options, &loop, &err), &err);
+        loop_free(loop);
+        rig_close(rig);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_link_that_others_reach_is_warned_of),
         cmocka_unit_test(protocols_know_the_head_and_its_data_link),
+        cmocka_unit_test(what_a_link_carries_is_compared),
     };
     return cmocka_run_group_tests_name("links", tests, make_folder, remove_folder);
 }

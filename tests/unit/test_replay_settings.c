@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The settings that a replay reports for its head follow from the recording, and so do its counts. */
+/* The settings that a replay reports for its head follow from the recording, and so do its counts and states. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/config/config.h"
 #include "firmware_sim/replay/replay_state.h"
 
 /* A sphere's step is the turn divided by its steps. A firing sequence lasts num / den ns. An anchor gives the
@@ -122,6 +123,7 @@ static void frames_are_counted(void **state)
     struct replay *r = calloc(1, sizeof *r);
     assert_non_null(r);
     note_event(r, NATIVE_EV_SCAN_START, 1, 0);
+    assert_int_equal(r->tick.scan, 0); /* a tick belongs to the scan of its points */
     note_points(r, 16, 5);
     note_points(r, 10, 0);
     assert_true(r->scans == 1 && r->tick.scan == 1 && r->frames == 3);
@@ -136,6 +138,30 @@ static void frames_are_counted(void **state)
     note_event(r, NATIVE_EV_SCAN_START, 2, 0);
     note_points(r, 1, 1);
     assert_true(r->scans == 2 && r->tick.scan == 2 && r->frames_done == 0 && r->frames == 7);
+    free(r);
+}
+
+/* Settings are those of the last descriptor, emitter and anchor that went out. A new descriptor is that of a head whose
+ * mirror turns, until an emitter says otherwise. */
+static void settings_follow_the_frames(void **state)
+{
+    (void)state;
+    struct replay *r = calloc(1, sizeof *r);
+    const struct native_emitter e = {.kind = NATIVE_EMIT_PLANAR, .steps = 1440, .turn = 1, .sequence_ns_den = 1};
+    const struct native_anchor a = {.station = 4};
+    struct native_descriptor d = {.prr_uhz = 7, .range_scale_m = 1};
+    assert_non_null(r);
+    d.mirror_counts_per_turn = d.pan_counts_per_turn = 1000;
+    assert_true(native_encode_emitter(frame, sizeof frame, &e, NULL, 0, 0) > 0);
+    replay_note_frame(r, frame, 0);
+    assert_true(r->cmd.limits.emitter == EMITTER_PLANAR && r->cmd.limits.line_pulses == 1440);
+    assert_true(native_encode_anchor(frame, sizeof frame, &a, 0, 0) > 0);
+    replay_note_frame(r, frame, 0);
+    assert_int_equal(r->cmd.settings.station, 4);
+    assert_true(native_encode_descriptor(frame, sizeof frame, &d, 0, 0) > 0);
+    replay_note_frame(r, frame, 0);
+    assert_true(r->cmd.settings.prr_uhz == 7 && r->cmd.limits.emitter == EMITTER_LINE);
+    assert_true(r->cmd.limits.line_pulses == 0 && r->cmd.settings.station == 4 && r->frames == 3);
     free(r);
 }
 
@@ -156,13 +182,45 @@ static void states_are_taken(void **state)
     }
 }
 
+static const char *state_at(struct replay *r, uint64_t released)
+{
+    static struct command_result result;
+    replay_command(r, 1, "HEAD:STATE?", released, &result);
+    return result.reply;
+}
+
+/* A state holds once the tick that contains it is released: ticks 0 to n - 1 are when n are. */
+static void a_state_holds_from_its_tick_on(void **state)
+{
+    (void)state;
+    struct replay *r = calloc(1, sizeof *r);
+    struct config *cfg = calloc(1, sizeof *cfg);
+    assert_true(r != NULL && cfg != NULL);
+    r->cfg = cfg;
+    pthread_mutex_init(&r->lock, NULL);
+    replay_open_commands(r);
+    assert_string_equal(state_at(r, 100), "idle"); /* nothing was said */
+    replay_set_state(r, 5, HEAD_SPIN_UP);
+    replay_set_state(r, 8, HEAD_SCANNING);
+    assert_string_equal(state_at(r, 5), "idle");
+    assert_string_equal(state_at(r, 6), "spin-up");
+    assert_string_equal(state_at(r, 8), "spin-up");
+    assert_string_equal(state_at(r, 9), "scanning");
+    for (uint64_t i = 0; i < 3 * REPLAY_CHANGES; i++) /* the oldest are forgotten */
+        replay_set_state(r, 10 + i, i % 2 == 0 ? HEAD_SPIN_DOWN : HEAD_IDLE);
+    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES - 1), "spin-down");
+    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES), "idle");
+    pthread_mutex_destroy(&r->lock);
+    free(cfg);
+    free(r);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_settings),
-        cmocka_unit_test(a_descriptor_gives_settings_and_limits),
-        cmocka_unit_test(frames_are_counted),
-        cmocka_unit_test(states_are_taken),
+        cmocka_unit_test(test_settings),      cmocka_unit_test(a_descriptor_gives_settings_and_limits),
+        cmocka_unit_test(frames_are_counted), cmocka_unit_test(settings_follow_the_frames),
+        cmocka_unit_test(states_are_taken),   cmocka_unit_test(a_state_holds_from_its_tick_on),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

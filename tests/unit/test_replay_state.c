@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A recording is replayed, without threads: the times at which its frames are sent, and its states. */
+/* A recording is replayed, without threads: the times at which its frames are sent, and commands. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -15,127 +15,6 @@
 #include "firmware_sim/replay/replay_state.h"
 #include "tests/unit/file_rig.h"
 #include "tests/unit/event_recording.h"
-
-/* ---- times of frames */
-
-enum { PERIOD_NS = 1000 };
-
-static uint32_t next_seq;
-
-static void put(FILE *f, uint8_t *frame, size_t len)
-{
-    assert_true(len > 0);
-    native_finish_frame(frame, next_seq++);
-    assert_int_equal(fwrite(frame, 1, len, f), len);
-}
-
-static void put_head(FILE *f, const char *idn)
-{
-    uint8_t frame[1024];
-    struct native_descriptor d = {.prr_uhz = UINT64_C(1000000000000), .range_scale_m = 1, .scan = 1};
-    d.mirror_counts_per_turn = d.pan_counts_per_turn = 1000;
-    snprintf(d.idn, sizeof d.idn, "%s", idn);
-    put(f, frame, native_encode_descriptor(frame, sizeof frame, &d, 0, 0));
-}
-
-static void put_descriptor(FILE *f)
-{
-    put_head(f, "");
-}
-
-static void put_event(FILE *f, enum native_event_code code, int64_t t_ns)
-{
-    uint8_t frame[256];
-    const struct native_event event = {.code = (uint32_t)code, .a = 1};
-    put(f, frame, native_encode_event(frame, sizeof frame, &event, t_ns, 0));
-}
-
-/* Writes the first n pulses of a scan, one each microsecond. The head computes 16 at a time. */
-static void put_points(FILE *f, uint32_t n)
-{
-    static uint32_t dt_ns[16], zero[16];
-    static int16_t refl_cdb[16];
-    static uint8_t echo[16], frame[1024];
-    static uint16_t label[16];
-    for (uint32_t i = 0; i < n; i++)
-        dt_ns[i] = i * PERIOD_NS;
-    const struct line_block block = {.n_pulses = n,
-                                     .n_points = n,
-                                     .dt_ns = dt_ns,
-                                     .a = zero,
-                                     .b = zero,
-                                     .c = zero,
-                                     .refl_cdb = refl_cdb,
-                                     .echo = echo,
-                                     .label = label};
-    put(f, frame, native_encode_points(frame, sizeof frame, &block, 0));
-}
-
-static int64_t time_of_points(struct recording *r)
-{
-    struct recording_frame frame;
-    struct sh_err err;
-    while (recording_next(r, &frame, &err) == 1)
-        if (frame.bytes[1] == NATIVE_POINTS) return frame.t_ns;
-    fail_msg("no points");
-    return 0;
-}
-
-static FILE *begin_file(void)
-{
-    FILE *f = fopen(file_path, "wb");
-    assert_non_null(f);
-    next_seq = 0;
-    return f;
-}
-
-/* Ten of sixteen pulses were sent with the sixteenth, or with an earlier frame. */
-static void points_go_out_with_what_follows(void **state)
-{
-    (void)state;
-    static const struct {
-        int64_t event_ns, want_ns;
-    } rows[] = {{12000, 12000}, {15000, 15000}, {20000, 15000}};
-    static struct recording r;
-    struct sh_err err;
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        FILE *f = begin_file();
-        put_descriptor(f);
-        put_event(f, NATIVE_EV_SCAN_START, 0);
-        put_points(f, 10);
-        put_event(f, NATIVE_EV_CONTROL, rows[i].event_ns);
-        assert_int_equal(fclose(f), 0);
-        memset(&r, 0, sizeof r);
-        if (recording_open(&r, file_path, &err) != SH_OK) fail_msg("%s", err.text);
-        assert_int_equal(time_of_points(&r), rows[i].want_ns);
-        recording_close(&r);
-    }
-}
-
-/* Facts at the end of a recording are not known when it begins anew: here the rate. */
-static void it_begins_anew_as_it_began(void **state)
-{
-    (void)state;
-    static struct recording r;
-    struct sh_err err;
-    FILE *f = begin_file();
-    put_points(f, 10);
-    put_event(f, NATIVE_EV_CONTROL, 12000);
-    put_descriptor(f);
-    assert_int_equal(fclose(f), 0);
-    memset(&r, 0, sizeof r);
-    if (recording_open(&r, file_path, &err) != SH_OK) fail_msg("%s", err.text);
-    for (int times = 0; times < 3; times++) {
-        struct recording_frame frame;
-        int n = 1;
-        assert_int_equal(time_of_points(&r), 9 * PERIOD_NS);
-        while (recording_next(&r, &frame, &err) == 1)
-            n++;
-        assert_int_equal(n, 3);
-        if (recording_rewind(&r, &err) != SH_OK) fail_msg("%s", err.text);
-    }
-    recording_close(&r);
-}
 
 /* ---- ticks */
 
@@ -191,11 +70,11 @@ static void frames_go_out_in_their_ticks(void **state)
                 {{0, 0, 1, 2, 3, 10}, 0.5, {1, 1, 3, 5, 7, 21}},
                 {{0, 5000, 4500, 5001, 3000, 3002}, 1, {0, 5000, 5000, 5001, 5002, 5004}}};
     for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
-        FILE *f = begin_file();
-        put_descriptor(f);
+        FILE *f = recording_begin(file_path);
+        recording_put_head(f, "", 0);
         for (int i = 0; i < EVENTS; i++)
-            put_event(f, NATIVE_EV_CONTROL, rows[k].event_ms[i] * TICK_NS);
-        assert_int_equal(fclose(f), 0);
+            recording_put_event(f, NATIVE_EV_CONTROL, rows[k].event_ms[i] * TICK_NS);
+        recording_end(f);
         for (uint64_t first = 0; first < 200; first += 77) {
             assert_int_equal(play(&(struct replay_options){.speed = rows[k].speed}, first, MOST), 1 + EVENTS);
             for (int i = 0; i < EVENTS; i++)
@@ -212,13 +91,13 @@ static void each_time_has_its_numbers(void **state)
     (void)state;
     uint8_t frame[256];
     const struct native_event local = {.code = NATIVE_EV_READER_LOST};
-    FILE *f = begin_file();
-    put_descriptor(f);
-    put_event(f, NATIVE_EV_CONTROL, 0);
-    put_event(f, NATIVE_EV_CONTROL, 2 * TICK_NS);
+    FILE *f = recording_begin(file_path);
+    recording_put_head(f, "", 0);
+    recording_put_event(f, NATIVE_EV_CONTROL, 0);
+    recording_put_event(f, NATIVE_EV_CONTROL, 2 * TICK_NS);
     const size_t len = native_encode_event(frame, sizeof frame, &local, 2 * TICK_NS, NATIVE_LOCAL);
     assert_int_equal(fwrite(frame, 1, len, f), len);
-    assert_int_equal(fclose(f), 0);
+    recording_end(f);
     assert_int_equal(play(&(struct replay_options){.speed = 1, .loop = 1}, 0, 12), 12);
     uint32_t last = 0;
     for (int i = 0; i < 12; i++) {
@@ -231,6 +110,21 @@ static void each_time_has_its_numbers(void **state)
         assert_int_equal(h->seq, i == 0 ? 0 : last + step);
         last = h->seq;
     }
+}
+
+/* A recording that begins within a scan has only repetitions of its descriptor. When it begins anew, its readers get
+ * one that holds at once, which is for them alone. */
+static void a_new_round_begins_with_the_head(void **state)
+{
+    (void)state;
+    FILE *f = recording_begin(file_path);
+    recording_put_head(f, "", NATIVE_REPEAT);
+    recording_put_event(f, NATIVE_EV_CONTROL, TICK_NS);
+    recording_end(f);
+    static const uint8_t flags[] = {NATIVE_REPEAT, 0, NATIVE_LOCAL, NATIVE_REPEAT, 0, NATIVE_LOCAL, NATIVE_REPEAT};
+    assert_int_equal(play(&(struct replay_options){.speed = 1, .loop = 1}, 0, 7), 7);
+    for (int i = 0; i < 7; i++)
+        if (played[i].header.flags != flags[i]) fail_msg("frame %d: %d", i, played[i].header.flags);
 }
 
 /* A part goes from 5 ms to 12 ms, both included. A reader first gets the head's description. */
@@ -341,10 +235,10 @@ static void its_name_is_a_line(void **state)
 {
     (void)state;
     struct config *cfg = config_new();
-    FILE *f = begin_file();
-    put_head(f, "Maker,Mo\r\ndel,\xd5,1");
-    put_event(f, NATIVE_EV_CONTROL, 0);
-    assert_int_equal(fclose(f), 0);
+    FILE *f = recording_begin(file_path);
+    recording_put_head(f, "Maker,Mo\r\ndel,\xd5,1", 0);
+    recording_put_event(f, NATIVE_EV_CONTROL, 0);
+    recording_end(f);
     const struct replay_options options = {.path = file_path, .speed = 1};
     struct replay *r = open_replay(cfg, &options);
     assert_string_equal(said(r, "*IDN?"), "Maker,Mo~~del,~,1");
@@ -389,49 +283,18 @@ static void what_a_replay_refuses(void **state)
     free(cfg);
 }
 
-/* ---- states */
-
-static const char *state_at(struct replay *r, uint64_t released)
-{
-    static struct command_result result;
-    replay_command(r, 1, "HEAD:STATE?", released, &result);
-    return result.reply;
-}
-
-/* A state holds once the tick that contains it is released: ticks 0 to n - 1 are when n are. */
-static void a_state_holds_from_its_tick_on(void **state)
-{
-    (void)state;
-    struct replay *r = calloc(1, sizeof *r);
-    struct config *cfg = calloc(1, sizeof *cfg);
-    assert_true(r != NULL && cfg != NULL);
-    r->cfg = cfg;
-    pthread_mutex_init(&r->lock, NULL);
-    replay_open_commands(r);
-    assert_string_equal(state_at(r, 100), "idle"); /* nothing was said */
-    replay_set_state(r, 5, HEAD_SPIN_UP);
-    replay_set_state(r, 8, HEAD_SCANNING);
-    assert_string_equal(state_at(r, 5), "idle");
-    assert_string_equal(state_at(r, 6), "spin-up");
-    assert_string_equal(state_at(r, 8), "spin-up");
-    assert_string_equal(state_at(r, 9), "scanning");
-    for (uint64_t i = 0; i < 3 * REPLAY_CHANGES; i++) /* the oldest are forgotten */
-        replay_set_state(r, 10 + i, i % 2 == 0 ? HEAD_SPIN_DOWN : HEAD_IDLE);
-    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES - 1), "spin-down");
-    assert_string_equal(state_at(r, 10 + 3 * REPLAY_CHANGES), "idle");
-    pthread_mutex_destroy(&r->lock);
-    free(cfg);
-    free(r);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_go_out_with_what_follows), cmocka_unit_test(it_begins_anew_as_it_began),
-        cmocka_unit_test(frames_go_out_in_their_ticks),    cmocka_unit_test(each_time_has_its_numbers),
-        cmocka_unit_test(a_part_begins_with_the_head),     cmocka_unit_test(its_name_is_a_line),
-        cmocka_unit_test(a_command_seeks_paces_and_loops), cmocka_unit_test(what_a_replay_refuses),
-        cmocka_unit_test(a_state_holds_from_its_tick_on),  cmocka_unit_test(a_seek_to_the_end_of_a_part_is_its_end),
+        cmocka_unit_test(frames_go_out_in_their_ticks),
+        cmocka_unit_test(each_time_has_its_numbers),
+        cmocka_unit_test(a_part_begins_with_the_head),
+        cmocka_unit_test(its_name_is_a_line),
+        cmocka_unit_test(a_command_seeks_paces_and_loops),
+        cmocka_unit_test(what_a_replay_refuses),
+        cmocka_unit_test(a_new_round_begins_with_the_head),
+
+        cmocka_unit_test(a_seek_to_the_end_of_a_part_is_its_end),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }

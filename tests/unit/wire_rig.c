@@ -139,7 +139,8 @@ uint32_t rig_take(int last)
         const size_t len = piece->kind != WIRE_ACT ? piece->len - piece->out : 0;
         if (piece->kind == WIRE_ACT) fault_board_note(rig.board, wire_act_note(piece)); /* it is carried out */
         assert_true(rig.n_writes < RIG_WRITES && rig.n_out + len <= RIG_OUT);
-        rig.write[rig.n_writes++] = (struct rig_write){rig.now_ns, piece->kind, piece->act, rig.n_out, len};
+        rig.write[rig.n_writes++] =
+            (struct rig_write){rig.now_ns, piece->kind, piece->act, rig.n_out, len, piece->n, piece->for_ms};
         if (len != 0) memcpy(rig.out + rig.n_out, piece->bytes + piece->out, len);
         rig.n_out += len;
         wire_pop(rig.wire);

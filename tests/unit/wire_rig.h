@@ -36,6 +36,8 @@ struct rig_write {
     enum wire_piece_kind kind;
     uint32_t act;
     size_t at, len; /* in rig.out */
+    uint32_t n;     /* n and for_ms are those of an act */
+    double for_ms;
 };
 
 struct rig {

@@ -108,7 +108,6 @@ int own_stream_start(struct own_stream *s, struct sh_err *err)
 void own_stream_join(struct own_stream *s)
 {
     if (s->running) pthread_join(s->thread, NULL);
-    s->running = 0;
 }
 
 void own_stream_close(struct own_stream *s)
