@@ -287,13 +287,11 @@ static void test_lines_of_rings(void **state)
 static void test_a_line_beyond(void **state)
 {
     (void)state;
-    static uint8_t out[1024];
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
-    const struct rig_point one = {0, 1000, 0, 0, 0, 1, 1};
-    const struct native_emitter e = {.firing = NATIVE_FIRING_SPHERE,
-                                     .step_udeg = 180000000,
-                                     .ring_step_udeg = 20000000,
-                                     .sequence_ns = 1,
+    const struct native_emitter e = {.kind = NATIVE_EMIT_SPHERE,
+                                     .steps = 10,
+                                     .rings = 10,
+                                     .turn = 1,
                                      .sequence_ns_den = 1,
                                      .first_ring_udeg = -90000000};
     const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
