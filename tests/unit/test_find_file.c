@@ -10,8 +10,8 @@
 #include "tests/common/cases.h"
 
 static char dir[] = "/tmp/scanhead-find-XXXXXX", first[64], second[64];
-static const char *const made[] = {"a/Wood.PNG", "a/sub/Stone.png", "b/wood.png",    "b/tex/x.png",
-                                   "b/Same.png", "b/SAME.png",      "b/tex/Tile.JPG"};
+static const char *const made[] = {"a/Wood.PNG", "a/sub/Stone.png", "b/wood.png",     "b/tex/x.png",
+                                   "b/Same.png", "b/SAME.png",      "b/tex/Tile.JPG", "b/TILE.JPG"};
 
 static void path_of(char path[128], const char *name)
 {
@@ -69,23 +69,25 @@ static void names_are_searched_in_order(void **state)
 {
     (void)state;
     const char *const both[2] = {first, second};
-    static const char *const rows[][2] = {{"Wood.PNG", "a/Wood.PNG"},
-                                          {"wood.png", "b/wood.png"}, /* exact in b, before any case in a */
-                                          {"WOOD.png", "a/Wood.PNG"},
-                                          {"sub/Stone.png", "a/sub/Stone.png"},
-                                          {"sub\\Stone.png", "a/sub/Stone.png"},
-                                          {"SUB\\STONE.PNG", "a/sub/Stone.png"},
-                                          {"C:\\maps\\wood.png", "b/wood.png"},
-                                          {"/home/other/Wood.PNG", "a/Wood.PNG"},
-                                          {"/home/other/tile.jpg", NULL}, /* tex is not named */
-                                          {"TEX/tile.jpg", "b/tex/Tile.JPG"},
-                                          {"other/WOOD.png", "a/Wood.PNG"},
-                                          {"same.png", "b/SAME.png"}, /* the first in byte order */
-                                          {"dir.png", NULL},          /* a folder is no file */
-                                          {"sub", NULL},
-                                          {"stone", NULL},
-                                          {"Stone.png", NULL},
-                                          {"", NULL}};
+    static const char *const rows[][2] = {
+        {"Wood.PNG", "a/Wood.PNG"},
+        {"wood.png", "b/wood.png"}, /* exact in b, before any case in a */
+        {"WOOD.png", "a/Wood.PNG"},
+        {"sub/Stone.png", "a/sub/Stone.png"},
+        {"sub\\Stone.png", "a/sub/Stone.png"},
+        {"SUB\\STONE.PNG", "a/sub/Stone.png"},
+        {"C:\\maps\\wood.png", "b/wood.png"},
+        {"/home/other/Wood.PNG", "a/Wood.PNG"},
+        {"/home/other/x.png", NULL},        /* tex is not named */
+        {"TEX/tile.jpg", "b/tex/Tile.JPG"}, /* whole before its last part, in any case */
+        {"tix/tile.jpg", "b/TILE.JPG"},
+        {"other/WOOD.png", "a/Wood.PNG"},
+        {"same.png", "b/SAME.png"}, /* the first in byte order */
+        {"dir.png", NULL},          /* a folder is no file */
+        {"sub", NULL},
+        {"stone", NULL},
+        {"Stone.png", NULL},
+        {"", NULL}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
         expect(both, 2, rows[i][0], rows[i][1]);
     const char *const swapped[2] = {second, first};

@@ -97,7 +97,8 @@ static void test_one_request_each(void **state)
     assert_non_null(strstr(answer, "connection: close\r\n"));
     assert_string_equal(answer + n - 5, "bbbbb");
     close(fd);
-    assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 200);
+    for (int i = 0; i < 100; i++) /* more than there are places: each answer gives all back */
+        assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 200);
     bench_close(&bench);
 }
 
@@ -321,11 +322,37 @@ static void test_turned_down(void **state)
     web_send_frame(fd[WEB_SESSIONS], 0x81, "*IDN?", 5);
     assert_int_equal(web_take_frame(&bench, fd[WEB_SESSIONS], payload, &len), 0x88);
     assert_int_equal(payload[0] << 8 | payload[1], 1013);
+    assert_int_equal(len, 2 + strlen("all 2 sessions of this link are taken"));
+    assert_memory_equal(payload + 2, "all 2 sessions of this link are taken", len - 2);
     bench_expect(&bench, LINK_REFUSED, 0);
     for (int i = 0; i <= WEB_SESSIONS; i++)
         close(fd[i]);
     for (int i = 0; i < WEB_SESSIONS; i++)
         bench_expect(&bench, LINK_CLOSED, 0);
+    bench_close(&bench);
+}
+
+/* A link of one session has other words for those who come too late. */
+static void test_only_session(void **state)
+{
+    (void)state;
+    static const struct link_spec one = {.type = LINK_WEB, .max_sessions = 1};
+    static const char why[] = "the only session of this link is taken";
+    char url[128];
+    uint8_t payload[200];
+    size_t len;
+    struct bench bench = bench_open(&one);
+    bench.ops->endpoint(bench.link, url, sizeof url);
+    char *place = url + strlen("http://");
+    place[strlen(place) - 1] = '\0';
+    const int first = web_upgrade(&bench, place, "/ws", ""), second = web_upgrade(&bench, place, "/ws", "");
+    assert_int_equal(web_take_frame(&bench, second, payload, &len), 0x88);
+    assert_int_equal(payload[0] << 8 | payload[1], 1013);
+    assert_int_equal(len, 2 + strlen(why));
+    assert_memory_equal(payload + 2, why, len - 2);
+    assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 404); /* it serves the page alone */
+    close(first);
+    close(second);
     bench_close(&bench);
 }
 
@@ -342,7 +369,9 @@ static void test_bad_messages(void **state)
         const char *data;
         size_t len;
         int code;
-    } cases[] = {{0x82, "*IDN?", 5, 1003}, {0x81, long_text, sizeof long_text, 1009}};
+        const char *why;
+    } cases[] = {{0x82, "*IDN?", 5, 1003, "a command must be a text message"},
+                 {0x81, long_text, sizeof long_text, 1009, "a message must have at most 4096 bytes"}};
     struct bench bench = web_open(place);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         size_t len;
@@ -351,6 +380,8 @@ static void test_bad_messages(void **state)
         web_send_frame(fd, cases[i].first, cases[i].data, cases[i].len);
         assert_int_equal(web_take_frame(&bench, fd, payload, &len), 0x88);
         assert_int_equal(payload[0] << 8 | payload[1], cases[i].code);
+        assert_int_equal(len, 2 + strlen(cases[i].why));
+        assert_memory_equal(payload + 2, cases[i].why, len - 2);
         close(fd); /* or, without its answer, some seconds later */
         bench_expect(&bench, LINK_CLOSED, 0);
     }
@@ -373,6 +404,7 @@ int main(void)
         cmocka_unit_test(test_refused_names),
         cmocka_unit_test(test_descriptors_run_out),
         cmocka_unit_test(test_turned_down),
+        cmocka_unit_test(test_only_session),
         cmocka_unit_test(test_bad_messages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
