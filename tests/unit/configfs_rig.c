@@ -6,9 +6,11 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
+#include <linux/usb/functionfs.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -17,6 +19,7 @@
 struct configfs configfs;
 static char root[40];
 static int udc_fd = -1; /* of a gadget's UDC */
+static int n_open;      /* descriptors of this process before the test */
 
 enum { PATH_ROOM = 600 };
 
@@ -189,6 +192,9 @@ int open(const char *path, int flags, ...)
 {
     char to[PATH_ROOM];
     const char *real = moved(path, to);
+    if (configfs.ep0 != 0 && is_attribute(path, "ep0")) return dup(configfs.ep0);
+    if (configfs.tty != NULL && strcmp(path, "/dev/ttyGS3") == 0)
+        return (int)syscall(SYS_openat, AT_FDCWD, configfs.tty, flags);
     if (real == path) return (int)syscall(SYS_openat, AT_FDCWD, path, flags, 0600);
     if ((flags & O_ACCMODE) == O_WRONLY && is_attribute(path, configfs.fails)) return errno = EIO, -1;
     const int fd = (int)syscall(SYS_openat, AT_FDCWD, real, flags | ((flags & O_ACCMODE) == O_WRONLY ? O_TRUNC : 0), 0);
@@ -220,11 +226,25 @@ ssize_t write(int fd, const void *bytes, size_t len)
 int access(const char *path, int mode)
 {
     char to[PATH_ROOM];
+    if (configfs.tty != NULL && strcmp(path, "/dev/ttyGS3") == 0) return 0;
     if (strcmp(path, CONFIGFS_GADGETS) == 0) {
         errno = mode == W_OK ? EACCES : ENOENT;
         if (configfs.is_unmounted || configfs.has_none || (configfs.is_read_only && mode == W_OK)) return -1;
     }
     return (int)syscall(SYS_faccessat, AT_FDCWD, moved(path, to), mode);
+}
+
+int ioctl(int fd, unsigned long request, ...)
+{
+    va_list ap;
+    va_start(ap, request);
+    void *to = va_arg(ap, void *);
+    va_end(ap);
+    if (request != FUNCTIONFS_ENDPOINT_DESC || configfs.given[0] == 0) return (int)syscall(SYS_ioctl, fd, request, to);
+    assert_in_range(configfs.n_given, 0, 1);
+    *(struct usb_endpoint_descriptor *)to =
+        (struct usb_endpoint_descriptor){.bEndpointAddress = configfs.given[configfs.n_given++]};
+    return 0;
 }
 
 FILE *fopen(const char *path, const char *mode)
@@ -235,6 +255,13 @@ FILE *fopen(const char *path, const char *mode)
     memcpy(&real, &found, sizeof real);
     if (strcmp(path, "/proc/self/mounts") == 0 && configfs.mounts != NULL) configfs_put(path, configfs.mounts);
     return real(moved(path, to), mode);
+}
+
+static const char *endpoint_in(const char *folder, int number)
+{
+    static char path[80];
+    snprintf(path, sizeof path, "%s/ep%d", folder, number);
+    return path;
 }
 
 int mount(const char *what, const char *where, const char *type, unsigned long flags, const void *data)
@@ -250,12 +277,16 @@ int mount(const char *what, const char *where, const char *type, unsigned long f
     if (configfs.mount_error != 0) return errno = configfs.mount_error, -1;
     snprintf(configfs.mounted, sizeof configfs.mounted, "%s", what);
     snprintf(configfs.at, sizeof configfs.at, "%s", where);
+    for (int i = 1; i <= 2; i++)
+        assert_int_equal(mkfifo(endpoint_in(where, i), 0600), 0);
     return 0;
 }
 
 int umount2(const char *where, int flags)
 {
     assert_int_equal(flags, MNT_DETACH);
+    for (int i = 1; i <= 2; i++)
+        unlink(endpoint_in(where, i));
     const size_t n = strlen(configfs.unmounted);
     snprintf(configfs.unmounted + n, sizeof configfs.unmounted - n, "%s ", where);
     return 0;
@@ -269,6 +300,16 @@ static int remove_one(const char *path, const struct stat *st, int type, struct 
     return (int)syscall(SYS_unlinkat, AT_FDCWD, path, type == FTW_DP ? AT_REMOVEDIR : 0);
 }
 
+static int count_open(void)
+{
+    int n = 0;
+    DIR *dir = opendir("/proc/self/fd");
+    for (struct dirent *entry; dir != NULL && (entry = readdir(dir)) != NULL;)
+        n += entry->d_name[0] != '.';
+    closedir(dir);
+    return n;
+}
+
 int configfs_set_up(void **state)
 {
     static const char *const folders[] = {"/sys",           "/sys/kernel", "/sys/kernel/config",
@@ -277,6 +318,7 @@ int configfs_set_up(void **state)
     (void)state;
     char path[80];
     configfs = (struct configfs){0};
+    n_open = count_open();
     strcpy(root, "/dev/shm/configfs.XXXXXX"); /* hundreds of files: on a disk they take seconds */
     if (mkdtemp(root) == NULL && mkdtemp(strcpy(root, "/tmp/configfs.XXXXXX")) == NULL) return -1;
     for (size_t i = 0; i < sizeof folders / sizeof folders[0]; i++) {
@@ -292,7 +334,9 @@ int configfs_tear_down(void **state)
     char dir[sizeof root];
     memcpy(dir, root, sizeof dir);
     root[0] = '\0';
-    return nftw(dir, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+    const int rc = nftw(dir, remove_one, 8, FTW_DEPTH | FTW_PHYS);
+    if (count_open() != n_open) fail_msg("%d descriptors were open before, now %d", n_open, count_open());
+    return rc;
 }
 
 const char *configfs_get(const char *dir, const char *name)

@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -344,6 +345,7 @@ static pid_t leave_one(void)
     const pid_t child = fork();
     if (child == 0) {
         const int rc = make(&scanhead_usb_model) == SH_OK && gadget_bind(&gadget, "udc.0", &err) == SH_OK;
+        umount2(gadget.mount, MNT_DETACH);
         rmdir(gadget.mount);
         _exit(rc ? 0 : 1);
     }

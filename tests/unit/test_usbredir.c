@@ -88,6 +88,13 @@ static void test_requests(void **state)
     assert_int_equal(s->length, 7);
     s = guest_control(g, 0xa1, 0x21, 0, 0, 7, NULL);
     assert_memory_equal(s->data, coding, 7);
+    s = guest_control(g, 0x80, USB_REQ_GET_CONFIGURATION, 0, 0, 1, NULL);
+    assert_int_equal(s->status, usb_redir_success);
+    assert_int_equal(s->length, 1);
+    assert_int_equal(s->data[0], 1);
+    s = guest_control(g, 0x80, 6, 0x0100, 0, 0, NULL); /* no byte is asked for */
+    assert_int_equal(s->status, usb_redir_success);
+    assert_int_equal(s->length, 0);
     assert_int_equal(guest_control(g, 0x80, 6, 0x3300, 0, 64, NULL)->status, usb_redir_stall);
     struct usb_redir_set_alt_setting_header alt = {.interface = 2, .alt = 0};
     g->interfaces.interface_count = 0; /* it is told them again */
