@@ -84,15 +84,16 @@ static int run_command(struct scanhead *sh, struct script *s, char *reply, size_
     return rc;
 }
 
-/* The head is gone before a command. That is an error, and no signal, which would end the client's program. */
+/* The head takes no more bytes. That is an error, and no signal, which would end the client's program. */
 static void test_command_to_nobody(void **state)
 {
     (void)state;
     char reply[16];
     int head;
     struct scanhead *sh = open_pair(&head);
-    close(head);
+    assert_int_equal(shutdown(head, SHUT_RD), 0);
     assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, WAIT_MS), SCANHEAD_ECLOSED);
+    close(head);
     scanhead_close(sh);
 }
 

@@ -76,6 +76,22 @@ static void test_requests(void **state)
     assert_int_equal(web_n_released, 2); /* one each; errors and the page's own files are not the owner's */
 }
 
+/* Whether a request is answered within far fewer turns than the seconds have that a client may take. */
+static int is_answered_soon(struct bench *bench, const char *place)
+{
+    char request[200], answer[4096];
+    int fd = web_dial(place);
+    snprintf(request, sizeof request, "GET /scene HTTP/1.1\r\nHost: %s\r\n\r\n", place);
+    assert_int_equal(send(fd, request, strlen(request), MSG_NOSIGNAL), strlen(request));
+    ssize_t n = -1;
+    for (int i = 0; i < 3000 && n < 0; i++) {
+        bench_poll(bench, 0, 1);
+        n = recv(fd, answer, sizeof answer, MSG_DONTWAIT);
+    }
+    close(fd);
+    return n > 12 && memcmp(answer, "HTTP/1.1 200", 12) == 0;
+}
+
 /* A connection ends with its first answer. */
 static void test_one_request_each(void **state)
 {
@@ -97,8 +113,9 @@ static void test_one_request_each(void **state)
     assert_non_null(strstr(answer, "connection: close\r\n"));
     assert_string_equal(answer + n - 5, "bbbbb");
     close(fd);
-    for (int i = 0; i < 100; i++) /* more than there are places: each answer gives all back */
-        assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 200);
+    assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 200);
+    for (int i = 0; i < 80; i++) /* more than libwebsockets has room for: each answer gives its own back */
+        assert_true(is_answered_soon(&bench, place));
     bench_close(&bench);
 }
 
