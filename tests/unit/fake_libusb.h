@@ -55,6 +55,7 @@ struct fake_bus {
     void (*idle)(void);
     int no_hotplug, no_udev, gone, init_rc; /* gone: every device that is open has been unplugged */
     int clear_halt_rc, submit_rc;           /* the results of these while not 0 */
+    int claim_rc, session_rc;               /* the results of claiming the interface, and of opening the stream */
     int submit_fails;                       /* for so many times; < 0: always */
     int submit_room;                        /* how many reads may be under way; 0: any number */
     int will_not_cancel, hold_writes;

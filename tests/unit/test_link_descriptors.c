@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: MIT */
+/* Links of all types give back every descriptor: when they are closed, with a client or without, and when they can't be
+ * opened. */
+#include "tests/unit/link_test.h"
+
+#include <dirent.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+
+#include "drivers/link/memory.h"
+#include "drivers/usb/backend.h"
+
+static char *dir;
+static struct link_memory memory;
+
+static int make_dir(void **state)
+{
+    (void)state;
+    dir = test_dir();
+    return 0;
+}
+
+static int remove_dir(void **state)
+{
+    static const char *const names[] = {"file", "port", "redir"};
+    char path[120];
+    (void)state;
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        snprintf(path, sizeof path, "%s/%s", dir, names[i]);
+        unlink(path);
+    }
+    return rmdir(dir);
+}
+
+static struct link_spec at(struct link_spec spec, const char *name)
+{
+    snprintf(spec.path, sizeof spec.path, "%s/%s", dir, name);
+    return spec;
+}
+
+enum { N_SPECS = 10 };
+
+static void list_specs(struct link_spec specs[N_SPECS])
+{
+    const struct link_spec usb = {.type = LINK_USB, .vid = 1, .own_serial = 1, .whose = "test_link_descriptors"};
+    struct link_spec redir = usb, usbip = usb;
+    redir.backend = USB_BACKEND_USBREDIR;
+    usbip.backend = USB_BACKEND_USBIP;
+    const struct link_spec all[N_SPECS] = {{.type = LINK_NULL},
+                                           at((struct link_spec){.type = LINK_FILE}, "file"),
+                                           at((struct link_spec){.type = LINK_PTY}, "port"),
+                                           {.type = LINK_TCP, .max_sessions = 2},
+                                           {.type = LINK_WEB, .max_sessions = 2},
+                                           {.type = LINK_UDP, .port = 9},
+                                           {.type = LINK_MEMORY, .memory = &memory},
+                                           usbip,
+                                           redir,
+                                           at(redir, "redir")};
+    memcpy(specs, all, sizeof all);
+}
+
+static int count_open(void)
+{
+    int n = 0;
+    DIR *fds = opendir("/proc/self/fd");
+    assert_non_null(fds);
+    while (readdir(fds) != NULL)
+        n++;
+    closedir(fds);
+    return n;
+}
+
+/* Opens a link, lets a client come where there is a port, and closes it. */
+static void use(const struct link_spec *spec, int with_client)
+{
+    struct bench bench = bench_open(spec);
+    char endpoint[300];
+    bench.wake = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    bench.ops->endpoint(bench.link, endpoint, sizeof endpoint);
+    const int fd =
+        with_client && strstr(endpoint, "127.0.0.1:") != NULL && spec->type != LINK_UDP ? dial(bench_port(&bench)) : -1;
+    for (int i = 0; i < 3; i++)
+        bench_poll(&bench, 0, 1);
+    if (fd >= 0) close(fd); /* else some would wait for it */
+    for (int i = 0; i < 3; i++)
+        bench_poll(&bench, 0, 1);
+    bench_close(&bench);
+    close(bench.wake);
+}
+
+static void test_closing(void **state)
+{
+    struct link_spec specs[N_SPECS];
+    (void)state;
+    list_specs(specs);
+    for (size_t i = 0; i < N_SPECS; i++) {
+        use(&specs[i], 0); /* libraries that are loaded once may keep something */
+        const int before = count_open();
+        for (int with_client = 0; with_client <= 1; with_client++) {
+            memory = (struct link_memory){0};
+            use(&specs[i], with_client);
+            if (count_open() != before)
+                fail_msg("%s, spec %zu: %d descriptors were open, now %d", link_ops_get(specs[i].type)->name, i, before,
+                         count_open());
+        }
+    }
+}
+
+static void test_failing(void **state)
+{
+    struct link_spec specs[N_SPECS];
+    struct sh_err err;
+    void *none;
+    (void)state;
+    list_specs(specs);
+    for (size_t i = 0; i < N_SPECS; i++) {
+        struct link_spec *spec = &specs[i];
+        if (spec->type == LINK_NULL || spec->type == LINK_MEMORY) continue;
+        if (spec->type == LINK_UDP) snprintf(spec->source, sizeof spec->source, "192.0.2.1"); /* nobody's: RFC 5737 */
+        struct bench bench = {.link = NULL};
+        if (spec->type != LINK_UDP) bench = bench_open(spec); /* takes the place */
+        if (spec->type != LINK_UDP && spec->path[0] == '\0') spec->port = bench_port(&bench);
+        if (spec->type == LINK_PTY) snprintf(spec->path, sizeof spec->path, "%s", dir); /* a folder is there */
+        const int before = count_open();
+        const struct link_ops *ops = link_ops_get(spec->type);
+        if (ops->open(spec, &none, &err) == SH_OK) fail_msg("%s opens twice", ops->name);
+        if (count_open() != before)
+            fail_msg("%s: %s: %d descriptors were open, now %d", ops->name, err.text, before, count_open());
+        if (bench.link != NULL) bench_close(&bench);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_closing), cmocka_unit_test(test_failing)};
+    return cmocka_run_group_tests(tests, make_dir, remove_dir);
+}
