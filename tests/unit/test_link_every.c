@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Links of all types give back every descriptor: when they are closed, with a client or without, and when they can't be
- * opened. */
+/* Links of all types: they give back every descriptor when they are closed, with a client or without, and when they can't
+ * be opened. Their owner can wake each. */
 #include "tests/unit/link_test.h"
 
 #include <dirent.h>
@@ -42,7 +42,7 @@ enum { N_SPECS = 10 };
 
 static void list_specs(struct link_spec specs[N_SPECS])
 {
-    const struct link_spec usb = {.type = LINK_USB, .vid = 1, .own_serial = 1, .whose = "test_link_descriptors"};
+    const struct link_spec usb = {.type = LINK_USB, .vid = 1, .own_serial = 1, .whose = "test_link_every"};
     struct link_spec redir = usb, usbip = usb;
     redir.backend = USB_BACKEND_USBREDIR;
     usbip.backend = USB_BACKEND_USBIP;
@@ -70,6 +70,25 @@ static int count_open(void)
     return n;
 }
 
+/* The owner is woken once for each time that it was signalled, whatever else happens. */
+static void wake_up(struct bench *bench)
+{
+    uint64_t count = 1;
+    for (int round = 0; round < 2; round++) {
+        int n_woken = 0;
+        assert_int_equal(write(bench->wake, &count, sizeof count), sizeof count);
+        for (int i = 0; i < 5; i++) {
+            bench_poll(bench, 0, n_woken ? 0 : 1000);
+            for (int k = 0; k < bench->n_queue; k++)
+                n_woken += bench->queue[k].kind == LINK_WOKEN;
+            bench->n_queue = 0;
+        }
+        assert_int_equal(n_woken, 1);
+        assert_int_equal(read(bench->wake, &count, sizeof count), -1);
+        count = 3;
+    }
+}
+
 /* Opens a link, lets a client come where there is a port, and closes it. */
 static void use(const struct link_spec *spec, int with_client)
 {
@@ -81,6 +100,7 @@ static void use(const struct link_spec *spec, int with_client)
         with_client && strstr(endpoint, "127.0.0.1:") != NULL && spec->type != LINK_UDP ? dial(bench_port(&bench)) : -1;
     for (int i = 0; i < 3; i++)
         bench_poll(&bench, 0, 1);
+    wake_up(&bench);
     if (fd >= 0) close(fd); /* else some would wait for it */
     for (int i = 0; i < 3; i++)
         bench_poll(&bench, 0, 1);
