@@ -320,6 +320,11 @@ int libusb_handle_events_timeout_completed(libusb_context *ctx, struct timeval *
 {
     (void)completed;
     int n = 0;
+    if (bus.events_rc != 0 && bus.events_in-- == 0) {
+        const int rc = bus.events_rc;
+        bus.events_rc = 0;
+        return rc;
+    }
     while (fake_happen())
         n++;
     if (n > 0) return 0;

@@ -250,6 +250,52 @@ static void test_unplug_while_writing(void **state)
     close_head(sh);
 }
 
+static void script_one(void)
+{
+    bus.idle = NULL;
+    script_events(0, 1);
+}
+
+/* The system fails, or a signal comes, while events are taken in: within a read, within a wait, and before a write. */
+static void test_events_fail(void **state)
+{
+    static const struct {
+        int rc, in, limit_ms, code;
+        const char *why; /* NULL: the frame comes all the same */
+    } rows[] = {
+        {LIBUSB_ERROR_IO, 0, TIMEOUT_MS, SCANHEAD_EIO, "cannot read: Input/output error"},
+        {LIBUSB_ERROR_IO, 1, TIMEOUT_MS, SCANHEAD_EIO, "Input/output error"},
+        {LIBUSB_ERROR_INTERRUPTED, 0, TIMEOUT_MS, SCANHEAD_OK, NULL},
+        {LIBUSB_ERROR_INTERRUPTED, 1, TIMEOUT_MS, SCANHEAD_OK, NULL},
+        {LIBUSB_ERROR_INTERRUPTED, 1, -1, SCANHEAD_ETIMEOUT, "a signal interrupted the wait"},
+    };
+    struct scanhead_frame frame;
+    char reply[64], want[100];
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct scanhead *sh = open_head("usb");
+        bus.events_rc = rows[i].rc;
+        bus.events_in = rows[i].in;
+        bus.n_steps = bus.done = 0;
+        bus.idle = rows[i].why == NULL ? script_one : NULL;
+        assert_int_equal(scanhead_next(sh, &frame, rows[i].limit_ms), rows[i].code);
+        if (rows[i].why == NULL)
+            assert_int_equal(frame.seq, 0);
+        else
+            snprintf(want, sizeof want, "usb:1209:0001:SH-1: %s", rows[i].why);
+        if (rows[i].why != NULL) assert_string_equal(scanhead_error(sh), want);
+        assert_int_equal(bus.events_rc, 0);
+        close_head(sh);
+    }
+    struct scanhead *sh = open_head("usb");
+    bus.hold_writes = 1;
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
+    bus.events_in = 0;
+    bus.events_rc = LIBUSB_ERROR_IO; /* that write is still under way, so events are taken in first */
+    assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_EIO);
+    close_head(sh);
+}
+
 /* The head takes no command. Closing cancels the write before anything is freed. */
 static void test_close_while_writing(void **state)
 {
@@ -287,6 +333,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_unplug_seen_by_writing, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_unplug_while_writing, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_close_while_writing, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_events_fail, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_close_with_a_stuck_transfer, rig_begin, rig_end),
     };
     return cmocka_run_group_tests_name("host_transfers", tests, NULL, NULL);
