@@ -183,6 +183,7 @@ static void what_waits_at_a_close_is_void(void **state)
         second_passes(port);
     assert_int_equal(port->head.session[CONSOLE].open, 0);
     assert_int_equal(ffs_console_events(&port->console) & POLLOUT, 0);
+    assert_int_equal(usb_device_can_write(port->head.device, CONSOLE_IN), 1); /* for the next session */
     const size_t held = client_reads(port, bytes, sizeof bytes);
     assert_in_range(held, 1, written - 1);
     for (size_t i = 0; i < held; i++)

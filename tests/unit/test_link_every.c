@@ -4,7 +4,9 @@
 #include "tests/unit/link_test.h"
 
 #include <dirent.h>
+#include <fcntl.h>
 #include <sys/eventfd.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 
 #include "drivers/link/memory.h"
@@ -150,8 +152,41 @@ static void test_failing(void **state)
     }
 }
 
+/* The process has only a few descriptors left, from none to as many as it takes. The link opens, or says why not, and
+ * then keeps nothing. */
+static void test_few_descriptors(void **state)
+{
+    enum { MOST = 16 };
+    struct link_spec specs[N_SPECS];
+    struct rlimit before;
+    (void)state;
+    list_specs(specs);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    const int n_open = count_open(), next = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    close(next);
+    for (size_t i = 0; i < N_SPECS; i++) {
+        const struct link_ops *ops = link_ops_get(specs[i].type);
+        for (int left = 0; left <= MOST; left++) {
+            const struct rlimit few = {.rlim_cur = (rlim_t)(next + left), .rlim_max = before.rlim_max};
+            struct sh_err err = {0, ""};
+            void *link;
+            assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+            const int rc = ops->open(&specs[i], &link, &err);
+            if (rc == SH_OK) ops->close(link);
+            assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+            if (rc != SH_OK && (err.text[0] == '\0' || strchr(err.text, '\n') != NULL))
+                fail_msg("%s: \"%s\" is no reason", ops->name, err.text);
+            if (rc != SH_OK && left == MOST) fail_msg("%s: %s", ops->name, err.text);
+            if (count_open() != n_open)
+                fail_msg("%s, %d left: %s: %d descriptors were open, now %d", ops->name, left, err.text, n_open,
+                         count_open());
+        }
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_closing), cmocka_unit_test(test_failing)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_closing), cmocka_unit_test(test_failing),
+                                       cmocka_unit_test(test_few_descriptors)};
     return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }
