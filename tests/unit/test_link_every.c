@@ -8,6 +8,7 @@
 #include <sys/eventfd.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 
 #include "drivers/link/memory.h"
 #include "drivers/usb/backend.h"
@@ -152,6 +153,65 @@ static void test_failing(void **state)
     }
 }
 
+static void expect_text(const struct link_spec *spec, const char *text)
+{
+    struct sh_err err = {0, ""};
+    void *link;
+    assert_int_equal(link_ops_get(spec->type)->open(spec, &link, &err), SH_EINPUT);
+    assert_string_equal(err.text, text);
+}
+
+/* Wrong specs: what, where, and what is allowed. */
+static void test_texts(void **state)
+{
+    (void)state;
+    int fd[2];
+    char text[300];
+    expect_text(&(struct link_spec){.type = LINK_FD, .fd = 999},
+                "link fd:999: not an open socket: Bad file descriptor");
+    assert_int_equal(pipe(fd), 0);
+    snprintf(text, sizeof text, "link fd:%d: not an open socket: Socket operation on non-socket", fd[0]);
+    expect_text(&(struct link_spec){.type = LINK_FD, .fd = fd[0]}, text);
+    close(fd[0]);
+    close(fd[1]);
+    assert_int_equal(socketpair(AF_UNIX, SOCK_DGRAM, 0, fd), 0);
+    snprintf(text, sizeof text, "link fd:%d: not a stream socket", fd[0]);
+    expect_text(&(struct link_spec){.type = LINK_FD, .fd = fd[0]}, text);
+    close(fd[0]);
+    close(fd[1]);
+    expect_text(&(struct link_spec){.type = LINK_FILE}, "link file: a path is needed");
+    static const struct {
+        struct link_spec spec;
+        const char *text;
+    } rows[] = {
+        {{.type = LINK_TCP, .port = 65536, .max_sessions = 1},
+         "link tcp:127.0.0.1:65536: allowed ports are 0 to 65535"},
+        {{.type = LINK_TCP, .port = -1, .max_sessions = 1}, "link tcp:127.0.0.1:-1: allowed ports are 0 to 65535"},
+        {{.type = LINK_TCP, .max_sessions = 0}, "link tcp:127.0.0.1:0: 0 sessions; allowed are 1 to 8"},
+        {{.type = LINK_WEB, .address = "localhost", .max_sessions = 9},
+         "link web:localhost:0: 9 sessions; allowed are 1 to 8"},
+        {{.type = LINK_USB, .personality = 99}, "link usb: no such USB identity"},
+        {{.type = LINK_USB, .backend = 99}, "link usb: this build does not have that back end"},
+        {{.type = LINK_UDP, .address = "255.255.255.255", .port = 9},
+         "link udp:255.255.255.255:9: a broadcast needs the key interface: the interface that sends it"},
+        {{.type = LINK_UDP, .address = "127.0.0.1", .port = 9, .interface = "no-such-if"},
+         "link udp:127.0.0.1:9: interface no-such-if doesn't exist, or has no address of the receiver's family"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
+        expect_text(&rows[i].spec, rows[i].text);
+    struct link_spec fifo = at((struct link_spec){.type = LINK_FILE}, "fifo");
+    assert_int_equal(mkfifo(fifo.path, 0600), 0);
+    const int reader = open(fifo.path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    snprintf(text, sizeof text,
+             "link file:%.200s: neither a regular file nor a character device; use a pty or tcp link", fifo.path);
+    expect_text(&fifo, text);
+    close(reader);
+    unlink(fifo.path);
+    struct link_spec missing = at((struct link_spec){.type = LINK_PTY}, "no/port");
+    snprintf(text, sizeof text, "link pty:%.200s: the symlink cannot be made: No such file or directory", missing.path);
+    expect_text(&missing, text);
+}
+
 /* The process has only a few descriptors left, from none to as many as it takes. The link opens, or says why not, and
  * then keeps nothing. */
 static void test_few_descriptors(void **state)
@@ -187,6 +247,6 @@ static void test_few_descriptors(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_closing), cmocka_unit_test(test_failing),
-                                       cmocka_unit_test(test_few_descriptors)};
+                                       cmocka_unit_test(test_texts), cmocka_unit_test(test_few_descriptors)};
     return cmocka_run_group_tests(tests, make_dir, remove_dir);
 }
