@@ -108,7 +108,12 @@ static void test_cannot_open(void **state)
     (void)state;
     bus.init_rc = LIBUSB_ERROR_OTHER;
     assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EIO);
+    assert_string_equal(err, "usb: no USB on this system: some error");
     bus.init_rc = 0;
+    bus.device[0].present = 0;
+    assert_int_equal(scanhead_open("usb:1209:1", &sh, err, sizeof err), SCANHEAD_ELOST);
+    assert_string_equal(err, "usb:1209:1: no such head on USB; scanhead list shows the heads");
+    bus.device[0].present = 1;
     bus.device[0].open_rc = LIBUSB_ERROR_NO_MEM;
     assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EIO);
     assert_memory_equal(err, "usb: cannot open the head 1209:0001, bus 1 device 2: ", 53);

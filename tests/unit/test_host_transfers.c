@@ -66,7 +66,7 @@ static void expect_lost(struct scanhead *sh)
     char reply[64];
     for (int i = 0; i < 2; i++) {
         assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ELOST);
-        assert_non_null(strstr(scanhead_error(sh), "unplugged"));
+        assert_string_equal(scanhead_error(sh), "usb:1209:0001:SH-1: the head was unplugged, or no longer answers");
         assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ELOST);
     }
     close_head(sh);
@@ -123,8 +123,8 @@ static void bus_resets(enum libusb_transfer_status status)
     expect_events(sh, 0, 4);
     for (int i = 0; i < 2; i++) {
         assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ERESET);
-        assert_non_null(strstr(scanhead_error(sh), "bus was reset"));
-        assert_null(strstr(scanhead_error(sh), "unplugged"));
+        assert_string_equal(scanhead_error(sh), "usb:1209:0001:SH-1: the USB bus was reset: the head is still plugged "
+                                                "in, and its session is over");
         assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ERESET);
     }
     bus.n_steps = bus.done = 0; /* the reset is over */
@@ -219,7 +219,7 @@ static void test_unplug_seen_by_writing(void **state)
     bus.submit_rc = bus.clear_halt_rc = LIBUSB_ERROR_IO;
     bus.submit_fails = -1;
     assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS), SCANHEAD_ELOST);
-    assert_non_null(strstr(scanhead_error(sh), "unplugged"));
+    assert_string_equal(scanhead_error(sh), "usb:1209:0001:SH-1: the head was unplugged, or no longer answers");
     close_head(sh);
 }
 

@@ -60,7 +60,8 @@ static void test_requests(void **state)
     assert_non_null(strstr(body, "three words"));
     assert_int_equal(web_status_of(&bench, place, "GET /scene?n=no", ""), 503);
     assert_int_equal(web_status_of(&bench, place, "HEAD /", ""), 200);
-    assert_int_equal(web_status_of(&bench, place, "GET /nothing", ""), 404);
+    assert_int_equal(web_ask(&bench, place, "GET /nothing", host, &body, &len), 404);
+    assert_string_equal(body, "there is nothing at this path\n");
     assert_int_equal(web_status_of(&bench, place, "GET /../web.c", ""), 404);
     assert_int_equal(web_status_of(&bench, place, "POST /", "Content-Length: 0\r\n"), 405);
     assert_int_equal(web_status_of(&bench, place, "GET /ws", ""), 426);
@@ -189,6 +190,7 @@ static void test_descriptors_run_out(void **state)
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
     assert_true(n > 13);
     assert_memory_equal(answer, "HTTP/1.1 503 ", 13);
+    assert_non_null(strstr(answer, "\r\n\r\nthe head has no file descriptor left for this connection\n"));
     bench_expect(&bench, LINK_REFUSED, 0);
     close(fd);
     bench_close(&bench);
