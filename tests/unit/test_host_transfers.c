@@ -29,6 +29,19 @@ static void test_failures_pass(void **state)
     close_head(sh);
 }
 
+/* Reads that fail together are one failure: the endpoint is started again once, and nothing is lost after it. */
+static void test_failures_together(void **state)
+{
+    (void)state;
+    struct scanhead *sh = open_head("usb");
+    for (int i = 0; i < 4; i++)
+        fake_script(FAKE_IN, i % 2 ? LIBUSB_TRANSFER_STALL : LIBUSB_TRANSFER_ERROR, NULL, 0);
+    script_events(0, 3);
+    expect_events(sh, 0, 3);
+    assert_int_equal(bus.n_clear_halts, 1);
+    close_head(sh);
+}
+
 /* The first half of a frame comes with the failure, as some controllers give it. */
 static void test_data_with_a_failure(void **state)
 {
@@ -321,6 +334,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_failures_pass, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_failures_together, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_data_with_a_failure, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_submit_fails_for_a_while, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_unplug_at_once, rig_begin, rig_end),
