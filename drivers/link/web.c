@@ -156,7 +156,8 @@ void web_conn_end(struct web_conn *conn)
 static int close_for(struct web_conn *conn, enum lws_close_status status, const char *why)
 {
     web_session_gone(conn);
-    web_lws.lws_close_reason(conn->wsi, status, (unsigned char *)(uintptr_t)why, strlen(why)); /* which only reads it */
+    /* The library only reads it. */
+    web_lws.lws_close_reason(conn->wsi, status, (unsigned char *)(uintptr_t)why, strlen(why));
     return -1;
 }
 

@@ -38,11 +38,11 @@ extern struct configfs {
 int configfs_set_up(void **state);
 /* Fails if descriptors were left open. */
 int configfs_tear_down(void **state);
-/* The text of a file below CONFIGFS_GADGETS; NULL: there is none. */
+/* Returns the text of a file in a folder; NULL: there is none. */
 const char *configfs_get(const char *dir, const char *name);
-/* The text that a link there leads to, without the folder. */
+/* Returns where a link in a folder leads to, without the folder. */
 const char *configfs_link(const char *dir, const char *name);
-/* Number of gadgets. */
+/* Returns the number of gadgets. */
 int configfs_count(void);
 /* Makes a controller with these texts in its files. */
 void configfs_add_udc(const char *name, const char *state, const char *now, const char *most);

@@ -91,7 +91,7 @@ static void end(void)
     end_head();
 }
 
-/* One call, as after poll(2). with: what it found for the state of a controller, or for the port. */
+/* Makes one call, as after poll(2). state, tty: more events of the controller and of the port. */
 static void handle(short state, short tty)
 {
     struct pollfd fds[USB_BACKEND_MAX_FDS];

@@ -144,7 +144,7 @@ static void test_port_alone(void **state)
     assert_string_equal(configfs.unmounted, "");
 }
 
-/* A device without a port, and one whose configuration has a name and no maker. */
+/* Models differ: one has no port, one has a name for its configuration and no maker, and one has two functions. */
 static void test_other_models(void **state)
 {
     (void)state;

@@ -197,7 +197,7 @@ static void test_description(void **state)
     end_description();
 }
 
-/* A function without WinUSB, with an id of its own and no property, and one at one rate. */
+/* Functions may lack WinUSB, or have an id of their own and no property. The device has one rate here. */
 static void test_plain_descriptions(void **state)
 {
     (void)state;
@@ -225,7 +225,7 @@ static void test_plain_descriptions(void **state)
     end_description();
 }
 
-/* At super speed there are companions as well: five descriptors. Of the head, only the stream is described. */
+/* At super speed there are companions as well: five descriptors. Only the stream of the head is described. */
 static void test_super_speed(void **state)
 {
     (void)state;

@@ -168,7 +168,7 @@ static void expect_end(struct scanhead *sh, int code, const char *source, const 
     assert_string_equal(scanhead_error(sh), want);
 }
 
-/* Why no frame comes: not yet, never again, or the recording is over. Commands have the same reasons. */
+/* The error says why no frame comes: not yet, never again, or the recording is over. Commands have the same reasons. */
 static void test_ends(void **state)
 {
     (void)state;

@@ -161,7 +161,7 @@ static void expect_text(const struct link_spec *spec, const char *text)
     assert_string_equal(err.text, text);
 }
 
-/* Wrong specs: what, where, and what is allowed. */
+/* The error of a wrong spec says what is wrong, where, and what is allowed. */
 static void test_texts(void **state)
 {
     (void)state;
