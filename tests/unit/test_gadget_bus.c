@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A gadget and its controller: plugging in and out, speeds and states as the kernel writes them (ABI/stable/sysfs-class-udc),
- * and the descriptions that FunctionFS gets (linux/usb/functionfs.h has the layout). Bytes are written out by hand. */
+/* A gadget and its controller: plugging in and out, speeds and states as the kernel writes them
+ * (ABI/stable/sysfs-class-udc), and the descriptions that FunctionFS gets (linux/usb/functionfs.h has the layout).
+ * Bytes are written out by hand. */
 #include "tests/unit/configfs_rig.h"
 #include "tests/unit/usb_models.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Numbers of libscanhead's header and of the native protocol. Programs are compiled with the first, and streams recorded
- * with the second. So none ever changes, and both are the same (drivers/protocol/native.h). */
+/* Numbers of libscanhead's header and of the native protocol. Programs are compiled with the first, and streams
+ * recorded with the second. So none ever changes, and both are the same (drivers/protocol/native.h). */
 #include "tests/common/cases.h"
 
 #include "core/err.h"

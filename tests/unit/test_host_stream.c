@@ -123,8 +123,8 @@ static void test_alike(void **state)
     scanhead_close(sh);
 }
 
-/* A repeated frame, or a descriptor for this reader alone, holds for a sequence that begins right after it. Once a frame
- * has gone by, it doesn't. */
+/* A repeated frame, or a descriptor for this reader alone, holds for a sequence that begins right after it. Once a
+ * frame has gone by, it doesn't. */
 static void test_alike_long_ago(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Links of all types: they give back every descriptor when they are closed, with a client or without, and when they can't
- * be opened. Their owner can wake each. */
+/* Links of all types: they give back every descriptor when they are closed, with a client or without, and when they
+ * can't be opened. Their owner can wake each. */
 #include "tests/unit/link_test.h"
 
 #include <dirent.h>
