@@ -3,8 +3,10 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <malloc.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "drivers/host/scanhead.h"
@@ -93,10 +95,27 @@ static void hold_streams(void)
     if (fd >= 0) close(fd);
 }
 
+/* Another program with the same pipe may make it non-blocking, and stdio would then lose what a full pipe doesn't take.
+ * So standard output and error open their pipe once more, for themselves. Opening must not wait for a reader. */
+static void own_pipes(void)
+{
+    for (int fd = STDOUT_FILENO; fd <= STDERR_FILENO; fd++) {
+        struct stat st;
+        char path[32];
+        snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
+        if (fstat(fd, &st) != 0 || !S_ISFIFO(st.st_mode)) continue;
+        const int own = open(path, O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+        if (own < 0) continue; /* another user's pipe, or one without a reader */
+        if (fcntl(own, F_SETFL, 0) == 0) dup2(own, fd);
+        close(own);
+    }
+}
+
 /* A command's output may still be in the buffer. A full disk or a closed pipe shows only here. */
 int main(int argc, char **argv)
 {
     hold_streams();
+    own_pipes();
     /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
     mallopt(M_MMAP_THRESHOLD, 4 << 20);
 #ifdef HEAD_ALONE

@@ -139,7 +139,6 @@ int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wante
 {
     libusb_device **list;
     struct search s = {.wanted = wanted, .found = found};
-    *found = (struct usb_found){.handle = NULL};
     ssize_t n = libusb_get_device_list(ctx, &list);
     if (n < 0) return sh_fail(err, SH_EIO, "%s: cannot list USB devices: %s", asked, libusb_strerror((int)n));
     for (ssize_t i = 0; i < n; i++)

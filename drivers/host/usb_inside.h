@@ -41,8 +41,8 @@ struct usb_found {
 /* Finds the vendor interface of a device's active configuration. Returns 1, or 0 where there is none. */
 int host_usb_interface(libusb_device *device, struct usb_interface *interface);
 
-/* Opens the one head that is wanted; asked: the source as the caller wrote it, for errors. SH_ELOST: there is
- * none; SH_EINPUT: there are several; SH_EPERM: the text has the rule that gives the permission. */
+/* Opens the one head that is wanted; asked: the source as the caller wrote it, for errors. found is zero before.
+ * SH_ELOST: there is none; SH_EINPUT: there are several; SH_EPERM: the text has the rule that gives the permission. */
 int host_usb_find(libusb_context *ctx, const char *asked, const struct usb_wanted *wanted, struct usb_found *found,
                   struct sh_err *err);
 

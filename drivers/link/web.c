@@ -155,10 +155,9 @@ void web_conn_end(struct web_conn *conn)
 /* Ends a session whose client breaks the rules: nothing more goes out but the reason. */
 static int close_for(struct web_conn *conn, enum lws_close_status status, const char *why)
 {
-    unsigned char words[80];
-    int n = snprintf((char *)words, sizeof words, "%s", why);
     web_session_gone(conn);
-    web_lws.lws_close_reason(conn->wsi, status, words, (size_t)n);
+    /* The library only reads it. */
+    web_lws.lws_close_reason(conn->wsi, status, (unsigned char *)(uintptr_t)why, strlen(why));
     return -1;
 }
 

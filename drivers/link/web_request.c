@@ -92,7 +92,7 @@ static int web_request_decode(struct http_text in, char *out, size_t room)
             i += 2;
             if (c == 0) return 400;
         }
-        if (n + 1 < room) out[n] = (char)c;
+        if (n < room) out[n] = (char)c;
         n++;
     }
     out[n < room ? n : room - 1] = '\0';

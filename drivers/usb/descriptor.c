@@ -110,7 +110,7 @@ static void put_interface(struct sink *to, const struct usb_interface_row *row, 
 {
     PUT(to, USB_DT_INTERFACE_SIZE, USB_DT_INTERFACE, row->number, 0, row->n_endpoints, row->class, row->subclass,
         row->protocol, row->string);
-    if (row->extra_len > 0) descriptor_put(to, row->extra, row->extra_len);
+    if (row->extra != NULL) descriptor_put(to, row->extra, row->extra_len);
     for (unsigned i = 0; i < row->n_endpoints; i++)
         put_endpoint(to, &row->endpoint[i], rate);
 }

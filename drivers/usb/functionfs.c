@@ -40,7 +40,6 @@ static int open_ep0(struct functionfs *self, struct sh_err *err)
 static void take_apart(struct functionfs *self)
 {
     gadget_unbind(&self->gadget);
-    ffs_pipes_stop(&self->pipes);
     usb_device_detach(self->device);
     ffs_pipes_close(&self->pipes);
     ffs_console_close(&self->console);

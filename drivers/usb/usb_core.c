@@ -150,7 +150,6 @@ void usb_device_submit(struct usb_device *device, struct usb_transfer *transfer)
     transfer->actual = 0;
     transfer->zero_packet = 0;
     transfer->epoch = pipe->epoch;
-    transfer->status = USB_OK;
     if (pipe->row == NULL || pipe->halted || pipe->gone_due) {
         transfer->status = pipe->row == NULL || pipe->gone_due ? USB_GONE : USB_STALLED;
         pipe->gone_due = 0;

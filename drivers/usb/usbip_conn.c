@@ -214,7 +214,6 @@ void usbip_conn_start(struct usbip_conn *conn, int fd, struct usb_device *device
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms)
 {
     struct pollfd slot = {.fd = conn->fd, .events = POLLOUT};
-    usbip_conn_write(conn);
     while (!conn->broken && conn->out_first != NULL && poll(&slot, 1, timeout_ms) > 0)
         usbip_conn_write(conn);
     if (!conn->broken) usb_backend_hang_up(conn->fd, timeout_ms);

@@ -279,7 +279,6 @@ static void usbredir_close(void *backend)
         struct pollfd slot = {.fd = self->fd, .events = POLLOUT};
         usb_device_detach(self->device);
         if (!self->unplugged) usbredirparser_send_device_disconnect(self->parser);
-        usbredir_flush(self);
         while (!self->broken && usbredirparser_has_data_to_write(self->parser) > 0 && poll(&slot, 1, CLOSE_WAIT_MS) > 0)
             usbredir_flush(self);
         if (!self->broken) usb_backend_hang_up(self->fd, CLOSE_WAIT_MS);

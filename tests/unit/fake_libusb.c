@@ -175,8 +175,8 @@ int libusb_claim_interface(libusb_device_handle *handle, int number)
 {
     (void)handle;
     assert_int_equal(number, 2);
-    bus.claimed++;
-    return 0;
+    bus.claimed += bus.claim_rc == 0;
+    return bus.claim_rc;
 }
 
 int libusb_release_interface(libusb_device_handle *handle, int number)
@@ -207,6 +207,7 @@ int libusb_control_transfer(libusb_device_handle *handle, uint8_t type, uint8_t 
     assert_int_equal(type, 0x41);
     assert_int_equal(length, 0);
     if (bus.gone) return LIBUSB_ERROR_NO_DEVICE;
+    if (value != 0 && bus.session_rc != 0) return bus.session_rc;
     bus.sessions += value ? 1 : -1;
     bus.was_reset = 0;
     return 0;
@@ -319,6 +320,11 @@ int libusb_handle_events_timeout_completed(libusb_context *ctx, struct timeval *
 {
     (void)completed;
     int n = 0;
+    if (bus.events_rc != 0 && bus.events_in-- == 0) {
+        const int rc = bus.events_rc;
+        bus.events_rc = 0;
+        return rc;
+    }
     while (fake_happen())
         n++;
     if (n > 0) return 0;

@@ -55,8 +55,10 @@ struct fake_bus {
     void (*idle)(void);
     int no_hotplug, no_udev, gone, init_rc; /* gone: every device that is open has been unplugged */
     int clear_halt_rc, submit_rc;           /* the results of these while not 0 */
+    int claim_rc, session_rc;               /* the results of claiming the interface, and of opening the stream */
     int submit_fails;                       /* for so many times; < 0: always */
     int submit_room;                        /* how many reads may be under way; 0: any number */
+    int events_rc, events_in;               /* the result of handling events, once, after that many calls */
     int will_not_cancel, hold_writes;
     int was_reset, no_question; /* sessions are over; the head stalls the question whether they are */
     int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */

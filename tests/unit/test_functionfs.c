@@ -232,6 +232,45 @@ static void test_failures_long_past(void **state)
     rig_close(&rig);
 }
 
+/* Nine endpoints are one too many; eight are opened, by their numbers. */
+static void test_most_endpoints(void **state)
+{
+    (void)state;
+    struct usb_endpoint_row row[FFS_MAX_PIPES + 1] = {{0}};
+    struct gadget gadget = {.mount = "/tmp/test_functionfs.XXXXXX"};
+    struct ffs_pipes pipes;
+    struct sh_err err = {0, ""};
+    char path[80];
+    struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
+    assert_non_null(mkdtemp(gadget.mount));
+    for (int i = 0; i <= FFS_MAX_PIPES; i++) {
+        row[i].address = (uint8_t)(i + 1);
+        snprintf(path, sizeof path, "%s/ep%d", gadget.mount, i + 1);
+        assert_int_equal(mkfifo(path, 0600), 0);
+    }
+    gadget.part.n_interfaces = 2;
+    for (int more = 0; more <= 1; more++) {
+        gadget.row[0] = (struct usb_interface_row){.endpoint = row, .n_endpoints = 3};
+        gadget.row[1] =
+            (struct usb_interface_row){.endpoint = row + 3, .n_endpoints = (uint8_t)(FFS_MAX_PIPES - 3 + more)};
+        assert_int_equal(ffs_pipes_open(&pipes, host->device, &gadget, &err), more ? SH_EINPUT : SH_OK);
+        for (unsigned i = 0; i <= FFS_MAX_PIPES + 1; i++)
+            assert_int_equal(ffs_pipes_address(&pipes, i), !more && i >= 1 && i <= FFS_MAX_PIPES ? i : 0);
+        ffs_pipes_close(&pipes);
+    }
+    assert_string_equal(err.text, "functionfs: too many endpoints; allowed are up to 8");
+    snprintf(path, sizeof path, "%s/ep2", gadget.mount);
+    unlink(path);
+    assert_int_equal(ffs_pipes_open(&pipes, host->device, &gadget, &err), SH_EIO);
+    assert_non_null(strstr(err.text, "/ep2: No such file or directory"));
+    for (int i = 1; i <= FFS_MAX_PIPES + 1; i++) {
+        snprintf(path, sizeof path, "%s/ep%d", gadget.mount, i);
+        unlink(path);
+    }
+    assert_int_equal(rmdir(gadget.mount), 0);
+    host_free(host);
+}
+
 static ssize_t endpoint_request(struct rig *rig, unsigned index, void *answer, size_t room)
 {
     struct usb_functionfs_event e = {.type = FUNCTIONFS_SETUP};
@@ -310,7 +349,7 @@ int main(void)
         cmocka_unit_test(test_deconfigured),       cmocka_unit_test(test_left_over),
         cmocka_unit_test(test_busy_endpoint),      cmocka_unit_test(test_failing_endpoint),
         cmocka_unit_test(test_endpoint_request),   cmocka_unit_test(test_units),
-        cmocka_unit_test(test_failures_long_past),
+        cmocka_unit_test(test_failures_long_past), cmocka_unit_test(test_most_endpoints),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -154,6 +154,24 @@ static size_t client_reads(struct port *port, void *bytes, size_t room)
 
 static char bytes[1 << 22];
 
+/* What the head has not read yet holds the client back. It is neither lost nor mixed with what comes next. */
+static void a_head_that_does_not_read_holds_back(void **state)
+{
+    struct port *port = *state;
+    char heard[64];
+    assert_int_equal(write(port->host, "first", 5), 5);
+    ffs_console_handle(&port->console, POLLIN, 0);
+    assert_int_equal(ffs_console_events(&port->console), 0);
+    assert_int_equal(write(port->host, "second", 6), 6);
+    ffs_console_handle(&port->console, POLLIN, 0);
+    assert_int_equal(usb_device_read(port->head.device, CONSOLE_OUT, heard, sizeof heard), 5);
+    assert_memory_equal(heard, "first", 5);
+    assert_int_equal(ffs_console_events(&port->console), POLLIN);
+    ffs_console_handle(&port->console, POLLIN, 0);
+    assert_int_equal(usb_device_read(port->head.device, CONSOLE_OUT, heard, sizeof heard), 6);
+    assert_memory_equal(heard, "second", 6);
+}
+
 /* The client closed its port, which is not reported: for a second and more the port takes nothing. Bytes in the port go
  * to the next client. Bytes still to be given to the port do not. A whole frame follows the one that was cut. */
 static void what_waits_at_a_close_is_void(void **state)
@@ -165,6 +183,7 @@ static void what_waits_at_a_close_is_void(void **state)
         second_passes(port);
     assert_int_equal(port->head.session[CONSOLE].open, 0);
     assert_int_equal(ffs_console_events(&port->console) & POLLOUT, 0);
+    assert_int_equal(usb_device_can_write(port->head.device, CONSOLE_IN), 1); /* for the next session */
     const size_t held = client_reads(port, bytes, sizeof bytes);
     assert_in_range(held, 1, written - 1);
     for (size_t i = 0; i < held; i++)
@@ -294,6 +313,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(what_waits_at_a_close_is_void, open_port, close_port),
+        cmocka_unit_test_setup_teardown(a_head_that_does_not_read_holds_back, open_port, close_port),
         cmocka_unit_test_setup_teardown(a_slow_client_keeps_its_session, open_port, close_port),
         cmocka_unit_test_setup_teardown(writing_is_not_taking, open_port_of_bytes, close_port),
         cmocka_unit_test_setup_teardown(a_lead_in_goes_in_parts, open_port, close_port),

@@ -108,7 +108,12 @@ static void test_cannot_open(void **state)
     (void)state;
     bus.init_rc = LIBUSB_ERROR_OTHER;
     assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EIO);
+    assert_string_equal(err, "usb: no USB on this system: some error");
     bus.init_rc = 0;
+    bus.device[0].present = 0;
+    assert_int_equal(scanhead_open("usb:1209:1", &sh, err, sizeof err), SCANHEAD_ELOST);
+    assert_string_equal(err, "usb:1209:1: no such head on USB; scanhead list shows the heads");
+    bus.device[0].present = 1;
     bus.device[0].open_rc = LIBUSB_ERROR_NO_MEM;
     assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EIO);
     assert_memory_equal(err, "usb: cannot open the head 1209:0001, bus 1 device 2: ", 53);
@@ -186,6 +191,37 @@ static void test_wait_for_permission(void **state)
     expect_rule(err);
 }
 
+/* The head is found, and can't be used: another program has it, it goes, it refuses, or the system has no room. */
+static void test_cannot_use(void **state)
+{
+    static const struct {
+        int claim_rc, session_rc, room, code;
+        const char *why;
+    } rows[] = {
+        {LIBUSB_ERROR_BUSY, 0, 0, SCANHEAD_EIO, "another program has the head's interface 2"},
+        {LIBUSB_ERROR_NO_DEVICE, 0, 0, SCANHEAD_ELOST, "unplugged while it was opened"},
+        {LIBUSB_ERROR_ACCESS, 0, 0, SCANHEAD_EIO,
+         "cannot claim the interface: Access denied (insufficient permissions)"},
+        {0, LIBUSB_ERROR_NO_DEVICE, 0, SCANHEAD_ELOST, "the head does not open the stream: some error"},
+        {0, LIBUSB_ERROR_PIPE, 0, SCANHEAD_EIO, "the head does not open the stream: some error"},
+        {0, 0, 1, SCANHEAD_EIO, "cannot start reading: some error"},
+        {0, 0, 2, SCANHEAD_OK, NULL}, /* fewer transfers work, too */
+    };
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct scanhead *sh = NULL;
+        char err[512] = "", want[200];
+        bus.claim_rc = rows[i].claim_rc;
+        bus.session_rc = rows[i].session_rc;
+        bus.submit_room = rows[i].room;
+        assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), rows[i].code);
+        snprintf(want, sizeof want, "usb:1209:0001:SH-1: %s", rows[i].why);
+        if (rows[i].code != SCANHEAD_OK) assert_string_equal(err, want);
+        if (sh != NULL) close_head(sh);
+        fake_expect_nothing_left();
+    }
+}
+
 /* Without hot-plug events the list is read again and again. */
 static void test_wait_without_events(void **state)
 {
@@ -208,6 +244,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_no_permission, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_several, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_cannot_open, rig_begin, rig_end),
+        cmocka_unit_test_setup_teardown(test_cannot_use, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_wait, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_wait_for_permission, rig_begin, rig_end),
         cmocka_unit_test_setup_teardown(test_wait_without_events, rig_begin, rig_end),

@@ -84,6 +84,19 @@ static int run_command(struct scanhead *sh, struct script *s, char *reply, size_
     return rc;
 }
 
+/* The head takes no more bytes. That is an error, and no signal, which would end the client's program. */
+static void test_command_to_nobody(void **state)
+{
+    (void)state;
+    char reply[16];
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    assert_int_equal(shutdown(head, SHUT_RD), 0);
+    assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, WAIT_MS), SCANHEAD_ECLOSED);
+    close(head);
+    scanhead_close(sh);
+}
+
 static void test_command(void **state)
 {
     (void)state;
@@ -432,6 +445,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_command),
+        cmocka_unit_test(test_command_to_nobody),
         cmocka_unit_test(test_command_refused),
         cmocka_unit_test(test_command_queue_bound),
         cmocka_unit_test(test_pty),

@@ -159,6 +159,53 @@ static void test_version(void **state)
     scanhead_close(sh);
 }
 
+static void expect_end(struct scanhead *sh, int code, const char *source, const char *why)
+{
+    struct scanhead_frame f;
+    char want[700];
+    snprintf(want, sizeof want, "%s: %s", source, why);
+    assert_int_equal(scanhead_next(sh, &f, 0), code);
+    assert_string_equal(scanhead_error(sh), want);
+}
+
+/* The error says why no frame comes: not yet, never again, or the recording is over. Commands have the same reasons. */
+static void test_ends(void **state)
+{
+    (void)state;
+    int head;
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    char source[32], want[700], reply[8];
+    assert_int_equal(scanhead_next(sh, &f, 0), SCANHEAD_ETIMEOUT);
+    assert_int_equal(sscanf(scanhead_error(sh), "%31[^ ]", source), 1);
+    source[strlen(source) - 1] = '\0';
+    expect_end(sh, SCANHEAD_ETIMEOUT, source, "no data came within the time limit");
+    close(head);
+    for (int i = 0; i < 2; i++)
+        expect_end(sh, SCANHEAD_ECLOSED, source, "the head is gone");
+    assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, 0), SCANHEAD_ECLOSED);
+    snprintf(want, sizeof want, "%s: the head is gone", source);
+    assert_string_equal(scanhead_error(sh), want);
+    scanhead_close(sh);
+
+    const struct native_event e = {.code = NATIVE_EV_ERROR};
+    const size_t len = native_encode_event(out, sizeof out, &e, 1, 0);
+    native_finish_frame(out, 0);
+    const char *path = write_file("%s/b.shs", out, len);
+    assert_int_equal(scanhead_open(path, &sh, NULL, 0), 0);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    expect_end(sh, SCANHEAD_ECLOSED, path, "end of the recording");
+    assert_int_equal(scanhead_command(sh, "*IDN?", reply, sizeof reply, 0), SCANHEAD_ESTATE);
+    snprintf(want, sizeof want, "%s: a recording takes no commands", path);
+    assert_string_equal(scanhead_error(sh), want);
+    scanhead_close(sh);
+    unlink(path);
+#define NO_USB ": not a USB head; allowed are usb, usb:VID:PID and usb:VID:PID:SERIAL, with the ids that lsusb shows"
+    expect_refusal("usb:x", SCANHEAD_EINPUT, "usb:x" NO_USB);
+    expect_refusal("usb:1209", SCANHEAD_EINPUT, "usb:1209" NO_USB);
+    expect_refusal("usb:12090:1", SCANHEAD_EINPUT, "usb:12090:1" NO_USB);
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -174,10 +221,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sources),
-        cmocka_unit_test(test_files),
-        cmocka_unit_test(test_calls),
-        cmocka_unit_test(test_version),
+        cmocka_unit_test(test_sources), cmocka_unit_test(test_files), cmocka_unit_test(test_calls),
+        cmocka_unit_test(test_version), cmocka_unit_test(test_ends),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -130,6 +130,15 @@ static void test_emitter(void **state)
     assert_true(got.first_ring_deg == -1.5 && got.ring_step_deg == 0);
     assert_true(got.beam[0].elevation_deg == -15 && got.beam[0].azimuth_deg == 0.25 && got.beam[0].offset_ns == 0);
     assert_true(got.beam[1].elevation_deg == 1 && got.beam[1].azimuth_deg == -0.5 && got.beam[1].offset_ns == 2304);
+    struct native_beam most[SCANHEAD_MAX_BEAMS];
+    struct native_emitter full = e;
+    full.n_beams = SCANHEAD_MAX_BEAMS;
+    for (int i = 0; i < SCANHEAD_MAX_BEAMS; i++)
+        most[i] = (struct native_beam){-i * 500000, i * 250000, (uint32_t)i};
+    got = emitter_of(sh, &full, most);
+    for (int i = 0; i < SCANHEAD_MAX_BEAMS; i++)
+        assert_true(fabs(got.beam[i].elevation_deg + 0.5 * i) < 1e-12 &&
+                    fabs(got.beam[i].azimuth_deg - 0.25 * i) < 1e-12 && got.beam[i].offset_ns == (uint32_t)i);
     close(head);
     scanhead_close(sh);
 }

@@ -123,6 +123,39 @@ static void test_alike(void **state)
     scanhead_close(sh);
 }
 
+/* A repeated frame, or a descriptor for this reader alone, holds for a sequence that begins right after it. Once a
+ * frame has gone by, it doesn't. */
+static void test_alike_long_ago(void **state)
+{
+    (void)state;
+    for (int alone = 0; alone <= 1; alone++) {
+        int head;
+        struct scanhead *sh = open_pair(&head);
+        struct scanhead_frame f;
+        struct scanhead_point point[3];
+        const struct line_block block = make_block(3, 120);
+        put_descriptor(head, 0, 1, 0);
+        expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+        put_anchor(head, 0);
+        expect_frame(sh, SCANHEAD_ANCHOR, &f);
+        put_points(head, 3, 100);
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        if (!alone) put_all(head, out, native_frame_len(out)); /* once more */
+        if (alone) put_descriptor(head, 0, 1, NATIVE_LOCAL | NATIVE_REPEAT);
+        if (alone) expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+        put_points(head, 3, 110);
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
+        const size_t len = native_encode_points(out, sizeof out, &block, 500);
+        native_finish_frame(out, 0);
+        put_all(head, out, len);
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        assert_int_equal(scanhead_points(sh, &f, 0, point, 3), SCANHEAD_ESTATE);
+        close(head);
+        scanhead_close(sh);
+    }
+}
+
 /* Numbers may begin anywhere: what came before the first one holds. */
 static void test_any_start(void **state)
 {
@@ -200,8 +233,10 @@ static void test_hash(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stats), cmocka_unit_test(test_version_and_types), cmocka_unit_test(test_restart),
-        cmocka_unit_test(test_alike), cmocka_unit_test(test_any_start),         cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_stats),   cmocka_unit_test(test_version_and_types),
+        cmocka_unit_test(test_restart), cmocka_unit_test(test_alike_long_ago),
+        cmocka_unit_test(test_alike),   cmocka_unit_test(test_any_start),
+        cmocka_unit_test(test_hash),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -110,6 +110,13 @@ static void a_client_sends_until_there_is_no_room(void **state)
     bench_close(&bench);
 }
 
+/* The owner works, and must not wait: the client is gone. */
+static void note_turn(void *owner, int timeout_ms)
+{
+    assert_int_equal(timeout_ms, 0);
+    ++*(int *)owner;
+}
+
 static void each_end_may_go(void **state)
 {
     (void)state;
@@ -119,8 +126,12 @@ static void each_end_may_go(void **state)
     char byte;
     assert_int_equal(memory_send(&memory, "x", 1), 1);
     assert_int_equal(bench.ops->write(bench.link, 0, WRITTEN, 5), 0);
+    int n_turns = 0;
+    memory.turn = note_turn;
+    memory.owner = &n_turns;
     memory_leave(&memory);
     memory_leave(&memory);
+    assert_int_equal(n_turns, 1);
     assert_int_equal(memory_take(&memory, &bytes), 0);
     bench_expect(&bench, LINK_CLOSED, 1);
     assert_int_equal(bench.ops->write(bench.link, 0, WRITTEN, 5), SH_ECLOSED);
@@ -135,9 +146,10 @@ static void each_end_may_go(void **state)
     bench.ops->end(bench.link, 0);
     assert_true(memory.over);
     assert_int_equal(memory_take(&memory, &bytes), 5); /* bytes written before still come */
+    memory.turn = note_turn;
     bench_close(&bench);
     assert_int_equal(memory_take(&memory, &bytes), 0);
-    memory_turn(&memory, -1); /* nobody is there, so this must not wait */
+    memory_turn(&memory, -1); /* nobody is there to work, or to wait */
 }
 
 /* ---- a head and its client */

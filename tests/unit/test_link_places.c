@@ -141,7 +141,7 @@ static int broadcasts; /* sockets that may send broadcasts */
 
 int setsockopt(int fd, int level, int name, const void *value, socklen_t len)
 {
-    broadcasts += level == SOL_SOCKET && name == SO_BROADCAST;
+    broadcasts += level == SOL_SOCKET && name == SO_BROADCAST && *(const int *)value != 0;
     return (int)syscall(SYS_setsockopt, fd, level, name, value, len);
 }
 

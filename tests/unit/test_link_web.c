@@ -60,7 +60,8 @@ static void test_requests(void **state)
     assert_non_null(strstr(body, "three words"));
     assert_int_equal(web_status_of(&bench, place, "GET /scene?n=no", ""), 503);
     assert_int_equal(web_status_of(&bench, place, "HEAD /", ""), 200);
-    assert_int_equal(web_status_of(&bench, place, "GET /nothing", ""), 404);
+    assert_int_equal(web_ask(&bench, place, "GET /nothing", host, &body, &len), 404);
+    assert_string_equal(body, "there is nothing at this path\n");
     assert_int_equal(web_status_of(&bench, place, "GET /../web.c", ""), 404);
     assert_int_equal(web_status_of(&bench, place, "POST /", "Content-Length: 0\r\n"), 405);
     assert_int_equal(web_status_of(&bench, place, "GET /ws", ""), 426);
@@ -74,6 +75,22 @@ static void test_requests(void **state)
     assert_int_equal(web_status_of(&bench, place, "GET /", "Upgrade: h2c\r\nConnection: Upgrade\r\n"), 200);
     bench_close(&bench);
     assert_int_equal(web_n_released, 2); /* one each; errors and the page's own files are not the owner's */
+}
+
+/* Whether a request is answered within far fewer turns than the seconds have that a client may take. */
+static int is_answered_soon(struct bench *bench, const char *place)
+{
+    char request[200], answer[4096];
+    int fd = web_dial(place);
+    snprintf(request, sizeof request, "GET /scene HTTP/1.1\r\nHost: %s\r\n\r\n", place);
+    assert_int_equal(send(fd, request, strlen(request), MSG_NOSIGNAL), strlen(request));
+    ssize_t n = -1;
+    for (int i = 0; i < 3000 && n < 0; i++) {
+        bench_poll(bench, 0, 1);
+        n = recv(fd, answer, sizeof answer, MSG_DONTWAIT);
+    }
+    close(fd);
+    return n > 12 && memcmp(answer, "HTTP/1.1 200", 12) == 0;
 }
 
 /* A connection ends with its first answer. */
@@ -98,6 +115,8 @@ static void test_one_request_each(void **state)
     assert_string_equal(answer + n - 5, "bbbbb");
     close(fd);
     assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 200);
+    for (int i = 0; i < 80; i++) /* more than libwebsockets has room for: each answer gives its own back */
+        assert_true(is_answered_soon(&bench, place));
     bench_close(&bench);
 }
 
@@ -171,6 +190,7 @@ static void test_descriptors_run_out(void **state)
     assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
     assert_true(n > 13);
     assert_memory_equal(answer, "HTTP/1.1 503 ", 13);
+    assert_non_null(strstr(answer, "\r\n\r\nthe head has no file descriptor left for this connection\n"));
     bench_expect(&bench, LINK_REFUSED, 0);
     close(fd);
     bench_close(&bench);
@@ -321,11 +341,37 @@ static void test_turned_down(void **state)
     web_send_frame(fd[WEB_SESSIONS], 0x81, "*IDN?", 5);
     assert_int_equal(web_take_frame(&bench, fd[WEB_SESSIONS], payload, &len), 0x88);
     assert_int_equal(payload[0] << 8 | payload[1], 1013);
+    assert_int_equal(len, 2 + strlen("all 2 sessions of this link are taken"));
+    assert_memory_equal(payload + 2, "all 2 sessions of this link are taken", len - 2);
     bench_expect(&bench, LINK_REFUSED, 0);
     for (int i = 0; i <= WEB_SESSIONS; i++)
         close(fd[i]);
     for (int i = 0; i < WEB_SESSIONS; i++)
         bench_expect(&bench, LINK_CLOSED, 0);
+    bench_close(&bench);
+}
+
+/* A link of one session has other words for those who come too late. */
+static void test_only_session(void **state)
+{
+    (void)state;
+    static const struct link_spec one = {.type = LINK_WEB, .max_sessions = 1};
+    static const char why[] = "the only session of this link is taken";
+    char url[128];
+    uint8_t payload[200];
+    size_t len;
+    struct bench bench = bench_open(&one);
+    bench.ops->endpoint(bench.link, url, sizeof url);
+    char *place = url + strlen("http://");
+    place[strlen(place) - 1] = '\0';
+    const int first = web_upgrade(&bench, place, "/ws", ""), second = web_upgrade(&bench, place, "/ws", "");
+    assert_int_equal(web_take_frame(&bench, second, payload, &len), 0x88);
+    assert_int_equal(payload[0] << 8 | payload[1], 1013);
+    assert_int_equal(len, 2 + strlen(why));
+    assert_memory_equal(payload + 2, why, len - 2);
+    assert_int_equal(web_status_of(&bench, place, "GET /scene", ""), 404); /* it serves the page alone */
+    close(first);
+    close(second);
     bench_close(&bench);
 }
 
@@ -342,7 +388,9 @@ static void test_bad_messages(void **state)
         const char *data;
         size_t len;
         int code;
-    } cases[] = {{0x82, "*IDN?", 5, 1003}, {0x81, long_text, sizeof long_text, 1009}};
+        const char *why;
+    } cases[] = {{0x82, "*IDN?", 5, 1003, "a command must be a text message"},
+                 {0x81, long_text, sizeof long_text, 1009, "a message must have at most 4096 bytes"}};
     struct bench bench = web_open(place);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         size_t len;
@@ -351,6 +399,8 @@ static void test_bad_messages(void **state)
         web_send_frame(fd, cases[i].first, cases[i].data, cases[i].len);
         assert_int_equal(web_take_frame(&bench, fd, payload, &len), 0x88);
         assert_int_equal(payload[0] << 8 | payload[1], cases[i].code);
+        assert_int_equal(len, 2 + strlen(cases[i].why));
+        assert_memory_equal(payload + 2, cases[i].why, len - 2);
         close(fd); /* or, without its answer, some seconds later */
         bench_expect(&bench, LINK_CLOSED, 0);
     }
@@ -373,6 +423,7 @@ int main(void)
         cmocka_unit_test(test_refused_names),
         cmocka_unit_test(test_descriptors_run_out),
         cmocka_unit_test(test_turned_down),
+        cmocka_unit_test(test_only_session),
         cmocka_unit_test(test_bad_messages),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -165,12 +165,16 @@ static void test_effects(void **state)
         host_control(host, 0x82, 0, 0, 0x82, 2, NULL);
         assert_int_equal(le_get16(host_in), 0);
     }
+    host_control(host, 0x00, 3, 48, 0, 0, NULL);
+    host_control(host, 0x00, 3, 49, 0, 0, NULL);
+    host_control(host, 0x80, 0, 0, 0, 2, NULL);
+    assert_int_equal(le_get16(host_in), 1 | 4 | 8);
     usb_device_reset(host->device);
     assert_true(!host->active[0] && !host->active[1]);
     assert_int_equal(host_control(host, 0x80, 8, 0, 0, 1, NULL), USB_STALL); /* default state */
     host_control(host, 0x00, USB_REQ_SET_ADDRESS, 5, 0, 0, NULL);
     host_control(host, 0x80, 0, 0, 0, 2, NULL);
-    assert_int_equal(le_get16(host_in), 1); /* U2 went with the reset */
+    assert_int_equal(le_get16(host_in), 1); /* U1 and U2 went with the reset */
     host_configure(host);
     host_control(host, 0x00, 9, 0, 0, 0, NULL);
     assert_true(!host->active[0]);

@@ -231,12 +231,17 @@ static void test_contradictions(void **state)
     model.interface = rows;
     model.n_interfaces = 2;
     assert_int_equal(usb_device_create(&model, &id, &hooks, NULL, &device, &err), SH_EINPUT); /* twice interface 0 */
+    assert_string_equal(err.text, "usb: interface row 1 is out of order");
     rows[1].number = 1;
     assert_int_equal(usb_device_create(&model, &id, &hooks, NULL, &device, &err), SH_EINPUT); /* endpoints shared */
-    assert_non_null(strstr(err.text, "81"));
+    assert_string_equal(err.text, "usb: endpoint 81 is number 0, or taken twice");
     rows[1].n_endpoints = 0;
     model.n_interfaces = 0;
     assert_int_equal(usb_device_create(&model, &id, &hooks, NULL, &device, &err), SH_EINPUT);
+    assert_string_equal(err.text, "usb: 0 interfaces; allowed 1 to 8");
+    model.n_interfaces = 9;
+    assert_int_equal(usb_device_create(&model, &id, &hooks, NULL, &device, &err), SH_EINPUT);
+    assert_string_equal(err.text, "usb: 9 interfaces; allowed 1 to 8");
     model.n_interfaces = 2;
     assert_int_equal(usb_device_create(&model, &id, &hooks, NULL, &device, &err), SH_OK);
     usb_device_free(device);

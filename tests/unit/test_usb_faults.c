@@ -86,7 +86,8 @@ static void test_slow_requests(void **state)
 {
     (void)state;
     struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);
-    struct usb_transfer request[3] = {{.id = 7}, {.id = 8}, {.id = 9}}, *held = NULL;
+    struct usb_transfer other = {.id = 10}; /* a list that the last one was in before */
+    struct usb_transfer request[3] = {{.id = 7}, {.id = 8}, {.id = 9, .next = &other}}, *held = NULL;
     assert_int_equal(usb_has_to_wait(host->device, NULL), 0);
     assert_true(usb_due_ns(NULL) == INT64_MAX);
     usb_device_set_slow(host->device, 3.6e6); /* an hour: none of them is due while this test runs */

@@ -88,6 +88,13 @@ static void test_requests(void **state)
     assert_int_equal(s->length, 7);
     s = guest_control(g, 0xa1, 0x21, 0, 0, 7, NULL);
     assert_memory_equal(s->data, coding, 7);
+    s = guest_control(g, 0x80, USB_REQ_GET_CONFIGURATION, 0, 0, 1, NULL);
+    assert_int_equal(s->status, usb_redir_success);
+    assert_int_equal(s->length, 1);
+    assert_int_equal(s->data[0], 1);
+    s = guest_control(g, 0x80, 6, 0x0100, 0, 0, NULL); /* no byte is asked for */
+    assert_int_equal(s->status, usb_redir_success);
+    assert_int_equal(s->length, 0);
     assert_int_equal(guest_control(g, 0x80, 6, 0x3300, 0, 64, NULL)->status, usb_redir_stall);
     struct usb_redir_set_alt_setting_header alt = {.interface = 2, .alt = 0};
     g->interfaces.interface_count = 0; /* it is told them again */
@@ -276,19 +283,38 @@ static void test_interrupt(void **state)
     bench_close(&bench);
 }
 
+/* The link is closed while a guest has the device. What was written goes out, then word that the device is gone. */
 static void test_close(void **state)
 {
     (void)state;
+    static uint8_t sent[60000];
     struct bench bench = redir_bench(USB_RATE_HIGH);
     struct guest *g = guest_new(&bench);
     guest_configure(g);
-    guest_bulk(g, 9, 0x83, 512, NULL);
-    guest_turn(g, 0);
+    guest_open_stream(g);
+    for (size_t i = 0; i < sizeof sent; i++)
+        sent[i] = (uint8_t)rng_u64(10, i);
+    guest_bulk(g, 1, 0x83, 65536, NULL);
+    guest_bulk(g, 2, 0x83, 65536, NULL); /* never filled */
+    while (usbredirparser_has_data_to_write(g->parser) > 0)
+        guest_turn(g, 0);
+    bench_expect(&bench, LINK_WRITABLE, 2);
+    bench_write_all(&bench, 1, sent, sizeof sent);
+    const int before = g->n_seen;
     shutdown(g->fd, SHUT_WR); /* so that the link need not wait for us */
     bench_close(&bench);
-    usbredirparser_do_read(g->parser);
+    while (!g->ended && g->errors == 0)
+        usbredirparser_do_read(g->parser);
     assert_int_equal(g->disconnects, 1);
-    assert_true(g->ended);
+    assert_int_equal(g->n_seen, before + 2);
+    const struct seen *s = &g->seen[before];
+    assert_int_equal(s[0].id, 1);
+    assert_int_equal(s[0].status, usb_redir_success);
+    assert_int_equal(s[0].length, sizeof sent);
+    assert_memory_equal(s[0].data, sent, sizeof sent);
+    assert_int_equal(s[1].id, 2);
+    assert_int_equal(s[1].status, usb_redir_ioerror);
+    assert_int_equal(s[1].length, 0);
     guest_free(g);
 }
 

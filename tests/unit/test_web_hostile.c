@@ -292,6 +292,7 @@ static void test_who_makes_room(void **state)
         fd[i] = dial_and_say(&bench, place, 1, "");
     answer[web_listen_to(&bench, first, answer, sizeof answer - 1)] = '\0';
     assert_int_equal(strncmp(answer, "HTTP/1.1 408 ", 13), 0);
+    expect_body(answer, "other clients wait; send the whole request at once");
     bench_expect(&bench, LINK_REFUSED, 0);
     assert_true(is_open(session));
     for (int i = 0; i < OF_ONE; i++)

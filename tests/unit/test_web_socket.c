@@ -204,11 +204,28 @@ static void test_crowd(void **state)
     bench_close(&bench);
 }
 
+/* The link is closed while its cable is pulled: its client hears of the end all the same. */
+static void test_goodbye_without_cable(void **state)
+{
+    (void)state;
+    static const char why[] = "\x88\x14\x03\xe9the head has ended"; /* 1001 */
+    char place[64], got[64];
+    struct bench bench = web_open(place);
+    const int fd = web_upgrade(&bench, place, "/ws", "");
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(bench.ops->fault(bench.link, LINK_FAULT_CABLE, 0, 0, 0), SH_OK);
+    web_send_frame(fd, 0x88, "\x03\xe8", 2); /* unheard until then, so that the link need not wait for an answer */
+    bench_close(&bench);
+    assert_int_equal(fd_read(fd, got, sizeof got), sizeof why - 1);
+    assert_memory_equal(got, why, sizeof why - 1);
+    close(fd);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_ends),       cmocka_unit_test(test_pings), cmocka_unit_test(test_early_frames),
-        cmocka_unit_test(test_last_words), cmocka_unit_test(test_crowd),
+        cmocka_unit_test(test_last_words), cmocka_unit_test(test_crowd), cmocka_unit_test(test_goodbye_without_cable),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -80,6 +80,8 @@ struct usb_transfer *host_submit(struct host *host, uint64_t id, uint8_t endpoin
 {
     struct usb_transfer *transfer = calloc(1, sizeof *transfer + length + 1);
     assert_non_null(transfer);
+    /* What the core sets itself may hold anything before. */
+    *transfer = (struct usb_transfer){.actual = 77, .status = USB_OVERFLOW, .zero_packet = 1, .next = transfer};
     transfer->id = id;
     transfer->endpoint = endpoint;
     transfer->length = length;
@@ -97,5 +99,6 @@ void host_expect(struct host *host, uint64_t id, enum usb_status status, uint32_
     assert_int_equal(transfer->id, id);
     assert_int_equal(transfer->status, status);
     assert_int_equal(transfer->actual, actual);
+    if (status != USB_OK || actual == 0) assert_int_equal(transfer->zero_packet, 0);
     free(transfer);
 }

@@ -288,9 +288,36 @@ static void test_small_stack(void **state)
     free(text);
 }
 
+/* Another program has made the pipe of standard output non-blocking, and reads more slowly than the command writes. */
+static void test_pipe_of_another(void **state)
+{
+    enum { ROOM = 1 << 20, PIPE_BYTES = 4096 }; /* the help is some times longer than the pipe */
+    struct wire *wire = *state;
+    const char *const args[] = {"-c", "exec \"$0\" check --help >&3", wire_program(), NULL};
+    size_t whole, len = 0;
+    int fd[2];
+    wire_run_program(wire, wire_program(), (const char *const[]){"check", "--help", NULL}, 0);
+    char *want = wire_read(wire_path(wire, "out"), &whole), *got = malloc(ROOM);
+    assert_in_range(whole, 4 * PIPE_BYTES, ROOM);
+    assert_int_equal(pipe(fd), 0);
+    assert_true(fcntl(fd[1], F_SETPIPE_SZ, PIPE_BYTES) >= 0);
+    assert_int_equal(fcntl(fd[1], F_SETFL, O_NONBLOCK), 0);
+    const pid_t pid = wire_spawn_program(wire, "/bin/sh", args, "out", "err", fd[1]);
+    close(fd[1]);
+    for (ssize_t n; (n = read(fd[0], got + len, ROOM - len)) > 0;)
+        len += (size_t)n;
+    close(fd[0]);
+    assert_int_equal(wire_wait(wire, pid), 0);
+    assert_int_equal(len, whole);
+    assert_memory_equal(got, want, whole);
+    free(want);
+    free(got);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_pipe_of_another, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_small_stack, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_configurations, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_meshes, wire_setup, wire_teardown),
