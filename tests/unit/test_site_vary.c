@@ -29,11 +29,11 @@ static void the_legs_of_other_stations_keep_their_scale(void **state)
     struct head_settings settings = cfg->head.settings;
     settings.range_max_nm = 1000000000000;
     for (uint32_t i = 0; i < 2; i++)
-        assert_true(is(site->station[i].leg[0].scale[0], 1e-5));
+        assert_true(is(site->station[i].on_stretch[0].scale[0], 1e-5));
     if (site_vary(site, &settings, 0, &near, &err) != SH_OK) fail_msg("%s", err.text);
-    assert_true(is(near->scale_m, 1e-6) && is(near->station[0].leg[0].scale[0], 1e-6));
+    assert_true(is(near->scale_m, 1e-6) && is(near->station[0].on_stretch[0].scale[0], 1e-6));
     for (uint32_t i = 0; i < 2; i++)
-        assert_true(is(site->station[i].leg[0].scale[0], 1e-5));
+        assert_true(is(site->station[i].on_stretch[0].scale[0], 1e-5));
     site_vary_free(near);
     site_free(site);
 }
