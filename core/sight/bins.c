@@ -12,7 +12,8 @@ struct range {
     uint32_t u0, u1, v0, v1;
 };
 
-/* Whether all corners lie beyond one of the pyramid's four sides, or behind the station. a, b across, w along.
+/* The station and a face of the cube span a pyramid with four sides. Returns whether all corners lie beyond one of
+ * these sides, or behind the station. w is along the pyramid's axis, a and b are across.
  * Corners within BUILD_BESIDE of a side count as within the pyramid, since a triangle seen edge-on may be hit a little
  * beside its end. BUILD_BESIDE is SIGHT_TILT_DOUBT over 1e-6, the sine below which core/bvh limits ranges to those
  * between the edges. */

@@ -70,7 +70,7 @@ int host_is_hang_up(const struct scanhead *sh, int error)
     case ENXIO:
     case EPIPE:
     case ECONNRESET:
-    case ETIMEDOUT: /* this and the next: TCP has given up, and reports the last reason that it met */
+    case ETIMEDOUT: /* from here on: TCP has given up, and reports its last failure */
     case EHOSTUNREACH:
     case ENETUNREACH:
     case ENETDOWN:

@@ -48,7 +48,7 @@ struct link_spec {
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
     struct link_memory *memory;   /* memory: what it shares with its client (memory.h); outlives the link */
-    /* usb; address, port and path as struct usb_backend_spec has them, which explains these as well */
+    /* usb: struct usb_backend_spec explains address, port, path, attach, retry_ms and udc */
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
     int attach, retry_ms, vid, pid;

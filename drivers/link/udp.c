@@ -50,8 +50,8 @@ static const char *host_of(const struct link_spec *spec)
     return spec->address[0] != '\0' ? spec->address : "127.0.0.1";
 }
 
-/* A name with addresses of both kinds, such as localhost, leads to the IPv4 one. The receivers of these protocols often
- * have no other, and no answer of theirs would show which one they listen on. */
+/* A name with addresses of IPv4 and IPv6, such as localhost, leads to the IPv4 one. Receivers of datagrams often listen
+ * on IPv4 alone. They send no answer that would show on which address they listen. */
 static int find_receiver(const struct link_spec *spec, struct sockaddr_storage *to, socklen_t *len, struct sh_err *err)
 {
     struct addrinfo *list;
@@ -347,7 +347,7 @@ static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     link_take_wake(&fds[0], &events);
     if ((fds[1].revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
     if ((fds[1].revents & POLLOUT) != 0) link_events_push(&events, LINK_WRITABLE, 0, NULL);
-    if ((fds[1].revents & POLLERR) != 0) { /* a refusal that came back, else poll would spin */
+    if ((fds[1].revents & POLLERR) != 0) { /* a datagram was refused; reading SO_ERROR clears POLLERR */
         int error;
         socklen_t len = sizeof error;
         if (getsockopt(udp->fd, SOL_SOCKET, SO_ERROR, &error, &len) == 0 && error != 0) udp->refused++;

@@ -186,7 +186,8 @@ static void planar_scan_take_points(struct planar_scan *s, const struct native_h
     end_if_whole(s, news);
 }
 
-/* Attributes of other points are ignored. The next frame then breaks the turn, since these points still lack theirs. */
+/* Ignores attributes that belong to other points than the last ones. The last points then still lack their attributes,
+ * so the next points or the end of the line break the turn. */
 static void take_attributes(struct planar_scan *s, const uint8_t *payload, const struct native_attributes *head,
                             struct planar_news *news)
 {

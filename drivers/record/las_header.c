@@ -35,8 +35,8 @@ static uint8_t *put_vlr_head(uint8_t *to, const char *user, uint16_t record, siz
     return to + LAS_VLR_HEAD_LEN;
 }
 
-/* Describes one of the extra fields after a point, of 2 bytes. no_data is the value that stands for none. scale 0:
- * none. */
+/* Describes an extra field of 2 bytes, which stands after a point. no_data is the field's value at points that have no
+ * figure. scale 0: the field has no scale. */
 static uint8_t *put_extra(uint8_t *to, uint8_t type, const char *name, int64_t no_data, double scale, const char *text)
 {
     memset(to, 0, LAS_EXTRA_LEN);

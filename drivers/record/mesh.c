@@ -302,7 +302,7 @@ static int mesh_finish(void *rec, struct sh_err *err)
     struct mesh_recorder *m = rec;
     int rc = end_grid(m, err);
     if (rc != SH_OK) return rc;
-    outfile_yield(&m->base.file); /* its place was kept until now */
+    outfile_yield(&m->base.file); /* removes FILE.part, which kept other recordings away from the path until now */
     if (m->n_faces == 0 && !mesh_takes_points(m->base.file.path))
         return sh_fail(err, SH_EINPUT, "%s: this scan has no triangles, and a %s file can't be empty",
                        m->base.file.path, m->base.ops->ending);

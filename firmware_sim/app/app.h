@@ -55,7 +55,8 @@ int app_with_links(const struct app_input *in, const char *links,
  * warning, unless it is the same. */
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
-/* Warns of a head.settings_file that is there but has no effect on the work; why: "SOAK uses ...". */
+/* Warns of a head.settings_file that is there but has no effect on the work. why is the reason, a clause such as "a
+ * soak has the settings of the configuration". */
 void app_warn_settings_file(const struct config *cfg, const char *why);
 
 /* To be called before any file is opened. Checks that the command writes no file twice, and none that it reads. Files
@@ -118,7 +119,7 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
                    struct sh_err *err);
 
 /* --ready-fd: writes one JSON value, by `put`, as a line to descriptor fd, and closes fd; standard output and standard
- * error stay open. 0: the option was not given, and nothing is done. */
+ * error stay open. fd 0: the option was not given, and nothing is done. */
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err);
 
 #endif

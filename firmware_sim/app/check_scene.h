@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead check --scene` prints the objects of the scene as a table. Open and turned objects, and transparent
- * surfaces, are listed once more by their names. */
+/* `scanhead check --scene` prints the objects of the scene as a table. After the table it lists the names of open
+ * objects, of turned objects, and of transparent surfaces. In a turned object neighbouring faces look to different
+ * sides (core/scene_objects.h). */
 #ifndef FIRMWARE_SIM_APP_CHECK_SCENE_H
 #define FIRMWARE_SIM_APP_CHECK_SCENE_H
 

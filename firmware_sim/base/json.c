@@ -152,7 +152,7 @@ int json_end(struct json *json, struct sh_err *err)
     fputc('\n', json->out);
     if (json->depth != 0 || json->closer[0] == '\0' || json->misused)
         return sh_fail(err, SH_ESTATE, "json: keys, objects and arrays do not nest");
-    errno = 0; /* a write that failed earlier leaves no reason: the last one may succeed */
+    errno = 0; /* only a failure of fflush sets errno again; the reason of an earlier failure is not known */
     if (fflush(json->out) != 0 || ferror(json->out))
         return sh_fail(err, SH_EIO, "json: %s", errno != 0 ? strerror(errno) : "writing failed");
     return SH_OK;

@@ -31,7 +31,8 @@ struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh
  * return that, too, and journal_close gives the reason. */
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line);
 
-/* The run ended at this tick; journal_close writes it. SH_EINPUT: t_ns is negative. */
+/* Sets the tick at which the run ended. journal_close writes the line END with this tick. SH_EINPUT: t_ns is
+ * negative. */
 int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns);
 
 /* Writes a note, which replaying passes over: one printable line. Failures as in journal_write. */

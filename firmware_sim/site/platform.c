@@ -264,8 +264,9 @@ static void set_time(const struct site *site, uint32_t k, struct site_station *s
     s->t_s = s->frame / p->frames_per_s;
 }
 
-/* Without a trajectory the stops are all stations of the configuration at the first time, then all at the next. The
- * stops are numbered from 1 on, as way-points are. */
+/* Without a trajectory the stops are all stations of the configuration at the first time, then all at the next time.
+ * The times are numbered from 1 on, as way-points are. The frame of a stop is the number of its time, unless the
+ * configuration counts in frames (set_time). */
 static void add_standing(struct site *site, const struct site_station *standing, uint32_t i)
 {
     const uint32_t n = site->cfg->n_stations, k = i / n;

@@ -12,7 +12,7 @@ struct scene_build;
 struct gltf_packed {
     struct gltf_bytes from;
     uint64_t stride, count;
-    const char *mode, *filter; /* NULL: it says none */
+    const char *mode, *filter; /* NULL: the extension names none */
 };
 /* at: the buffer view, for messages. *own is to be freed, even after an error. */
 int gltf_meshopt(struct scene_build *b, const struct gltf_packed *packed, const char *at, void **own,

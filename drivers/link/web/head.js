@@ -157,7 +157,8 @@ export class Head extends EventTarget {
       event.preventDefault?.();
       worker.terminate();
       this.#wire = this.#inPage();
-      if (this.isOpen) this.#closed({code: 1006, reason: 'this page failed to read the stream'}); // this connects again
+      // #closed() connects again after a delay
+      if (this.isOpen) this.#closed({code: 1006, reason: 'this page failed to read the stream'});
       else this.#connect();
     };
     return {post: (message) => worker.postMessage(message), end: () => worker.terminate()};

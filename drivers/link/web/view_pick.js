@@ -26,8 +26,8 @@ function meets(block, eye, forward, slope, beside_m) {
 
 // Steps through blocks; each next() looks through one of them. The last value is {block, i, w, px} or null. The value
 // is null, too, if the cloud was cleared meanwhile: places in its blocks would be relative to another origin.
-// limit is the number of points of each block that search() tests. The rays of a flat view are parallel: there w may be
-// less than 0, and a depth of a tenth of the target's distance counts as much as a tenth in a view with perspective.
+// limit is the number of points of each block that search() tests. In a flat view the rays are parallel, and w may be
+// less than 0. There four pixels beside the pointer count as much as a depth of a tenth of the target's distance.
 export function* search(cloud, camera, x, y, radius_px, limit = Infinity) {
   const {origin} = cloud, {flat, distance} = camera;
   if (origin === null) return null;

@@ -16,7 +16,7 @@ struct init_mesh {
     enum scene_up up;
     double scale;
     char up_from[64], scale_from[176]; /* the source of each, for comments */
-    char crs[16]; /* the CRS of a GeoTIFF that is taken as it is and that PROJ can place; else empty */
+    char crs[16]; /* the CRS of a GeoTIFF with z up and scale 1, if PROJ finds its place on the Earth; else empty */
 };
 
 /* Loads the mesh. Warns of all that is assumed, with `name` for the file. scene_free is due where it succeeds. */

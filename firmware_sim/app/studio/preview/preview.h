@@ -17,8 +17,8 @@ struct preview;
 struct preview_options {
     const struct config *cfg;
     const struct site *site; /* of the head that runs, copies written out; it and cfg outlive the preview */
-    /* This is the site's coverage. Only the preview adds scans and stations to it; others may only ask it for cells of
-     * places. NULL: there is no coverage, and previews have points alone. */
+    /* This is the site's coverage. Only the preview adds scans and stations to the coverage. Other code may only ask in
+     * which cell a place lies (coverage_cell_at). NULL: there is no coverage, and previews have points alone. */
     struct coverage *coverage;
     double cell_m;
     int nice;                       /* of the thread that works, as setpriority() has it */
