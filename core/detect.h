@@ -4,13 +4,13 @@
  *
  * Signal. The range equation for a target that the beam doesn't miss (W. Wagner et al., Gaussian
  * decomposition and calibration of a novel small-footprint full-waveform digitising airborne laser scanner,
- * 2006): power falls with rho(i) / R^2 and exp(-2 a R), a the extinction of the air. This module counts it in units of
- * the detection threshold:
+ * 2006): the received power is proportional to rho(i) / R^2 and to exp(-2 a R), a the extinction of the air. This
+ * module counts the power in units of the detection threshold:
  *
  *     A = E rho(i) o(R) exp(-2 a R) / rho_min(R)
  *
- * with E the share of the pulse's energy that took this way, rho(i) as in surface.h, and rho_min(R) the
- * reflectance that is just seen at R. rho_min follows from the data sheet's ranges R_k for targets of rho_k: log
+ * with E the share of the pulse's energy on the way to the target and back, rho(i) as in surface.h, and rho_min(R)
+ * the reflectance that is just seen at R. rho_min follows from the data sheet's ranges R_k for targets of rho_k: log
  * rho_min = 2 log R + g(R) passes through each of them, and g is linear between them. The slope of g is 2 a
  * for the air on the data sheet's day. Beyond the last and before the first R_k the nearest slope holds;
  * with a single R_k it is 0. So the a in A is only the extinction beyond that of the data sheet's day.
@@ -94,7 +94,7 @@ struct detect_echoes {
     uint32_t n;
     const uint64_t *key; /* rng_echo(pulse, number) */
     double *range_m;     /* along the beam; NaN: no echo */
-    const double *rho;   /* surface_return, times the share of the pulse's energy that took this way */
+    const double *rho;   /* surface_return, times the share E of the pulse's energy */
     double *amplitude;   /* A, without noise */
     int16_t *refl_cdb;   /* 0.01 dB; LINE_REFL_NONE where there is no echo */
     uint64_t scan_key;   /* rng_scan */

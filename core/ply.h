@@ -90,7 +90,7 @@ struct ply_rows {
     double scalar[PLY_SCALARS];        /* of the row, by ply_use; [PLY_SKIP] has no meaning */
     struct ply_list corners, texcoords;
     bool is_single; /* x, y or z of vertices is a float of a binary file: its writer has rounded it */
-    bool is_kept;   /* bytes before p are read again: faces that come before their vertices */
+    bool is_kept;   /* bytes before t.p are read again, since faces come before their vertices */
     text_progress *progress;
     void *progress_ctx;
 };

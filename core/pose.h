@@ -68,7 +68,8 @@ void pose_between(const struct pose *a, const struct pose *b, double fraction, s
 /* The pose of a head that is mounted on a body: mount is the head's pose in the body's frame. */
 void pose_mount(const struct pose *body, const struct pose *mount, struct pose *out);
 
-/* The last of n >= 1 knots, in order of time, at or before t_ns; before the first one 0. */
+/* Returns the index of the last knot at or before t_ns; 0 where t_ns is before the first knot. The n >= 1 knots are in
+ * order of time. */
 size_t pose_find_knot(const struct pose_knot *knot, size_t n, int64_t t_ns);
 
 /* Files of millions of samples take seconds. Functions with a report end with SH_ESTOPPED where it asks to
@@ -100,8 +101,8 @@ int trajectory_read_csv(const char *path, const struct sh_report *report, struct
  * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
  * the last point needs a speed, which is not used. At a point with pause_s the platform comes to rest smoothly, stands
  * for that time and starts smoothly. The platform heads along the path, with pitch and roll 0, about the axes that a
- * station has there: geoframe_level of frame, or the scene's own where frame is NULL. SH_EINPUT, too, where
- * the way needs more than POSE_MAX_KNOTS samples: one every 0.02 s, or every 0.01 m where that is longer. */
+ * station has there: geoframe_level of frame, or the scene's own where frame is NULL. Samples are 0.02 s apart, or
+ * 0.01 m of the way where that takes longer. SH_EINPUT is also returned for more than POSE_MAX_KNOTS samples. */
 int trajectory_read_waypoints(const char *path, const struct geoframe *frame, const struct sh_report *report,
                               struct trajectory **out, struct sh_err *err);
 

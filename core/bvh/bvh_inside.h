@@ -4,8 +4,8 @@
  *
  * Meeting a triangle. A leaf has one or two triangles. Seen from the origin o of a ray, a corner A is p = A - o. The
  * ray with direction d passes an edge from p to q on the side that the sign of (p x (q - p)) . d says, and meets a
- * triangle where the sides of its edges, taken one way round, don't differ. Where the rounding of single precision
- * can't change that sign, vectors compute it in single precision (meet.c). Else the sign is computed again in double
+ * triangle where the sides of its edges, taken one way round, don't differ. The sign is computed in single precision
+ * first, with vector instructions (meet.c). Where rounding might have changed the sign, it is computed again in double
  * (edges.h), in one way for both triangles of the edge. Both triangles then get the same number with opposite signs, so
  * no ray passes between them. A ray that misses a triangle by less than the rounding at its edges meets that triangle,
  * unless it meets something nearer. So nothing passes at corners, either. The same holds where a corner of one triangle
@@ -19,16 +19,17 @@
  * Why no leaf is left out. Embree works in float. Errors are in units of 2^-24 here. o is the start of a ray and h its
  * hit, both counted from the BVH's origin. At h Embree's ray is at most 2 |o| + |h| away from the real ray. One |o| is
  * the rounding of the start. The rest is the rounding of the direction over the range, which is at most |o| + |h|.
- * Whatever the scene's flags say, Embree (3.13 and 4.4) uses its fast test of a box for such geometry. This test
- * multiplies by the reciprocal of the direction, and errs by up to 7 times the range. Together these errors are 9 |o| +
- * 8 |h| at most. The boxes are larger than their triangles by 8 (2 r + |h|), where r is the radius of the scene. R is
- * BVH_STRETCH_M. Where 9 R + 17 |h| is smaller, boxes are larger by this instead, and float rays are at most R long:
- * then |o| is at most |h| + R. A hit makes tfar the next float above its range. At that range the real ray is at its
- * triangle. So the float ray is in the triangle's box there, and has entered that box at a shorter range. A ray from
- * outside of the sphere of radius r about the BVH's origin starts further along its direction (hits.c). If it can hit
- * anything, its start is then at most 1.5 r from that origin. So nothing here depends on where rays begin. Large
- * triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene that origin is where most
- * triangles are, else in the middle.
+ * The leaves are geometry of our own for Embree (RTC_GEOMETRY_TYPE_USER). Embree (3.13 and 4.4) tests the boxes of such
+ * geometry by its fast test, whatever the scene's flags say. This test multiplies by the reciprocal of the direction,
+ * and errs by up to 7 times the range. Together these errors are 9 |o| + 8 |h| at most. The boxes are larger than their
+ * triangles by 8 (2 r + |h|), where r is the radius of the scene. In a large scene float rays are at most R =
+ * BVH_STRETCH_M long, so |o| is at most |h| + R. Then 9 R + 17 |h| covers the errors, too, and the boxes are larger
+ * than their triangles by the smaller one of the two lengths. A hit makes tfar the next float above its range. At that
+ * range the real ray is at its triangle. So the float ray is in the triangle's box there, and has entered that box at a
+ * shorter range. A ray from outside of the sphere of radius r about the BVH's origin starts further along its direction
+ * (hits.c). If it can hit anything, its start is then at most 1.5 r from that origin. So nothing here depends on where
+ * rays begin. Large triangles hardly enlarge the boxes of small ones near the BVH's origin. In a large scene without
+ * copies that origin is where most triangles are, else in the middle.
  *
  * Copies of a mesh. The mesh has a BVH of its own, in its own frame. The copies are primitives of the scene's BVH, with
  * boxes made larger in the same way. A packet that reaches a copy is turned into the mesh's frame in double, and cast

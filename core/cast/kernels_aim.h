@@ -21,7 +21,7 @@ struct kernel_turns {
  * e. */
 struct kernel_reading {
     const struct cast_setup *setup; /* has the counts */
-    const double *rotation;         /* takes socs to the CRS or to prcs, or leaves it (aim.c) */
+    const double *rotation;         /* from socs to the CRS or to prcs; unit matrix: e is in socs (aim.c) */
     struct vec3_out e;
 };
 /* Computes directions of beams in prcs: rotation times (sin p cos m, cos p cos m, sin m). With `reading` it

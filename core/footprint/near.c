@@ -106,7 +106,8 @@ static void look_up(const struct beam_outlines *o, struct beam_near *near, uint3
 }
 
 /* Most cells list no edge. A cell that lists edges is mostly wider than the footprint. So the function passes over a
- * cell's first edges as long as the footprint does not reach their planes. beam_find_lines looks at ranges. */
+ * cell's first edges as long as the footprint does not reach their planes. beam_find_lines examines the edges that are
+ * left, and compares their ranges. */
 uint32_t beam_near_outlines(const struct beam_outlines *o, const struct beam *beam, const struct vec3_floats *dir,
                             uint32_t n, struct beam_near *near)
 {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/georef: what a georef consists of. georef.c fills it; axes.c and scale.c read it. Lengths
- * are in metres, positions in prcs or in units of the CRS. */
+/* Private to core/georef: what a georef consists of. georef.c fills it; axes.c and scale.c read it. Where the CRS is
+ * linear in prcs, a rotation converts positions. Elsewhere a map does (struct shim_map in geographiclib_shim.h), or its
+ * polynomial. Lengths are in metres, positions in prcs or in units of the CRS. */
 #ifndef CORE_GEOREF_STATE_H
 #define CORE_GEOREF_STATE_H
 
@@ -15,7 +16,7 @@ struct georef {
     double centre_m[3];  /* prcs */
     double anchor[3];
     double rotation[9];   /* where there is no map: prcs -> CRS, row by row */
-    struct shim_map *map; /* NULL: linear */
+    struct shim_map *map; /* NULL: the CRS is linear in prcs */
     int has_geoid, from_grid, epsg;
     struct polynomial polynomial; /* of the map; half_m 0: none */
 };

@@ -9,8 +9,9 @@
 struct text_span build_folder_of(const char *path);
 /* Returns the path, with / for \\. The path is to be freed; NULL: there is no memory. */
 char *build_join(struct text_span folder, struct text_span name);
-/* Finds the file of that name in one of the folders; else by the name's last part there; else both without regard to
- * case. The path is to be freed; NULL: the file is nowhere. */
+/* Finds a file in one of the folders: by the whole name, or else by the name's last part. Where neither is there, the
+ * case of letters is ignored, for the whole name and then for its last part. The path is to be freed; NULL: the file is
+ * nowhere. */
 char *build_find_file(const struct text_span *folder, size_t n, struct text_span name);
 
 #endif

@@ -91,7 +91,8 @@ int build_groups(struct build_shared *b, struct sh_err *err);
 int build_group_rect(const struct build_group *g, uint32_t face, double rect[2][2]);
 void build_group_candidate(const struct build_group *g, uint32_t face, struct build_candidate *c);
 
-/* ---- bins.c: fills seen, bin and binned. Where these are more than the memory allows, no region is seen. */
+/* ---- bins.c: fills seen, bin and binned, and counts each triangle's regions in kept. Where binned and kept need more
+ * memory than is allowed, seen becomes 0 for all regions. */
 int build_bins(struct build_shared *b, struct sh_err *err);
 
 /* ---- candidate.c */

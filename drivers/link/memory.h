@@ -2,8 +2,9 @@
 /* The memory link: one client, in the thread that owns the link. So nothing is copied, locked or waited for. A client
  * that needs bytes lets the link's owner work, and then reads the bytes where the owner wrote them.
  *
- * In: the owner's writes, of any length; the bytes that the client sends, at most MEMORY_ROOM between two turns. The
- * owner leaves its bytes unchanged. It repeats a write that took nothing, with the same bytes, until they are taken. */
+ * In: the owner's writes, of any length; the bytes that the client sends, at most MEMORY_ROOM between two turns. A turn
+ * is a call of memory_turn, in which the owner works. The owner leaves its bytes unchanged. It repeats a write that
+ * took nothing, with the same bytes, until they are taken. */
 #ifndef DRIVERS_LINK_MEMORY_H
 #define DRIVERS_LINK_MEMORY_H
 

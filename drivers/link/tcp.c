@@ -25,7 +25,7 @@ struct tcp_session {
     enum tcp_state state;
     int shut; /* LINK_SHUT was reported */
     int fd;
-    uint64_t turn; /* the higher, the later it came, sent or got something */
+    uint64_t turn; /* number of the last connection, read or write, in order of time over all sessions */
     char peer[64];
 };
 
@@ -121,7 +121,7 @@ static void tcp_welcome(struct tcp_link *tcp, struct link_events *events)
         }
         if (slot == tcp->n_sessions && tcp->brief) return; /* all have asked something, and are answered soon */
         if (!socket_accept(tcp->listener.fd, &tcp->listener.reserve_fd, &fd, &from, &len))
-            return; /* none left, or one that gave up before we came */
+            return; /* no client waits, or the client has gone before it was accepted */
         socket_address_text((struct sockaddr *)&from, len, peer, sizeof peer);
         if (fd < 0 || slot == tcp->n_sessions) {
             if (fd >= 0) close(fd);
@@ -213,7 +213,7 @@ static ssize_t tcp_read(void *link, int session, void *buf, size_t len)
     const ssize_t n = socket_read(self->fd, buf, len);
     struct pollfd now = {.fd = self->fd, .events = POLLIN};
     if (n < 0 && poll(&now, 1, 0) > 0 && socket_state(self->fd, now.revents) == SOCKET_SHUT)
-        return 0; /* poll reports it */
+        return 0; /* tcp_poll reports LINK_SHUT */
     return moved(link, self, n);
 }
 

@@ -159,7 +159,7 @@ static int hand_over(struct web_link *web, struct web_conn *conn)
     conn->wsi = NULL;
     web_set_phase(conn, WEB_ANSWERING);
     web->entering = conn;
-    web_lws.lws_adopt_socket_vhost_readbuf(web->vhost, fd, text, strlen(text)); /* which closes it when it fails */
+    web_lws.lws_adopt_socket_vhost_readbuf(web->vhost, fd, text, strlen(text)); /* on failure it has closed fd */
     if (conn->wsi == NULL) web_conn_end(conn);
     return -1;
 }

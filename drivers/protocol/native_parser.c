@@ -183,8 +183,8 @@ static void count_notice(struct native_stats *stats, const struct native_notice 
     stats->restarts += notice->kind == NATIVE_RESTARTED;
 }
 
-/* Renews bad_unseen, the broken frames that no gap shows. A frame in order, or after a gap, shows which frames were
- * missing before it. So only those before the first frame of the sequence remain. */
+/* Renews bad_unseen at a frame of the sequence. The frame's number shows all frames that are missing before it, broken
+ * ones too, but none before the first frame of the sequence. So bad_unseen goes back to what it was at that frame. */
 static void see_bad(struct native_parser *parser, int is_first)
 {
     if (is_first)

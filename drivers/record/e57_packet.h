@@ -50,8 +50,8 @@ struct e57_packet {
 
 /* Begins a packet without records, for a file with these fields. The packet must stay where it is in memory. */
 void e57_packet_begin(struct e57_packet *packet, const struct e57_facts *facts);
-/* Makes the packet of the records, and leaves none of them. The packet's bytes are good until the next records are put.
- */
+/* Makes the packet of the records; then no record is left in `packet`. The returned bytes are good until the next
+ * records are put. */
 const uint8_t *e57_packet_make(struct e57_packet *packet, const struct e57_facts *facts, size_t *len);
 /* Adds the packet to the figures of its scan. -1: it is not a packet of this file. */
 int e57_packet_count(const uint8_t *packet, size_t len, const struct e57_facts *facts, struct e57_scan *scan);

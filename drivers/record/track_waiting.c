@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Points that wait for the frames that follow theirs. */
+/* Points of a frame wait here until the frames with their attributes, colours and waveforms have come. */
 #include "drivers/record/track_inside.h"
 
 #include <math.h>

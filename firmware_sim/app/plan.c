@@ -56,7 +56,7 @@ static void print_line(const char *stage, const char *method, const double figur
     printf("%-8s %-22s %8s %8s %6s  %s\n", stage, method, shown[0], shown[1], shown[2], why);
 }
 
-/* Returns whether neither method is measured, for the same reason. The reason is then printed once. */
+/* Returns whether both methods were left out for the same reason, and have no measured error. They share one line. */
 static int is_like(const struct plan_option *a, const struct plan_option *b)
 {
     return isnan(a->error_m) && isnan(b->error_m) && strcmp(a->why_not, b->why_not) == 0;
@@ -151,9 +151,9 @@ static const char NOTES[] =
     "are not cast. `run` warns above 80 %. No method is chosen by this row; only its figures differ from call to\n"
     "call.\n"
     "\n"
-    "Other costs are in ns per pulse, beyond a single ray. They are rounded figures of `make chart` and\n"
-    "`make bench-beam` on one core with AVX2, for comparing methods. `make bench` measures the part that depends\n"
-    "on the scene.\n";
+    "Other costs are in ns per pulse, added to the cost of a single ray. They are rounded figures of `make chart`\n"
+    "and `make bench-beam` on one core with AVX2, for comparing methods. `make bench` measures the part that\n"
+    "depends on the scene.\n";
 
 const struct app_command app_plan = {
     .name = "plan",

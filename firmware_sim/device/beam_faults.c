@@ -160,7 +160,7 @@ static void add_up(struct device_beam *beam)
     if (now->stuck) cast->n_wobbles = 0;
 }
 
-/* Returns the turn that the mirror, or the rotor, is in at a pulse. */
+/* Returns the angle of the mirror, or of the rotor, at a pulse, in turns. */
 static double find_turn(const struct device_beam *beam, uint64_t pulse, int64_t t_ns)
 {
     const struct device_disturbance *now = &beam->now;

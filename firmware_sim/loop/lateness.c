@@ -5,7 +5,7 @@ static uint32_t bin_of(uint64_t ns)
 {
     if (ns < LATENESS_PER_OCTAVE) return (uint32_t)ns;
     const uint32_t shift = 63U - (uint32_t)__builtin_clzll(ns) - LATENESS_BITS;
-    return shift * LATENESS_PER_OCTAVE + (uint32_t)(ns >> shift); /* the top bit of this adds LATENESS_PER_OCTAVE */
+    return shift * LATENESS_PER_OCTAVE + (uint32_t)(ns >> shift); /* ns >> shift is from 32 to 63 */
 }
 
 /* Returns the first lateness of the next bin. */

@@ -15,7 +15,7 @@ static void count_lost(struct pump *pump, uint32_t n, uint64_t pulses)
     atomic_fetch_add(&pump->stream->counters->reader_lost_pulses, pulses);
 }
 
-/* The error queue gets an entry once per episode. */
+/* Reports the session to the error queue, once until its reader has caught up again. */
 static void lost_frames_report(struct pump *pump, struct session *s)
 {
     if (!s->lost.lagging) {

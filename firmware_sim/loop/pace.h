@@ -38,7 +38,8 @@ enum pace_step { PACE_SLEEP, PACE_AWAIT, PACE_RELEASE, PACE_GIVE_UP };
 void pace_begin(struct pace *pace, int64_t now_ns);
 /* SLEEP: up to until_ns. AWAIT: until the tick is ready, up to until_ns at most. */
 enum pace_step pace_look(struct pace *pace, uint64_t tick, int ready, int64_t now_ns, int64_t *until_ns);
-/* The tick is published, and its readers are woken. Counts it if it is late by more than a tick. */
+/* Called after the tick was published and its readers were woken. Notes how late the tick is, and counts it in
+ * late_blocks if it is late by more than a tick. */
 void pace_released(struct pace *pace, uint64_t tick, int64_t now_ns);
 
 #endif

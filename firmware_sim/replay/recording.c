@@ -41,7 +41,7 @@ int recording_open(struct recording *r, const char *path, struct sh_err *err)
     return open_stream(r, err);
 }
 
-/* Takes all that is in the parser. */
+/* Reads all items in the parser. *t_ns becomes the time of the last frame that is not LOCAL. 0: there is none. */
 static int take_times(struct native_parser *parser, int64_t *t_ns)
 {
     int found = 0;

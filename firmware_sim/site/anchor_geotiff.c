@@ -83,7 +83,7 @@ static int find_terrain(const struct config *cfg, struct terrain *t, struct sh_e
         t->file);
 }
 
-/* The UTM zone whose coordinates these are, with its hemisphere; 0: none. */
+/* Finds the UTM zone, and its hemisphere, in which the place `at` has the coordinates grid_m. Returns 0: none. */
 static int find_zone(const double grid_m[3], const struct georef_place *at, int *north)
 {
     for (int zone = 1; zone <= 60; zone++) {

@@ -5,7 +5,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/steps.h"
 
-/* Warns of textures that can't be read, and of a scene without colours. */
+/* Fills in colours and textures of surfaces. Warns of textures that can't be used, and of surfaces without colours. */
 static int load_textures(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const uint32_t n = site->detect.ghost != NULL ? site->detect.n_real : site->n_surfaces;

@@ -27,7 +27,7 @@ struct ifc_product {
     bool is_coarse;                /* curved, and the body is ifc-lite's, which cuts circles up by levels of its own */
     bool is_turned;                /* it has a solid that is turned about an axis */
     double points_m;               /* largest coordinate of its points */
-    bool is_far;                   /* it has points beyond 1 km of their own origin */
+    bool is_far;                   /* points_m is more than 1 km */
     struct text_span assimp_wrong; /* the first entity in it that Assimp is known to get wrong; n 0: none */
     uint32_t *style;               /* [n_styles] styles of its items, as indices into ifc_records.style */
     size_t n_styles, room_styles;

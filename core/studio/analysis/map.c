@@ -8,7 +8,8 @@
 #include "core/studio/analysis/map_inside.h"
 #include "core/grow.h"
 
-/* A level must be higher than noise and slope of a floor within one pixel. */
+/* The least height of a height level (map_pixel.levels). The noise of points, and the rise of a floor within one pixel,
+ * are smaller. So a floor fills at most two levels. */
 #define LEVEL_MIN_M 0.1
 
 enum { MARGIN_PX = 24, CAPTION_PX = 72 };

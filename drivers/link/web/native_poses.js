@@ -2,7 +2,7 @@
 // Poses of a head that moves: points of the polar layout go from the head's frame to the scene by the pose of their
 // time (ANCHOR.md, *Between two poses*).
 
-const KEEP = 8192; // some seconds, and more than two of the longest frames
+const KEEP = 8192; // most poses that are kept: 8 s at 1,000 poses a second, or ten of the longest poses frames
 
 // Returns the way from pose a to pose b: the rotation at a, and the axis (head's frame) and angle of the turn from
 // there.
@@ -36,7 +36,8 @@ export class Poses {
     while (this.n > KEEP) this.n -= this.frames.shift().length;
   }
 
-  // Returns the leg between the two poses around a time, both of one frame, the newest that has them. null: none has.
+  // Returns the leg between the two poses around a time. Both poses are of the newest poses frame that covers the time.
+  // null: no frame does.
   #leg(t_ns) {
     for (let f = this.frames.length - 1; f >= 0; f--) {
       const poses = this.frames[f], last = poses.length - 1;

@@ -8,8 +8,8 @@ import {searchSlowly} from './view_pick.js';
 
 const NEEDED = 3;
 
-// Returns the cell that a place lies on, by the nearest piece; one in another plane counts as farther away. null: none
-// is near.
+// Returns the cell that a place lies on: the cell of the nearest piece of the surface (/cells). The distance to a piece
+// is the distance to its middle plus ten times the distance to its plane. null: no piece is near.
 export function cellAt(cells, [x, y, z]) {
   const {corners, origin, cell, pieces, cell_m} = cells;
   const p = [x - origin[0], y - origin[1], z - origin[2]];
@@ -32,7 +32,7 @@ export function cellAt(cells, [x, y, z]) {
 // Returns the numbers of the stations that see a cell.
 export const seenBy = (stations, cell) => stations.filter((s) => s.seen && hasBit(s.seen, cell)).map((s) => s.number);
 
-// Returns [a, b, n] for each pair of stations, which see n targets both. sights has the stations that see each target.
+// Returns [a, b, n] for each pair of stations a and b; both see n targets. sights: the stations that see each target.
 export function pairsOf(stations, sights) {
   return stations.flatMap((a, i) => stations.slice(i + 1).map((b) =>
     [a.number, b.number, sights.filter((s) => s.includes(a.number) && s.includes(b.number)).length]));

@@ -41,9 +41,9 @@ struct raw_ops {
     int (*work)(struct raw *r, struct sh_err *err);
     /* The recording ends: writes what is still to be written. */
     int (*finish)(struct raw *r, struct sh_err *err);
-    /* After all: whether something is missing in the recording. */
+    /* Called once the file is closed. Fails if something is missing in the recording. */
     int (*check)(const struct raw *r, struct sh_err *err);
-    /* Members of the statistics. */
+    /* Writes figures of the source into the statistics. */
     void (*put)(struct json *json, const struct raw *r);
     uint64_t (*dropped)(const struct raw *r);
     void (*close)(struct raw *r);
