@@ -4,8 +4,8 @@
  * stations agree.
  *   tangent  metric. One point of the scene, origin_m, is at a place on the Earth. z is the plumb line (the
  *            ellipsoid's normal) there, and true north there lies north_deg clockwise from the scene's y
- *            axis. Elsewhere z differs from the local plumb line by the angle between the two places at the Earth's
- *            centre, about 0.009 deg per km.
+ *            axis. Elsewhere z differs from the local plumb line by the angle that the two places make at the
+ *            Earth's centre, about 0.009 deg per km.
  *   grid     prcs is easting, northing (with false origin) and ellipsoidal height of one UTM or UPS grid, as
  *            a mesh in such coordinates is. y is grid north, z the plumb line everywhere. Lengths are grid
  *            lengths: a true horizontal metre has the length k in the scene, the grid's scale there (0.9996 to

@@ -23,7 +23,7 @@ static inline void mat3_apply(const double a[9], const double v[3], double out[3
         out[i] = a[3 * i] * v[0] + a[3 * i + 1] * v[1] + a[3 * i + 2] * v[2];
 }
 
-/* The inverse of a rotation. */
+/* Multiplies v by the transpose of a. The transpose of a rotation is its inverse. */
 static inline void mat3_apply_transposed(const double a[9], const double v[3], double out[3])
 {
     for (int i = 0; i < 3; i++)

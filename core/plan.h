@@ -101,9 +101,9 @@ void plan_sample_free(struct plan_sample *sample);
 
 /* Finds the error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
  * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures have margins: error_m
- * is three standard errors above the mean square. For footprints that do not lie on one smooth surface, echo_share has
- * the 95 % limit of Poisson's distribution. For the other footprints it has the share that was found, without a margin.
- * The first call casts the reference. */
+ * is the root of the mean square plus three standard errors of that mean. For footprints that do not lie on one smooth
+ * surface, echo_share has the 95 % limit of Poisson's distribution. For the other footprints it has the share that was
+ * found, without a margin. The first call casts the reference. */
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* Finds the error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A

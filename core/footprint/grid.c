@@ -12,7 +12,8 @@ enum { N_CELLS = 6 * OUTLINE_CELLS * OUTLINE_CELLS };
 #define NEAREST_M 0.02 /* nearer pieces of edges are left out: most cells would list them */
 #define PIECE     0.1  /* length of the longest piece of an edge, as a share of its distance */
 
-/* Count into first[c + 1]; write at first[c]++; mark in around. */
+/* COUNT counts the entries of cell c in first[c + 1]. FILL writes each entry at first[c]++. AROUND sets the cell's bit
+ * in the array `around`. */
 enum draw_what { COUNT, FILL, AROUND };
 
 struct draw {
@@ -74,7 +75,7 @@ static void draw_on_face(struct draw *d, uint32_t face, const double p[2], const
     }
 }
 
-/* Draws a short piece on each face that it, or a footprint at it, may reach. */
+/* Draws a short piece on each face that the piece, or a footprint on the piece, may reach. */
 static void draw_piece(struct draw *d, const double p[3], const double q[3], double range_m)
 {
     const double half = 0.5 * OUTLINE_CELLS;
@@ -88,7 +89,7 @@ static void draw_piece(struct draw *d, const double p[3], const double q[3], dou
         double least = 0.35 * range_m;
         if (zp < least || zq < least) continue;
         double a[2] = {p[ua] / zp, p[va] / zp}, b[2] = {q[ua] / zq, q[va] / zq};
-        /* on the face an angle appears larger by 1 / cos^2 from its middle */
+        /* On the face a small angle appears larger by 1 / cos^2 of its distance from the face's middle. */
         double more = fmax(1.0 + a[0] * a[0] + a[1] * a[1], 1.0 + b[0] * b[0] + b[1] * b[1]);
         double wide = 1.1 * angle * more * half + 0.01;
         for (int i = 0; i < 2; i++) {

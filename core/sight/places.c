@@ -8,9 +8,10 @@
 
 /* Finds the place of each ray's leaf: the number of its tile, and the cell within. Coordinates are those of
  * sight_inside.h in single precision, counted in cells from 0. With e = 2^-24, the error of b / |a| is 2 e of its value
- * for the rounded components, and 3 e more for the reciprocal and the products; values are 1 at most. The sum, 2 at
- * most, is rounded by e. Together the error is 6 e and some e^2, less than half of SIGHT_PAD. The error also stays
- * below that where rounding chooses another face. Vectors that are no direction belong to `nowhere`. */
+ * for the rounded components, and 3 e more for the reciprocal and the products; values are 1 at most. A coordinate is
+ * half the number of cells times 1 + b / |a|. This sum is 2 at most, and is rounded by e. Together the error is 6 e and
+ * some e^2, less than half of SIGHT_PAD. The error also stays below that where rounding chooses another face. Vectors
+ * that are no direction belong to `nowhere`. */
 VEC_CLONES
 static void find_places(uint32_t cells, const struct vec3_in *dir, uint32_t n, int32_t nowhere, int32_t *restrict tile,
                         int32_t *restrict within)

@@ -47,8 +47,8 @@ static double decompose_height(const struct finder *finder, double span, double 
 }
 
 /* Does the same by the rising flank alone, whose last samples are y0 and y1. The higher the top is, the faster its
- * flank rises from y0 to y1. The height is found with which this rise takes one sample. *centroid counts from the
- * sample of y1. */
+ * flank rises from y0 to y1. The function looks for the height at which this rise takes exactly one sample. *centroid
+ * counts from the sample of y1. */
 static double decompose_flank(const struct finder *finder, double y0, double y1, double *centroid)
 {
     double least = 0.0, most = 9.0; /* logarithms of the peak over y1; more than 39 dB is not believed */
@@ -78,7 +78,7 @@ static int decompose_limited(const struct finder_run *run, const struct finder_p
     if (!blind) {
         height = decompose_height(finder, (double)b - (double)a + 1.0, &centroid);
     } else {
-        /* A sample below 3 sigma can't be told from noise. Half of that stands for it. */
+        /* A sample below 3 sigma can't be told from noise. The value 1.5 sigma takes the place of such a sample. */
         const double least = 1.5 * finder->noise;
         uint32_t k = a > peak->from && run->y[a - 1] > 2.0 * least ? a - 1 : a;
         height = decompose_flank(finder, k > peak->from ? fmax(run->y[k - 1], least) : least,
@@ -214,7 +214,8 @@ static int decompose_more(const struct finder_task *task, double least, struct f
         best = &tried[i];
         if (decompose_enough(task, best)) break;
     }
-    /* Three more parameters lower the sum by 3 variances if they mean nothing; 25 by chance in one of 60,000. */
+    /* Three more parameters lower the sum by 3 variances if they mean nothing. By chance they lower it by 25 variances
+     * in one case of 60,000. */
     if (best == NULL || mix->chi2 - best->chi2 < 25.0 * task->variance + decompose_shapes(task, best)) return 0;
     *mix = *best;
     return 1;

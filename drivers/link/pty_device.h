@@ -15,8 +15,8 @@ struct pty_device {
 };
 
 /* Makes the pair, at rest, and the symlink (path may be empty). An existing path is replaced only where it is a symlink
- * that dangles, names our own slave, or was left by a head that was killed. The latter is older than the terminal that
- * it names. Anything else is SH_EINPUT. */
+ * that dangles, names our own slave, or was left by a head that was killed. A symlink was left so if it is older than
+ * the terminal that it names. Anything else is SH_EINPUT. */
 int pty_device_open(struct pty_device *device, const char *path, struct sh_err *err);
 
 /* Brings the slave back to how a fresh client expects it: raw, nothing to read, no exclusive use, not

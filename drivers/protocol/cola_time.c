@@ -128,7 +128,8 @@ NUMBERS(time_zone, zone, 1, 1)
 NUMBERS(time_update, update_s, 1, 4)
 NUMBERS(time_address, address, 4, 1)
 
-/* Writes one of the times of TIME:SERVer? STATe as a float, s: 0 the limit, 1 the offset, 2 the delay. */
+/* Writes one of the times of TIME:SERVer? STATe as a float, in seconds. which: 0 the limit, 1 the offset, 2 the
+ * delay. */
 static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
 {
     char reply[PROTOCOL_REPLY];
@@ -152,7 +153,8 @@ enum cola_error cola_read_time_delay(struct cola *self, struct cola_args *args, 
     return put_answered(self, 2, args, out);
 }
 
-/* u16 year, 5 x u8, u32 us; u8 1: set. A client can't set the clock while a time server sets it. */
+/* The request has u16 year; u8 month, day, hour, minute, second; u32 us. The answer is u8 1 if the clock was set, else
+ * 0. A client can't set the clock while a time server sets it. */
 enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     struct cola_date d = {.year = cola_arg_u(args, 2)};

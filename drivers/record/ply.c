@@ -91,7 +91,7 @@ struct ply_rows {
     int n;
 };
 
-/* Puts columns side by side. The compiler makes one pass of it where their number is known. */
+/* Puts columns side by side. Where the number of columns is a constant, the compiler can unroll the inner loop. */
 static inline __attribute__((always_inline)) void put_doubles(struct ply_rows *rows, const double *const *v,
                                                               int columns)
 {
@@ -205,7 +205,8 @@ static char *put_frame(char *to, double v)
     return to;
 }
 
-/* Writes point i, in TEXT_ROOM. Returns the end of the row, or NULL if numbers are too long for it. */
+/* Writes point i as text. `row` has room for TEXT_ROOM bytes. Returns the end of the text, or NULL where the text has
+ * TEXT_LEN bytes or more. */
 static uint8_t *put_ascii(uint8_t *row, const struct ply *ply, int i)
 {
     const struct track *t = &ply->base.track;
@@ -310,7 +311,7 @@ static unsigned columns_spared(unsigned columns)
            ((columns & PLY_TIME) != 0 ? 0 : TRACK_TIME) | ((columns & PLY_LABEL) != 0 ? 0 : TRACK_LABEL);
 }
 
-/* Notes the scan's head, unless it is that of the scan before. Returns 1 if the header has another one now. */
+/* Adds the scan's head to the header's facts, unless the scan before had the same head. Returns 1 if it was added. */
 static int add_head(struct ply *ply)
 {
     const struct scanhead_info *info = &ply->base.track.info;

@@ -57,7 +57,7 @@ int socket_is_own_end(int fd)
            own_len == peer_len && memcmp(&own, &peer, own_len) == 0;
 }
 
-/* Connects while blocking, since the other end is on this machine or near; not blocking from then on. */
+/* connect() blocks, since the other end is on this machine or near. The socket does not block afterwards. */
 int socket_open_at(const struct sockaddr *at, socklen_t len, int connecting)
 {
     int fd = socket(at->sa_family, SOCK_STREAM | SOCK_CLOEXEC, 0);

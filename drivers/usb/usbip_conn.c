@@ -12,7 +12,7 @@
 #include "drivers/usb/usbip_private.h"
 
 enum {
-    MAX_URB_BYTES = 16 << 20, /* of one URB; usbfs's default limit for all URBs together */
+    MAX_URB_BYTES = 16 << 20, /* of one URB: as much as usbfs by default allows for all URBs together */
     MAX_READS = 256,          /* in one call: a peer that sends without end must not occupy the thread */
 };
 
@@ -56,7 +56,7 @@ void usbip_conn_import(struct usbip_conn *conn)
 {
     conn->imported = *conn->taken = 1;
     usb_device_attach(conn->device, usb_device_identity(conn->device)->highest, on_complete, conn);
-    usb_device_assume_address(conn->device); /* the client's kernel gives out addresses, and keeps them */
+    usb_device_assume_address(conn->device); /* the client's kernel does not send SET_ADDRESS on */
 }
 
 /* ---- URBs */

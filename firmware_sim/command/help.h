@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `HELP?` and `HELP:SETtings?`: the table, for people and for programs. */
+/* `HELP?` and `HELP:SETtings?` list the headers of the table of commands. `HELP? HEADER` describes one command, for
+ * people and for programs. */
 #ifndef FIRMWARE_SIM_COMMAND_HELP_H
 #define FIRMWARE_SIM_COMMAND_HELP_H
 

@@ -103,7 +103,7 @@ struct config_head {
     char serial[32], name[32];
     char settings_file[CONFIG_PATH_LEN];
     int start;        /* scan when booted; only the command run uses it */
-    double motor_ppm; /* beams: the error of the rotor's speed where nothing holds its phase */
+    double motor_ppm; /* with emitter: beams, the error of the rotor's speed where nothing holds the rotor's phase */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
     /* of a sphere (core/emitter.h); also copied into the profile's emitter */
@@ -190,7 +190,7 @@ struct config {
     const char *const *sets; /* the --set that it was loaded with; not copied */
     int n_sets;
     char scenario_file[CONFIG_PATH_LEN]; /* the scenario that was added; empty: none */
-    int has_no_head;                     /* 1: for the links of a replay, which itself refuses faults in the head */
+    int has_no_head;                     /* 1: a replay has these links; the replay itself refuses faults in the head */
     int links_are_not_here;              /* 1: this is not the scanner of head.station, which has the links */
     char profile_file[CONFIG_PATH_LEN];
     struct config_profile profile;

@@ -42,7 +42,7 @@ static void warn_expired(struct head_clock *clock)
         day);
 }
 
-/* Computes the pieces from the i-th on from their changes. */
+/* Computes piece i and all later pieces from the changes at their beginnings. */
 static void renew_pieces(struct head_clock *clock, uint32_t i)
 {
     for (; i < clock->n; i++) {

@@ -35,7 +35,7 @@ struct link_counts {
 /* An observer of the clients. The threads of the links call each function when its event happens. */
 struct links_observer {
     void *ctx;
-    /* A session begins (1) or ends (0). t_ns: device time from which on, or up to which, it is given the stream. */
+    /* A session begins (1) or ends (0). t_ns: the device time at which the session's stream begins or ends. */
     void (*session)(void *ctx, uint32_t session, int begins, const char *peer, int64_t t_ns);
     /* The session's client sent these bytes. */
     void (*heard)(void *ctx, uint32_t session, const void *bytes, size_t len);

@@ -56,8 +56,8 @@ static int move_on_earth(const struct placement *was, const struct site_place *t
     return SH_OK;
 }
 
-/* Sets the station's new place in s, which is as configured. Back at its first place the station stays as configured,
- * with its floor and its place on the Earth. */
+/* Sets the station's new place in s. Before the call, s is the station as it was configured. If the new place is the
+ * first one, s stays as it is, with its floor and its place on the Earth. */
 static int place(const struct site *first, uint32_t station, const struct site_place *to, struct config_station *s,
                  struct sh_err *err)
 {

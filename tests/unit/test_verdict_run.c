@@ -370,8 +370,8 @@ static void resealed_flips(void **state)
             const int is_out = compares && (i == 0 || i == 3);
             assert_true(cfg.faults.fault[i].until_s == (is_out ? 1e-9 : 9));
         }
-        assert_string_equal(warned, compares ? "soak: 2 faults flip with reseal do not strike: no client can notice "
-                                               "them, and the points that they change would count as unknown\n"
+        assert_string_equal(warned, compares ? "soak: 2 faults of kind flip with reseal do not strike: no client can "
+                                               "notice them, and the points that they change would count as unknown\n"
                                              : "");
     }
 }

@@ -14,7 +14,7 @@ export class CommandError extends Error {
 }
 
 const isIdentity = (reply) => !reply.includes('"') && reply.split(',').length === 4;
-const LATER_MS = 200; // further answers to *IDN? may take so long, if some were given up
+const LATER_MS = 200; // where several *IDN? have no answer yet, each further answer may take this long
 
 export class Replies {
   #send;
@@ -116,7 +116,7 @@ export class Replies {
     this.#send('*IDN?');
   }
 
-  // Answers to an earlier *IDN? may have been lost, so after the first answer the others have only LATER_MS to come.
+  // Answers to an earlier *IDN? may have been lost. So after each answer the next one has only LATER_MS to come.
   #settled() {
     clearTimeout(this.#timer);
     this.#settling.left--;

@@ -171,8 +171,8 @@ export class ReplayPlayer {
   #plays = false;
   #described_ns = null; // the time of the last descriptor
 
-  // The stream itself says where another time begins: the recording's first descriptor comes again, or a descriptor
-  // marked LOCAL that is no repetition. Points before it in the stream belong to the earlier time.
+  // A seek shows in the stream itself: the recording's first descriptor comes again, or a descriptor marked LOCAL that
+  // is no repetition. Points before this descriptor in the stream are from before the seek.
   #described({repeat, local, t_ns}) {
     const jumps = !repeat && (local || (this.#described_ns !== null && t_ns <= this.#described_ns));
     this.#described_ns = t_ns;

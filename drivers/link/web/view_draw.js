@@ -79,8 +79,8 @@ export class Painter {
   constructor(gl) { this.#gl = gl; }
 
   get shown() { return this.#shown; }
-  get scale() { return this.#work.scale; } // it is that of the target that is drawn into
-  get swapped() { return this.#work === this.#shown; } // it is true if the target that is drawn into is also shown
+  get scale() { return this.#work.scale; } // the scale of the target that is drawn into
+  get swapped() { return this.#work === this.#shown; } // true if the target that is drawn into is also shown
 
   resize(width, height) {
     for (const target of new Set([this.#shown, this.#work, ...this.#spare])) target?.free();
@@ -121,7 +121,7 @@ export class Painter {
     this.#shown = this.#work;
   }
 
-  // Draws up to so many more points, and returns how many it drew. of is shares or restShares.
+  // Draws up to `points` more points, and returns how many it drew. The function `of` is shares or restShares.
   draw(parts, points, of = restShares) {
     const upTo = of(parts, points);
     let did = 0;

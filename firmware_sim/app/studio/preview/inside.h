@@ -11,7 +11,8 @@ enum { PREVIEW_MOST_PULSES = 1500000, PREVIEW_MOST_OF = 16, PREVIEW_MOST_PIECES 
 
 enum preview_kind { PREVIEW_PLACE, PREVIEW_NEXT, PREVIEW_REACH, PREVIEW_CELLS };
 
-/* A box that is turned about the vertical, clockwise from above: half of its size to the right, ahead and up. */
+/* A box that is turned about the vertical by heading_deg, clockwise from above. half_m: half of the box's size to the
+ * right, ahead and up. */
 struct preview_section {
     double middle_m[3], half_m[3], heading_deg; /* half_m INFINITY: no limit in that direction */
 };
@@ -42,9 +43,9 @@ struct preview_seen {
 /* The preview's own thread alone uses this. */
 struct preview_work {
     const struct preview_options *options;
-    struct coverage *coverage; /* without cells where the options have none */
+    struct coverage *coverage; /* that of the options; if they have no coverage, one without cells */
     const struct sites *sites; /* a scanner that could not be set up has no site */
-    struct sh_report stop;     /* of long work */
+    struct sh_report stop;     /* long work asks this report whether it must stop */
 };
 static inline size_t preview_words(const struct coverage *coverage)
 {

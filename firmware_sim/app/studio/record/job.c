@@ -354,7 +354,8 @@ int record_job_off_line(struct record_job *r, struct config *cfg, struct sh_err 
     return rc;
 }
 
-/* Waits for the source in parts of WAIT_MS: a signal that comes just before a part is seen after it. */
+/* Waits for the source in parts of WAIT_MS, and checks for a signal after each part. A signal that comes just before a
+ * part does not end that part. */
 static int open_stream(const struct record_job *r, struct scanhead **sh, char *why, size_t len)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)(1e9 * r->wait_s);

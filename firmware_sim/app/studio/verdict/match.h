@@ -14,7 +14,7 @@ struct match {
     size_t n;                /* other points */
     size_t unknown;          /* no pulse had them */
     size_t repeated;         /* the client has them more often than they were sent */
-    size_t sent;             /* points of the head that some session was sent, once for each */
+    size_t sent;             /* points that the head sent; a point that went to two sessions counts twice */
     size_t again;            /* points in `sent` that agree with an earlier one; a repetition of these may go unseen */
     size_t first_unknown;    /* index in the cloud */
     const char *frame;       /* the coordinate frame in which they agree best */
@@ -34,7 +34,8 @@ struct match_input {
 int match_points(const struct match_input *in, struct match *match, struct sh_err *err);
 
 /* Returns the rounding of a file's coordinates: in text the unit of the last digit, in single precision two units in
- * the last place of the largest one, else count_m. Points with a coordinate beyond limit_m do not count. */
+ * the last place of the largest coordinate, else cloud->count_m. Points with a coordinate beyond limit_m do not
+ * count. */
 double match_unit_m(const struct cloud *cloud, double limit_m);
 
 #endif

@@ -22,7 +22,8 @@
 
 enum { WAIT_MS = 10 };
 static const double UP_WITHIN_S = 60.0, NEVER_S = 1e-9; /* NEVER_S: before the first frame */
-static const int64_t AT_LEAST_NS = 100000000;           /* device time of points that show that a scan goes on */
+/* Points that come over this much device time show that the scan goes on. */
+static const int64_t AT_LEAST_NS = 100000000;
 
 struct run {
     struct config *cfg;
@@ -64,8 +65,8 @@ static void run_prepare(struct run *r)
     }
     if (n != 0)
         sh_warn(&app_report_stderr,
-                "soak: %u faults flip with reseal do not strike: no client can notice them, and the points that they "
-                "change would count as unknown",
+                "soak: %u faults of kind flip with reseal do not strike: no client can notice them, and the points "
+                "that they change would count as unknown",
                 n);
 }
 
@@ -79,7 +80,7 @@ static int open_head(struct run *r, struct sh_err *err)
         .extra = &r->stream.link, .report = &app_report_stderr, .observer = &r->watch.observer};
     int rc = site_load(cfg, &app_report_stderr, &r->site, err);
     if (rc == SH_OK) rc = site_open_sights(r->site, 0, r->site->n_stations, &app_report_stderr, err);
-    cfg->head.settings.frames = 0; /* only after the plan was made */
+    cfg->head.settings.frames = 0; /* the scan has no end; the plan was made for the configured number */
     if (rc == SH_OK) rc = device_create(r->site, &device, &r->device, err);
     if (rc == SH_OK) rc = own_stream_open(&r->stream, err);
     if (rc == SH_OK) rc = loop_create(r->site, r->device, &options, &r->loop, err);
