@@ -28,8 +28,8 @@ static int is_near(const struct device *device, const struct pose *pose)
     return off_m <= device->site->cfg->platform.reach_m;
 }
 
-/* Whether a pose is so far ahead that its time must be wrong: it would keep all later ones out. In the pace step the
- * time is granted, so it is right. */
+/* Whether a pose is so far ahead that its time must be wrong. Such a pose would keep out all poses with right times. In
+ * the pace `step` a client grants the time, so no pose is too far ahead. */
 static int is_early(const struct device *device, int64_t t_ns)
 {
     int64_t now_ns = (int64_t)device->next_tick * device->tick_ns;
