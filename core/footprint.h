@@ -200,13 +200,13 @@ struct beam_outlines_spec {
     const uint16_t *kind;
     const struct sh_report *report; /* SH_ESTOPPED where it asks to stop; NULL: nothing does */
 };
-/* probe, NULL: all outlines count. Else rays are cast close along both sides of each, a footprint's radius apart. A
- * stretch of an outline is left out where it is hidden, or where the ranges on both sides agree to BEAM_LEAST_STEP_M (a
- * wall that stands on a floor; parts of a wall): it can't make another echo. Like any fold between triangles, an
- * outline that is left out may move a range by a sixth of the footprint's radius times the change of slope. The rays
- * begin at the station, and sub-rays up to the exit's radius beside it. So a sub-ray may see a strip behind an edge
- * that these rays don't, and an outline in it is left out. As an angle, the strip is at most as wide as the exit's
- * radius at that edge. */
+/* probe, NULL: all outlines count. Else rays are cast in pairs along each outline, one close beside it on each side.
+ * The pairs are about a footprint's radius apart. A stretch of an outline is left out where it is hidden, or where the
+ * ranges on both sides agree to BEAM_LEAST_STEP_M (a wall that stands on a floor; parts of a wall): it can't make
+ * another echo. Like any fold between triangles, an outline that is left out may move a range by a sixth of the
+ * footprint's radius times the change of slope. The rays begin at the station, and sub-rays up to the exit's radius
+ * beside it. So a sub-ray may see a strip behind an edge that these rays don't, and an outline in it is left out. As an
+ * angle, the strip is at most as wide as the exit's radius at that edge. */
 int beam_outlines_create(const struct beam_outlines_spec *spec, const struct beam_probe *probe,
                          struct beam_outlines **out, struct sh_err *err);
 void beam_outlines_free(struct beam_outlines *outlines);
@@ -228,7 +228,7 @@ struct beam_line {
     double n[2], h;
 };
 /* Finds the outlines that cross the footprint of a pulse nearer than limit_m, as lines in the axes of `sight`. Returns
- * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. From the range near->next_m on further
+ * their number, up to BEAM_MAX_LINES, or BEAM_MAX_LINES + 1: more than that. From the range near->next_m on, further
  * outlines may cross the footprint. next_m is INFINITY where there are none, or where no outline crosses up to
  * limit_m. */
 uint32_t beam_find_lines(const struct beam_outlines *outlines, const struct beam *beam, struct beam_near *near,

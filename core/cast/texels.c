@@ -41,7 +41,7 @@ static void find_place(const struct cast_setup *s, const struct ray_hits *hits, 
         place->corner[c] = part.scene->vertex_m[part.scene->triangle[part.triangle][c]];
 }
 
-/* Returns 0 where the mesh has none. */
+/* Returns 0 where the mesh has no texture coordinates, or where they are not finite. */
 static int uv_of(const struct place *place, double uv[2])
 {
     if (place->scene->uv == NULL) return 0;

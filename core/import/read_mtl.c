@@ -183,8 +183,8 @@ static bool take_value(const struct text *t, struct map *map, struct text_span o
     return n < (text_is(option, "-mm") ? 2 : 1);
 }
 
-/* Options before the file's name: -clamp on, -s u v w, -o u v w, and others, which have one or two values. The name is
- * the rest, blanks and all. */
+/* Reads the options before the file's name: -clamp on; -s, -o and -t with up to three numbers; -mm with two values; all
+ * others with one. The rest of the line, with its blanks, is the name. */
 static void read_map(const struct text *t, struct text_span text, struct map *map)
 {
     const char *p = text.p, *end = text.p + text.n;

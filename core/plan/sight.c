@@ -32,8 +32,8 @@ double plan_pulse_ns(double n_triangles, uint32_t packet)
     return PLAN_COST_PULSE + ray_cost(packet)->hit + plane_ns(n_triangles);
 }
 
-/* Returns the number of cells of a map for that many pulses. The cells divide the six faces of a cube around the
- * station (core/sight.h); sight_cells chooses how many lie along an edge. */
+/* Returns the number of cells of a map. The cells divide the six faces of a cube around the station (core/sight.h).
+ * sight_cells chooses how many lie along an edge, by the number of pulses that would fill all directions as densely. */
 static double cells(const struct plan_sight_need *need)
 {
     const double edge = sight_cells(need->pulses / need->share, need->memory_bytes);

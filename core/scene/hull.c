@@ -6,7 +6,7 @@
 #include "core/scene/hull.h"
 #include "core/vec3.h"
 
-/* Twice the area of the triangle a, b, c: above 0 where it turns left. */
+/* Twice the area of the triangle a, b, c: above 0 where the way from a by b to c turns left. */
 static double turns(const double a[2], const double b[2], const double c[2])
 {
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);

@@ -72,7 +72,7 @@ static int set_plane(const struct sight *sight, struct build_candidate *c)
 
 /* For a triangle where double precision can't say from which side the station sees it, the sides of its edges have no
  * certain sign. Two strips of directions each hold all rays that may hit it. The narrower one replaces the edges:
- * directions beside it are certainly outside, and none is inside.
+ * a direction outside this strip is certainly outside the triangle, and no direction counts as certainly inside.
  * - One strip holds directions at small angles to the plane. A ray at a larger angle hits the plane where the ray
  *   begins (SIGHT_NEAR). This also holds where the plane is at the station up to rounding.
  * - The other strip holds directions that pass the longest edge at most the triangle's width away. Inside the triangle
@@ -154,8 +154,8 @@ int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triang
     return 1;
 }
 
-/* Before, kept[i] is the number of regions that triangle i lies in; afterwards it is its place in
- * figures. */
+/* Before the call, kept[i] is the number of regions that triangle i lies in. After the call, kept[i] is the triangle's
+ * place in figures, or BUILD_NOT_KEPT. Where there is no memory for the figures, kept becomes NULL. */
 void build_figures(struct build_shared *b)
 {
     const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles;

@@ -2,9 +2,9 @@
 /* The native protocol on a link: the stream as it is, and command lines with their replies (PROTOCOL.md).
  *
  * No function here does that work. The loop copies whole ticks of frames to the client without looking into them, up to
- * millions of pulses per second. It also carries out the command lines (firmware_sim/loop/session.c, pump_commands.c):
- * the reply to TIME:STEP comes after the frames of that time, lines wait for it, and a client keeps control between its
- * lines. */
+ * millions of pulses per second. It also carries out the command lines (firmware_sim/loop/session.c, pump_commands.c).
+ * The reply to TIME:STEP comes after the frames of that time, and the client's next lines wait for this reply. A client
+ * keeps control between its lines. */
 #include <string.h>
 
 #include "drivers/protocol/native.h"

@@ -94,7 +94,8 @@ static void take_descriptor(struct velodyne *v, const uint8_t *payload, size_t l
     if (d.scan != v->scan) fall_out_of_step(v);
     v->scan = d.scan;
     v->range_units_per_count = d.range_scale_m / 0.002;
-    v->azimuth_per_count = 36000.0 / fmax(d.pan_counts_per_turn, 1.0); /* in the polar layout it is 1 at least */
+    /* In the polar layout pan_counts_per_turn is at least 1. fmax() keeps the 0 of another layout from the division. */
+    v->azimuth_per_count = 36000.0 / fmax(d.pan_counts_per_turn, 1.0);
 }
 
 /* Finds the model by the elevations of the beams in the order of firing, as packets have it. 0: none has them. */
@@ -281,7 +282,7 @@ static void velodyne_take_gap(void *protocol, uint32_t n_frames)
     if (v->n_firings != 0) v->host.count(v->host.ctx, PROTOCOL_UNITS_LOST, 1);
     v->n_firings = 0;
     fall_out_of_step(v);
-    v->is_left_over = 0; /* they are part of that loss */
+    v->is_left_over = 0; /* the loss of the gap includes the other pulses of this firing sequence */
 }
 
 /* Readers take elevations and times of firing from the model's number. */

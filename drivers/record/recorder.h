@@ -47,7 +47,7 @@ struct recorder_options {
     struct colour_choice colour; /* for formats that hold a colour */
     unsigned columns;            /* of .ply: enum ply_column; 0: all, in double */
     int scalar_names;            /* PLY's columns besides coordinates and colour are called scalar_NAME */
-    uint32_t n_heads;            /* turns of heads: one that scans again after another counts again; 0 stands for 1 */
+    uint32_t n_heads;            /* heads one after the other; a head that comes again counts again; 0 stands for 1 */
     int may_wait;  /* the stream waits for the recorder: large files are written past the system's cache (outfile.h) */
     int las_minor; /* LAS 1.2 or 1.4: 2 or 4; 0: 4 */
     int las_wdp;   /* waveforms of .las go to a .wdp beside it */
@@ -81,8 +81,8 @@ struct recorder {
     int is_refused;     /* the format can't hold the first scan: no file is made */
 };
 
-/* A format. Each function gets the recorder's own struct as rec; each may be NULL. Errors: SH_E, text
- * in err. */
+/* A format. All functions but fits and repair get the recorder's own struct as rec. Each function may be NULL. Errors:
+ * SH_E, with the text in err. */
 struct recorder_ops {
     const char *ending;     /* ".ply" */
     int is_mesh;            /* 1: the file is a mesh of the scan's grid, or has points spread over it */

@@ -100,7 +100,7 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
 {
     int n = 0;
     for (; rows[n].kind != APP_LAST; n++)
-        if (rows[n].kind == APP_PASS) return; /* they are there */
+        if (rows[n].kind == APP_PASS) return; /* the options are in the table already */
     for (const struct app_option *row = other->options; row->kind != APP_LAST && n < APP_MAX_OPTIONS; row++) {
         const char *const *name = names;
         while (*name != NULL && strcmp(*name, row->name) != 0)

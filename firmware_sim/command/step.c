@@ -171,7 +171,7 @@ static int is_sphere(const struct command_device *dev)
     return dev->limits.emitter == EMITTER_SPHERE;
 }
 
-/* Whether a value is 0 from which the step follows. No configuration has that, but a damaged recording may. */
+/* Whether the step follows from a value that is 0. No configuration has such a value, but a damaged recording may. */
 static int lacks_rates(const struct command_device *dev)
 {
     const struct head_settings *s = &dev->settings;

@@ -215,7 +215,7 @@ static void refuse_sphere_settings(struct cfg_reader *rd, const struct config *c
         refuse_key_of_other(rd, cfg, of_sphere[i], "", "only with emitter: sphere");
 }
 
-/* Other heads have no rotor that runs free of their pulses. */
+/* Only a head with `emitter: beams` has a rotor that runs free of the pulses. */
 static void refuse_rotor_settings(struct cfg_reader *rd, const struct config *cfg)
 {
     static const char *const of_rotor[] = {"head.phase_lock", "head.phase_deg", "head.motor_ppm"};

@@ -78,8 +78,8 @@ static const struct cfg_key config_keys[] = {
      WITHIN("pan_min_deg", "pan_max_deg"), .help = "Pan angle where a frame ends; at most a turn after its start."},
     {KEY(head.range_min_m), CFG_REAL, "m", "@range_min_m", 0, 1e5,
      .allowed = "range_min_m to range_max_m of the head profile, in m",
-     .help = "Pulses that hit something nearer are shots without echo. It applies at every pulse rate for which the "
-             "profile doesn't have a larger limit."},
+     .help = "Pulses that hit something nearer are shots without echo. A larger limit that the profile has for a "
+             "pulse rate replaces this one."},
     {KEY(head.range_max_m), CFG_REAL, "m", "@range_max_m", 0, 1e5,
      .allowed = "range_min_m to range_max_m of the head profile, in m",
      .help = "Pulses that hit something farther are shots without echo. The descriptor on the wire has these limits."},
@@ -180,8 +180,8 @@ static const struct cfg_key config_keys[] = {
      .help = "pty: symbolic link to the terminal (optional); file: file to write (required); usbredir: Unix socket, "
              "instead of a port."},
     {LINK(baud), CFG_COUNT, NULL, "0", 0, 4000000, .example = "115200", .of = CFG_KIND(LINK_PTY),
-     .help = "pty: bit rate of the head's serial port. A client that has set another one gets, and sends, the bytes that "
-             "a UART reads at that rate. 0: any rate will do."},
+     .help = "pty: bit rate of the head's serial port. Where a client sets another rate, each side reads the other's "
+             "bytes as a UART at the wrong rate does. 0: any rate will do."},
     {LINK(address), CFG_TEXT, .def = "", .example = "127.0.0.1",
      .of = NETWORK, .of_backend = SOCKETS,
      .help = "tcp, usb, web: address to listen on, or with attach to connect to; udp: where the packets go. 127.0.0.1 "
@@ -192,12 +192,13 @@ static const struct cfg_key config_keys[] = {
              "(required)."},
     {LINK(interface), CFG_TEXT, .def = "", .example = "eth1", .of = CFG_KIND(LINK_UDP),
      .help = "udp: the packets' source is this interface's address. Required where they are broadcast, to "
-             "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. Routes still "
-             "say where packets to other addresses go: binding a socket to an interface needs a privilege."},
+             "255.255.255.255 or to its own broadcast address, and where they go to a multicast group. For packets to "
+             "other addresses the system's routes still choose the interface, since only a program with privileges can "
+             "bind a socket to an interface."},
     {LINK(source), CFG_TEXT, .def = "", .example = "192.168.1.201", .of = CFG_KIND(LINK_UDP),
      .help = "udp: numeric address of this machine that packets come from, so that receivers can distinguish heads. "
-             "When not given: the interface's, or as the system chooses. If that is the receiver's own address and "
-             "port on the IPv4 loopback, packets come from the next address, such as 127.0.0.2 after 127.0.0.1."},
+             "When not given: the interface's, or as the system chooses. If this gives the receiver's own address "
+             "and port on the IPv4 loopback, packets come from the next address, such as 127.0.0.2 after 127.0.0.1."},
     {LINK(source_port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(LINK_UDP),
      .help = "udp: port that packets come from; 0: the system chooses. When not given: velodyne 2368, "
              "velodyne-position 8308, as the device's. If that port is taken, another one is used, with a warning. For "
@@ -211,7 +212,7 @@ static const struct cfg_key config_keys[] = {
     {LINK(waits), CFG_ENUM, .def = "by-type",
      WORDS([LINK_WAITS_BY_TYPE] = "by-type", [LINK_WAITS_YES] = "yes", [LINK_WAITS_NO] = "no"),
      .help = "Whether a slow reader holds back the head in the paces fast and step. yes: it does; no: it loses "
-             "frames, as in real time; by-type: readers of web links lose frames, all others hold back."},
+             "frames, as in real time; by-type: readers of web links lose frames, all others hold the head back."},
     {LINK(latency_ms), CFG_COUNT, "ms", "0", 0, 20, .of = ~(CFG_KIND(LINK_NULL) | CFG_KIND(LINK_FILE)),
      .help = "How long a stream frame may wait for later ones in real time, so that one wake-up and one write serve "
              "several ticks. That takes less processor time. 0: a frame goes out with its tick. A frame never waits "
@@ -233,8 +234,8 @@ static const struct cfg_key config_keys[] = {
      .help = "usb: full (12 Mbit/s), high (480) or super (5000): the fastest that the device offers."},
     {LINK(vid), CFG_COUNT, NULL, "0x1209", 1, 65535, .flags = CFG_HEX, .allowed = "0x0001 to 0xffff",
      .of = CFG_KIND(LINK_USB),
-     .help = "usb: vendor id. When not given, that of the device whose protocol it is: native 0x1209 (with pid 0x0001 "
-             "set aside for private tests), scip 0x15d1, cola 0x19a2."},
+     .help = "usb: vendor id. When not given, it depends on the protocol: native 0x1209 (with pid 0x0001 set aside for "
+             "private tests), scip 0x15d1, cola 0x19a2."},
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .of = CFG_KIND(LINK_USB),
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},

@@ -28,8 +28,8 @@ static int is_near(const struct device *device, const struct pose *pose)
     return off_m <= device->site->cfg->platform.reach_m;
 }
 
-/* Whether a pose is so far ahead that its time must be wrong: it would keep all later ones out. In the pace step the
- * time is granted, so it is right. */
+/* Whether a pose is so far ahead that its time must be wrong. Such a pose would keep out all poses with right times. In
+ * the pace `step` a client grants the time, so no pose counts as too far ahead. */
 static int is_early(const struct device *device, int64_t t_ns)
 {
     int64_t now_ns = (int64_t)device->next_tick * device->tick_ns;
@@ -50,8 +50,8 @@ int device_pose(struct device *device, int64_t t_ns, const double v[6])
     return bad;
 }
 
-/* After the last pose the motion between the last two goes on, for extrapolate_ms and within reach. Then the platform
- * stands. */
+/* After the last pose the motion between the last two poses goes on for extrapolate_ms. Then the platform stands. Where
+ * the motion would leave the reach, the platform stands at the last pose instead. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;

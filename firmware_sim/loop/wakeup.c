@@ -15,8 +15,9 @@ void wakeup_free(struct wakeup *wakeup)
     sem_destroy(&wakeup->signals);
 }
 
-/* Either this thread sees that an earlier signal was taken, and signals again; or the thread that took it sees the
- * change. Both cases need a store to be ordered before a later load, which a semaphore by itself does not promise. */
+/* The caller has changed something before. Either this thread sees that an earlier signal has been taken, and signals
+ * again; or the thread that takes the earlier signal sees what the caller has changed. Both cases need a store to be
+ * ordered before a later load, which a semaphore by itself does not promise. */
 void wakeup_signal(struct wakeup *wakeup, uint32_t n)
 {
     int kept = 0;

@@ -46,7 +46,7 @@ static int read_front(struct replay *r, struct sh_err *err)
     return recording_rewind(&r->recording, err);
 }
 
-/* Finds the first frame with a time of day within the first seconds; heads send telemetry each second. */
+/* Takes the time of day from the first telemetry frame, if it comes within two seconds. Heads send one each second. */
 static int read_clock(struct replay *r, struct sh_err *err)
 {
     enum { LONG_ENOUGH_NS = 2000000000 };

@@ -42,7 +42,8 @@ static int plan_again(struct site_vary *v, const struct site *from, struct sh_er
     if (site->station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu stations", n);
     memcpy(site->station, from->station, n * sizeof *site->station);
     site->station[v->station].georef = NULL;
-    /* Scales are written to each stretch of a path. Those that were copied belong to `from`, so they are not kept. */
+    /* Georeferencing writes a scale to each stretch of a path. The copied pointers lead to the stretches of `from`,
+     * whose scales must not change. */
     for (size_t i = 0; i < n; i++)
         site->station[i].on_stretch = NULL;
     int rc = site_vary_detect(site, err);

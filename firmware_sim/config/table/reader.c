@@ -62,7 +62,7 @@ int cfg_is_given(const struct cfg_reader *rd, const char *path)
 int cfg_is_item_given(const struct cfg_reader *rd, const char *path, uint32_t item)
 {
     const struct cfg_key *key = cfg_find(&rd->table, path);
-    return key != NULL && rd->line[cfg_row(rd, key)][item] != 0; /* a table of some sections lacks other keys */
+    return key != NULL && rd->line[cfg_row(rd, key)][item] != 0; /* key is NULL: the table lacks its section */
 }
 
 int cfg_has_profile(const struct cfg_reader *rd)

@@ -148,20 +148,20 @@ static void offline_end(struct offline *off)
 
 int offline_finish(struct offline *off, struct sh_err *err)
 {
-    if (off->sh != NULL) host_hang_up(off->sh); /* as below */
+    if (off->sh != NULL) host_hang_up(off->sh); /* a loop that waited for this client goes on */
     end_loop(off);
     return off->device != NULL ? device_close_journal(off->device, err) : SH_OK;
 }
 
 void offline_stop(struct offline *off)
 {
-    if (off->sh != NULL) host_hang_up(off->sh); /* a loop that waited for this reader goes on */
+    if (off->sh != NULL) host_hang_up(off->sh); /* a loop that waited for this client goes on */
     offline_end(off);
 }
 
 void offline_close(struct offline *off)
 {
-    if (off->sh != NULL) scanhead_close(off->sh); /* likewise */
+    if (off->sh != NULL) scanhead_close(off->sh); /* a loop that waited for this client goes on */
     off->sh = NULL;
     offline_end(off);
     free(off->memory);

@@ -215,7 +215,8 @@ static int check_repair(const struct record_line *r)
     return APP_GO_ON;
 }
 
-/* Adds the files that are written beside those of -o: one of each scan, those that a mesh names, and a .wdp. */
+/* Lists the files that are written beside each file of -o: a file for each scan (--split, --each), the files that a
+ * mesh names, and a .wdp. */
 static int add_names(struct record_line *r)
 {
     static const struct {
@@ -227,7 +228,7 @@ static int add_names(struct record_line *r)
     for (int i = 0; i < n_files; i++) {
         struct app_file *named = &r->in.file[i];
         if (named->option == NULL || strcmp(named->option, "output") != 0) continue;
-        const struct recorder_ops *ops = r->job.files.file[file++].ops; /* they came in this order */
+        const struct recorder_ops *ops = r->job.files.file[file++].ops; /* both lists have the order of -o */
         named->n_ending = strlen(ops->ending);
         named->each = r->job.files.split || r->job.each;
         for (size_t k = 0; k < sizeof beside / sizeof beside[0] && status == APP_OK; k++) {
@@ -346,7 +347,7 @@ static const struct app_option OPTIONS[] = {
      .help = "leave out triangles of meshes with an edge longer than FACTOR times the scan's mean edge (default 10); "
              "0: leave out none"},
     {APP_NUMBER, "sparse", "DENSITY", .min = 1e-6, .max = 1e9, .at = AT(job.files.recorder.sparse_per_m2),
-     .help = "write .ply as points spread evenly over that mesh, DENSITY per square metre"},
+     .help = "write .ply as points spread evenly over the mesh that --mesh writes, DENSITY per square metre"},
     {APP_WHOLE, "sparse-seed", "N", .min = 0, .max = 1000000000, .at = AT(sparse_seed),
      .help = "seed of the random points: the same N gives the same points (default 1)"},
     {APP_CALL, "las-version", "1.2|1.4", .apply = take_las_version,
@@ -377,7 +378,7 @@ static const struct app_option OPTIONS[] = {
     {APP_CALL, "relay", "[ADDRESS:]PORT", .apply = take_raw_only,
      .help = "only with --raw: listen there, and record the connections of others"},
     {APP_CALL, "ready-fd", "N", .apply = take_raw_only,
-     .help = "only with --raw: descriptor that gets a line when it listens"},
+     .help = "only with --raw: descriptor that gets a line of JSON once the recorder listens"},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };

@@ -16,7 +16,7 @@ struct soak_row {
     uint64_t hidden;   /* that no client could notice there; `why` says the last reason */
     uint64_t missed;   /* that it should have noticed */
     uint64_t lost;     /* frames that the client did not get because of it */
-    uint64_t accepted; /* in frames that it took, and that differ from the clean ones */
+    uint64_t accepted; /* faults in frames that the client took, though these differ from the clean ones */
     const char *why;
 };
 

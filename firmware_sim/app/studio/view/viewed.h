@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A recording that is shown: its points, its meshes, and what the file says of itself. In: a file (.shs, .ply, .las).
- * Out: arrays, in metres, in one coordinate frame with z up.
+/* A recording that is shown: its points, its meshes, and what the file says of itself. In: a file (.shs, .pcapng, .ply,
+ * .las). Out: arrays, in metres, in one coordinate frame with z up.
  *
  * Shots without echo are counted, not held. Meshes are those of `scanhead record --mesh` before the long-edge filter.
  * Each triangle has its edge ratio, by which the filter decides, so that any factor can be shown at once.
@@ -42,8 +42,8 @@ struct viewed_points {
 
 /* The array of a column, or NULL; *size: bytes of one value, its components together. */
 const void *viewed_array(const struct viewed_points *points, enum viewed_column column, size_t *size);
-/* Makes room for n points in xyz_m and in the columns of `has` (bit c: column c). Columns are NULL before their first
- * call. SH_ENOMEM: the points are unchanged; some arrays may have the new room. */
+/* Makes room for n points in xyz_m and in the columns of `has` (bit c: column c). The array of a column is NULL until
+ * the first call that names the column. SH_ENOMEM: the points are unchanged; some arrays may have the new room. */
 int viewed_points_room(struct viewed_points *points, size_t n, unsigned has, struct sh_err *err);
 void viewed_points_free(struct viewed_points *points);
 
@@ -98,7 +98,7 @@ void viewed_free(struct viewed *viewed);
 
 /* ---- the steps of viewed_load */
 
-/* SH_OK where the ending is one that is shown. */
+/* Returns SH_OK where recordings with the ending of this path can be shown. */
 int viewed_check_ending(const char *path, struct sh_err *err);
 int viewed_load_cloud(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
 int viewed_load_stream(struct viewed *viewed, const struct sh_report *report, struct sh_err *err);
