@@ -76,7 +76,7 @@ static int has_gap(const struct line_writer *w)
     return w->gap[LINE_PLAIN] != 0 || w->gap[LINE_REMARK] != 0;
 }
 
-/* Takes the line that stands for dropped ones, of which there are some. */
+/* Makes the line that stands for the dropped lines, and forgets their number. Callers ask has_gap() first. */
 static size_t take_gap(struct line_writer *w, char text[LINE_GAP_BYTES])
 {
     w->spec.gap(text, w->gap);

@@ -62,7 +62,7 @@ int site_set_up_tripods(struct site *site, const struct sh_report *report, struc
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
 /* Makes the parts of detection again that depend on ranges and noise. site is a copy of one that is set up, with
- * another cfg; what it points to stays that of the original. */
+ * another cfg. The original still owns the memory that the copy's pointers point to. */
 int site_vary_detect(struct site *site, struct sh_err *err);
 /* Sets the number of surfaces of glass or mirrors that pulses are followed through. */
 void site_set_depth(struct site *site, uint32_t depth);
@@ -73,10 +73,10 @@ double site_ball_m(const struct site *site);
 double site_range_noise_m(const struct site *site);
 
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops) */
-/* Replaces the stations, once they are placed, by the stops. Without a trajectory these are all stations at the first
- * time, then all at the next. Along a trajectory there is one station, and the head stops on the way. Without an anchor
- * that station gives the scene's place on the Earth: it counts as an anchor at its position, with the scene's y axis to
- * true north. */
+/* Replaces the stations, once they are placed, by the stops. Without a trajectory there is a stop for each station and
+ * each time: first all stations at the first time, then all stations at the second time. Along a trajectory there is
+ * one station, and the head stops on the way. If the scene has no anchor, that station gives the scene's place on the
+ * Earth: the station counts as an anchor at its position, with the scene's y axis to true north. */
 int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 /* Reads the trajectory, and cuts the path into stretches. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
@@ -99,9 +99,10 @@ int site_georeference_one(struct site *site, uint32_t station, struct sh_err *er
 void site_free_georeference(struct site *site, uint32_t station);
 
 /* ---- beam_choice.c: the beam of a pulse, and how far pulses are followed through glass and mirrors */
-/* After all else of the site. Sets beam, rings and depth of site->plan.methods and the rows of beam and optics, and
- * makes the stations' beams. Beam and optics are measured on the scene where the configuration leaves them open; for
- * `plan` (site->measures) the error of forced methods, too. Warns where no method holds the tolerances. */
+/* The site is complete before this step, except for visibility maps. The step sets beam, rings and depth of
+ * site->plan.methods and the rows of beam and optics, and makes the stations' beams. Where the configuration
+ * leaves beam or optics open, methods are measured on the scene. For `plan` (site->measures) the error of a method that
+ * the configuration forces is measured, too. Warns where no method holds the tolerances. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- sights.c: the visibility maps of stations */
