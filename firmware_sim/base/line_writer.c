@@ -113,8 +113,8 @@ static void take_piece(struct line_writer *w, struct piece *piece)
     piece->len += len;
 }
 
-/* Returns 0, or the errno of the write that failed. A descriptor that another program made non-blocking is waited for
- * as any other. */
+/* Returns 0, or the errno of the write that failed. If another program has made the descriptor non-blocking, the
+ * function waits until the descriptor takes bytes again. */
 static int write_piece(int fd, const struct piece *piece)
 {
     struct pollfd slot = {.fd = fd, .events = POLLOUT};

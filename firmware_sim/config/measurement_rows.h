@@ -44,7 +44,7 @@
     {"noise", .type = CFG_MAP, .help = "Noise of the measurement."},
     {KEY(noise.range), CFG_ENUM, .def = "off",
      WORDS([RANGE_NOISE_OFF] = "off", [RANGE_NOISE_ON] = "on", [RANGE_NOISE_SIGNAL] = "signal"),
-     .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: that value applies at "
+     .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: range_sigma_m holds at "
              "range_sigma_at_m, and noise grows as the signal gets weaker (signal.model: on); off: exact ranges."},
     {KEY(noise.sigma_m), CFG_REAL, "m", "@range_sigma_m", 0, 10,
      .help = "One sigma of the range noise, its fixed part, in place of the profile's range_sigma_m. With a signal "

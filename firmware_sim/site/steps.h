@@ -43,22 +43,22 @@ int site_read_copies(const struct config *cfg, uint32_t number, const struct sh_
                      struct scene_places *places, struct sh_err *err);
 
 /* ---- target.c: the objects that are scanned (scene.target); the others are left out, or give no echo */
-/* After the meshes are loaded, each with labels of its own. Leaves out objects that are no target, or notes which
- * objects are targets. SH_EINPUT where a pattern fits nothing, or nothing is left. */
+/* Called after the meshes are loaded, when each mesh has labels of its own. Leaves out objects that are no target, or
+ * notes which objects are targets. SH_EINPUT where a pattern fits nothing, or nothing is left. */
 int site_select_target(struct site *site, struct sh_err *err);
-/* Notes which labels give no echo. After the labels of ghosts are known. */
+/* Notes which labels give no echo. Called after the labels of ghosts are known. */
 int site_set_up_silent(struct site *site, struct sh_err *err);
 
 /* ---- tripod.c: the tripods under stations' heads */
-/* Makes labels for legs, if there are any. After the scene and its movers are loaded. */
+/* Makes labels for legs, if there are any. Called after the scene and its movers are loaded. */
 int site_name_legs(struct site *site, struct sh_err *err);
-/* After stations are placed and the scene has its BVHs. Finds each tripod's opening and the directions that it hides,
- * and makes its legs where they are in view. Warns of tripods that hover, and of those without a ground. */
+/* Called after stations are placed and the scene has its BVHs. Finds each tripod's opening and the directions that it
+ * hides, and makes its legs where they are in view. Warns of tripods that hover, and of those without a ground. */
 int site_set_up_tripods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- detection.c: from a hit to a point: signal, surfaces, instrument, noise */
-/* After the scene and its movers are loaded. With mirrors, site->n_surfaces grows by the labels of ghosts. Warns of
- * entries of `surfaces` that fit no surface. */
+/* Called after the scene and its movers are loaded. With mirrors, site->n_surfaces grows by the labels of ghosts. Warns
+ * of entries of `surfaces` that fit no surface. */
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
 /* Makes the parts of detection again that depend on ranges and noise. site is a copy of one that is set up, with
@@ -85,8 +85,8 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
 int site_set_up_colours(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- plausibility.c: values that are allowed, but hardly meant */
-/* After the scene has its BVHs. Warns, with figures, of a scene of an unlikely size, of a step of a sphere that is
- * rounded, of stations that see nothing or little, of lines without a pulse, of fields that nothing evaluates, of
+/* Called after the scene has its BVHs. Warns, with figures, of a scene of an unlikely size, of a step of a sphere that
+ * is rounded, of stations that see nothing or little, of lines without a pulse, of fields that nothing evaluates, of
  * transparent surfaces without a rule, and of attributes and colours that nothing fills. */
 int site_check_plausibility(const struct site *site, const struct sh_report *report, struct sh_err *err);
 
@@ -106,7 +106,7 @@ void site_free_georeference(struct site *site, uint32_t station);
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- sights.c: the visibility maps of stations */
-/* After beam and optics are chosen. Sets site->plan.methods.sight and the row. */
+/* Called after beam and optics are chosen. Sets site->plan.methods.sight and the row. */
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_close_sights(struct site *site);
 /* Takes over another site's maps for stations that have the same position, attitude and BVH there. Then
