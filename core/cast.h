@@ -115,7 +115,7 @@ struct cast_disturbance {
  * lies on the plane it hits. Waveforms need cast_detect with a signal. */
 struct cast_waves {
     const struct waveform *waveform;
-    const struct beam *beam; /* the head's, also of single rays */
+    const struct beam *beam; /* the head's beam, also where cast_setup.beam is NULL */
     /* The echoes of a pulse are those that the detector finds in its samples, in place of merged returns. The echoes'
      * noise is that of the samples: cast_setup's range noise is not added. */
     int finds;
@@ -125,7 +125,8 @@ struct cast_waves {
 /* Adds the wobbles at t_ns to scheduled angles. */
 void cast_wobble(const struct cast_disturbance *disturbance, int64_t t_ns, double *mirror_turn, double *pan_turn);
 
-/* The settings that are the same for all pulses of a scan (movers' poses: of a run). */
+/* The settings that are the same for all pulses of a scan. Only movers' poses and disturbances may change from run to
+ * run. */
 struct cast_setup {
     const struct bvh *bvh;
     /* The station's visibility map; NULL: none. The map is made for `bvh` and `station_m`. Rays that begin at the
@@ -221,8 +222,9 @@ uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, cons
 void caster_hits(struct caster *caster, const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* Calls beam_outlines_create with a probe that casts its rays into bvh. So outlines are left out that are hidden from
- * the station, or on whose two sides range and kind of surface are the same. spec->kind is that of surface_kinds where
- * detection models surfaces. The function allocates: call it before the scan. */
+ * the station, or on whose two sides range and kind of surface are the same. Where detection models surfaces, the
+ * caller lets surface_kinds fill spec->kind; else spec->kind is NULL. The function allocates: call it before the
+ * scan. */
 int cast_outlines(const struct beam_outlines_spec *spec, const struct bvh *bvh, struct beam_outlines **out,
                   struct sh_err *err);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Work that several threads share, each taking the next piece until there is none. With fewer threads than asked for it
- * takes longer; nothing else changes. */
+/* Work that several threads share: each thread takes the next piece until no piece is left. If fewer threads can be
+ * made than the caller asks for, the work takes longer; nothing else changes. */
 #ifndef CORE_TOGETHER_H
 #define CORE_TOGETHER_H
 
@@ -21,7 +21,8 @@ static inline void *together_main(void *together)
     return NULL;
 }
 
-/* Calls work on that many threads. The caller's thread is one of them, and the one that reports. */
+/* Calls work on that many threads. The caller's thread is one of them. `reports` is 1 in the caller's thread, which may
+ * report progress, and 0 in the others. */
 static inline void together(unsigned threads, void (*work)(void *ctx, int reports), void *ctx)
 {
     struct together t = {work, ctx};

@@ -65,7 +65,8 @@ struct utc_gps utc_gps_week(int64_t tai_ns);
 
 /* ISO 8601: "2016-12-31T23:59:60Z", with up to 9 decimals of the second. Nothing else is taken. */
 int utc_parse(const char *text, struct utc_time *out, struct sh_err *err);
-/* The same; n decimals (0 to 9) of the second, cut, not rounded, so that no second begins early. */
+/* Writes a time in the form that utc_parse reads. The second has 0 to 9 decimals. Further decimals are cut
+ * off, not rounded, so that no second begins early. */
 void utc_format(const struct utc_time *utc, int decimals, char buf[UTC_TEXT_LEN]);
 
 #endif

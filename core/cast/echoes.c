@@ -216,7 +216,7 @@ static uint32_t take_echoes(const struct echo_list *l, const double *strength, c
     return n;
 }
 
-/* Sorts by the range that is sent: folding may have changed the order. */
+/* Sorts by the range that is sent: the range ambiguity of DETECT_FOLDED may have changed the order. */
 static void sort_echoes(struct pulse_echo *h, uint32_t n)
 {
     for (uint32_t i = 1; i < n; i++)

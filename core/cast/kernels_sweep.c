@@ -88,7 +88,7 @@ VEC_INLINE void turn_on(const struct middles *m, uint32_t b, double s, double c1
     *cosine = m->cosine[b] + (m->cosine1[b] + (m->cosine[b] * c1 - m->sine[b] * s));
 }
 
-/* Callers pass a pointer or the constant NULL, so that the compiler makes a loop for each case. */
+/* Callers pass a pointer or the constant NULL for `reading`, so that the compiler makes a loop for each case. */
 VEC_INLINE void sweep_blocks(const struct kernel_steps *steps, const struct kernel_pulses *sweep,
                              const double rotation[9], const struct vec3_out *out, const struct kernel_reading *reading)
 {

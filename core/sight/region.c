@@ -42,7 +42,7 @@ struct quarters {
     struct square square[4];
     struct seen seen[4];
     quad u, v;   /* their middles */
-    double half; /* of each, with the pad */
+    double half; /* half of a quarter's width, plus SIGHT_PAD */
     /* The plane of the candidate that covers each quarter; cover is NO_CANDIDATE, and first 0, where none
      * does. */
     quad_mask cover;
@@ -87,7 +87,8 @@ VEC_INLINE uint16_t place_group(const struct build_candidate *c, const struct qu
 }
 
 /* Finds which candidates lie outside of each quarter, which cover it, and which of those comes first in its
- * middle. Rays here are 1 to sqrt(3) long, since a direction's largest component is 1. So doubts count twice. */
+ * middle. Doubts are for directions of length 1 (sight_inside.h). Here a direction's largest component is 1, so its
+ * length is 1 to sqrt(3). So each doubt is doubled. */
 VEC_INLINE void find_covers(const struct build_work *w, const struct seen *in, struct quarters *four)
 {
     quad first = {0.0, 0.0, 0.0, 0.0};
@@ -186,7 +187,8 @@ static void region_look(const struct build_work *w, const struct seen *in, struc
     }
 }
 
-/* Sets a square's leaf: of whole tiles, or in the current block. */
+/* Sets the leaf of a square. A square smaller than a tile has its cells in the current block; any other square consists
+ * of whole tiles. */
 static void put_leaf(const struct division *d, const struct square *q, uint32_t leaf)
 {
     struct sight *s = d->b->sight;
@@ -281,7 +283,8 @@ static void divide_quarters(struct division *d, const struct square *q, const st
     }
 }
 
-/* Divides a tile. Leaves that differ become a block, where they lie next to each other; equal ones become one leaf. */
+/* Divides a tile. If the leaves of its cells differ, the map gets a block with all of them. If they are equal, the tile
+ * becomes one leaf. */
 static void divide_tile(struct division *d, const struct square *q, const struct seen *seen)
 {
     uint32_t block[SIGHT_BLOCK], same = 1;
@@ -329,7 +332,8 @@ void build_work_free(struct build_work *w)
     free(w->where);
 }
 
-/* Each square's candidates stand above those of the square that it is a quarter of: four lists a level. */
+/* Returns how many numbers the stack may hold for a region of n candidates. Each division of a square puts four lists
+ * of at most n candidates on top of the stack, one list for each quarter. */
 static size_t stacked(const struct build_shared *b, size_t n)
 {
     size_t lists = 5;
@@ -353,7 +357,7 @@ static int may_take(struct build_shared *b, struct build_work *w, size_t n)
     return 1;
 }
 
-/* Candidates of a region. *fits is 0 where there are too many. */
+/* Fills the work with the candidates of a region. *fits is 0 where memory_bytes does not allow them. */
 static int gather(struct build_shared *b, struct build_work *w, uint32_t region, uint32_t face, int *fits)
 {
     const size_t n = b->bin[region + 1] - b->bin[region];

@@ -73,7 +73,7 @@ void cola_field_describe(const struct cola_field *field, const struct planar_hea
 enum cola_error cola_record_take(struct cola_args *args, struct cola_record *record);
 void cola_record_put(const struct cola_record *record, struct cola_out *out);
 /* The shape of a record. A record on the head's own grid has the exact directions of beams. COLA_INVALID_DATA:
- * directions that do not ascend, or span more than a turn. */
+ * its directions don't ascend, or span more than a turn; or a length or a direction is too large for a shape. */
 enum cola_error cola_record_shape(const struct cola_record *record, const struct planar_head *head, int from_first,
                                   struct cola_shape *shape);
 

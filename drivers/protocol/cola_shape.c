@@ -102,7 +102,8 @@ static void cut_edge(const struct cola_point *a, const struct cola_point *b, con
 {
     const double sa = ray[0] * a->y_um - ray[1] * a->x_um, sb = ray[0] * b->y_um - ray[1] * b->x_um;
     const double ra = ray[0] * a->x_um + ray[1] * a->y_um, rb = ray[0] * b->x_um + ray[1] * b->y_um;
-    const double slack = 0.5; /* um: corners on the ray are rounded to it */
+    /* A corner on the ray is rounded to whole um, so it may lie this far beside the ray. */
+    const double slack = 0.5;
     if (fabs(sa) <= slack && ra >= 0.0) widen(ra, near, far);
     if (fabs(sb) <= slack && rb >= 0.0) widen(rb, near, far);
     if ((sa < 0.0) == (sb < 0.0)) return;

@@ -30,7 +30,7 @@ void cola_watch_select(struct cola_watch *watch, const struct cola_fields *field
 /* Chooses the echoes of a beam that count. Returns how many there are, from *first on. */
 static uint32_t choose(const struct planar_turn *turn, uint32_t beam, enum cola_echoes echoes, uint32_t *first)
 {
-    const uint32_t n = turn->n[beam]; /* a whole turn has seen all of them */
+    const uint32_t n = turn->n[beam]; /* never PLANAR_UNSEEN: in a whole turn every beam has its pulse */
     *first = echoes == COLA_ECHOES_LAST && n != 0 ? n - 1 : 0;
     return echoes == COLA_ECHOES_ALL || n == 0 ? n : 1;
 }

@@ -52,7 +52,9 @@ static int is_loopback(const struct ethernet_end *end)
     return end->is_v6 ? memcmp(end->address, one, 16) == 0 : end->address[0] == 127;
 }
 
-/* RFC 1112, 6.4, and RFC 2464, 7. */
+/* Writes the hardware address of an end. RFC 1112, 6.4, and RFC 2464, 7, define it for multicast by IPv4 and IPv6. The
+ * address of loopback is all zeros, that of an IPv4 broadcast all ones. Any other end gets a locally administered
+ * address, with the last four bytes of its IP address. */
 static void put_hardware(uint8_t *to, const struct ethernet_end *end)
 {
     static const uint8_t all[4] = {255, 255, 255, 255};

@@ -50,7 +50,8 @@ static enum ip_packet_found read_ipv4(struct rest *r, struct ip_packet *out, uns
     if (r->len < IPV4_LEN) return IP_PACKET_DAMAGED;
     const size_t head = 4 * (size_t)(r->p[0] & 15);
     size_t total = be_get16(r->p + 2);
-    if (total == 0) total = r->len; /* the network card sets it, as it cuts the packet into segments */
+    /* The length is 0 in a packet that was captured before the network card cut it into segments. */
+    if (total == 0) total = r->len;
     if (head < IPV4_LEN || total < head || r->len < head) return IP_PACKET_DAMAGED;
     if ((be_get16(r->p + 6) & 0x3fff) != 0) return IP_PACKET_FRAGMENT;
     *protocol = r->p[9];

@@ -39,7 +39,7 @@ struct scip_model {
     uint16_t no_object, too_near, no_step; /* instead of a range */
 };
 
-/* enum scip_feature of a model with a firmware. */
+/* Returns the features of a model with this version of its firmware, as bits of enum scip_feature. */
 uint32_t scip_model_features(const struct scip_model *model, const char *firmware);
 /* Never NULL. */
 const struct scip_model *scip_model_find(const char *model);

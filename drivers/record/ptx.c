@@ -73,7 +73,8 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
                             .coloured = ptx->base.track.has_colours,
                             .report = ptx->base.options.report};
     int rc = ptx_text_put(&text, err);
-    if (rc == 0) rc = outfile_flush(&ptx->base.file, err); /* before the cells are deleted, which a repair needs */
+    /* A repair makes a missing text from the cells. So the text goes to the file before the cells are deleted. */
+    if (rc == 0) rc = outfile_flush(&ptx->base.file, err);
     return rc == 0 ? ptx_grid_clear(g, err) : rc;
 }
 

@@ -56,8 +56,9 @@ VEC_CLONES void station_pose_forward_all(const struct station_pose *restrict pos
     }
 }
 
-/* The quaternion is a row of the matrix of its products, divided by the row's length. The row of the largest component
- * is taken, so that no figure is the difference of near numbers (Shepperd 1978). */
+/* The rotation gives the products 4 q[i] q[j] of all components of the quaternion q. Row i of these products is q times
+ * 4 q[i]. So the row divided by its length is q, up to the sign. The row of the largest component is taken, so that no
+ * figure is the difference of near numbers (Shepperd 1978). */
 void station_pose_quaternion(const struct station_pose *pose, double q[4])
 {
     const double *r = pose->rotation;

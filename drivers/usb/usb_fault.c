@@ -40,7 +40,7 @@ void usb_device_set_slow(struct usb_device *device, double ms)
 
 int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held)
 {
-    return device->slow_ms > 0.0 || held != NULL; /* none overtakes another */
+    return device->slow_ms > 0.0 || held != NULL; /* a request waits for those that are held before it */
 }
 
 void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request)

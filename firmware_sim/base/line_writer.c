@@ -76,7 +76,7 @@ static int has_gap(const struct line_writer *w)
     return w->gap[LINE_PLAIN] != 0 || w->gap[LINE_REMARK] != 0;
 }
 
-/* Takes the line that stands for dropped ones, of which there are some. */
+/* Makes the line that stands for the dropped lines, and forgets their number. Callers ask has_gap() first. */
 static size_t take_gap(struct line_writer *w, char text[LINE_GAP_BYTES])
 {
     w->spec.gap(text, w->gap);
@@ -113,8 +113,8 @@ static void take_piece(struct line_writer *w, struct piece *piece)
     piece->len += len;
 }
 
-/* Returns 0, or the errno of the write that failed. A descriptor that another program made non-blocking is waited for
- * as any other. */
+/* Returns 0, or the errno of the write that failed. If another program has made the descriptor non-blocking, the
+ * function waits until the descriptor takes bytes again. */
 static int write_piece(int fd, const struct piece *piece)
 {
     struct pollfd slot = {.fd = fd, .events = POLLOUT};

@@ -10,8 +10,9 @@
 enum { NEAREST_MAX = 96 };
 size_t nearest_distance(const char *a, const char *b);
 
-/* Whether `known` may have been meant by `word`: at most two letters differ, and not all of them; or one is
- * the other's beginning, of three letters at least. */
+/* Returns whether a user who wrote `word` may have meant `known`. There are two cases: the distance of the two words is
+ * at most 2 and less than the length of `word`; or the shorter word has at least three letters and is the beginning of
+ * the other word. */
 int nearest_is_near(const char *word, const char *known);
 
 #endif

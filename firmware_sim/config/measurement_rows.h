@@ -9,8 +9,8 @@
     {KEY(beam.rings), CFG_COUNT, NULL, "4", 0, BEAM_MAX_RINGS,
      .help = "Rings of sub-rays: n rings have 1 + 3 n (n + 1). At a plane's end a range is wrong by up to 0.35 / "
              "n^0.75 of the footprint's radius times the tangent of the incidence: 9 mm with 4 rings, 0.35 mrad, "
-             "100 m and 77 deg. Outlines are exact. adaptive: used where a footprint holds more edges than this "
-             "mode can tell apart."},
+             "100 m and 77 deg. Outlines are exact. In the mode adaptive the rings are for footprints on glass or "
+             "mirrors, and for those with more edges than that mode can tell apart."},
     {"beam.echoes", SETTING(echoes), CFG_ENUM, .def = "all",
      WORDS([BEAM_ALL] = "all", [BEAM_FIRST] = "first", [BEAM_LAST] = "last", [BEAM_STRONGEST] = "strongest"),
      .help = "Which echoes of a pulse are sent. Echoes of glass and of surfaces behind it are among them."},
@@ -44,7 +44,7 @@
     {"noise", .type = CFG_MAP, .help = "Noise of the measurement."},
     {KEY(noise.range), CFG_ENUM, .def = "off",
      WORDS([RANGE_NOISE_OFF] = "off", [RANGE_NOISE_ON] = "on", [RANGE_NOISE_SIGNAL] = "signal"),
-     .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: that value applies at "
+     .help = "Range noise. on: the profile's range_sigma_m and ppm, for any target; signal: range_sigma_m holds at "
              "range_sigma_at_m, and noise grows as the signal gets weaker (signal.model: on); off: exact ranges."},
     {KEY(noise.sigma_m), CFG_REAL, "m", "@range_sigma_m", 0, 10,
      .help = "One sigma of the range noise, its fixed part, in place of the profile's range_sigma_m. With a signal "
@@ -160,7 +160,7 @@
      .help = "Errors of the head's geometry (core/instrument.h). The beam follows the mechanics with these errors; "
              "points are computed as if there were no errors."},
 #define ANGLE(name, text) {KEY(instrument.name), CFG_REAL, "deg", "0", -10, 10, .help = text}
-    ANGLE(collimation_deg, "The beam leaves the plane across the mirror's axis, to the right."),
+    ANGLE(collimation_deg, "The beam points to the right of the plane perpendicular to the mirror's axis."),
     ANGLE(trunnion_deg, "The mirror's axis is not level: its right end is lower by this angle."),
     {KEY(instrument.transit_offset_m), CFG_REAL, "m", "0", -1, 1,
      .help = "The mirror's axis passes this far ahead of the pan's axis."},

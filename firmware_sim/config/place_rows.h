@@ -23,9 +23,9 @@
     {"scene.ifc_reader", IN_CONFIG(scene.import.ifc_reader), CFG_ENUM,
      .def = "auto", WORDS([IFC_READER_AUTO] = "auto", [IFC_READER_WEB] = "web-ifc", [IFC_READER_LITE] = "ifc-lite",
      [IFC_READER_ASSIMP] = "assimp"),
-     .help = "Reader of bodies of .ifc. auto: web-ifc and ifc-lite, compared product by product. Where they are not "
-             "installed, Assimp reads them; products with shapes that Assimp is known to read wrong are an error "
-             "then. web-ifc, ifc-lite: that one alone, not cross-checked. assimp: Assimp; a warning names such "
+     .help = "Reader of bodies of .ifc. auto: web-ifc and ifc-lite, compared product by product. Where these two "
+             "are not installed, Assimp reads the bodies; then products with shapes that Assimp is known to read wrong "
+             "are an error. web-ifc, ifc-lite: that one alone, not cross-checked. assimp: Assimp; a warning names such "
              "products."},
     {"scene.ifc_strict", IN_CONFIG(scene.import.ifc_strict), CFG_BOOL, .def = "off",
      .help = "on: a product that the readers of .ifc make differently, or that only one of them makes, is an error, "
@@ -48,7 +48,8 @@
      .help = "on: each copy has its own surfaces, with objects \"NAME 1\", \"NAME 2\" ...; off: all copies share the "
              "mesh's surfaces."},
     {MESH(move_m_s), CFG_VEC3, "m/s", "[0, 0, 0]", -1000, 1000,
-     .help = "Velocity of the mesh, from the scan's start. At a stop it stands where it is at the stop's time."},
+     .help = "Velocity of the mesh, from the scan's start. For a stop of the platform the mesh is moved to its "
+             "place at the stop's time, and stands there."},
     {MESH(turn_deg_s), CFG_REAL, "deg/s", "0", -36000, 36000,
      .help = "The mesh turns about the vertical through pivot_m, clockwise seen from above."},
     {MESH(pivot_m), CFG_VEC3, "m", "[0, 0, 0]", -1e9, 1e9, .help = "The point that it turns about."},
@@ -149,9 +150,10 @@
     {KEY(platform.kind), CFG_ENUM,
      .def = "static", WORDS([PLATFORM_STATIC] = "static", [PLATFORM_TRAJECTORY] = "trajectory", [PLATFORM_LIVE] =
      "live", [PLATFORM_STOPS] = "stops"),
-     .help = "static: at the station; trajectory: along a file; stops: standing at some poses of the file, which "
-             "are then the scan's stations, or without a file at the stations themselves, while meshes move; live: "
-             "at poses that a peer sends, by UDP or, with pace step, by TIME:STEP."},
+     .help = "static: at the station; trajectory: along a file; stops: at poses of the file, where "
+             "the platform stands; these are the scan's stations. Without a file, stops: at the stations, once for "
+             "each time, while meshes move. live: at poses that a peer sends, by UDP or, with pace step, by "
+             "TIME:STEP."},
     {KEY(platform.file), CFG_PATH, .def = "", .example = "path.csv", .of = ON_PATH,
      .help = "trajectory, stops: CSV with t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg (or qw,qx,qy,qz), scene "
              "frame."},

@@ -74,7 +74,7 @@ static const struct cfg_key profile_keys[] = {
     {"geometries[].from", GEOMETRY(from), CFG_ENUM, .names = cfg_from_names, .help = "Where the figures are from."},
     {"firing_ns", IN_PROFILE(arrangement.firing_fs), CFG_MICRO, "ns", OWNED, 0.001, 1e9, FIGURE,
      NEEDED_BY(EMITTER_BEAMS),
-     .help = "beams: duration of a firing sequence with its rest; a multiple of 0.001 ns."},
+     .help = "beams: duration of a firing sequence with its pauses; a multiple of 0.001 ns."},
     {"beams", .type = CFG_LIST, .min = 0, .max = EMITTER_MAX_BEAMS,
      .offset = offsetof(struct config_profile, arrangement.beam), .size = sizeof(struct config_profile_beam),
      .count_offset = offsetof(struct config_profile, arrangement.n_beams), NEEDED_BY(EMITTER_BEAMS),
@@ -162,10 +162,10 @@ static const struct cfg_key profile_keys[] = {
      .help = "Pulses per second that fall into the field of view; within 2 % of prr_hz times that field's share of the "
              "sweep."},
     {KEY(accuracy_m), CFG_REAL, "m", "0", 0, 10, FIGURE,
-     .help = "Accuracy of ranges, fixed part: shown, never drawn as noise. 0: not known."},
+     .help = "Accuracy of ranges, fixed part. It is only shown, and makes no noise. 0: not known."},
     {KEY(accuracy_ppm), CFG_REAL, "ppm", "0", 0, 1e4, FIGURE, .help = "Accuracy of ranges, part per distance."},
     {KEY(angle_accuracy_deg), CFG_REAL, "deg", "0", 0, 1, FIGURE,
-     .help = "Accuracy of angles: shown, never drawn as noise. 0: not known."},
+     .help = "Accuracy of angles. It is only shown, and makes no noise. 0: not known."},
     {KEY(threshold_snr), CFG_REAL, NULL, "8", 1, 1000, FIGURE,
      .help = "Signal-to-noise ratio (amplitudes) at the detection threshold."},
     {KEY(overlap_m), CFG_REAL, "m", "0", 0, 1000, FIGURE,
@@ -188,8 +188,8 @@ static const struct cfg_key profile_keys[] = {
              "FWHM, half angle 1/e2. The full angle at 1/e2 is the figure times 1.41 (1/e), 1.70 (FWHM) or 2 (half "
              "angle)."},
     {KEY(pulse_width_ns), CFG_REAL, "ns", NULL, 0, 1000, FIGURE,
-     .help = "Width of the pulse: echoes closer to each other than c / 2 times it merge into one. A beam that has a "
-             "width needs at least 0.1 ns in any beam.mode but single."},
+     .help = "Width of the pulse in time. Echoes that are closer to each other than c / 2 times this width merge into "
+             "one. A beam that has a width needs at least 0.1 ns in any beam.mode but single."},
     {KEY(max_echoes), CFG_COUNT, NULL, NULL, 1, LINE_MAX_ECHOES, FIGURE, .help = "Echoes per pulse."},
     {KEY(boot_s), CFG_REAL, "s", NULL, 0, 600, FIGURE, .help = "Power-on to ready."},
     {KEY(spin_up_s), CFG_REAL, "s", NULL, 0, 600, FIGURE, .help = "Start command to mirror at speed."},

@@ -88,6 +88,6 @@ void mover_join(struct mover *mover)
     mover->running = 0;
     pthread_cond_signal(&mover->changed);
     pthread_mutex_unlock(&mover->lock);
-    if (mover->device != NULL) device_end(mover->device); /* ends the planning, too, now and later */
+    if (mover->device != NULL) device_end(mover->device); /* ends the planning of a move, and of any later move */
     if (running) pthread_join(mover->thread, NULL);
 }

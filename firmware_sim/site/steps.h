@@ -43,26 +43,26 @@ int site_read_copies(const struct config *cfg, uint32_t number, const struct sh_
                      struct scene_places *places, struct sh_err *err);
 
 /* ---- target.c: the objects that are scanned (scene.target); the others are left out, or give no echo */
-/* After the meshes are loaded, each with labels of its own. Leaves out objects that are no target, or notes which
- * objects are targets. SH_EINPUT where a pattern fits nothing, or nothing is left. */
+/* Called after the meshes are loaded, when each mesh has labels of its own. Leaves out objects that are no target, or
+ * notes which objects are targets. SH_EINPUT where a pattern fits nothing, or nothing is left. */
 int site_select_target(struct site *site, struct sh_err *err);
-/* Notes which labels give no echo. After the labels of ghosts are known. */
+/* Notes which labels give no echo. Called after the labels of ghosts are known. */
 int site_set_up_silent(struct site *site, struct sh_err *err);
 
 /* ---- tripod.c: the tripods under stations' heads */
-/* Makes labels for legs, if there are any. After the scene and its movers are loaded. */
+/* Makes labels for legs, if there are any. Called after the scene and its movers are loaded. */
 int site_name_legs(struct site *site, struct sh_err *err);
-/* After stations are placed and the scene has its BVHs. Finds each tripod's opening and the directions that it hides,
- * and makes its legs where they are in view. Warns of tripods that hover, and of those without a ground. */
+/* Called after stations are placed and the scene has its BVHs. Finds each tripod's opening and the directions that it
+ * hides, and makes its legs where they are in view. Warns of tripods that hover, and of those without a ground. */
 int site_set_up_tripods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- detection.c: from a hit to a point: signal, surfaces, instrument, noise */
-/* After the scene and its movers are loaded. With mirrors, site->n_surfaces grows by the labels of ghosts. Warns of
- * entries of `surfaces` that fit no surface. */
+/* Called after the scene and its movers are loaded. With mirrors, site->n_surfaces grows by the labels of ghosts. Warns
+ * of entries of `surfaces` that fit no surface. */
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
 /* Makes the parts of detection again that depend on ranges and noise. site is a copy of one that is set up, with
- * another cfg; what it points to stays that of the original. */
+ * another cfg. The original still owns the memory that the copy's pointers point to. */
 int site_vary_detect(struct site *site, struct sh_err *err);
 /* Sets the number of surfaces of glass or mirrors that pulses are followed through. */
 void site_set_depth(struct site *site, uint32_t depth);
@@ -73,10 +73,10 @@ double site_ball_m(const struct site *site);
 double site_range_noise_m(const struct site *site);
 
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops) */
-/* Replaces the stations, once they are placed, by the stops. Without a trajectory these are all stations at the first
- * time, then all at the next. Along a trajectory there is one station, and the head stops on the way. Without an anchor
- * that station gives the scene's place on the Earth: it counts as an anchor at its position, with the scene's y axis to
- * true north. */
+/* Replaces the stations, once they are placed, by the stops. Without a trajectory there is a stop for each station and
+ * each time: first all stations at the first time, then all stations at the second time. Along a trajectory there is
+ * one station, and the head stops on the way. If the scene has no anchor, that station gives the scene's place on the
+ * Earth: the station counts as an anchor at its position, with the scene's y axis to true north. */
 int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 /* Reads the trajectory, and cuts the path into stretches. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);
@@ -85,8 +85,8 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
 int site_set_up_colours(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- plausibility.c: values that are allowed, but hardly meant */
-/* After the scene has its BVHs. Warns, with figures, of a scene of an unlikely size, of a step of a sphere that is
- * rounded, of stations that see nothing or little, of lines without a pulse, of fields that nothing evaluates, of
+/* Called after the scene has its BVHs. Warns, with figures, of a scene of an unlikely size, of a step of a sphere that
+ * is rounded, of stations that see nothing or little, of lines without a pulse, of fields that nothing evaluates, of
  * transparent surfaces without a rule, and of attributes and colours that nothing fills. */
 int site_check_plausibility(const struct site *site, const struct sh_report *report, struct sh_err *err);
 
@@ -99,13 +99,14 @@ int site_georeference_one(struct site *site, uint32_t station, struct sh_err *er
 void site_free_georeference(struct site *site, uint32_t station);
 
 /* ---- beam_choice.c: the beam of a pulse, and how far pulses are followed through glass and mirrors */
-/* After all else of the site. Sets beam, rings and depth of site->plan.methods and the rows of beam and optics, and
- * makes the stations' beams. Beam and optics are measured on the scene where the configuration leaves them open; for
- * `plan` (site->measures) the error of forced methods, too. Warns where no method holds the tolerances. */
+/* The site is complete before this step, except for visibility maps. The step sets beam, rings and depth of
+ * site->plan.methods and the rows of beam and optics, and makes the stations' beams. Where the configuration
+ * leaves beam or optics open, methods are measured on the scene. For `plan` (site->measures) the error of a method that
+ * the configuration forces is measured, too. Warns where no method holds the tolerances. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
 
 /* ---- sights.c: the visibility maps of stations */
-/* After beam and optics are chosen. Sets site->plan.methods.sight and the row. */
+/* Called after beam and optics are chosen. Sets site->plan.methods.sight and the row. */
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_close_sights(struct site *site);
 /* Takes over another site's maps for stations that have the same position, attitude and BVH there. Then

@@ -261,7 +261,7 @@ static void a_pulse_is_late(void **state)
     }
     begin(FAULT_PPS_JITTER, 1.5, 40);
     stop(FAULT_PPS_JITTER, 1.6, 0);
-    expect(FAULT_PPS_JITTER, 1, 0, "no pulse was in it");
+    expect(FAULT_PPS_JITTER, 1, 0, "no PPS came while the fault lasted");
     begin(FAULT_PPS_JITTER, 1.5, 40);
     stop(FAULT_PPS_JITTER, 1.6, 1);
     expect(FAULT_PPS_JITTER, 1, 0, NULL);

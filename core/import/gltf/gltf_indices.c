@@ -47,8 +47,8 @@ static const char *const entered[] = {"EXT_mesh_gpu_instancing",
 
 struct search {
     const json_t *root;
-    uint64_t n;
-    struct gltf_at first; /* place of the first such index; `number` is its value, `list` the list it is for */
+    uint64_t n;           /* indices that name no element */
+    struct gltf_at first; /* place of the first index that names no element; `number`: its value; `list`: the list */
     double number;
     const char *list;
 };

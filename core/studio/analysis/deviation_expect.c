@@ -115,7 +115,7 @@ int deviation_terms_of(const struct deviation_head *head, struct deviation_terms
     *out = (struct deviation_terms){.range_floor_m = (double)NAN, .range_jitter_m = (double)NAN};
     if (head->has_instrument_errors) return 0;
     if (setup->detect != NULL) signal_terms(setup->detect, out);
-    if (setup->noise_on) { /* it comes first, as in range_sigma_m() */
+    if (setup->noise_on) { /* fixed noise replaces noise by the signal, as in range_sigma_m() */
         out->range_floor_m = out->range_jitter_m = (double)NAN;
         out->range_sigma_m = setup->range_sigma_m;
         out->range_sigma_per_m = 1e-6 * setup->range_sigma_ppm;

@@ -8,7 +8,8 @@
 
 struct cfg_reader;
 
-/* Where a name has `item`, the path has [], and item is the element, from 0. Without it, the key is in no list. */
+/* Functions with `item` in their name are for keys of a list: the path has [], and item is the element's number, from
+ * 0. Functions without `item` in their name are for keys outside of lists. */
 
 /* Returns whether the key was given. */
 int cfg_is_given(const struct cfg_reader *rd, const char *path);

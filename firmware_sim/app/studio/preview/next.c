@@ -46,7 +46,7 @@ static double grid_of(const struct scene *scene)
     return fmax(LEAST_GRID_M, sqrt(area_m2 / PLACES));
 }
 
-/* The hits of all previews stand for those of the stations. */
+/* Marks the cells that the previews see as seen, and sums the previews' hits, in place of the stations' own ones. */
 static void keep_seen(struct coverage *coverage, const struct preview_seen *seen, uint32_t n,
                       struct coverage_pulses *sum)
 {

@@ -92,7 +92,7 @@ void soak_heard_head(struct soak_link *link, const struct fault_note *note)
     for (uint32_t i = link->n_moments; i-- > 0;) {
         if (link->moment[i].fault != note->fault || link->moment[i].to_ns != INT64_MAX) continue;
         link->moment[i].to_ns = note->t_ns;
-        if (note->kind == FAULT_PPS_JITTER && note->n == 0) hide_moment(link, i, "no pulse was in it");
+        if (note->kind == FAULT_PPS_JITTER && note->n == 0) hide_moment(link, i, "no PPS came while the fault lasted");
     }
 }
 
@@ -332,7 +332,7 @@ static void take_usual_rate(struct soak_link *link, int64_t t_ns, double rate)
         if (is_of_mirror(&link->moment[i]) && link->moment[i].from_ns <= t_ns && t_ns < link->moment[i].to_ns) return;
     for (uint32_t i = link->n_moments; i-- > 0;)
         if (is_of_mirror(&link->moment[i]) && link->moment[i].to_ns <= t_ns)
-            hide_moment(link, i, "the client's scan began with it");
+            hide_moment(link, i, "the fault was over before the client knew the mirror's usual rate");
     link->usual_rate = rate;
 }
 

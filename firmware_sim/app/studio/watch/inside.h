@@ -71,7 +71,7 @@ struct watch {
     struct link_spec link;
     struct web_source source;
     int link_given; /* the loop owns its descriptor */
-    int fd;         /* the observer's end, which the handle owns */
+    int fd;         /* the observer's end of the socket pair; `sh` owns it */
     struct scanhead *sh;
     pthread_t thread;
     int running;
