@@ -74,7 +74,7 @@ int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
     if (rc != SH_OK) return rc;
     if (out->n == 0 || out->expires_s <= out->leap[out->n - 1].posix_s)
         return sh_fail(err, SH_EFORMAT,
-                       "no table of leap seconds with an expiry (#@) after its last entry, and by the end of %d",
+                       "not a table of leap seconds that expires (#@) after its last entry and by the end of %d",
                        LAST_YEAR);
     return SH_OK;
 }

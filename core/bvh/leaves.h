@@ -17,7 +17,8 @@
  * hit. The scene has the corners in double. */
 struct bvh_leaf {
     /* Corners count from this point, which counts from the BVH's origin. The lowest bits of the point's numbers hold
-     * other figures (bvh_leaf_rest). These bits stay in the numbers when corners are computed. */
+     * the leaf's size, and how far triangle 1 follows triangle 0 (bvh_leaf_size_m, bvh_leaf_ahead). These bits stay in
+     * the numbers when corners are computed. */
     float base_m[3];
     float corner_m[3][4]; /* x, y, z of the corners, from base_m */
     uint32_t triangle;    /* number of triangle 0 */
@@ -26,7 +27,7 @@ struct bvh_leaf {
 _Static_assert(sizeof(struct bvh_leaf) == 128, "a leaf is two cache lines");
 
 enum {
-    BVH_LEAF_BITS = 6,       /* lowest bits of each number of base_m, which hold other figures */
+    BVH_LEAF_BITS = 6,       /* lowest bits of each number of base_m, which hold the two figures below */
     BVH_LEAF_AHEAD_BITS = 4, /* how far triangle 1 follows triangle 0 in the scene's list, 0: there is none */
     BVH_LEAF_AHEAD = 1 << BVH_LEAF_AHEAD_BITS,
     BVH_LENGTH_BITS = 17, /* a length is a float without its sign and this many lowest bits, rounded up */

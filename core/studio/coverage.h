@@ -68,7 +68,7 @@ int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, c
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
 /* Gives figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */
 void coverage_waiting(const struct coverage *coverage, double *seen_m2, double *gain_m2);
-/* Makes the waiting scan that of the next station. Stations are numbered from 1 in the order of these calls. */
+/* Keeps the waiting scan as the scan of the next station. Stations are numbered from 1 in the order of these calls. */
 void coverage_keep(struct coverage *coverage);
 void coverage_drop(struct coverage *coverage);
 

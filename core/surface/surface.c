@@ -60,7 +60,7 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
 }
 
 struct named_surface {
-    struct surface surface; /* first: compared */
+    struct surface surface; /* the first member, since by_surface compares what the struct begins with */
     uint32_t label;
 };
 

@@ -186,8 +186,8 @@ static int is_late(struct scanhead *sh, const char *command)
 /* Comes into step with the replies, before the first exchange on a terminal and after a command that was given up.
  * Between open() and raw mode the terminal echoes what the head sends, and the head takes the echo for commands;
  * another program may have left half a line. So an empty line ends that line, and all replies are skipped up to the
- * answer to a question of our own. The head may have sent half a frame to the program before; that half may swallow the
- * answer. So the question is asked again. */
+ * answer to a question of our own. The last thing that the head sent to the program before this one may be half a
+ * frame. The parser may take the answer for the other half. So the question is asked again. */
 static int exchange_settle(struct scanhead *sh, int64_t deadline_ns)
 {
     static const char question[] = "\n*IDN?\n";
@@ -241,7 +241,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
     if (is_sent) give_up(sh, command);                  /* also where a frame that came meanwhile was wrong */
-    if (rc != SH_ETIMEOUT || timeout_ms < 0) return rc; /* without a time limit it was a signal */
+    if (rc != SH_ETIMEOUT || timeout_ms < 0) return rc; /* no time limit: a signal ended the wait */
     return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
                    timeout_ms);
 }

@@ -168,7 +168,7 @@ int native_decode_surfaces(const uint8_t *payload, size_t len,
     if (len < NATIVE_SURFACES_HEAD_LEN) return SH_EFORMAT;
     uint32_t first = le_get32(payload), count = le_get32(payload + 4);
     if (count > 0xffff || first > 0xffff - count) return SH_EFORMAT;
-    /* Twice: a payload that is wrong somewhere has no effect at all. */
+    /* The first pass only checks, so that a payload that is wrong somewhere has no effect at all. */
     for (int pass = 0; pass < 2; pass++) {
         size_t at = NATIVE_SURFACES_HEAD_LEN;
         for (uint32_t i = 0; i < count; i++) {

@@ -39,8 +39,8 @@ static inline void track_set_point(struct track *track, int i, const struct scan
 
 /* Returns the columns that the library writes points to. */
 struct scanhead_columns track_columns_to(struct track *track);
-/* Gives each of n points the row of its pulse. row: how many pulses of the line come before the n points. Returns how
- * many come before the points after them. */
+/* Gives each of n points the row of its pulse. row: the number of pulses in the line before these points. Returns the
+ * number of pulses in the line up to the last of these points. */
 uint64_t track_number_rows(struct track *track, uint64_t row, int n);
 /* Takes the points of a moving head to the scene. Returns as scanhead_to_scene does. */
 int track_to_scene(struct track *track, int n);

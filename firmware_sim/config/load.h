@@ -35,8 +35,8 @@ int config_load_links(const char *text, const char *name, const char *const *set
                       struct config_diagnostics *diagnostics);
 
 /* Adds the injected faults of a scenario, a file that has nothing but a list `faults`. name: a path, or the name of a
- * scenario that comes with the program. At most once. With diagnostics nothing is added, and the code of the first is
- * returned. */
+ * scenario that comes with the program. The caller adds one scenario at most. With diagnostics nothing is added, and
+ * the code of the first is returned. */
 int config_add_scenario(struct config *cfg, const char *name, struct config_diagnostics *diagnostics);
 /* Writes the names of the scenarios that come with the program, "a, b, c", as many as buf holds. */
 void config_name_scenarios(char *buf, size_t len);

@@ -3,15 +3,16 @@
  * pulses, and the counter of time since the top of the hour that data and position packets carry (VLP-16 User Manual,
  * appendix G).
  *
- * In: each pulse and each sentence as it arrives, in order of time, with the head's own clock at that moment. Out: both
- * at a device time.
+ * In: each pulse and each sentence as it arrives, in order of time, with the head's own clock at that moment. Out: the
+ * state of the pulses and the counter, at a device time.
  *
  * Pulses are absent where none came for more than a second. A pulse agrees when the head's clock has counted a whole
  * number of seconds since the pulse before, within PPS_TOLERANCE_NS for each second. Any other pulse but the first is
  * an error. Pulses are locked after PPS_TO_LOCK pulses in a row that agreed, a second apart.
  *
- *     power comes -> counts from 0 -> locked pulse: its part of a second becomes 0 -> sentence: its minutes and seconds
- *                    by the head's own clock                                          are taken over
+ *     power comes        the counter begins with hour_ns, and goes on by the head's own clock
+ *     -> locked pulse    the counter's part of a second becomes 0
+ *     -> sentence        the counter gets the minutes and seconds of the sentence
  *
  * While pulses aren't locked, neither pulses nor sentences set the counter: it goes on by the head's clock. While
  * pulses are locked but sentences are missing, the counter's minutes and seconds are counted on, and pulses set the

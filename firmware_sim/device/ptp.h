@@ -25,8 +25,8 @@
  * In holdover the rate stays as it was last corrected, and a fault's drift is added (clock_faults.c). Offset, delay and
  * grandmaster stay those of the last master, as ptp4l reports them.
  *
- * All figures are integers of ns and 1e-12, and the clock takes each correction exactly. A jitter's number is
- * keyed by noise.seed and the number of the Sync. The last PTP_KEPT changes are kept, since sessions ask for past
+ * All figures are integers of ns and 1e-12, and the clock takes each correction exactly. The random number of a jitter
+ * is keyed by noise.seed and the number of the Sync. The last PTP_KEPT changes are kept, since sessions ask for past
  * times.
  *
  * Thread: with the device's lock. A head without a follower costs one comparison a tick. */

@@ -165,7 +165,8 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->cut_short = (stop || ends) && end < seg->end_pulse;
     device_take_poses(device, work);
     struct schedule_line line; /* of the next pulse, or of the last where no more come */
-    const int is_whole = end >= seg->end_pulse && seg->spec.frames != 0; /* above it after SCAN:FRAMes was lowered */
+    /* After SCAN:FRAMes was lowered, `end` may be above end_pulse. */
+    const int is_whole = end >= seg->end_pulse && seg->spec.frames != 0;
     schedule_get_line(seg, schedule_line_of(seg, is_whole ? end - 1 : end), &line);
     device->cmd.frames_done = (uint64_t)line.frame + (uint64_t)is_whole;
     return done || stop || ends;

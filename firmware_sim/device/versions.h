@@ -14,7 +14,7 @@
 /* A site that is kept while it is in use: by the device, and by ticks that were claimed while it was the device's. */
 struct device_version {
     const struct site *site;
-    struct site *own;       /* NULL: the one the device was made with, which is its caller's */
+    struct site *own;       /* the site, which is freed with the version; NULL: device_create's caller frees it */
     _Atomic uint32_t users; /* not counting the device */
     struct device_version *next;
 };
@@ -44,7 +44,7 @@ struct device_moves {
 struct device_version *device_make_version(const struct site *site, struct site *own);
 void device_free_version(struct device_version *version);
 void device_free_versions(struct device_version **list);
-/* Frees earlier versions that nobody uses. Without the lock; by the thread that plans moves. */
+/* Frees earlier versions that nobody uses. The thread that plans moves calls this, without the lock. */
 void device_free_unused_sites(struct device_moves *moves);
 void device_set_places(const struct site *site, struct command_place *place);
 int device_open_moves(struct device_moves *moves, const struct site *site, struct sh_err *err);

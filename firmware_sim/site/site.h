@@ -265,7 +265,7 @@ const struct scene_texture *site_texture(const struct site *site, uint32_t label
 struct site_clear {
     uint32_t n, n_left_out;         /* surfaces; rules that had no room */
     size_t room;                    /* for the rules; 0: all of them */
-    char rules[8 * SCENE_NAME_LEN]; /* "{material: "Glas", glass: 0.7}, ...", for `surfaces`; any one has room */
+    char rules[8 * SCENE_NAME_LEN]; /* "{material: "Glas", glass: 0.7}, ...", for `surfaces`; one rule always fits */
 };
 void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n);
 

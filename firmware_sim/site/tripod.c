@@ -108,7 +108,7 @@ void site_describe_tripod(const struct site_station *s, char *text, size_t len)
 /* A leg begins this part of its length below the top. Otherwise a head at the top itself would be inside all legs. */
 static const double LEG_BEGINS = 0.1;
 
-/* Makes a prism along the leg, from there to the ground. */
+/* Makes a prism along the leg, from LEG_BEGINS of the leg's length to its end. */
 static void fill_leg(const struct site_tripod *t, const double top_m[3], const double level[9], int leg,
                      double (*vertex_m)[3])
 {

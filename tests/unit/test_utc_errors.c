@@ -37,15 +37,15 @@ static void tables(void **state)
               {EXPIRY FIRST "2272060800 11\n", 3, steps},
               {EXPIRY FIRST "2271974400 11\n", 3, steps},
               {"#@ 2400000000\n" FIRST SECOND "\n2303683200 10\n", 0, NULL}, /* a second less */
-              {FIRST, 0, "no table of leap seconds with an expiry (#@) after its last entry, and by the end of 2199"},
-              {EXPIRY, 0, "no table of leap seconds with an expiry (#@) after its last entry, and by the end of 2199"},
+              {FIRST, 0, "not a table of leap seconds that expires (#@) after its last entry and by the end of 2199"},
+              {EXPIRY, 0, "not a table of leap seconds that expires (#@) after its last entry and by the end of 2199"},
               {"#@ 2287785600\n" FIRST SECOND, 0,
-               "no table of leap seconds with an expiry (#@) after its last entry, and by the end of 2199"},
+               "not a table of leap seconds that expires (#@) after its last entry and by the end of 2199"},
               {"#@ 2287785601\n" FIRST SECOND, 0, NULL},
               /* 2200-01-01 is 300 years of 365 days, and 73 leap days, after 1900. */
               {"#@ 9467107200\n" FIRST, 0, NULL},
               {"#@ 9467107201\n" FIRST, 0,
-               "no table of leap seconds with an expiry (#@) after its last entry, and by the end of 2199"}};
+               "not a table of leap seconds that expires (#@) after its last entry and by the end of 2199"}};
     for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
         struct utc_table table;
         char want[160];

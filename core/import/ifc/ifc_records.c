@@ -30,7 +30,7 @@ static bool is_air(struct text_span type)
 }
 
 /* IfcLocalPlacement(PlacementRelTo, RelativePlacement): follows PlacementRelTo up to a placement that is absolute, or
- * that was checked for another product. A chain that meets a link of its own has no end. */
+ * that was checked for another product. A chain that comes back to one of its own placements has no end. */
 static int check_placement(struct ifc_records *r, const struct ifc_product *p, struct text_span placement,
                            struct sh_err *err)
 {

@@ -16,7 +16,7 @@ struct mesh_file {
     FILE *file;    /* reads, too */
     char *buffer;  /* of file, in whole blocks */
     int is_named;  /* it has its name by now */
-    off_t at, end; /* of the stream, also after a write has failed */
+    off_t at, end; /* place and length of the stream; a write that fails moves them, too */
     int error;     /* errno of the first write that failed; 0: none */
     int is_direct; /* now the descriptor writes past the system's cache; -1: the file system can't do it */
 };
@@ -58,7 +58,8 @@ int mesh_work_step(struct mesh_work *work, struct sh_err *err);
  * (core/decimal.h). Returns the end. */
 char *mesh_put_number(char *to, double v);
 
-/* Puts a line of a key, which ends with a blank, and a text. Control characters in the text become question marks. */
+/* Writes one line: the key, which ends with a blank, then the text. Control characters in the text become question
+ * marks. */
 void mesh_put_line(FILE *out, const char *key, const char *text);
 
 /* Returns the path's name without folders. *len: its length without the ending. */

@@ -96,8 +96,8 @@ static struct survey_sight floors_look(struct survey *s, const struct floor *f, 
     return survey_look(s, LEGS, LOOKS);
 }
 
-/* Returns a score that grows with the share seen and with its distance. The score falls with the place's distance from
- * the middle and with its height. */
+/* Returns a score that grows with the share of rays that hit something, and a little with the ranges of these hits. The
+ * score falls with the place's distance from the scene's middle, and with the place's height in the scene. */
 static double score(const struct survey *s, const struct floor *f, const struct survey_sight *sight)
 {
     double aside = hypot(f->at_m[0] - s->centre_m[0], f->at_m[1] - s->centre_m[1]) / s->radius_m;

@@ -150,7 +150,7 @@ class Block {
 export class Cloud {
   total = 0; // so many points came since it was cleared
   gone = 0; // so many of them are no longer stored
-  replaced = 0; // so often points were dropped because their scan was repeated
+  replaced = 0; // so often points were dropped because a newer scan of their station came
   origin = null;
   blocks = [];
   changed = null; // it is called after each change
@@ -222,8 +222,8 @@ export class Cloud {
     return this.total;
   }
 
-  /** The first `total` points come from another run of the head, which counts its scans from 1 again. So the next scan
-   * of a station replaces them, whatever its number. */
+  /** The first `total` points come from an earlier run of the head. The present run counts its scans from 1 again. So
+   * the next scan of a station replaces its earlier points, whatever the scan's number is. */
   outdate(total) {
     this.#outdated = total;
     this.#scans.clear();

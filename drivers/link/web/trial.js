@@ -25,7 +25,7 @@ const turned = (deg) => ((deg + 180) % 360 + 360) % 360 - 180;
 export class Trial extends EventTarget {
   stations = [];
   cells = null; // null: not there yet, or there are none
-  isBlind = false; // there are none, since the scene has too many triangles: points are all that is shown
+  isBlind = false; // true: the head gave no cells, so only points are shown; `error` says why
   reach = null; // the cells that can be seen from anywhere; null: not known yet
   sum = null;   // it has counts, none_m2, one_m2, several_m2, hidden_m2 of all stations
   step_deg; // of stations without a step of their own
@@ -130,7 +130,7 @@ export class Trial extends EventTarget {
     return parsePreview(await ask(pathOf('preview', {station: station.of, ...place, ...settings, ...more}), this.#ended.signal));
   }
 
-  // Asks for the points and cells of change number `asked`, as station.wanted counts changes.
+  // Asks for the points and cells of the station as it is after `asked` changes. station.wanted counts its changes.
   async #look(station, asked) {
     try {
       const shown = await this.#ask(station, {step_deg: station.step_deg ?? this.step_deg});

@@ -22,7 +22,7 @@ struct cfg_reader {
     int root_line;
     int profile_read;                                /* 1: the head profile was read without a diagnostic */
     const struct config_profile *profile;            /* for the limits in errors; NULL: not known */
-    unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of figures: 1 + enum config_from; 0: not given */
+    unsigned char from[CFG_MAX_ROWS][CFG_MAX_ITEMS]; /* of a profile's figure: 1 + enum config_from; 0: not given */
     struct config_diagnostics *diagnostics;
     const char *of;  /* the text before its keys in errors; NULL: none */
     const char *set; /* the key of --set whose value is being parsed as YAML; NULL: none */

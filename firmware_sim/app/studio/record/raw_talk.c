@@ -200,7 +200,7 @@ int talk_open(struct talk *talk, struct raw *r, const int fd[2], int64_t began_n
         end->received = 0;
         end->input = (struct raw_input){.take = fd[i] < 0 ? take_send : raw_talk_take, .pass = pass};
     }
-    /* Where the device broke the connection at once, it has no name any more. */
+    /* Where the device broke the connection at once, the socket has no address of a peer any more. */
     if (set_ends(talk, fd[1]) != SH_OK)
         return sh_fail(err, SH_ELOST, "%s: the connection was closed at once", r->in.operand[0]);
     return write_handshake(talk, began_ns, err);

@@ -16,8 +16,8 @@
 struct recording_options {
     int listen; /* take the frames that come until the stream or the time ends; send nothing */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
-    /* Where this is a part of a recording with several heads: first and last station of the whole, for progress and for
-     * naming what is missing. 0: this is all of it. */
+    /* Where several heads make one recording: first and last station of the whole recording, for progress and for
+     * naming what is missing. 0: this head makes the whole recording. */
     uint32_t begin_station, end_station;
     long frames;           /* per scan; -1: as the head is set */
     double duration_s;     /* > 0: stop each scan after this device time ... */

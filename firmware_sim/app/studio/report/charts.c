@@ -116,7 +116,8 @@ static void put_legend(FILE *out, const struct page_bars *b)
     fputs("</p>\n", out);
 }
 
-/* Returns how many groups share one name, so that the longest name has room. A letter is up to LETTER wide. */
+/* Returns n, where only each n-th group gets its name, so that the longest name has room. A letter is up to LETTER
+ * wide. */
 static uint32_t names_apart(const struct page_bars *b)
 {
     enum { LETTER = 7, GAP = 8 };

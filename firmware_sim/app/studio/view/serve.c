@@ -54,7 +54,7 @@ static int get_mesh(struct view_serve *s, const char *query, struct web_body *ou
                        : rc;
 }
 
-/* Where the wish is the last one again, its points are still there, and are used. */
+/* Spreads the points of a request. Where the last request asked for the same points, s->sparse still has them. */
 static int make_sparse(struct view_serve *s, const struct view_spread *wish, struct sh_err *err)
 {
     if (s->made && s->per_m2 == wish->per_m2 && s->long_edge == wish->long_edge && s->seed == wish->seed &&

@@ -27,8 +27,8 @@ static int is_about(const struct georef *georef, const struct scanhead_info *inf
     return fabs(d[0]) <= info->scale[0] && fabs(d[1]) <= info->scale[1] && fabs(d[2]) <= info->scale[2];
 }
 
-/* Makes a georeference around the place in the stream, from that of the station. The station may have moved since the
- * scan began. Returns 0 where there is none. */
+/* Makes now_georef from `of`, the station's georeference, with its centre at the place in the stream: the station may
+ * have moved since the scan began. Returns 0 if `of` is NULL, or if now_georef does not give the stream's anchor. */
 static int follow_georef(struct watch *w, const struct georef *of, const struct scanhead_info *info)
 {
     struct sh_err err;
