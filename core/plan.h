@@ -27,7 +27,7 @@ struct plan_option {
     char method[32];
     double error_m;    /* bound; NaN: not known */
     double echo_share; /* bound; NaN: not known */
-    double cost_ns;    /* per pulse, beyond a single ray, less than 0 where it saves; NaN: depends on the scene */
+    double cost_ns;    /* per pulse, added to the cost of a single ray; < 0 where it saves; NaN: depends on the scene */
     char why_not[96];  /* why it is not possible; empty: it is */
 };
 

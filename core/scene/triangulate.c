@@ -127,7 +127,7 @@ void triangulate_polygon(struct triangulate *t, uint32_t n)
         if (!(triangulate_turn(t, t->at[i].prev, i, t->at[i].next) > 0)) t->at[t->n_reflex++].reflex = i;
     uint32_t n_out = 0, left = n, tried = 0, i = 1; /* from 1: a convex polygon becomes a fan about corner 0 */
     for (uint32_t step = 1; left > 3; step++) {
-        /* A polygon of the most corners may take seconds. */
+        /* A polygon of 65,536 corners, the most that core/scene/build.h allows, may take seconds. */
         if (step % 16 == 0 && (t->stopped = sh_stopped(t->report))) return;
         uint32_t next = t->at[i].next;
         if (is_ear(t, i)) {

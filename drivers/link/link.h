@@ -42,13 +42,15 @@ struct link_spec {
     int dialect;        /* of that protocol; 0: any. Links don't look at it either */
     int units;          /* 1: each write has one whole unit of the protocol (a telegram), or the rest of one */
     int brief; /* tcp: 1: clients come for one request. When all places are taken, the longest silent one makes room */
-    int waits; /* enum link_waits; its owner sees to it */
-    int latency_ms;               /* in real time bytes may wait this long for others; its owner sees to it */
-    int clean;                    /* 1: it gets no injected faults; its owner sees to it */
+    /* The link's owner carries out the next three. Links don't look at them. */
+    int waits;                    /* enum link_waits */
+    int latency_ms;               /* in real time bytes may wait this long for others */
+    int clean;                    /* 1: the link gets no injected faults */
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
     struct link_memory *memory;   /* memory: what it shares with its client (memory.h); outlives the link */
-    /* usb: struct usb_backend_spec explains address, port, path, attach, retry_ms and udc */
+    /* usb: struct usb_backend_spec explains address, port, path, attach, retry_ms and udc. vid and pid are the vendor id
+     * and the product id of the device, 0x0000 to 0xffff. */
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
     int attach, retry_ms, vid, pid;

@@ -46,7 +46,7 @@ void usbredir_plug(struct usbredir *self)
     const struct usb_model *model = usb_device_model(self->device);
     const struct usb_identity *id = usb_device_identity(self->device);
     usb_device_attach(self->device, id->highest, usbredir_on_complete, self);
-    usb_device_assume_address(self->device); /* the guest's controller gives out addresses, and keeps them */
+    usb_device_assume_address(self->device); /* the guest's controller does not send SET_ADDRESS on */
     send_interfaces(self);
     struct usb_redir_device_connect_header connect = {.speed = speed[id->highest],
                                                       .device_class = model->class,

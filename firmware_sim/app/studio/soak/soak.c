@@ -186,7 +186,9 @@ static int open_head(struct soak_options *o, struct config *cfg, struct soak *so
     o->device.report = &app_report_stderr;
     int rc = site_load(cfg, &app_report_stderr, &head->site, err);
     if (rc == SH_OK) rc = site_open_sights(head->site, 0, head->site->n_stations, &app_report_stderr, err);
-    cfg->head.settings.frames = 0; /* only after the plan was made, as with `run --start --duration` */
+    /* From here on the scan has no end. The plan above is made for head.frames of the configuration, as with
+     * `run --start --duration`. */
+    cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = device_create(head->site, &o->device, &head->device, err);
     if (rc == SH_OK) rc = soak_clean_open(soak, err);
     if (rc == SH_OK) rc = loop_create(head->site, head->device, &options, &head->loop, err);
