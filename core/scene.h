@@ -6,7 +6,7 @@
  * (x, y, z) to (x, -z, y). Units and axes are what the spec says, never guessed. Readers give v in these
  * units and axes:
  *   Collada  comes in metres and y up: Assimp (5.2) applies its unit and up_axis
- *   IFC      comes in metres and y up, from its own readers, too
+ *   IFC      comes in metres and y up, from web-ifc and ifc-lite as from Assimp
  *   FBX      keeps the file's unit (mostly centimetres: scale 0.01) and axes (mostly y up)
  *   glTF     is metres and y up by definition; its tree is multiplied in double (core/import/gltf)
  *   STL      has neither
