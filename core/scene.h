@@ -6,7 +6,7 @@
  * (x, y, z) to (x, -z, y). Units and axes are what the spec says, never guessed. Readers give v in these
  * units and axes:
  *   Collada  comes in metres and y up: Assimp (5.2) applies its unit and up_axis
- *   IFC      comes in metres and y up, from its own readers, too
+ *   IFC      comes in metres and y up, from web-ifc and ifc-lite as from Assimp
  *   FBX      keeps the file's unit (mostly centimetres: scale 0.01) and axes (mostly y up)
  *   glTF     is metres and y up by definition; its tree is multiplied in double (core/import/gltf)
  *   STL      has neither
@@ -178,7 +178,8 @@ struct scene {
  *   whose error is larger than tolerance_m is refused. The message names the error.
  *   An error above 1e-6 m is warned of, also that of a binary .ply with float coordinates, and of a binary .stl.
  * Errors (SH_EINPUT, naming the file): missing or unreadable, not a mesh, no triangles, a coordinate that is
- *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces or triangles (2^32-1).
+ *   not finite, an index out of range, |coordinate| beyond 1e9 m, too many surfaces, more than
+ *   2^32-2 vertices or triangles.
  * Progress goes to report about four times a second once a load takes longer than a second. SH_ESTOPPED where
  *   report asks to stop.
  * Assimp and the readers of glTF, GeoTIFF and IFC read in processes of their own, started here, since some broken files
@@ -212,8 +213,8 @@ int scene_keep(struct scene *scene, const uint8_t *keep, struct sh_err *err);
 int scene_find_duplicate_faces(const struct scene *scene, const struct sh_report *report, uint64_t **duplicate,
                                struct sh_err *err);
 
-/* (*same)[i] is the first of the scene's own vertices at the place of vertex i, bit for bit; to be freed. SH_ENOMEM,
- * SH_ESTOPPED. */
+/* (*same)[i] is the first of the scene's own vertices with the coordinates of vertex i, where -0 equals 0; to be freed.
+ * SH_ENOMEM, SH_ESTOPPED. */
 int scene_find_same(const struct scene *scene, const struct sh_report *report, uint32_t **same, struct sh_err *err);
 
 void scene_free(struct scene *scene);

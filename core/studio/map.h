@@ -7,7 +7,8 @@
  *   lightness  shows structure: a pixel with points on many levels (a wall) is dark, one with floor and
  *              ceiling only is light, one without points is white. Lightness does not depend on the density of
  *              points, so far walls stand out like near ones. Each point is drawn three pixels wide.
- *   hue        shows the height of the pixel's lowest point above the map's lowest
+ *   hue        shows the height of the lowest point in the pixel and its neighbours. The hues spread over the
+ *              heights of 99 % of the pixels, so that stray points don't take the colours from all others.
  * Lightness and hue are even steps of CIE L*a*b*. Below the map: scale bar, legend of heights, north arrow. Each
  * station has a red triangle, a tick where its heading points, and its name and height beside it. A label stands near
  * its station where it covers neither another label nor a station, and as little of walls as possible. Without such a

@@ -17,7 +17,7 @@
 enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 8, FINDER_PEAKS = 64 };
 #define FINDER_NEAR       2.5                /* sigmas on both sides of an echo's centre that a fit of one term uses */
 #define FINDER_LEAST      0.75               /* least sigma of an echo, over the pulse's: only noise makes it less */
-#define FINDER_ROUGH      0.001              /* added to a misfit (over the peak) that was learned at other samples */
+#define FINDER_ROUGH      0.001              /* added to a learned misfit (over the peak): its samples lay elsewhere */
 #define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
@@ -30,8 +30,8 @@ struct finder_term {
     double at, sigma, peak;
 };
 
-/* The echo of a plane of one of the tilts, without noise: its true figures, and how they differ from those of the term
- * that fits it best. A real head is adjusted on such targets. */
+/* This struct has the true figures of the echo of a plane, without noise, and how they differ from those of the term
+ * that fits the echo best. detect_learn.c lists the tilts of the planes. A real head is adjusted on such targets. */
 struct finder_spread {
     double sigma;     /* of that term */
     double lag;       /* from the echo's centroid to that term's middle */
@@ -39,7 +39,7 @@ struct finder_spread {
     double width;     /* of the echo, full at half maximum */
     double half_lead; /* from the echo's rising half maximum to its centroid */
     double misfit;    /* RMS of echo minus term near its middle, over its peak */
-    double tail;      /* largest difference of echo and term further out, over its peak */
+    double tail;      /* how far the echo is above the term further out, at most, over its peak */
 };
 
 /* This is the pulse h, as detectors know it. The struct is constant after finder_learn. */
@@ -106,7 +106,7 @@ static inline int finder_limited(const struct finder_run *run, const struct find
 {
     return run->mark != NULL && run->mark[peak->top] != FINDER_PLAIN;
 }
-/* Finds maxima of at least `least`, and keeps `most` of them. Returns their number, with those that found no room. */
+/* Finds maxima of at least `least`, and keeps the first `most` of them. Returns the number of all of them. */
 uint32_t finder_peaks(const struct finder_run *run, double least, struct finder_peak *peak, uint32_t most);
 /* Returns the largest signal about a top sample. *place: where it is. */
 double finder_top(const struct finder_run *run, uint32_t top, double *place);
@@ -125,7 +125,8 @@ struct finder_found {
 /* Returns a limit that a mean of n squares of noise exceeds once in 30,000 times. */
 double finder_noise2(const struct finder *finder, double n);
 
-/* A sum of terms. `open`: bit j is set where component j is limited, or cut by the window's end. */
+/* A sum of terms. `open`: bit j is set where component j is limited, has its top at the window's end, or falls to half
+ * of its peak on neither side. */
 struct finder_mix {
     uint32_t n, open, limited; /* limited: bit j is set where component j is limited */
     struct finder_term g[FINDER_MIX];
@@ -157,7 +158,8 @@ void finder_mix_fit(const struct finder_task *task, struct finder_mix *mix);
 /* Fills rest[hi - lo + 1] with the part of the samples that the components don't explain. */
 void finder_mix_rest(const struct finder_task *task, const struct finder_mix *mix, double *rest);
 /* Begins with one component for each peak. adds: more components follow while the residual could have another echo. The
- * height of a limited top is estimated from its flanks. */
+ * height of a limited top is estimated from the time for which the top is limited. Where the receiver went blind after
+ * the top, the height is estimated from the rising flank. */
 void finder_decompose(const struct finder_run *run, const struct finder_peak *peak, uint32_t n, int adds,
                       struct finder_mix *mix);
 

@@ -252,7 +252,7 @@ static void open_at(void *protocol, int64_t t_ns)
     if (s->talk->connection_run != TALK_NO_RUN) talk_begin(s, s->talk->connection_run, NO_REQUEST);
 }
 
-/* Requests are taken with the next tick: all the pieces of one that came together are there by then. */
+/* Requests are taken with the next tick. By then all pieces of a request that arrived together are in the buffer. */
 static void talk_input(void *protocol, const uint8_t *bytes, size_t len)
 {
     struct capture_session *s = protocol;
@@ -299,7 +299,7 @@ static int owes(const void *protocol)
 
 const struct protocol_ops protocol_capture = {
     .name = "capture",
-    .emitters = 1u << 31, /* no kind of emitter has this bit: it speaks for no head */
+    .emitters = 1u << 31, /* no kind of emitter has this bit: links of heads can't have this protocol */
     .max_unit = TALK_MAX_MESSAGE,
     .create = talk_create,
     .destroy = free,

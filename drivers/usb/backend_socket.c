@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Sockets of the back ends that talk over one. */
+/* The sockets over which the back ends usbip and usbredir reach a host. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>

@@ -19,7 +19,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 
-static atomic_int interrupted; /* lock-free, as a handler needs it; other threads ask for it, too */
+static atomic_int interrupted; /* lock-free, as a signal handler needs; other threads read it, too */
 
 /* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its
  * group. A third signal, or one more than a second after the first, ends the process at once. */

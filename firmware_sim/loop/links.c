@@ -42,8 +42,8 @@ static void advise(const struct config *cfg, double share, char *text, size_t le
         snprintf(text, len, "no rate of the head is low enough; allowed is a faster link%s", less);
 }
 
-/* A link that can't carry the stream is refused before it loses any of it. Other protocols are not checked: their rates
- * depend on what clients ask for. What such a link can't carry is lost in whole units, and counted. */
+/* A link of the native protocol that can't carry the stream is refused before it loses any of it. The other protocols
+ * are not checked: their rates depend on what clients ask for. A link of these loses whole units, which are counted. */
 static int check_capacity(const struct links *links, const struct config *cfg, const struct pump *pump,
                           struct sh_err *err)
 {

@@ -39,7 +39,8 @@ void mover_create(struct mover *mover, struct device *device, struct stream *str
 void mover_ask(struct mover *mover, struct move_box *box, int wake_fd);
 /* Takes the reply. 0: it is not there yet. */
 int mover_take(struct mover *mover, struct move_box *box, char reply[COMMAND_MAX_REPLY]);
-/* Ends the thread. A move that is under way is refused, and so are later ones. After the casters are joined. */
+/* Ends the thread. A move that is under way is refused, and so are later moves. To be called after the casters are
+ * joined. */
 void mover_join(struct mover *mover);
 
 #endif

@@ -10,8 +10,8 @@
  * datagrams in.
  *
  * A line is not used when it is malformed, out of reach, not later than the one before, or more than
- * DEVICE_POSE_AHEAD_S ahead of device time. Such a line is counted (bad_poses), and reported once per second at
- * most. */
+ * DEVICE_POSE_AHEAD_S ahead of device time (except in the pace `step`). Such a line is counted (bad_poses), and
+ * reported once per second at most. */
 #ifndef FIRMWARE_SIM_LOOP_POSE_FEED_H
 #define FIRMWARE_SIM_LOOP_POSE_FEED_H
 

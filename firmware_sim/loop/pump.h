@@ -16,7 +16,7 @@ int pump_start(struct pump *pump, struct sh_err *err);
 void pump_join(struct pump *pump);
 void pump_close(struct pump *pump);
 void pump_get_place(const struct pump *pump, struct link_place *place);
-/* After pump_join. */
+/* To be called after pump_join. */
 void pump_get_counts(const struct pump *pump, struct link_counts *counts);
 
 #endif

@@ -38,7 +38,7 @@ struct session_commands {
 struct session {
     int open;
     int shut;            /* its client sends nothing more */
-    int left;            /* the source was told (session_closed); control and a half line are gone */
+    int left;            /* session_closed was called: control is given back, an incomplete line is reported */
     uint32_t id;         /* from 1, over all links */
     int reader;          /* of the stream */
     uint64_t cursor;     /* next tick to take */
@@ -49,7 +49,7 @@ struct session {
         uint32_t next_seq;
         uint64_t next_pulse; /* pulses delivered before the frame of that number */
         uint64_t frames;
-        int lagging; /* the error queue has the loss */
+        int lagging; /* a loss was reported to the error queue; 0 again once the reader has caught up */
     } lost;          /* lost_frames.c */
     uint8_t *out;
     uint32_t out_len, out_pos;       /* bytes from out_pos on are not written yet */
@@ -150,7 +150,7 @@ void session_catch_up(struct pump *pump, struct session *s, uint64_t released, u
  * frame before the tick's frames. The tick's frames lie at the end of the session's buffer, with REPLY_ROOM / 8 bytes
  * free after them. `released`: ticks released when the tick was read. Returns how many frames are missing. */
 uint32_t session_check_lost(struct pump *pump, struct session *s, const struct ring_copy *tick, uint64_t released);
-/* Counts n units of a protocol. */
+/* Counts n units of a protocol as lost. */
 void session_count_units(struct pump *pump, struct session *s, uint64_t n);
 /* The client went away. Bytes that were not written to it count neither as received nor as lost. */
 void session_gone(struct pump *pump, struct session *s);

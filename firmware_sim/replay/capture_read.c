@@ -141,7 +141,7 @@ static int pass_time(struct replay_capture *c, const struct pcapng_packet *packe
                        (unsigned long long)c->counts.packets);
     if (!c->has_clock) c->clock_ns = packet->t_ns;
     c->has_clock = 1;
-    const int64_t passed_ns = packet->t_ns - c->clock_ns; /* neither is negative */
+    const int64_t passed_ns = packet->t_ns - c->clock_ns; /* fits: both times are 0 or more */
     c->counts.backward += passed_ns < 0;
     if (passed_ns > MAX_SPAN_NS - c->now_ns)
         return sh_fail(err, SH_EFORMAT, "packet %llu comes %.3g s after the first; allowed are up to %.3g s",

@@ -246,7 +246,8 @@ export class Knobs extends EventTarget {
     } catch { /* gone */ }
   }
 
-  // Arrow keys change the last digit that is shown by one. The head may still refuse the value.
+  // An arrow key adds or subtracts one in the last digit of the shown number, with Shift ten. The head may still refuse
+  // the value.
   #nudge(knob, event) {
     if (knob.field.tagName === 'SELECT' || knob.field.readOnly) return;
     const number = Number(knob.field.value);

@@ -2,8 +2,8 @@
 // This module reads payloads of fixed layout into objects, by the tables of the protocol's pages. A payload that
 // LOSSES.md tells a reader to refuse throws Refused.
 //
-// Whole numbers of 64 bits: times (`_ns`), the seed and an event's a, b, c are BigInt. All others are Numbers, or
-// BigInt where a Number can't hold them exactly (beyond 2^53).
+// Whole numbers of 64 bits: times (`_ns`), the seed, ptp_grandmaster and an event's a, b, c are BigInt. All others are
+// Numbers, or BigInt where a Number can't hold them exactly (beyond 2^53).
 
 export class Refused extends Error {}
 
@@ -102,7 +102,8 @@ export function readDescriptor(view) {
   return d;
 }
 
-/** `scale` and `axes` are filled in where the frame has zeros for "the same". */
+/** Where the frame has zeros, `scale` gets scale_m. `axes` gets the unit matrix if the frame has zeros alone: the axes
+ * of the CRS are then those of the scene. */
 export function readAnchor(view) {
   const a = whole(anchor, view, 'an anchor');
   if (a.crs > 3 || a.heights > 1) refuse('an anchor in an unknown CRS');
@@ -113,8 +114,8 @@ export function readAnchor(view) {
 
 export const readLineEnd = (view) => whole(lineEnd, view, 'a line end');
 
-/** The scan's counts are null in recordings of older heads, which did not have them. lost_lines is sent where it is not
- * 0. ptp_port is 0, and the rest of ptp is not there, where the head follows no PTP master. */
+/** The scan's counts are null in recordings of older heads, which did not have them. lost_lines is 0 where the payload
+ * ends before it. ptp_port is 0, and the rest of ptp is not there, where the head follows no PTP master. */
 export function readTelemetry(view) {
   const t = whole(telemetry, view, 'a telemetry');
   t.scan_fired = t.scan_cast = t.scan_lost = null;

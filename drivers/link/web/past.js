@@ -24,8 +24,8 @@ function readHead(bytes) {
 
 export class Past {
   stats = {past_points: 0, past_pulses: 0, past_gone: 0, past_lost_frames: 0};
-  unplaced = {points: 0, shots: 0}; // counts of live frames that were left to /past, where the head has no /past
-  #left = {points: 0, shots: 0}; // these are live frames that are left to /past
+  unplaced = {points: 0, shots: 0}; // of live frames that were left to /past, where the head has no /past
+  #left = {points: 0, shots: 0}; // of live frames that are left to /past
   #give;
   #hasRoom;
   #get;

@@ -131,7 +131,8 @@ export class Camera {
     this.distance = distance;
   }
 
-  // Looks in a direction without perspective; the scale at the target stays.
+  // Looks in a direction without perspective. The scale at the target stays, unless the eye was in the place of a head:
+  // then the field of view is 50 degrees again, and the target at least 10 m away.
   lookFlat(azimuth, elevation) {
     if (this.inside) this.distance = Math.max(this.distance, 10);
     Object.assign(this, {inside: false, flat: true, fov: radians(50), azimuth, elevation});

@@ -11,8 +11,8 @@
 #include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/fault/fault.h"
 
-/* A frame counts as late from LATE_MS on. MARGIN_MS is the tolerance: the time of a frame is exact only to a tick, and
- * the smallest delay that was seen may be above the smallest possible one. */
+/* Delays below LATE_MS are not judged. MARGIN_MS is the tolerance: the time of a frame is exact only to a tick, and the
+ * smallest delay that was seen may be above the smallest possible one. */
 static const double LATE_MS = 10.0, MARGIN_MS = 5.0;
 enum { NEAR_FRAMES = 64 };
 static const int64_t NEAR_NS = 20000000, FAR_NS = 20000000000;

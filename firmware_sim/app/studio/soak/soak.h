@@ -26,7 +26,7 @@ struct soak {
     int realtime;
     atomic_int phase;         /* enum soak_phase */
     _Atomic uint64_t until;   /* SOAK_DRAINS: clients go on up to this frame */
-    _Atomic uint64_t base;    /* a late soak_seq, from which soak_seq_of finds others; 0: no frame came so far */
+    _Atomic uint64_t base;    /* a recent soak_seq; soak_seq_of counts others from it; 0: no frame came so far */
     struct fault_list faults; /* as configured */
     struct loop_stats stats;
     double wall_s;
