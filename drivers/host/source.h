@@ -50,7 +50,7 @@ void host_hang_up(struct scanhead *sh);
 /* Opens what `source` names. Reading and writing it don't block; opening waits up to 10 s for a TCP connection. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
 int host_source_is_usb(const char *source);
-/* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
+/* usb_transfers.c: the same for "usb...". host_source_open() has set out's name, its fd to -1, and the rest to 0. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
 /* capture.c: source is an open .pcapng file. Where it fails, the descriptor is still the caller's. */
