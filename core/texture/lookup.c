@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which texel lies at a coordinate, and masks of holes. */
+/* Finds the texel at a coordinate, and makes masks of holes. */
 #include <math.h>
 #include <stdlib.h>
 

@@ -38,7 +38,7 @@ struct host_source {
     void *ctx;                    /* of host_open()'s caller */
     int is_file, is_socket;
     int unsettled;   /* lines may come that answer no command of ours: on a new terminal, after a time-out */
-    int asked;       /* *IDN? that went out to skip such lines, and have no answer yet */
+    int asked;       /* *IDN? without an answer yet: sent to skip such lines, or by a command that was given up */
     char name[4112]; /* for messages, and to open it again: a path (PATH_MAX) after "tty:" */
 };
 
