@@ -139,7 +139,8 @@ END
     as_nobody python3 /tmp/client.py "tcp:127.0.0.1:$port"
 }
 
-# Builds and runs the README's client, by pkg-config, with the library of the package: shared, then as an archive.
+# Builds and runs the README's client with the library of the package: with the shared library, by the flags of
+# pkg-config, and with the archive, by flags that are written here.
 client_in_c() {
     sed -n '/^```c /,/^```$/p' "$project/README.md" | sed '/^```/d' >"$root/tmp/client.c"
     inside sh -c 'cd /tmp && cc -Wall -Werror client.c $(pkg-config --cflags --libs libscanhead) -o client &&

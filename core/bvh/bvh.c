@@ -8,8 +8,8 @@
 #include "core/bvh/meet.h"
 #include "core/monotonic.h"
 
-/* tests/check/tsan.supp has the names of this function and of the two others that Embree's threads
- * call. */
+/* tests/check/tsan.supp has the names of this function and of the three others that Embree's threads call during a
+ * build. */
 static bool embree_counts_bytes(void *user, ssize_t bytes, bool post)
 {
     (void)post;

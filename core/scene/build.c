@@ -250,8 +250,9 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err)
 }
 
 /* Without area: the height over the longest edge is below 1e-12 of that edge. Rounding of the differences and
- * products stays under 1e-15 of it, so the test separates zero from noise. No real needle is that thin: over
- * 100 m it would be narrower than an atom. The test asks for "greater", so that underflow counts as zero. */
+ * products stays under 1e-15 of the edge, so a triangle that only rounding gives a height has no area here. No real
+ * needle is that thin: over 100 m it would be narrower than an atom. The test asks for "greater", so that underflow
+ * counts as zero. */
 static bool has_area(const double *a, const double *b, const double *c)
 {
     double u[3], v[3], w[3];

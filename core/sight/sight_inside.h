@@ -15,8 +15,8 @@
  * leaves. A look-up may round a direction's coordinates: each leaf is valid for SIGHT_PAD beyond its own
  * borders.
  *
- * Why leaves are right. The hit of a ray, as core/bvh has it, depends on the triangles that the ray meets or
- * misses by less than double precision tells, and on where it meets their planes. So it is enough to show
+ * Why leaves are right. The hit of a ray, as core/bvh has it, depends on the triangles that the ray meets, or
+ * misses by no more than the rounding of double, and on where it meets their planes. So it is enough to show
  * that all other triangles of the scene leave the hit as it is. A triangle is left out of a square only in
  * one of three ways:
  * - Beside the square (bins.c, region.c): the side of one edge is below minus its doubt at the four corners of the
@@ -49,14 +49,14 @@ enum {
     SIGHT_MAX_CELLS = 2048, /* a cell is then a thousand times its pad */
     SIGHT_MAX_LIST = 32,
 };
-/* In the coordinates on a face: 8 times their rounding in single precision. */
+/* In the coordinates on a face: more than twice the error of a look-up in single precision (places.c). */
 #define SIGHT_PAD 0x1p-20
 
 /* A leaf, or what a tile says: the kind in the two highest bits, a number in the others. */
 enum sight_kind {
-    SIGHT_ONE,   /* the number is that of a triangle, which all rays meet, and nothing before it */
+    SIGHT_ONE,   /* the number is that of a triangle: all rays meet it first */
     SIGHT_FEW,   /* list[number] is how many records follow, list[number + 1] .. which ones */
-    SIGHT_TILED, /* of a tile: leaf[number] .. leaf[number + SIGHT_BLOCK] are its leaves, rows of u */
+    SIGHT_TILED, /* of a tile: leaf[number] .. leaf[number + SIGHT_BLOCK - 1] are its leaves, rows of u */
     SIGHT_OTHER,
 };
 enum { SIGHT_KIND_SHIFT = 30, SIGHT_NUMBER = (1U << SIGHT_KIND_SHIFT) - 1 };

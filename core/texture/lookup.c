@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which texel lies at a coordinate, and masks of holes. */
+/* Finds the texel at a coordinate, and makes masks of holes. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -32,7 +32,8 @@ static int64_t along(double x, uint32_t n, enum texture_wrap wrap)
     return at < (int64_t)n ? at : (int64_t)n - 1; /* at the end, or rounded to it */
 }
 
-/* The row of a coordinate, counted from the top. A point on the border of two rows belongs to the upper one. */
+/* The row of a coordinate, counted from the top. A point on the border of two rows of the image belongs to the lower
+ * row. Where the image repeats, a point on the border of two copies belongs to the last row of the upper copy. */
 static int64_t down(double y, uint32_t n, enum texture_wrap wrap)
 {
     double turn = floor(y), part = y - turn;

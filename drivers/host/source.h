@@ -38,7 +38,7 @@ struct host_source {
     void *ctx;                    /* of host_open()'s caller */
     int is_file, is_socket;
     int unsettled;   /* lines may come that answer no command of ours: on a new terminal, after a time-out */
-    int asked;       /* *IDN? that went out to skip such lines, and have no answer yet */
+    int asked;       /* *IDN? without an answer yet: sent to skip such lines, or by a command that was given up */
     char name[4112]; /* for messages, and to open it again: a path (PATH_MAX) after "tty:" */
 };
 
@@ -50,7 +50,7 @@ void host_hang_up(struct scanhead *sh);
 /* Opens what `source` names. Reading and writing it don't block; opening waits up to 10 s for a TCP connection. */
 int host_source_open(const char *source, struct host_source *out, struct sh_err *err);
 int host_source_is_usb(const char *source);
-/* usb_transfers.c: the same for "usb..."; out is zero but for its name. */
+/* usb_transfers.c: the same for "usb...". host_source_open() has set out's name, its fd to -1, and the rest to 0. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
 /* capture.c: source is an open .pcapng file. Where it fails, the descriptor is still the caller's. */

@@ -72,7 +72,7 @@ struct scan_cfg {
     int32_t sectors, start_e4, stop_e4;
 };
 
-/* Both ends become the nearest beams, as with LMPoutputRange. */
+/* Whether the beams nearest to the two ends are the head's first and last. LMPoutputRange takes nearest beams, too. */
 static int area_fits(const struct planar_head *head, const struct scan_cfg *asked)
 {
     return cola_beam_at(head, asked->start_e4) == 0 && cola_beam_at(head, asked->stop_e4) == head->n - 1;

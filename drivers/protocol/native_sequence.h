@@ -3,7 +3,7 @@
  * missing. LOSSES.md has the rules.
  *
  * Headers of whole frames go in, one after the other. A kind of notice comes out for each. Numbers are modulo 2^32
- * throughout. A frame in order costs one store; only a jump is examined. */
+ * throughout. The header of a frame in order is only stored; only a jump is examined. */
 #ifndef DRIVERS_PROTOCOL_NATIVE_SEQUENCE_H
 #define DRIVERS_PROTOCOL_NATIVE_SEQUENCE_H
 

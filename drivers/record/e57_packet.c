@@ -191,7 +191,8 @@ static void count_points(struct e57_scan *scan, const uint8_t *const stream[E57_
     scan->n_points += n;
 }
 
-/* Counts the intensities of the records from `first` on. The caller has left out records without intensity. */
+/* Widens the scan's limits of intensity by the n records from `first` on. The caller has left out records without
+ * intensity. */
 static void count_intensities(struct e57_scan *scan, const uint8_t *const stream[E57_N_STREAMS], unsigned first,
                               unsigned n)
 {

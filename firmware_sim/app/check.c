@@ -273,8 +273,8 @@ static int print_section(const char *section)
 static const struct app_option OPTIONS[] = {
     OPTION_SET,
     {APP_FLAG, "scene", NULL, .at = offsetof(struct check_run, scene),
-     .help = "print the objects of the scene: triangles, open edges, area, volume and colour, the 50 largest first; "
-             "their sum; the names of open objects"},
+     .help = "print the 50 largest objects of the scene, with triangles, open edges, area, volume and colour; the sum "
+             "of all objects; the names of open objects"},
     {APP_TEXT, "scene-csv", "FILE", .at = offsetof(struct check_run, csv), .file = APP_WRITES,
      .help = "write all objects, with IFC type and GlobalId, as CSV; - is standard output, and all other output goes "
              "to standard error then"},

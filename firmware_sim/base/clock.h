@@ -11,7 +11,8 @@
 /* CLOCK_MONOTONIC in nanoseconds. Real-time safe. */
 int64_t clock_now_ns(void);
 /* UTC (ns since 1970, as POSIX counts) and TAI (ns since 1970-01-01 TAI) of the system's clocks at a
- * monotonic time near now. TAI: 0 where the system has no offset from UTC, so that its CLOCK_TAI shows UTC. */
+ * monotonic time near now. clock_tai_ns returns 0 where the system does not know the offset between TAI and UTC: then
+ * *tai_ns is UTC. */
 int64_t clock_utc_ns(int64_t now_ns);
 int clock_tai_ns(int64_t now_ns, int64_t *tai_ns);
 /* Sleeps until the monotonic time is reached; goes on after signals. Real-time safe. */

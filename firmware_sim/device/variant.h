@@ -16,7 +16,7 @@
  * it. */
 struct device_variant {
     struct device_variant *next;
-    struct device_version *version; /* that it is made from, and that it holds */
+    struct device_version *version; /* the variant is made from it, and counts as one of its users */
     struct site *site;
     struct head_settings settings;
     uint32_t station; /* from 0 */

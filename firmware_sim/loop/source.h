@@ -47,7 +47,7 @@ struct loop_source_ops {
     int (*power_up)(void *self, int64_t now_ns, const char **warning, struct sh_err *err);
     void (*end)(void *self);
     /* True while the buffer of a file that the source writes is more than a quarter full. At a pace other than
-     * `realtime`, the loop waits until none is. Takes no lock. */
+     * `realtime`, the loop waits as long as the function returns true. Takes no lock. */
     int (*files_fill)(const void *self);
     /* After all threads have ended: writes these files to their end. */
     int (*close_files)(void *self, struct sh_err *err);

@@ -11,8 +11,8 @@
 
 /* ---- which device it can be */
 
-/* Whether the stream has all that the protocol needs beside the emitter. NULL: it has; else a text says what is
- * missing. Amplitudes may be missing: protocols then use reflectances. */
+/* Checks that the stream has all that the protocol needs, except for the emitter. NULL: nothing is missing; else a text
+ * says what is. Amplitudes may be missing: protocols then use reflectances. */
 static const char *lacks(const struct replay *r, const struct protocol_ops *ops, const struct native_descriptor *d,
                          const struct native_emitter *e)
 {

@@ -24,7 +24,8 @@ static int column_of(double x, enum texture_wrap wrap)
     return column < WIDTH ? column : WIDTH - 1;
 }
 
-/* Row 0 is the upper one, at 1. A border belongs to the row above it. */
+/* Row 0 is the upper one, at 1. A border of two rows belongs to the lower one. A border of two copies of a repeated
+ * image belongs to the upper copy's last row. */
 static int row_of(double y, enum texture_wrap wrap)
 {
     double part = y - floor(y);

@@ -5,7 +5,7 @@
 
 #include "core/import/ifc/ifc_index.h"
 
-/* Finds the metres per unit of length, as the IfcProject says; SH_EINPUT where it doesn't. *m is good on success. */
+/* Sets *m to the metres per unit of length, as the IfcProject gives them. SH_EINPUT where the project gives none. */
 int ifc_unit_find(const struct ifc_index *x, double *m, struct sh_err *err);
 /* The same for a record that is a unit. */
 int ifc_unit_of(const struct ifc_index *x, const struct step_record *unit, double *m, struct sh_err *err);

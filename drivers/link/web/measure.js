@@ -217,7 +217,7 @@ const NEIGHBOURS = 8;
 
 // A generator, whose last value is the mean distance of the points around a place. The distance follows from the area
 // of the k nearest points, which has (k - 1) points in the mean if they lie evenly at random. NaN: fewer than nine
-// points lie within 2 m, or the cloud was cleared.
+// points lie within the largest radius, which is 2 to 6 m, or the cloud was cleared.
 export function* spacingAround(cloud, place, first_m) {
   const {window, origin} = cloud;
   if (origin === null) return NaN;

@@ -112,7 +112,8 @@ export function widened(old, fresh) {
   return [fresh[0] < old[0] - slack ? fresh[0] : old[0], fresh[1] > old[1] + slack ? fresh[1] : old[1]];
 }
 
-// Returns steps of 1, 2 or 5 times a power of ten within the limits, at most `most`.
+// Returns round values within the limits: {value, text}. Their distance is 1, 2 or 5 times a power of ten. The limits
+// are at most `most` such distances apart, so there are up to `most` + 1 values.
 export function ticks([lo, hi], most = 6) {
   const raw = (hi - lo) / most;
   const power = 10 ** Math.floor(Math.log10(raw));

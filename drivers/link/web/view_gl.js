@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 // This module has shaders, programs and targets of the picture in WebGL 2, but not their use.
 //
-// All positions are relative to an origin of their own; the eye relative to it comes as the sum of two floats. Depth is
-// logarithmic (view_camera.js), and stands in the target's texture, where shading and hiding read it.
+// All positions are relative to an origin of their own; the eye relative to it comes as the sum of two floats. The
+// depth (view_camera.js) is logarithmic in a perspective view, but not in a flat one. The target's texture has the
+// depth; shading and hiding read it there.
 
 import {FAR_M, FLAT_REACH, NEAR_M, split, sub} from './view_camera.js';
 
@@ -152,8 +153,8 @@ void main() {
 }`,
 };
 
-// Puts the picture onto the page: the ground where it is empty, and darker beside nearer things (eye-dome lighting,
-// Boucheny 2009). With logarithmic depth the shading is the same at all scales.
+// Puts the picture onto the page. Empty pixels get the page's background (u_ground), and pixels beside nearer things
+// become darker (eye-dome lighting, Boucheny 2009). With logarithmic depth the shading is the same at all scales.
 const SHADE = {
   vertex: `${HEAD}
 void main() { gl_Position = vec4(vec2(gl_VertexID & 1, gl_VertexID >> 1) * 4.0 - 1.0, 0.0, 1.0); }`,
@@ -293,7 +294,7 @@ export class Target {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
   }
 
-  // Puts the picture onto the canvas, which has so many pixels.
+  // Puts the picture onto the canvas, which is `width` by `height` pixels large.
   toPage(width, height) {
     const {gl} = this;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.buffer);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-// This class finds limits of the colours and of the view from the cloud's points. The limits change rarely, so that
-// nothing flickers: each time the cloud has twice the points, and then only if the new points lie far outside.
+// From the cloud's points, the class Scale finds the limits of the colours, and boxOf() finds the box of the view. The
+// limits change rarely, so that nothing flickers: each time the cloud has twice the points, and then only if the new
+// points lie far outside.
 
 import {MODES, legendOf, robustLimits, sampleOf, widened} from './view_colours.js';
 

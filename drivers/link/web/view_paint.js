@@ -100,8 +100,8 @@ export class CellsPart {
     this.n = n / 3;
   }
 
-  // counts has the number of stations that see each cell. isTurned: they see the backs of the faces. showsUnseen(cell)
-  // says whether a cell that none sees is painted; false: none is.
+  // counts has the number of stations that see each cell. isTurned: the stations see the backs of the faces.
+  // showsUnseen(cell) says whether a cell that no station sees is painted; without showsUnseen no such cell is.
   show({counts, isTurned, showsUnseen}) {
     const {gl} = this;
     this.isTurned = isTurned;

@@ -22,7 +22,8 @@ static int64_t udeg_or(double deg, int64_t otherwise_udeg)
     return isinf(deg) ? otherwise_udeg : llround(1e6 * deg);
 }
 
-/* Sets windows of the lines and of the pan. Heads that don't scan lines are refused. */
+/* Sets the windows of the lines and of the pan that the request gives. A window for a head that does not scan lines is
+ * refused. */
 static int set_windows(const struct preview_request *r, const struct config_profile *p, struct head_settings *s,
                        struct sh_err *err)
 {
@@ -164,8 +165,8 @@ static void put_floats(char **to, const float *v, size_t n)
         le_put_float(*to, v[i]);
 }
 
-/* Writes the height above the ground, the radius that a cone hides there, and how far the feet reach. Without a tripod
- * they are NaN and 0. */
+/* Writes the head's height above the ground, the radius of the ground that the tripod's cone hides, and how far its
+ * feet reach. Without a tripod these are NaN, 0 and 0. */
 static void put_tripod(char *to, const struct site_tripod *t)
 {
     const int stands = t->from != NULL, hides = stands && t->cast.cos_opening < 1.0 && !isnan(t->head_m);

@@ -28,7 +28,7 @@ struct report_verdict {
 /* "within", "beyond", "not judged". */
 const char *report_judgement_name(enum report_judgement judgement);
 
-/* Fills in the setup and the errors of a site's head at a station, from 0. file_count_m is the caller's. */
+/* Sets *head to the setup and the errors of a site's head at a station. file_count_m becomes 0: the caller sets it. */
 void report_head_of(const struct site *site, uint32_t station, struct deviation_head *head);
 
 /* Counts one point, by its distance from the scene, its deviation along the beam and its range
