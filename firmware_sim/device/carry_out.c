@@ -86,7 +86,8 @@ static void do_dead(struct device *device, uint32_t session, const char *line, u
     *cmd = device->cmd;
     cmd->faults = &fault_desk_queries; /* the copy must not change the device's own faults */
     command_execute(cmd, session, line, out);
-    if (out->changes && out->effect != COMMAND_STEP) command_refuse(cmd, CMD_E_SETTINGS, "the head has no power", out);
+    const int is_act = out->changes || out->effect == COMMAND_TAKE;
+    if (is_act && out->effect != COMMAND_STEP) command_refuse(cmd, CMD_E_SETTINGS, "the head has no power", out);
     free(cmd);
 }
 

@@ -150,6 +150,9 @@ static void loses_power(void **state)
     assert_non_null(strstr(result.reply, "the head has no power"));
     device_command(rig->device, 1, "FAULt:CLEar 1", 1001, &result);
     assert_non_null(strstr(result.reply, "the head has no power"));
+    device_command(rig->device, 1, "SYSTem:CONTrol:TAKE", 1001, &result);
+    assert_int_equal(result.error, CMD_E_SETTINGS);
+    assert_non_null(strstr(result.reply, "the head has no power"));
     assert_string_equal(rig_tell(rig, "FAULt:LIST?", 1001), "1 power_cycle"); /* a query is answered */
     assert_string_equal(rig_tell(rig, "FAULt:INJected? 1", 1001), "1");
     while (rig->next < 1500) {
