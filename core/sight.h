@@ -58,7 +58,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
 void sight_free(struct sight *sight);
 void sight_get_info(const struct sight *sight, struct sight_info *info);
 
-/* How often rays could not be decided by the map. */
+/* How often the cell of a ray did not give the answer by itself. */
 struct sight_counters {
     uint64_t few;   /* rays decided among a few triangles */
     uint64_t asked; /* the BVH was asked: the cell says so, or double precision can't separate two edges or planes */
