@@ -2,7 +2,7 @@
 /* The rows of a table: a key with its type, unit, default, limits and member of a struct. Tables are constant.
  *
  * A row's path is generic: "stations[].lat_deg" stands for every station, and `item` is the station's number. Lists
- * do not nest, so one number is enough. */
+ * of one table do not nest, so one number is enough. The copies of a mesh have a table of their own (copies.h). */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_ROW_H
 #define FIRMWARE_SIM_CONFIG_TABLE_ROW_H
 
