@@ -122,7 +122,8 @@ double schedule_sweep_turn(const struct schedule_segment *seg, uint64_t k);
 /* Changes a run of a line head, or of a head of beams: that axis stands still at sweep_turn. Lines go on by time. */
 void schedule_hold_run(const struct schedule_segment *seg, double sweep_turn, struct schedule_run *run);
 
-/* Returns the number of pulses that fire within max_ns, at least one. */
+/* Returns a number of pulses that fire within max_ns for certain, or 1. The time from pulse to pulse is rounded up, so
+ * a few more pulses may fire within max_ns. */
 uint64_t schedule_longest_run(const struct schedule_segment *seg, int64_t max_ns);
 
 /* These two functions return pan angle and mirror angle of any pulse, in turns, for the encoders. The pan angle is not

@@ -10,7 +10,7 @@
  * cells are right is in core/sight/sight_inside.h.
  *
  * A sight is constant after it is made, and may be used from any thread; each thread has working memory of
- * its own. The scene must stand still, and have no surface with holes. */
+ * its own. The scene must stand still. It must have no surface with holes and no copies of meshes. */
 #ifndef CORE_SIGHT_H
 #define CORE_SIGHT_H
 
@@ -45,7 +45,8 @@ struct sight_info {
     double build_s;
 };
 
-/* True where a sight is possible: no surface has holes, and triangles are few enough to be numbered. */
+/* True where a sight is possible: no surface has holes, no mesh has copies, and triangles are few enough to be
+ * numbered. */
 int sight_possible(const struct scene *scene);
 /* Cells along an edge of the cube's faces, for rays and memory_bytes as of struct sight_spec. */
 uint32_t sight_cells(double rays, uint64_t memory_bytes);
@@ -58,7 +59,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
 void sight_free(struct sight *sight);
 void sight_get_info(const struct sight *sight, struct sight_info *info);
 
-/* How often rays could not be decided by the map. */
+/* How often the cell of a ray did not give the answer by itself. */
 struct sight_counters {
     uint64_t few;   /* rays decided among a few triangles */
     uint64_t asked; /* the BVH was asked: the cell says so, or double precision can't separate two edges or planes */

@@ -9,7 +9,7 @@
 /* Rays, and their first hits among scene and bodies. */
 struct ray_hits {
     struct bvh_rays rays; /* a triangle's number is that in the body that was hit */
-    /* only where surfaces are modelled or bodies move, else NULL: */
+    /* cosine and body are NULL where no later stage needs them: */
     double *cosine; /* of the incidence */
     uint8_t *body;  /* 0: what stands still; k + 1: mover k */
     /* only where colours are those of textures, else NULL: */
@@ -20,8 +20,8 @@ struct ray_hits {
 struct nearest {
     struct bvh_work *bvh;
     struct sight_work *sight;
-    /* touched only where something moves: */
-    struct chunk_vectors mover_d, mover_p; /* rays in the frame of a moving body */
+    /* touched only where bodies are cast by themselves (a mover, a tripod's legs): */
+    struct chunk_vectors mover_d, mover_p; /* rays in the frame of that body */
     double mover_range_m[CHUNK];
     uint32_t mover_hit[CHUNK], mover_label[CHUNK];
 };

@@ -28,7 +28,7 @@ struct wave_work {
     } of[CHUNK];
     struct wave_part part[CHUNK * WAVES_PARTS];
     uint32_t n_parts;
-    uint8_t merged[CHUNK]; /* where echoes are found in samples: a pulse's echoes by its merged returns */
+    uint8_t merged[CHUNK]; /* where echoes are found in samples: the number of echoes of a pulse's merged returns */
     /* of the pulse at hand: */
     struct waveform_return returns[WAVES_PARTS];
     struct waveform_record record;

@@ -24,12 +24,12 @@ struct ply {
     uint64_t n_empty; /* faces without corners */
     /* ---- read_ply_colours.c */
     struct ply_colour {
-        float rgb[3], uv[2]; /* as in the file; NaN: none */
+        float rgb[3], uv[2]; /* as in the file. Without colours rgb is 0; without coordinates uv is NaN. */
     } * colour;              /* of each vertex, where colours or texture coordinates are wanted and there */
     size_t n_colours, cap_colours;
     double rgb_scale;  /* of colours of vertices; 0: not known yet */
     double face_scale; /* of those of faces */
-    /* The file has these, and they are wanted: */
+    /* has_vertex_uv and has_texnumbers: the file has such figures. The others: they are wanted, too. */
     bool has_vertex_rgb;               /* colours of vertices */
     bool has_face_rgb;                 /* colours of faces, in the element at hand */
     bool has_uv;                       /* texture coordinates, by vertex, face or both */

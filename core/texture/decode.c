@@ -201,7 +201,7 @@ static const uint8_t *find_frame(const uint8_t *bytes, size_t n)
     for (size_t at = 2; at + 9 <= n && bytes[at] == 0xff;) {
         const uint8_t marker = bytes[at + 1];
         if ((marker & 0xf0) == 0xc0 && marker != 0xc4 && marker != 0xc8 && marker != 0xcc) return bytes + at;
-        if (marker == 0xda || marker == 0xd9) return NULL; /* texels begin */
+        if (marker == 0xda || marker == 0xd9) return NULL; /* the texels begin, or the image ends */
         at += marker == 0xff ? 1 : 2 + 256U * bytes[at + 2] + bytes[at + 3];
     }
     return NULL;

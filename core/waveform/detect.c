@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Echoes are found in a pulse's samples in three steps. Counts become signals, windows are searched for maxima, and
- * maxima that run into each other are decomposed together. */
+/* Finds echoes in a pulse's samples. First counts become signals. Then one of the detectors searches each window. The
+ * detector `gaussians` is in this file: it finds maxima, and decomposes those that run into each other together. */
 #include "core/waveform/detect_inside.h"
 
 #include <math.h>

@@ -13,7 +13,8 @@ enum { LEARN_STEPS = 24, LEARN_ROOM = 2048 };
 /* Extent of each tilt, in widths of the pulse. */
 static const double learn_tilts[FINDER_SPREADS] = {0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0};
 
-/* Shares of the peak of h. A term reaches as far as h is above LEARN_LEAST, which a Gaussian has at 5 sigmas. In
+/* Shares of the peak of h. After its middle a term reaches as far as h is above LEARN_LEAST, which a Gaussian has at 5
+ * sigmas. Before its middle a term reaches to the beginning of the table of h, or 5 sigmas far for a Gaussian. In
  * logarithms, values below LEARN_NOTHING count as LEARN_NOTHING. */
 #define LEARN_LEAST   4e-6
 #define LEARN_NOTHING 1e-12

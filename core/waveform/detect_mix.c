@@ -49,7 +49,7 @@ static void mix_begin(const struct finder_task *task, const struct finder_term *
     walker->change = exp(-walker->step * walker->step);
 }
 
-/* Computes a component's values and derivatives in samples first .. first + MIX_BLOCK. */
+/* Computes a component's values and derivatives in samples first .. first + MIX_BLOCK - 1. */
 static void mix_rows(struct mix_walker *walker, uint32_t first, double (*restrict row)[MIX_BLOCK])
 {
     struct mix_walker w = *walker;

@@ -26,7 +26,7 @@ struct usb_wanted {
 };
 
 struct usb_interface {
-    uint8_t number, in, out; /* endpoint addresses */
+    uint8_t number, in, out; /* number of the interface; addresses of its endpoints */
 };
 
 int host_usb_parse(const char *source, struct usb_wanted *wanted, struct sh_err *err);

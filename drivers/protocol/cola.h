@@ -72,14 +72,14 @@ struct cola {
     int64_t now_ns;
     int64_t power_ns; /* device time of power-up: its clock begins there */
     uint32_t power_ons;
-    uint32_t near_wrap;         /* how far below their wrap counters begin; 0: they begin at 0 */
-    int streams;                /* sEN LMDscandata 1 */
-    enum cola_form stream_form; /* of telegrams without a request */
-    int pending;                /* a scan is done and not yet looked at */
-    uint32_t since_sent;        /* scans since one was sent */
-    uint32_t n_waiting;         /* sRN LMDscandata before there was a scan; answered with the first, in their forms: */
-    uint8_t waiting_form[COLA_MOST_WAITING];
-    uint16_t telegrams; /* counter of LMDscandata */
+    uint32_t near_wrap;                      /* counters begin this far below their wrap; 0: they begin at 0 */
+    int streams;                             /* sEN LMDscandata 1 */
+    enum cola_form stream_form;              /* of telegrams without a request */
+    int pending;                             /* a scan is done and not yet looked at */
+    uint32_t since_sent;                     /* scans since one was sent */
+    uint32_t n_waiting;                      /* polls (sRN LMDscandata) that wait for the next scan */
+    uint8_t waiting_form[COLA_MOST_WAITING]; /* the form in which each is answered */
+    uint16_t telegrams;                      /* counter of LMDscandata */
     struct cola_input input;
     struct planar_scan scan;
     struct cola_way way;

@@ -171,7 +171,7 @@ int cola_start_scan(struct cola *self)
     return 1;
 }
 
-/* u8 0: measures; 1: not allowed, and all is as before */
+/* u8 0: measures; 1: not allowed; polls that wait are then refused */
 enum cola_error cola_start(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const enum cola_error error = cola_args_end(args);

@@ -130,8 +130,8 @@ static int pcapng_fail(const struct pcapng_reader *reader, struct sh_err *err, c
     return sh_fail(err, SH_EFORMAT, "at byte %llu: %s", (unsigned long long)reader->at_byte, what);
 }
 
-/* if_tsresol: 10^-n s, or with the top bit 2^-n s. if_tsoffset: whole seconds more, from 1970 on. Times farther than
- * 292 years from 1970 are INT64_MAX or INT64_MIN. */
+/* The unit of a time is if_tsresol: 10^-n s, or with the top bit 2^-n s. The whole seconds of if_tsoffset are added.
+ * The sum counts from 1970. Times farther than 292 years from 1970 are INT64_MAX or INT64_MIN. */
 static int64_t to_ns(uint64_t time, const struct pcapng_interface *interface)
 {
     const int n = interface->resolution & 0x7f;

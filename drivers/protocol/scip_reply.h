@@ -43,7 +43,7 @@ void scip_reply_time_us(struct scip_reply *r, uint64_t us);
  * fits is written. */
 void scip_reply_value(struct scip_reply *r, uint32_t value, int n_chars);
 void scip_reply_mark(struct scip_reply *r, char mark);
-/* The last block, and the empty line. */
+/* Ends the last block with its sum, and puts the empty line. */
 void scip_reply_end(struct scip_reply *r);
 
 /* The sum of a line, as the character that ends it. */

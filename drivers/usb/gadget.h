@@ -26,8 +26,8 @@ struct gadget {
     uint8_t interface[USB_MAX_INTERFACES]; /* of the model, by number in the part */
 };
 
-/* Removes what dead processes left, then makes everything but the binding: ep0 in gadget->mount is ready to
- * be opened. */
+/* Removes what dead processes left, then makes everything but the binding. Where the gadget has FunctionFS, ep0 in
+ * gadget->mount is then ready to be opened. */
 int gadget_create(struct gadget *gadget, const struct usb_model *model, const struct usb_identity *id,
                   struct sh_err *err);
 /* Whether FunctionFS carries something of the gadget. */

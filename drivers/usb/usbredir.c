@@ -19,7 +19,7 @@
 
 #include "drivers/usb/usbredir_private.h"
 
-/* MAX_UNSENT: packets that wait for the guest to read them; above that nothing more is read from it.
+/* MAX_UNSENT: while so many packets wait for the guest to read them, nothing is read from the guest.
  * MAX_READS: in one call; a guest that sends without end must not occupy the thread. */
 enum { CLOSE_WAIT_MS = 500, SEND_BUFFER_BYTES = 1 << 20, MAX_UNSENT = 64, MAX_READS = 256 };
 

@@ -19,7 +19,7 @@ struct usbredir {
     int broken;
     int greeted;               /* its hello has come */
     int unplugged;             /* by an injected fault */
-    struct usb_transfer *held; /* requests that take their time, each of a redir_request */
+    struct usb_transfer *held; /* requests that are answered later; each is the first member of a redir_request */
     uint32_t n_held;
     const struct usb_owner *owner; /* within handle() */
     int n_reads;                   /* within one call of handle */

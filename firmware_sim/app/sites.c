@@ -20,7 +20,7 @@ static int sites_add(const struct config *cfg, uint32_t station, const struct sh
                        : rc;
 }
 
-/* Loads the sites of all stations but the first, which is loaded already. */
+/* Loads a site for each scanner but that of head.station, whose site is loaded already. */
 static int load_others(const struct config *cfg, const struct sh_report *report, struct sites *sites,
                        struct sh_err *err)
 {

@@ -30,7 +30,7 @@ static void stop(struct device *device, enum head_event event, uint64_t tick)
 static void carry_out(struct device *device, enum command_effect effect, uint64_t released)
 {
     switch (effect) {
-    case COMMAND_MOVE: /* only begins the move; it is done once it is planned */
+    case COMMAND_MOVE: /* the caller begins the move; change_settings does nothing where no scan is on */
     case COMMAND_SETTINGS:
         change_settings(device);
         break;
@@ -106,7 +106,8 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->t_ns = (int64_t)released * device->tick_ns;
     device->desk.now_ns = (int64_t)device->next_tick * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
-    cmd->keeps = session == 0 || device->settings != NULL; /* a replayed journal stores nothing */
+    /* HEAD:STORe of a journal (session 0) is not refused, though a replay stores nothing. */
+    cmd->keeps = session == 0 || device->settings != NULL;
     cmd->lost_journal_lines = atomic_load(&device->counters.lost_journal_lines);
     cmd->lost_truth_lines = atomic_load(&device->counters.lost_truth_lines);
     device_set_time_texts(device);

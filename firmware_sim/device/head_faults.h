@@ -3,8 +3,8 @@
  *
  * In: the board of the run, and each tick as it is claimed. Out: the faults that are active in it. A fault is noted on
  * the board when it begins, with device time and, during a scan, the first pulse that it hits. The fault is noted
- * again, as ended, when it is over. Everything depends on device time only, so it is the same at any pace and number of
- * threads.
+ * again, as ended, when it is over; jumps and leap seconds have no end. Everything depends on device time only, so it
+ * is the same at any pace and number of threads.
  *
  * A fault begins with the first tick that starts at from_s or later, and ends with the first that starts at until_s or
  * later, as commands do. The clock's faults are exact to the nanosecond instead. With from_pulse or until_pulse a fault

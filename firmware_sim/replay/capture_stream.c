@@ -19,7 +19,7 @@ struct part {
 struct parts {
     struct part *part;
     size_t n, room;
-    int has_begin; /* the side's SYN is there: place 0 is its first byte */
+    int has_begin; /* place 0 is the side's first byte: its SYN is there, or the flow is not TCP */
     int64_t end;   /* the place after the last byte that was sent, also if that byte was cut off */
 };
 

@@ -179,7 +179,8 @@ static void warn_of_coarse_counts(const struct site *site, const struct sh_repor
         FINEST_M * MOST_RANGE_COUNTS / (polar ? 1.0 : 2.0));
 }
 
-/* Points reach as far as for scale_station: within a longer reach the same count would seem too long. */
+/* Returns the longest count of a station, in metres. The reach is that of scale_station: beyond it no point lies, and
+ * a count of longitude may be longer there. */
 static double count_m(const struct site *site, const struct site_station *s)
 {
     double most_m = 0.0;

@@ -13,8 +13,8 @@
 #include "firmware_sim/site/look.h"
 #include "firmware_sim/site/waves.h"
 
-/* Processor time for warming the caches, and for measuring. Runs are short enough that one of the most
- * expensive pulses (1,027 sub-rays) ends within a few milliseconds. */
+/* Processor time for warming the caches, and for measuring. Runs are short, so that even a run of the most expensive
+ * pulses (1,027 sub-rays each) ends within a few milliseconds. */
 static const int64_t WARM_NS = 2000000, MEASURE_NS = 6000000;
 enum { RUN = 64, TRIES = 4096, LEAST_RUNS = 2, MOST_RUNS = 4096 };
 enum { MAX_DT_NS = (1 << 24) - 1 };   /* a point's time within its frame has 24 bits */

@@ -209,7 +209,8 @@ static int read_lay(struct gltf *g, const json_t *info, const char *at, struct g
 
 /* ---- materials */
 
-/* The opacity below which a material has holes, as the format says. */
+/* Returns the opacity below which a material has holes. For OPAQUE and MASK the format gives the figure. For BLEND
+ * the format gives none, so this reader takes 0.5. */
 static float solid_of(const json_t *material)
 {
     const char *mode = gltf_text(material, "alphaMode");

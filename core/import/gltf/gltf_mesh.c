@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Adds the primitives of a mesh to the builder, of any mode. A vertex is added when a triangle first uses it, since
- * primitives may share accessors that are much larger than themselves. */
+/* Adds the triangles of a mesh's primitives to the builder. Points and lines are left out and counted. A vertex is
+ * added when a triangle first uses it, since primitives may share accessors that are much larger than themselves. */
 #include "core/import/gltf/gltf_mesh.h"
 
 #include <stdlib.h>

@@ -85,7 +85,7 @@ static double pieces_of(const struct count *count)
 {
     const double n = ceil(count->columns);
     if (n == 0.0) return 0.0;
-    if (n > 1e4) return n * (0.5 * count->across + 1.0); /* rounded up by half a row each, on average */
+    if (n > 1e4) return n * (0.5 * count->across + 1.0); /* the sum is not more than this */
     double sum = 0.0;
     for (double k = 1.0; k <= n; k++)
         sum += fmax(ceil(count->across * k / n), 1.0);

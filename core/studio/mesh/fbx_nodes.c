@@ -56,7 +56,7 @@ static int read_node(const struct nodes *n, uint64_t at, uint64_t end, struct no
     return 1;
 }
 
-/* Returns the length of the node with all ends, in bytes. Negative: an error. */
+/* Returns the length of the node in bytes, with the empty nodes that end its lists. Negative: an error. */
 static int64_t length_of(const struct nodes *n, const struct node *node, int depth, struct sh_err *err)
 {
     int64_t sum = (int64_t)(node->inside - node->at);

@@ -54,7 +54,7 @@ export function atMostEvery(ms, call) {
 export const NONE = '–';
 const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
-// Turns 1234567 into '1 234 567' with thin spaces; at most `digits` stand after the point.
+// Turns 1234567 into '1 234 567' with thin spaces; `digits` digits stand after the point.
 export function grouped(value, digits = 0) {
   if (typeof value === 'bigint') value = Number(value);
   if (!known(value)) return NONE;

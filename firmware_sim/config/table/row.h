@@ -2,7 +2,7 @@
 /* The rows of a table: a key with its type, unit, default, limits and member of a struct. Tables are constant.
  *
  * A row's path is generic: "stations[].lat_deg" stands for every station, and `item` is the station's number. Lists
- * do not nest, so one number is enough. */
+ * of one table do not nest, so one number is enough. The copies of a mesh have a table of their own (copies.h). */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_ROW_H
 #define FIRMWARE_SIM_CONFIG_TABLE_ROW_H
 
@@ -29,7 +29,7 @@ enum cfg_flags {
     CFG_FIGURE = 1,   /* written { value: V, from: data sheet|quoted|assumed }; source, note, definition may follow */
     CFG_HEX = 4,      /* written 0x1209, and only so: 1209 could be decimal or hexadecimal */
     CFG_ASCII = 2,    /* goes into *IDN?: printable ASCII without comma and quotes */
-    CFG_WRITTEN = 16, /* of CFG_PATH: the file is written; without it, it is read */
+    CFG_WRITTEN = 16, /* of CFG_PATH: the file is written; without this flag the file is read */
     CFG_NEEDED = 8,   /* has no default that suits most configurations: the example gives it a value */
     CFG_SPECIAL = 32, /* a list for some heads only: the example comments it out with all that is in it */
 };

@@ -53,7 +53,7 @@ static int sort_faces(struct viewed_mesh *m)
     return ok;
 }
 
-/* Takes the triangles over; corners become points of the recording. */
+/* Takes the triangles over. Their corners become numbers of points, counted from the mesh's first point. */
 static int add_mesh(struct viewed_stream *s, struct scan_faces *faces, const double (*xyz_m)[3], struct sh_err *err)
 {
     struct viewed *v = s->v;

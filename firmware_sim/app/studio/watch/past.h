@@ -10,7 +10,7 @@
  * `bytes`, the oldest piece goes, and its points are counted as gone.
  *
  * Memory: pieces with room for PAST_PIECE bytes and four more frames, allocated as points come. All pieces together
- * hold up to `bytes` of frames. No piece is allocated before the first points.
+ * hold up to `bytes` of frames. No piece is allocated before the first points or poses.
  * Threads: one takes frames; any number of others read. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H
 #define FIRMWARE_SIM_APP_STUDIO_WATCH_PAST_H

@@ -8,9 +8,9 @@
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/config/config.h"
 
-/* Limits of the number of cells, which is approximate, and of memory. Each triangle has at least one piece of a cell.
- * A piece is counted below with 148 bytes, a little more than it takes (PIECE_BYTES in
- * core/studio/coverage/cells.c). */
+/* Limits of the number of cells, which is approximate, and of memory. Each triangle is counted below with at least one
+ * piece of a cell, also a duplicate face, which has none. A piece is counted with 148 bytes, a little more than it
+ * takes (PIECE_BYTES in core/studio/coverage/cells.c). */
 static const double MOST_CELLS = 20000.0, MOST_MIB = 160.0;
 enum { TRIES = 12 };
 
