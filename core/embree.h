@@ -20,8 +20,8 @@
 /* Turns an error of Embree into ours. */
 int embree_fail(enum RTCError code, struct sh_err *err);
 
-/* Whether Embree takes packets of that many rays (4, 8 or 16) as they are. Embree divides packets of other sizes, and a
- * leaf may then get rays of several packets at once. */
+/* Whether Embree takes packets of that many rays (4, 8 or 16) as they are. Packets of 16 also need leaves for them
+ * (bvh_has_wide). Embree divides packets of other sizes, and a leaf may then get rays of several packets at once. */
 int embree_has_packet(RTCDevice device, uint32_t rays);
 /* Rays a packet at which Embree is best on this machine: 16, 8, 4 or 1. */
 uint32_t embree_packet(RTCDevice device);

@@ -52,7 +52,8 @@ static struct strip between(double from, double to)
     return (struct strip){sum.energy * step / 3.0, sum.along * step / 3.0, sum.across * step / 3.0};
 }
 
-/* By Gauss's theorem: x exp(-2 r^2) is minus a quarter of the derivative of exp(-2 r^2) by x. */
+/* Returns the first moment of the energy beyond the chord at h. It follows by Gauss's theorem, since x exp(-2 r^2) is
+ * minus a quarter of the derivative of exp(-2 r^2) by x. */
 static double moment_beyond(double h)
 {
     const double scale = 2.0 / (M_PI * (1.0 - exp(-2.0)));
@@ -212,8 +213,9 @@ void beam_rings(uint32_t rings, struct beam_pattern *pattern)
     }
 }
 
-/* With 1 to 18 rings the result is an upper bound of the errors of all cuts that leave 1 % of the energy (test_beam.c).
- * Without rings the centre is the only sub-ray. It may stand for a sliver at the rim, one radius away. */
+/* With 1 to 18 rings the result is an upper bound of the errors of all cuts that leave 1 % of the energy or more
+ * (test_beam.c). Without rings the centre is the only sub-ray. It may stand for a sliver at the rim, one radius
+ * away. */
 double beam_end_error(uint32_t rings)
 {
     return rings == 0 ? 1.0 : 0.35 * pow(rings, -0.75);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Assimp reads the formats that no reader of ours reads. */
+/* Assimp reads FBX, Collada, glTF 1.0, and glTF 2.0 with Draco: we have no readers for these. Assimp also reads IFC
+ * where the readers of IFC are not installed. */
 #ifndef CORE_IMPORT_IMPORT_ASSIMP_H
 #define CORE_IMPORT_IMPORT_ASSIMP_H
 

@@ -46,8 +46,8 @@ uint32_t sight_cells(double rays, uint64_t memory_bytes)
     return cells;
 }
 
-/* Arrays have their largest size: pages that are never touched take no memory. The arrays are in huge pages, since they
- * are filled at once and read at random. */
+/* Arrays have their largest size: pages that are never touched take no memory. Arrays of LARGE bytes or more are in
+ * huge pages, since they are filled at once and read at random. */
 static void *take_array(struct build_shared *b, struct build_arena *arena, uint64_t most, uint64_t size)
 {
     const uint64_t within = b->spec->memory_bytes / size + 1;

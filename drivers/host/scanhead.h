@@ -78,9 +78,10 @@ const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
  * SCANHEAD_ERESET or SCANHEAD_ECLOSED, once all frames that had come were taken. Counters and the hash are kept.
- * Descriptor, anchor and names are kept, too, unless the head has started again. A jump in the sequence shows how many
- * frames were lost meanwhile. On USB the same head is the one with the same ids and serial number. SCANHEAD_ESTATE for
- * a file or "fd:N". Any other error: the head did not come back in time, or a signal came; call again, or close. */
+ * Descriptor and anchor are kept, too, unless the head has started again. Names of labels are kept until the head sends
+ * others. A jump in the sequence shows how many frames were lost meanwhile. On USB the same head is the one with the
+ * same ids and serial number. SCANHEAD_ESTATE for a file or "fd:N". Any other error: the head did not come back in
+ * time, or a signal came; call again, or close. */
 int scanhead_reattach(struct scanhead *sh, int timeout_ms);
 
 /* A head that is on USB now. */
@@ -418,9 +419,9 @@ int scanhead_to_scene(struct scanhead *sh, struct scanhead_point *points, uint32
  * since 1980-01-06T00:00:00Z without leap seconds, less 1e9. Add 1e9 and divide by 604800 for week and second of week.
  * The time is valid for frames up to the one that scanhead_next returned last. It counts from the last time of the
  * head's clock, which comes at the scan's start and each second (events SCAN_START, PPS, TIME). It is exact to the
- * nanosecond where the head's clock has no drift; a double of that size has steps of 0.12 us. SCANHEAD_ESTATE where the
- * head doesn't know the time, or before the time and the scan's start have come. A head that knows the time sends it
- * before the first points that can be decoded. */
+ * nanosecond where the head's clock has no drift; a double of that size has steps of 0.06 us, and of 0.12 us from
+ * September 2028 on. SCANHEAD_ESTATE where the head doesn't know the time, or before the time and the scan's start have
+ * come. A head that knows the time sends it before the first points that can be decoded. */
 int scanhead_gps_time(const struct scanhead *sh, int64_t t_ns, double *adjusted_standard_gps_time_s);
 /* Does the same for n times, bit for bit, and faster where all times lie within one second. */
 int scanhead_gps_times(const struct scanhead *sh, const int64_t *t_ns, uint32_t n,

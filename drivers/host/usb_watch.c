@@ -8,7 +8,8 @@
 
 /* No event reports a permission that comes late, a configuration that the kernel sets, or another program
  * that closes the device. So tries come every PAUSE_MS for HURRY_MS after a device has come, and as long as a head is
- * there that can't be opened. Else they come every LOOK_MS. */
+ * there that can't be opened. Else they come every LOOK_MS. Without events of the system, tries always come every
+ * PAUSE_MS. */
 enum { PAUSE_MS = 50, HURRY_MS = 2000, LOOK_MS = 1000 };
 
 struct host_usb_watch {

@@ -147,7 +147,8 @@ static int n_echoes(const struct measured *m, int32_t number)
     return n < SCIP_MAX_ECHOES ? n : SCIP_MAX_ECHOES;
 }
 
-/* The step that stands for a cluster: that with the smallest range, or the first one where no step has a range. */
+/* Returns the step that stands for a cluster: the step with the smallest range. Ranges below min_mm are errors, and do
+ * not count. If no step has a range that counts, the first step stands for the cluster. */
 static int32_t nearest(const struct measured *m, int32_t from, int32_t to)
 {
     int32_t best = -1;
@@ -235,7 +236,8 @@ static void stream_scan(struct scip *s)
     if (q->count != 0 && q->remaining == 0) q->active = s->laser = 0;
 }
 
-/* A broken scan is neither sent nor counted: the client gets as many whole scans as it asked for. */
+/* A broken scan is not sent, and is not one of the scans that the client asked for: the client gets as many whole
+ * scans. Broken scans count as lost units, and as scans that are left out before the next one. */
 void scip_scans_came(struct scip *s, struct planar_news news)
 {
     const int streams = s->stream.active, waits = s->single.active;

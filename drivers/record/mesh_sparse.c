@@ -42,8 +42,8 @@ static void interpolate(const struct mesh_points *p, const uint32_t face[3], con
     point->station = p->station[face[near]];
 }
 
-/* Refuses points that neither a file nor the memory can hold, before they are made. With a broken stream the area may
- * be infinite. */
+/* Refuses more points than a file or the memory can hold, before they are made. With a broken stream the area may be
+ * infinite. */
 static int check_count(double n, double area_m2, double per_m2, struct sh_err *err)
 {
     const double there = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE), held = there / BYTES_A_POINT;

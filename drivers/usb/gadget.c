@@ -16,7 +16,7 @@
 static const char GADGETS[] = "/sys/kernel/config/usb_gadget";
 static const char PREFIX[] = "scanhead-";
 
-/* ---- what dead processes left */
+/* ---- gadgets of dead processes */
 
 static void unmount(const char *name)
 {

@@ -44,7 +44,8 @@ struct usb_interface_row {
 
 /* Interfaces that one driver of the host serves. */
 struct usb_function_row {
-    uint8_t first, count; /* interfaces; above 1, in devices of class EF: with an association descriptor */
+    /* The first interface, and how many there are. Two or more get an association descriptor in devices of class EF. */
+    uint8_t first, count;
     uint8_t class, subclass, protocol;
     uint8_t string;
     const char *compatible_id; /* Microsoft OS 2.0, "WINUSB" for instance; NULL: none */

@@ -75,7 +75,7 @@ static int outputs_is_same(const struct named *a, const struct named *b)
     return is_same_name(a, b);
 }
 
-/* ---- what there is */
+/* ---- the list of files */
 
 /* Adds a file. `who` and `path` then belong to the list; both are freed after a failure. A NULL means that there was no
  * memory for it. */
@@ -128,8 +128,8 @@ static int add_of_mesh(void *ctx, const char *name, const char *path)
     return outputs_add(f, join(name, INT_MAX, ", named in ", f->prefix), strdup(path), 0, 0);
 }
 
-/* Adds the files that meshes name. The search takes as long as reading the meshes, so it is made only where a file to
- * be written exists already (any_is_there). */
+/* Adds the files that meshes name. The search takes as long as reading the meshes, so it is made only where a file may
+ * be overwritten (any_is_there). */
 static int add_of_meshes(struct files *f)
 {
     static const char *const endings[] = {".obj", ".ply", ".gltf", ".glb", ".fbx", ".dae", ".ifc"};
@@ -165,7 +165,8 @@ static int add_of_scanners(struct files *f, const struct config *cfg)
     return rc;
 }
 
-/* 1: a file that is to be written exists already. Where none does, nothing can be overwritten. */
+/* 1: a file that is to be written exists already, or each scan writes a file, whose name is not known yet. 0: nothing
+ * can be overwritten. */
 static int any_is_there(const struct files *f)
 {
     for (size_t i = 0; i < f->n; i++) {

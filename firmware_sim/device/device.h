@@ -144,8 +144,9 @@ void device_lost(struct device *device, const struct device_work *work);
 /* Ends the use of a work, delivered or lost. Call it once for each claimed work. Any thread; takes no lock. */
 void device_done(struct device_work *work);
 /* Holds the site of a scan, by the scan's number, for callers without its works. NULL: that is neither the scan at hand
- * nor the last one, or stations have moved since. The site is valid until device_let_go, which must come before
- * device_free, and soon after the scan's end. Takes the device's lock for a moment. Any thread. */
+ * nor the last one. If stations have moved since the last scan, its site has their present places. The site is valid
+ * until device_let_go, which must come before device_free, and soon after the scan's end. Takes the device's lock for a
+ * moment. Any thread. */
 struct device_held {
     struct device_variant *variant;
     struct device_version *version;
@@ -221,7 +222,8 @@ int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix);
 /* The pulses per second, and the time since the top of the hour, at a device time that was claimed (pps.h). */
 enum protocol_pps device_pps(void *self, int64_t t_ns, int64_t *hour_ns);
 
-/* Returns the tick after the one that reports the head idle; UINT64_MAX: it boots, scans, or is about to. */
+/* Returns the tick after the one that reports the head idle, in fault or off; UINT64_MAX: the head boots, scans, or its
+ * mirror changes speed. */
 uint64_t device_rests_from(void *self);
 
 /* The last power-up. While power is off, all but the time are those of the power-up before. */
@@ -239,7 +241,7 @@ double device_window_loss_db(void *self);
 /* The number of the last scan that began, which is how many have begun; 0: none. *station: where it stands, from 1;
  * NULL: not asked for. */
 uint32_t device_last_scan(struct device *device, uint32_t *station);
-/* Returns the length of the last scan, in whole ticks; 0: none has ended. */
+/* Returns the length of the last scan in ns, whole ticks; 0: there was no scan, or the last one has not ended. */
 int64_t device_scan_ns(struct device *device);
 
 int64_t device_tick_ns(const void *self);

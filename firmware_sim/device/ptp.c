@@ -95,9 +95,9 @@ void ptp_text(const struct ptp_status *status, char text[PTP_TEXT_LEN])
              status->utc_valid);
 }
 
-/* ---- what faults do */
+/* ---- injected faults */
 
-/* Returns the fault of a kind that holds at a device time of the tick and comes next in the list. */
+/* Returns the next fault of a kind in the list, after `before`, that holds at device time t_ns. NULL: there is none. */
 static const struct head_fault *ptp_next(const struct ptp *ptp, enum fault_kind kind, int64_t t_ns,
                                          const struct head_fault *before)
 {

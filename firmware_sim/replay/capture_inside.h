@@ -43,7 +43,7 @@ struct replay_capture {
     size_t n_flows, flow_room;
     struct capture_counts counts;
     int64_t now_ns;   /* of the last packet that was read, since the first one */
-    int64_t clock_ns; /* the file's time then */
+    int64_t clock_ns; /* the time in the file that now_ns stands for */
     int has_clock;
     uint32_t n_places; /* a place: a port of a device, with the talk that was captured there */
     struct capture_place place[CAPTURE_MAX_TALKS];

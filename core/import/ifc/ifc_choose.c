@@ -29,7 +29,7 @@ static bool boxes_differ(const struct ifc_figures *a, const struct ifc_figures *
     return false;
 }
 
-/* The sign of an open body's volume means nothing. */
+/* Compares areas, and volumes where both bodies are closed. The volume of an open body means nothing. */
 static bool areas_differ(const struct ifc_figures *a, const struct ifc_figures *b, bool is_curved)
 {
     const double share = is_curved ? CURVED_SHARE : PLAIN_SHARE;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// The records of a points frame become columns in the scene frame. The module is the hot path: it makes no object and
-// no BigInt for a point.
+// The records of a points frame become columns in the scene frame. The module is the hot path: it makes no BigInt for a
+// point, and objects for a point only with geodetic coordinates.
 import {fitCubic, geodeticToEcef, toScene} from './native_earth.js';
 
 const TWO_PI = 6.283185307179586476925, PARTS = 256, HEAD = 40, RECORD = 20, NO_REFLECTANCE = -32768;
@@ -77,8 +77,9 @@ export function polarPlacer(descriptor, anchor) {
   const m = Float64Array.from(anchor.rotation), [x0, y0, z0] = anchor.station_m, scale = descriptor.range_scale_m;
   const lineTurn = 1 / descriptor.mirror_counts_per_turn, panTurn = 1 / descriptor.pan_counts_per_turn;
   const turned = !(anchor.moving & 1);
-  // These compute sin and cos of a part of a turn: whole 1/256 turns by the table, the rest by a series, whose next
-  // terms are below 2^-56. The operations and their order are those of libscanhead (drivers/host/decode_points.c).
+  // The sine and the cosine of an angle come from the table for whole 1/256 turns, and from a series for the rest. The
+  // next terms of the series are below 2^-56. The operations and their order are those of libscanhead
+  // (drivers/host/decode_points.c).
   return (c, view, n, pulse0, t0_ns) => {
     const {x, y, z, range} = c;
     let to = c.n, pulse = pulse0 - 1, atStart = true;
@@ -145,7 +146,7 @@ export function geoPlacer(descriptor, anchor) {
   };
 }
 
-// Local and ECEF need a rotation and a shift.
+// Local coordinates need a rotation and a shift. So do ECEF coordinates where the scene frame is no grid.
 function placeFlat(exactAt, anchor) {
   const [ox, oy, oz] = exactAt(anchor.anchor), m = anchor.axes;
   return (c, to, _x, _y, _z, dx, dy, dz) => {

@@ -62,7 +62,7 @@ static void put_ends(const char *first, const char *section)
     putchar('\n');
 }
 
-static char this_page[NAME_MAX_LEN]; /* whose command is being printed */
+static char this_page[NAME_MAX_LEN]; /* the page that is being printed */
 
 static void put_command(const struct app_command *command)
 {

@@ -186,7 +186,8 @@ static void keep_warning(void *ctx, const char *warning)
     fprintf(ctx, "%s\n", warning);
 }
 
-/* The reader's warnings come again when the configuration is checked, so they are printed here only where it fails. */
+/* The reader's warnings come again when the configuration is checked. So they are printed here only if reading
+ * fails. */
 static int read_mesh(const struct scene_mesh_spec *spec, struct scene **scene, struct sh_err *why)
 {
     const struct sh_report *all = &app_report_stderr;

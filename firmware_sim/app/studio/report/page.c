@@ -83,7 +83,8 @@ const char *page_unit(double largest_m, double *per_m)
     return "nm";
 }
 
-/* Writes four digits, with three decimals at most. */
+/* Writes four digits, with three decimals at most. Whole numbers of more than four digits are written in full; 0 has no
+ * decimals. */
 static void put_digits(FILE *out, double v, int is_signed)
 {
     const double a = fabs(v);

@@ -41,8 +41,8 @@ void report_head_of(const struct site *site, uint32_t station, struct deviation_
         georef_count_m(site->station[station].georef, cfg->profile.range_max_m * SITE_MARGIN, head->setup.xyz_scale);
 }
 
-/* All points are judged by the bound. With a footprint only those on smooth faces are: at an edge it hits more than one
- * surface. */
+/* Without a footprint all points are judged by the bound. With a footprint only points on smooth faces are: at an edge
+ * the footprint hits more than one surface. */
 static int is_judged(const struct deviation_head *head, double distance_m, double along_m)
 {
     if (isnan(distance_m)) return 0;

@@ -68,7 +68,8 @@ static int save_ends(void *self)
     return atomic_load(&s->ends);
 }
 
-/* Writes the frames that there are now; those that come meanwhile are left out. */
+/* Writes the frames that there are now. Frames that come meanwhile are left out, except in the last piece: it is read
+ * with all frames that it has by then. */
 static int write_frames(struct save *s, FILE *f, struct sh_err *err)
 {
     char query[32] = "";
