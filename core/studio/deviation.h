@@ -57,7 +57,8 @@ struct deviation_head {
 
 /* [n] each. */
 struct deviation_points {
-    float *along_m;  /* measured minus exact; NaN: not on a smooth face, far, a shot without echo, of a body */
+    float *along_m;  /* measured minus exact. NaN: the point is not on a smooth face, is far from the scene, is on a
+                      * body that moves, or is a shot without echo */
     float *sigma_m;  /* expected; NaN: not known, the point isn't judged, or along_m is NaN */
     float *counts_m; /* the counts' part of it; NaN where sigma_m is */
     float *cosine;   /* of the incidence where the beam hits; NaN: it hits nothing, or the station moves */
