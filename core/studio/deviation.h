@@ -69,9 +69,9 @@ struct deviation_points {
 int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err);
 void deviation_points_free(struct deviation_points *points);
 
-/* Fills `out`. head: [compared->site->n_stations]. Points without a triangle of the scene, such as points on bodies that
- * move (cloud_compare), get ranges alone. The function uses compared->site->threads threads; the result doesn't depend
- * on their number. Returns SH_ESTOPPED after a stop. */
+/* Fills `out`. head: [compared->site->n_stations]. Points without a triangle of the scene, such as points on bodies
+ * that move (cloud_compare), get ranges alone. The function uses compared->site->threads threads; the result doesn't
+ * depend on their number. Returns SH_ESTOPPED after a stop. */
 int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
                     const struct sh_report *report, const struct deviation_points *out, struct sh_err *err);
 

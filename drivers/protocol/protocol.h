@@ -80,8 +80,9 @@ enum protocol_count {
  * op but create and destroy. */
 struct protocol_host {
     void *ctx;
-    /* Queues one unit for the client, whole or not at all. 0; or 1: the unit is lost, since there is no room, an earlier
-     * unit has waited for too long, or hang_up was called. The owner counts units that are lost before hang_up. */
+    /* Queues one unit for the client, whole or not at all. 0; or 1: the unit is lost, since there is no room, an
+     * earlier unit has waited for too long, or hang_up was called. The owner counts units that are lost before
+     * hang_up. */
     int (*send)(void *ctx, const void *unit, size_t len);
     /* Carries out one line of the native command set (COMMANDS.md), "HEAD:LINES 20" for example, as this
      * session, which then releases control. reply (cap PROTOCOL_REPLY; or NULL and 0: not looked at) gets the reply
