@@ -8,8 +8,8 @@
 struct ray_hits;
 
 /* Looks up reflectance and colour at each hit. The reflectance goes into the high bits of the hit's label, as
- * surface_texel defines them, and the colour into hits->colour. Does nothing where surfaces have no textures and no
- * colours are asked for. */
+ * surface_texel defines them, and the colour into hits->colour. Does nothing where surfaces have neither
+ * textures nor colours of vertices, and no colours are asked for. */
 void caster_texels(const struct cast_setup *s, const struct ray_hits *hits);
 
 #endif

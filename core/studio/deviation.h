@@ -57,7 +57,8 @@ struct deviation_head {
 
 /* [n] each. */
 struct deviation_points {
-    float *along_m;  /* measured minus exact; NaN: not on a smooth face, far, a shot without echo, of a body */
+    float *along_m;  /* measured minus exact. NaN: the point is not on a smooth face, is far from the scene, is on a
+                      * body that moves, or is a shot without echo */
     float *sigma_m;  /* expected; NaN: not known, the point isn't judged, or along_m is NaN */
     float *counts_m; /* the counts' part of it; NaN where sigma_m is */
     float *cosine;   /* of the incidence where the beam hits; NaN: it hits nothing, or the station moves */
@@ -68,9 +69,9 @@ struct deviation_points {
 int deviation_points_create(size_t n, struct deviation_points *out, struct sh_err *err);
 void deviation_points_free(struct deviation_points *points);
 
-/* Fills `out`. head: [compared->site->n_stations]. Labels from n_surfaces on are of bodies that move: their points get
- * ranges alone. The function uses all threads; the result doesn't depend on their number. Returns SH_ESTOPPED after a
- * stop. */
+/* Fills `out`. head: [compared->site->n_stations]. Points without a triangle of the scene, such as points on bodies
+ * that move (cloud_compare), get ranges alone. The function uses compared->site->threads threads; the result doesn't
+ * depend on their number. Returns SH_ESTOPPED after a stop. */
 int deviation_along(const struct cloud_compared *compared, const struct deviation_head *head,
                     const struct sh_report *report, const struct deviation_points *out, struct sh_err *err);
 

@@ -11,8 +11,9 @@
  *          needs within.
  *          Vertices nearer to each other than 10 micrometres that agree in all else may become one.
  *   .fbx   binary, float; z up and metres, and its header says so (UpAxis 2, UnitScaleFactor 100).
- * Float steps by up to 6e-8 of a coordinate. Where half a step is more than MESH_FLOAT_PART of the mesh's size (and
- * more than 1 micrometre), the mesh is refused with the figures: nothing is moved to the origin in silence.
+ * Rounding to float moves a coordinate by up to 6e-8 of it, half a step. Where that is more than MESH_FLOAT_PART of the
+ * mesh's size (and more than 1 micrometre), the mesh is refused with the figures: nothing is moved to the origin in
+ * silence.
  *
  * Ownership: all arrays are the caller's and are not changed. .gltf, .glb and .fbx take about 500 bytes of memory a
  * face while they are written. Not real-time safe; any thread, one file each. */

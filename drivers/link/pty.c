@@ -142,7 +142,7 @@ static int pty_open(const struct link_spec *spec, void **link, struct sh_err *er
                        error == EMFILE ? "; see /proc/sys/fs/inotify/max_user_instances" : "");
     }
     int rc = pty_device_open(&pty->device, spec->path, err);
-    if (rc == SH_OK && pty_wait_for_client(pty) != SH_OK) { /* one may be there as soon as the symlink is */
+    if (rc == SH_OK && pty_wait_for_client(pty) != SH_OK) { /* a client may open it once the symlink is there */
         rc = sh_fail(err, SH_EIO, "link pty:%s: inotify on %s: %s", spec->path, pty->device.slave, strerror(errno));
         pty_device_close(&pty->device);
     }

@@ -45,7 +45,7 @@ LATE_LIBRARY(websockets, WEBSOCKETS_CALLS)
 extern struct websockets_lib web_lws;
 
 enum {
-    WEB_MAX_REQUEST = 8192,    /* a request's line and fields; one more: 413 */
+    WEB_MAX_REQUEST = 8192,    /* bytes of a request's line and fields; a longer request: 413 */
     WEB_MAX_MESSAGE = 4096,    /* of commands, in one WebSocket message */
     WEB_IN_ROOM = 32768,       /* of commands that the owner has not read */
     WEB_SEND_BUFFER = 1 << 20, /* as a TCP link has */

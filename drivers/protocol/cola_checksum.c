@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For injected faults: marks the values of LMDscandata, and corrects its check byte. COLA.md draws the telegram. */
+/* For injected faults: marks the values of LMDscandata, and corrects the check byte of any CoLa-B telegram (CoLa-A has
+ * none). COLA.md draws the telegram. */
 #include <string.h>
 
 #include "core/bytes.h"

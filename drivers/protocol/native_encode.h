@@ -40,8 +40,7 @@ struct native_names {
  * rest. */
 size_t native_encode_surfaces(uint8_t *dst, size_t cap, size_t max_payload, struct native_names *names, int64_t t_ns);
 
-/* Sets the sequence number of the whole frame at frame and renews the header CRC. Returns the frame's
- * length. */
+/* Sets the sequence number of a whole frame, and renews the CRC of its header. Returns the frame's length. */
 size_t native_finish_frame(uint8_t *frame, uint32_t seq);
 
 /* Makes both checksums of a frame of len bytes right, whatever is in it. */

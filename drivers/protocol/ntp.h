@@ -22,7 +22,8 @@ enum { NTP_LEN = 48, NTP_PORT = 123 };
 
 enum ntp_kind {
     NTP_GOOD,
-    NTP_FOREIGN,        /* no answer to this request: shorter, of another mode or version, or with another T1 */
+    NTP_FOREIGN,        /* no answer to this request: shorter than 48 bytes, not from a server, of a version other than
+                         * 1 to 4, or with another T1 */
     NTP_UNSYNCHRONISED, /* the server says that it has no time, or sends impossible times: RFC 4330, section 5 */
     NTP_KISS,
 };

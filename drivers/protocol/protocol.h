@@ -2,9 +2,9 @@
 /* Protocols: what a head speaks on a link. Native frames of the stream, bytes from a client and device time go
  * in; units for the client and calls on the device come out.
  *
- * A protocol is one file of this folder with one `const struct protocol_ops`, whose members are the contract;
- * protocol.c has the list. Each session of a link has an instance of its own. A protocol does no I/O and has no
- * clock: a test drives it from bytes to bytes with a struct protocol_host of its own. One thread makes all calls
+ * Each protocol has one `const struct protocol_ops` in one of the files of this folder. The struct's members are the
+ * contract, and protocol.c has the list. Each session of a link has an instance of its own. A protocol does no I/O and
+ * has no clock: a test drives it from bytes to bytes with a struct protocol_host of its own. One thread makes all calls
  * on an instance. Nothing is allocated after create().
  *
  * A unit is what must stay together: a datagram on udp, a transfer on USB (which a short packet ends). On byte
@@ -80,8 +80,9 @@ enum protocol_count {
  * op but create and destroy. */
 struct protocol_host {
     void *ctx;
-    /* Queues one unit for the client, whole or not at all. 0; or 1: there was no room, and the unit is lost. The owner
-     * counts lost units. */
+    /* Queues one unit for the client, whole or not at all. 0; or 1: the unit is lost, since there is no room, an
+     * earlier unit has waited for too long, or hang_up was called. The owner counts units that are lost before
+     * hang_up. */
     int (*send)(void *ctx, const void *unit, size_t len);
     /* Carries out one line of the native command set (COMMANDS.md), "HEAD:LINES 20" for example, as this
      * session, which then releases control. reply (cap PROTOCOL_REPLY; or NULL and 0: not looked at) gets the reply
@@ -197,7 +198,7 @@ struct protocol_ops {
     void (*frame)(void *protocol, const uint8_t *frame, size_t len);
     /* Frames are missing before the next one: the client, or the head, was too slow. May be NULL, as frame. */
     void (*gap)(void *protocol, uint32_t n_frames);
-    /* All frames before device time t_ns have come. Called for each tick, also of those without frames. Where the
+    /* All frames before device time t_ns have come. Called for each tick, also for a tick without frames. Where the
      * client was too slow, time jumps after a gap. */
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size; from a link of datagrams each call has a whole one. */

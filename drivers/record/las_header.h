@@ -74,9 +74,9 @@ void las_count_record(struct las_facts *facts, const uint8_t *record);
 /* Writes the number of points, of returns, and the bounds into a header that has the rest. */
 void las_put_counts(const struct las_facts *facts, uint8_t *header);
 
-/* Writes everything before the points. Returns its length, which depends only on the CRS, the kind of time, the
- * attributes and whether there are waveforms. Therefore these bytes can be written again when the counts, or more
- * descriptors, are known. */
+/* Writes everything before the points. Returns its length, which stays the same for a file: it depends on the version,
+ * the CRS, the kind of time, the attributes, whether the head moves and whether there are waveforms. Therefore these
+ * bytes can be written again when the counts, or more descriptors, are known. */
 size_t las_front(const struct las_facts *facts, uint8_t to[LAS_FRONT_MAX]);
 
 #endif

@@ -16,8 +16,8 @@ static uint32_t count_descriptors(const uint8_t *bytes, size_t len)
     return n;
 }
 
-/* Announces WinUSB by Microsoft OS 1.0, the older way, since the kernel's gadgets know no other. A function has one
- * compatible id and one property. Returns the new end. */
+/* Announces WinUSB by Microsoft OS 1.0, the older way, since the kernel's gadgets know no other. A function has at
+ * most one compatible id, and with that id at most one property, its guid. Returns the new end. */
 static size_t put_os_descriptors(const struct usb_function_row *function, uint8_t *out, size_t at, uint32_t *count)
 {
     static const char name[] = "DeviceInterfaceGUID";

@@ -12,7 +12,7 @@
 int notify_is_wanted(void);
 
 /* Sends lines with '\n' between them; SH_OK also without a socket. Waits a second at most. SH_EINPUT: the socket's name
- * is invalid; SH_EIO: nobody is there, or takes it. */
+ * is invalid; SH_EIO: nobody has that socket, or its owner does not take the datagram. */
 int notify_send(const char *lines, struct sh_err *err);
 
 #endif

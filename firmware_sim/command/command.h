@@ -25,8 +25,8 @@
  * pulse are sent. On a head with fixed pulse rates HEAD:PRR takes only these; another rate is -222 with the list of
  * them.
  *
- * Ranges and noise hold from the next scan on, and can't change within one. So does the step of a head whose emitter is
- * a sphere, or is planar with several geometries (pairs of a line rate and a step).
+ * New ranges and noise hold from the next scan on; they can't change within a scan. The same is true of the step of a
+ * head whose emitter is a sphere, or is planar with several geometries (pairs of a line rate and a step).
  *
  * Stations. HEAD:STATION takes stations that have this scanner; a station with another scanner is -221.
  *

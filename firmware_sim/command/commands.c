@@ -311,7 +311,8 @@ const struct command_row command_rows[] = {
     VALUE("HEAD:LINes", unit_hz, LINES),
     VALUE("HEAD:PAN", unit_deg_s, PAN),
     QUERY("HEAD:STATe", query_state),
-    /* Open to all, as a head's plug is: clients of its maker's protocol know nothing of control. */
+    /* Open to sessions without control: clients of a maker's protocol know nothing of control. Anybody can also pull
+     * the plug of a real head. */
     {"HEAD:REBoot", NULL, act_reboot, NULL, NULL, 1, 0, 0, 0, HEAD_EV_POWER_OFF + 1},
     ACTION("HEAD:STORe", act_store, 0),
     VALUE("HEAD:STATION", unit_count, STATION), /* no short form: STAT is STATe */
@@ -351,7 +352,7 @@ const struct command_row command_rows[] = {
     QUERY("TIME:GPS", query_gps),
     QUERY("TIME:PTP", query_ptp),
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1, 0, 0, 0},
-    /* Open to all, as HEAD:REBoot is. */
+    /* Open to sessions without control, as HEAD:REBoot is. */
     {"TIME:SHIFt", command_shift_query, command_shift_change, &unit_ns, NULL, 1, 0, 0, 0, 0},
     {"TIME:SERVer", command_server_query, command_server_change, &command_unit_server, NULL, 1, 0, 1, 0, 0},
     {.header = NULL},

@@ -59,7 +59,8 @@ struct config_tripod {
 
 struct config_station {
     char name[32];
-    double position_m[3];                    /* of the head's origin in the scene frame */
+    double position_m[3];                    /* of the head's origin in the scene frame; with instrument_height_m only
+                                              * of a point above the floor */
     int has_position;                        /* 0: it follows from the place on the Earth, through the anchor */
     double heading_deg, pitch_deg, roll_deg; /* pose_attitude */
     double instrument_height_m;              /* of the head's origin above the floor below position_m */

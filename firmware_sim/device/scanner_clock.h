@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The clock of a scanner that has a date of its own and no battery, as SICK's: device time -> ns since 1970.
  *
- * This clock runs as the head's clock does, with the same errors (head_clock.h). At power-up it shows UTC where the
- * head knows the time of day and no time server is to be asked (ntp.role: client); else it begins with 1970. TIME:SHIFt
- * sets it, and so do answers of a time server. The commands are journalled, so a replayed session has the same dates.
+ * This clock runs as the head's clock does, with the same errors (head_clock.h). At power-up it begins with 1970 where
+ * a time server is to be asked (ntp.role: client), or where the head does not know the time of day. Else it shows UTC.
+ * TIME:SHIFt sets it, and so do answers of a time server. The commands are journalled, so a replayed session has the
+ * same dates.
  *
  * Thread: any. */
 #ifndef FIRMWARE_SIM_DEVICE_SCANNER_CLOCK_H
@@ -36,7 +37,8 @@ struct device_time_server {
     int64_t max_offset_ns;
 };
 void device_get_time_server(struct device *device, struct device_time_server *out);
-/* An eventfd that is written whenever that may have changed; -1: none. */
+/* Sets the eventfd that is written whenever the facts of device_get_time_server may have changed; -1: none. With an
+ * eventfd TIME:SERVer may be CLIENT. */
 void device_watch_time_server(struct device *device, int fd);
 /* Applies injected faults to a server's answer that comes at a device time. 1: it is as if it had not come. */
 int device_change_time_answer(struct device *device, int64_t t_ns, uint8_t packet[NTP_LEN]);

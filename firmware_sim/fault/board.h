@@ -53,7 +53,8 @@ int fault_board_add(struct fault_board *board, const struct fault *fault, int64_
  * their way; INT64_MIN: none is hit any more. Returns how many faults were taken out. */
 uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_ns);
 
-/* Notes an injection: counts it, writes it to the truth, and passes it to the listeners. */
+/* Notes an injection, or its end (note->ended): writes the note to the truth, and passes it to the listeners. Only
+ * injections are counted. */
 void fault_board_note(struct fault_board *board, const struct fault_note *note);
 /* Returns the number of the fault that was added last; 0: there never was one. */
 uint32_t fault_board_last(struct fault_board *board);

@@ -72,7 +72,7 @@ static int rank_of(const struct wire *wire, const struct fault *f)
     case FAULT_TRUNCATE:
         return 2;
     case FAULT_FLIP:
-        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK; /* that datagram is not sent */
+        return f->reseal ? 3 : wire->spec.datagrams ? 1 : LAST_RANK; /* a damaged datagram is not sent, as with drop */
     default:
         return LAST_RANK;
     }

@@ -30,7 +30,7 @@ struct wire_spec {
     struct fault_board *board;
     uint32_t link, session; /* from 1 */
     uint32_t max_unit;      /* the usual longest frame or unit: room for it is allocated at once */
-    int units;              /* 1: each unit is a write of its own */
+    int units;              /* 1: another protocol; each of its units counts as a frame */
     int native;             /* frames of the native protocol */
     int datagrams;          /* 1: the system adds a checksum to each unit, and its receiver drops damaged ones */
     /* The protocol's functions (protocol.h). */

@@ -9,12 +9,13 @@
  * or of commands.
  *
  * Wake-ups. In real time a link is woken at each tick that it wants, or once in `every` ticks. Casters are woken once a
- * quarter of the ticks ahead is free, and the hash once an eighth of the queue was released: both have time. The pacing
- * thread sleeps up to the next tick that wakes one of them. In the paces that wait for readers, nobody waits for a
- * single tick. So wake-ups are saved up, and ticks pass from thread to thread in batches. One rule prevents a deadlock:
- * a thread that is about to sleep first wakes all threads that can go on by its work. Casters announce the ticks that
- * they made, the pacing thread those that it released, readers how far they are. So when all threads sleep, each has
- * seen all work of the others, and there is nothing to do. Batches change when a tick is read, never its bytes.
+ * quarter of the ticks ahead is free, and the hash once an eighth of the queue was released. The work of these threads
+ * is not needed at once. The pacing thread sleeps up to the next tick that wakes a link, the casters or the hash. In
+ * the paces that wait for readers, nobody waits for a single tick. So wake-ups are saved up, and ticks pass from thread
+ * to thread in batches. One rule prevents a deadlock: a thread that is about to sleep first wakes all threads that can
+ * go on by its work. Casters announce the ticks that they made, the pacing thread those that it released, readers how
+ * far they are. So when all threads sleep, each has seen all work of the others, and there is nothing to do. Batches
+ * change when a tick is read, never its bytes.
  *
  * Units: ticks from power-up, device time in ns. */
 #ifndef FIRMWARE_SIM_LOOP_STREAM_H

@@ -30,8 +30,8 @@ int gltf_pose_open(struct gltf *g, const json_t *node, const json_t *mesh, const
                    struct gltf_pose *pose);
 /* Vertex i < position.count, in the frame of the node, or of the scene where there is a skin. */
 int gltf_pose_vertex(struct gltf *g, struct gltf_pose *pose, uint32_t i, double out[3]);
-/* Raises g->error and g->step_error to the largest errors of these vertices once `world` has placed them, and
- * g->largest to their largest coordinate. */
+/* Raises g->error and g->step_error to the largest errors of these vertices once `world`, or joints, have placed them.
+ * Where POSITION is in single precision, it also raises g->largest to the largest of pose->most. */
 void gltf_pose_error(struct gltf *g, const struct gltf_pose *pose, const gltf_matrix world);
 void gltf_pose_close(struct gltf_pose *pose);
 

@@ -15,7 +15,8 @@ static const double side_worth[SIDES] = {1.0, 0.95, 0.95, 0.9, 0.9, 0.85, 0.85, 
 static const double height_deg[HEIGHTS] = {8, 22, 35}, height_worth[HEIGHTS] = {1.0, 0.9, 0.8};
 
 /* Returns the distance from the centre. From there the sphere around the scene fills 47 degrees, and lies beyond the
- * head's least range. Where the scene is larger than the head's range, the head stands nearer, at the scene's side. */
+ * head's least range. Where that distance is too long for the head's range, the head stands nearer. Then its distance
+ * from the side of the scene's box is 0.3 of the largest range, plus the least range. */
 static double distance_m(const struct survey *s, const double toward[3])
 {
     const struct viewpoint_view *v = s->view;

@@ -19,7 +19,7 @@ export const STATES = ['off', 'boot', 'idle', 'spin-up', 'scanning', 'spin-down'
 const [, DESCRIPTOR, ANCHOR, POINTS, LINE_END, TELEMETRY, EVENT, SURFACES, POSES, ATTRIBUTES, EMITTER, COLOURS,
   WAVES] = TYPES.keys();
 export {POINTS};
-export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and what says more of them
+export const BESIDE_POINTS = [POINTS, ATTRIBUTES, COLOURS]; // points, and the frames that add to them
 const HEAD = 40, RECORD = 20, MAX_POINTS = 3274, ROOM = 32768, NO_AMPLITUDE = -32768, HAS_DEVIATIONS = 8;
 
 /** Turns frames into values. State that PROTOCOL.md calls void is forgotten. A frame that the protocol tells readers to

@@ -7,7 +7,7 @@ import {arrowStep, degrees, headingTo, onPlane, sub} from './view_camera.js';
 
 const NAMES = {right: 'Right face', left: 'Left face', ahead: 'Far face', back: 'Near face', top: 'Top', bottom: 'Bottom',
   turn: 'Heading', move: 'Place of the box'};
-const STEP_M = 0.05, LARGE = 10, TURN_DEG = 1; // of the arrow keys; with Shift so many times as much
+const STEP_M = 0.05, LARGE = 10, TURN_DEG = 1; // steps of the arrow keys; with Shift a step is LARGE times as large
 const EDGES = [0, 2, 4, 6, 0, 1, 4, 5, 0, 1, 2, 3]; // corners where an edge along x, y, z begins
 const FIELDS = [['from', 'From height, m'], ['to', 'To height, m'], ['wide', 'Width, m'], ['deep', 'Depth, m'],
   ['x', 'Middle x, m'], ['y', 'Middle y, m'], ['heading', 'Heading, °']];

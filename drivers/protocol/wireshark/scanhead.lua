@@ -1178,8 +1178,8 @@ local function new_flow()
           line = {pulses = 0, whole = false}}
 end
 
--- Results of the first look at each packet, by packet number and content. Positions can't be the key, since Wireshark
--- may cut the same bytes otherwise at the next look. Equal contents share a list, which is taken in turns.
+-- Results of the first look at each packet, by packet number and content. Positions can't be the key, since at
+-- the next look Wireshark may cut the same bytes at other places. Equal contents share a list, which is taken in turns.
 local memo
 
 local function memo_of(pinfo)
@@ -1453,7 +1453,7 @@ end
 
 -- Frames that go on in the next packet are joined here, or by TCP where `ask` is given: ask(at, more) tells TCP where
 -- to begin. Even then they are joined here if TCP would give bytes again that were taken already, or would cut them
--- otherwise at the next look.
+-- at other places at the next look.
 local function dissect_joined(tvb, pinfo, tree, conn, is_down, can_wait, ask)
   local side, packet, first_time = is_down and "in" or "out", memo_of(pinfo), not pinfo.visited
   local key = side .. tvb:offset()

@@ -251,7 +251,7 @@ static const struct app_option OPTIONS[] = {
 
 static const char NOTES[] =
     "Ctrl-C, or SIGTERM, ends the head with all files complete. A second signal within a second counts as the same\n"
-    "one. A third signal, or one more than a second after the first, ends the head at once.\n"
+    "one. A third signal ends the head at once, and so does a second one that comes after more than a second.\n"
     "\n"
     "As a service (systemd, Type=notify) it sends READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
     "when its end begins.\n"

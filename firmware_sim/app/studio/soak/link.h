@@ -41,7 +41,7 @@ struct soak_link {
     uint64_t wrong_plain;       /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;           /* the clean reader did not get them */
     uint64_t odd_closings;      /* the connection was closed without a fault */
-    int64_t odd_ns, no_open_ns; /* when that was last, and when an attempt to connect failed; 0: never */
+    int64_t odd_ns, no_open_ns; /* last such closing, and last failed attempt to connect; 0: never */
     uint64_t away;              /* frames that came while there was no session */
     /* Bytes that belong to no frame: as the client counted them, and the least and the most that the faults explain.
      * The most includes frames that may not have arrived, and a reply that was destroyed with such bytes. */

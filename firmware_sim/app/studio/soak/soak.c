@@ -162,8 +162,9 @@ static int say_result(const struct soak_options *o, struct soak *soak, struct sh
     return sh_fail(err, SH_ESTATE, "soak: %s", soak->failures[0]);
 }
 
-/* Adds a second link, without faults, beside each udp link. A udp link without such a second one gets no client. Each
- * device on USB gets a name. Where no client could start a scan, the head does so itself. */
+/* Adds a second link, without faults, beside each udp link. A udp link without such a second one gets no client. A USB
+ * device that is attached to this machine gets a serial number where none is configured. Where no client could start a
+ * scan, the head does so itself. */
 static void open_clean_links(struct config *cfg, struct soak *soak, struct soak_options *o)
 {
     int starts = 0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* JUnit XML, as continuous integration reads it: what was not judged is skipped, a finding is a failure. */
+/* JUnit XML, as continuous integration reads it. A check that was not judged, or whose finding is allowed, is skipped.
+ * Any other finding is a failure. */
 #include <inttypes.h>
 #include <stdio.h>
 

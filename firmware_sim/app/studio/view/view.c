@@ -27,7 +27,7 @@ static void view_take_event(const struct link_ops *ops, void *link, const struct
 
 static int serve_page(const struct link_ops *ops, void *link, struct sh_err *err)
 {
-    enum { POLL_MS = 200 }; /* so long a signal may wait */
+    enum { POLL_MS = 200 }; /* longest time from a signal to the end of the loop */
     struct link_event event[LINK_MAX_EVENTS];
     while (!app_interrupted()) {
         const int n = ops->poll(link, -1, 0, POLL_MS, event, LINK_MAX_EVENTS);
