@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The clients as the head sees them: sessions, requests, and the disturbances before them. In: calls of the links and
- * of the board of faults, from any thread. Out: how long each client was away after a disturbance; which frames each
- * session was given. */
+/* The clients as the head sees them: their sessions and requests, and the faults that disturbed them. In: calls of the
+ * links and of the board of faults, from any thread. Out: how long each client was away after a disturbance; which
+ * frames each session was given. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_WATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_WATCH_H
 
