@@ -11,7 +11,7 @@
 
 /* This margin is beyond all known effects that bend or move the beam. */
 static const double MARGIN_RAD = 2e-3;
-/* Angle noise stays below this many sigmas: rng_normal's largest value is 6.7. */
+/* Angle noise stays below this many sigmas: rng_normal's largest value is 6.8. */
 static const double SIGMAS = 7.0;
 
 enum { DIRECTIONS = 2048 };

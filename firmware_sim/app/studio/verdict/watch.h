@@ -27,14 +27,14 @@ struct watch_span {
     int64_t from_ns, to_ns; /* to_ns INT64_MAX: it is open */
 };
 
-/* A native frame that a session did not get as the head sent it. */
+/* A native frame that a drop or a truncation has destroyed for a session. */
 struct watch_spoiled {
     uint32_t session, seq;
 };
 
 struct watch_link {
     uint32_t open; /* sessions */
-    int acted;     /* a fault ends its sessions now, or soon: */
+    int acted;     /* a fault ends its sessions or silences them, now or soon: */
     enum fault_kind kind;
     int64_t over_ns;
 };
