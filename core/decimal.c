@@ -126,7 +126,7 @@ static inline int scale(struct parts v, u128 power, uint64_t *whole)
 {
     *whole = 0;
     if (v.s > 127) return 1; /* below 2^-75, also a denormal: nothing of it is left */
-    if (v.s < 1) return 0;   /* 2^53 and more, infinite, NaN */
+    if (v.s < 1) return 0;   /* 2^52 and more, infinite, NaN */
     const u128 sum = power * v.m + ((u128)1 << (v.s - 1)), rounded = sum >> v.s;
     const int is_tie = sum << (128 - v.s) == 0;
     *whole = (uint64_t)rounded & ~(uint64_t)is_tie;

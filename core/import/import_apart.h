@@ -37,8 +37,8 @@ struct import_apart {
 };
 /* Fails where no process can be made; nothing is open then. */
 int import_start(struct import_apart *a, struct sh_err *err);
-/* Waits until all n <= 2 are over. Once one has ended as it should, the other gets ten times as long as that one took,
- * or 10 s where that is more. */
+/* Waits until all n <= 2 are over. Once one has ended as it should, the other may go on for ten times as long as that
+ * one took, or for 10 s where that is more. */
 void import_watch(struct import_apart *const a[], size_t n);
 /* Returns how the process ended: 0, or the error. With 0, result_fd has its result. */
 int import_judge(struct import_apart *a, struct sh_err *err);

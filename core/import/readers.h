@@ -12,9 +12,9 @@ struct mtl_line {
     struct text_span names;
     uint64_t line;
 };
-/* Colours and textures of the surfaces from first_surface on, from the libraries that these lines name; the first one
- * that knows a material counts. Meshes often come without a library: they have no colours then. Where textures are
- * wanted, warnings say which libraries, materials and textures are missing. */
+/* Reads colours, opacities and textures of the surfaces from first_surface on. They come from the libraries that these
+ * lines name; the first library that knows a material counts. Meshes often come without a library: they have no colours
+ * then. Warnings say which libraries are missing, and where textures are wanted, which materials and textures are. */
 int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
 int read_stl(struct scene_build *b, struct sh_err *err);

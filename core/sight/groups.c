@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Groups of triangles: where each is seen, and which of them are too small to be examined one by one. */
+/* Groups of triangles: where each group is seen, and whether its triangles are too small to be examined one by one. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -47,7 +47,7 @@ int viewpoint_find(const struct scene *scene, const struct viewpoint_view *view,
 /* ---- places to choose from: a grid of them, on all floors. */
 
 struct viewpoint_grid {
-    double step_m;             /* of the grid along x and y; it lies in the middle of its area */
+    double step_m;             /* of the grid along x and y; the grid is centred between min_m and max_m */
     double height_m;           /* of the head's origin above the floor */
     double min_m[3], max_m[3]; /* prcs; floors count whose z lies between these */
 };
@@ -61,7 +61,7 @@ enum { VIEWPOINT_MAX_PLACES = 1000000 };
 
 /* Places where a tripod can stand: on a surface at most 20 degrees steep, with 0.2 m of room above the head. Around the
  * place, at a distance of 0.3 m, the surface is looked at in 8 directions. In at least 6 of these directions the
- * surface is on the place's level, to 0.15 m. At the height of the head nothing is nearer than 0.3 m in these
+ * surface is on the place's level, to 0.15 m. At the height of the head nothing is nearer than 0.3 m in any of the 8
  * directions. Which side of the surface is up does not matter: some of the places may lie within closed bodies. In
  * order of x, then y, then z downward. The BVH is that of the whole scene. The caller frees *out. SH_EINPUT: more
  * columns than VIEWPOINT_MAX_PLACES. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Windows of pulses' waveforms, from stream frames that follow their points. */
+/* Reads windows of waveforms. Stream frames of waveforms follow the frame that has the points of their pulses. */
 #include <math.h>
 
 #include "drivers/host/host.h"

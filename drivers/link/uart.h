@@ -18,13 +18,14 @@
 /* A byte needs a falling edge, and the ten bits of a sent byte have five at most. */
 enum { UART_MOST_PER_BYTE = 5 };
 
-/* The receiver's driver keeps a byte whose stop bit was 0, makes it 0, or drops it. */
+/* The receiver's driver keeps a byte whose stop bit was 0, makes it 0, or drops it. A byte of 0 with such a stop bit is
+ * a break: the driver passes it on, unless drops_breaks is set. */
 enum uart_errors { UART_KEEPS_ERRORS, UART_ZEROES_ERRORS, UART_DROPS_ERRORS };
 
 struct uart {
     uint32_t sender_baud, receiver_baud; /* above 0 */
     enum uart_errors errors;
-    int drops_breaks; /* a byte of 0 whose stop bit was 0 */
+    int drops_breaks; /* the driver drops bytes of 0 whose stop bit was 0 */
 };
 
 /* Whether each byte is read as it was sent. */

@@ -17,7 +17,7 @@
 
 enum {
     PLANAR_MAX_STEPS = 3000,         /* that are cast in a turn */
-    PLANAR_MAX_TURN = INT32_MAX / 4, /* steps of a turn: quarters of them have 32 bits */
+    PLANAR_MAX_TURN = INT32_MAX / 4, /* steps of a turn: four times as many still fit into an int32_t */
     PLANAR_ECHOES = 4,               /* kept of a step: where it has more, the first three and the last */
     PLANAR_UNSEEN = 0xff,
 };
@@ -39,7 +39,7 @@ struct planar_echo {
 
 struct planar_turn {
     int64_t t0_ns;               /* device time of step 0 */
-    uint32_t number;             /* of turns since the head's scan began; goes on over scans, jumps over lost turns */
+    uint32_t number;             /* turns before it, in its scan and in earlier ones, lost turns included */
     uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, PLANAR_ECHOES at most; PLANAR_UNSEEN: no pulse came */
     struct planar_echo echo[PLANAR_MAX_STEPS][PLANAR_ECHOES]; /* in order of range */
 };

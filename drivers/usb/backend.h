@@ -92,9 +92,9 @@ struct socket_address; /* drivers/socket/socket.h */
 void usb_backend_peer(const struct usb_backend_spec *spec, int fd, struct socket_address *out);
 int usb_backend_connect(const struct socket_address *to, int *fd);
 int usb_backend_connect_error(int fd);
-/* To be called before closing. Sends nothing more, and waits until the peer has read everything and hung up,
- * or until timeout_ms pass without a byte; eight times that at most. Closing with unread requests of the peer
- * would throw away replies on their way. */
+/* To be called before closing. Sends nothing more, and reads what the peer still sends, eight times at most. Ends when
+ * the peer has read everything and hung up, or when timeout_ms pass without a byte. Closing with unread requests of the
+ * peer would throw away replies on their way. */
 void usb_backend_hang_up(int fd, int timeout_ms);
 
 #endif

@@ -17,7 +17,7 @@ static const char *const state_words[] = {[SCENE_OBJECT_EMPTY] = "empty",
                                           [SCENE_OBJECT_TURNED] = "turned",
                                           [SCENE_OBJECT_OPEN] = "open"};
 
-/* The objects of one mesh: the scene's, or those of one that moves. */
+/* The objects of the scene that stands still, or of a mesh that moves. */
 struct part {
     const struct scene *scene;
     struct scene_objects objects;
@@ -120,7 +120,7 @@ static void print_sum(const struct part *p, FILE *out)
             n[SCENE_OBJECT_TURNED], n[SCENE_OBJECT_EMPTY]);
 }
 
-/* A line for each object of that state, in the order of their areas. */
+/* Prints a line for each object of that state, the largest area first. After MAX_ROWS lines it only counts the rest. */
 static void print_state(const struct part *p, enum scene_object_state state, FILE *out)
 {
     uint32_t n = 0;
@@ -138,7 +138,7 @@ static void print_state(const struct part *p, enum scene_object_state state, FIL
     if (n > MAX_ROWS) fprintf(out, "%-9s and %u more; --scene-csv FILE has all\n", state_words[state], n - MAX_ROWS);
 }
 
-/* Surfaces that the file calls transparent, a line each. */
+/* Prints a line for each surface that the file calls transparent. After MAX_ROWS lines it only counts the rest. */
 static void print_clear(const struct part *p, FILE *out)
 {
     uint32_t n = 0;

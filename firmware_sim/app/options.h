@@ -57,8 +57,8 @@ struct app_option {
 /* Rows that are the same in every table. */
 #define OPTION_SET \
     {APP_SET, "set", "KEY=VALUE", \
-     .help = "another value of a configuration key; that of a list or a section is YAML, as in 'links=[{type: tcp}]', " \
-             "and replaces it; may be repeated"}
+     .help = "another value of a configuration key; the value of a list or a section is YAML, as in " \
+             "'links=[{type: tcp}]', and replaces the whole list or section; may be repeated"}
 #define OPTION_NO_HASH(offset) \
     {APP_FLAG, "no-hash", NULL, .at = offset, \
      .help = "leave stream_sha256 out of --stats (null); it takes 10 to 20 ns of processor time a pulse"}

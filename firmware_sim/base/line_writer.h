@@ -44,8 +44,8 @@ int line_writer_put(struct line_writer *writer, enum line_kind kind, const char 
 int line_writer_is_filling(const struct line_writer *writer);
 
 /* Writes what is left, then the line `last` (NULL: none), and closes. When the file takes nothing for 2 s, the rest is
- * dropped. SH_EIO: that happened, or writing failed; the text says how many lines are missing. Lines that were dropped
- * before are counted in *lost alone. A writer of NULL is allowed. */
+ * dropped. SH_EIO: that happened, or writing failed; the text says how many lines are missing in all. Lines that were
+ * dropped before are counted in *lost, but are no error alone. A writer of NULL is allowed. */
 int line_writer_close(struct line_writer *writer, const char *last, struct sh_err *err);
 
 #endif

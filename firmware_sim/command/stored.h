@@ -12,9 +12,9 @@
  * -1: cap is too small. */
 int command_stored_text(struct command_device *dev, const struct head_settings *configured, char *text, size_t cap);
 
-/* Carries out such lines in an order in which none is refused, since a setting's limits depend on others: calls `set`
- * for each. A line whose value is set already is left out. Returns 0; or -1: a line is refused, and why has it with the
- * reason. */
+/* Carries out such lines: calls `set` for each. A setting's limits depend on others, so a line that is refused is tried
+ * again after the others. A line whose value is set already is left out. Returns 0; or -1, with the reason in why: a
+ * line is no such line or is refused in any order, there are too many lines, or there is no memory. */
 int command_stored_apply(struct command_device *dev, const char *text, void (*set)(void *ctx, const char *line),
                          void *ctx, char *why, size_t len);
 

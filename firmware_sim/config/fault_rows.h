@@ -14,7 +14,8 @@
      .help = "On the wire, at a frame: drop, duplicate, reorder, delay, jitter, truncate, flip, stall, split, merge, "
              "garbage, disconnect, unplug, cable, usb_reset, endpoint_stall, short_packets; at a reply: no_reply, "
              "late_reply, wrong_reply, echo; at a connection: refuse, slow_enumeration, descriptor_length. All other "
-             "kinds are in the head, and change the measurement, or what the head says of the time."},
+             "kinds are in the head, and change the measurement, what the head says of the time, its boots and power, "
+             "or its counters."},
     {FAULT(link), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_LINKS,
      .help = "Number of the link, in the order of links, from 1; 0: all links that can have the fault."},
     {FAULT(of), CFG_ENUM, .def = "stream", .names = (const char *const[]){"stream", "notices", NULL},

@@ -19,7 +19,7 @@ enum fault_kind {
     FAULT_DROP,
     FAULT_DUPLICATE, /* n copies more */
     FAULT_REORDER,   /* comes after up to n later ones */
-    FAULT_DELAY,     /* it and all after it come for_ms later */
+    FAULT_DELAY,     /* it comes for_ms later; none overtakes it */
     FAULT_JITTER,    /* the same, by a random time of up to for_ms */
     FAULT_TRUNCATE,  /* its last n bytes are missing; n = 0: a random number */
     FAULT_FLIP,      /* n bits change, at `byte` or anywhere; reseal: its checksums are made right again */
@@ -87,8 +87,8 @@ enum fault_place {
     FAULT_AT_MOMENT      /* in the head, in device time */
 };
 
-/* Frames of the stream, notices (telemetry, events, repetitions) and replies are numbered separately. A fault counts
- * those of one kind: struct fault, of. */
+/* Frames of the stream, notices (telemetry, events, repetitions) and replies are numbered separately. A fault of frames
+ * counts either frames of the stream or notices: the member `of` of struct fault says which. */
 enum fault_of { FAULT_OF_STREAM, FAULT_OF_NOTICES, FAULT_OF_REPLIES, FAULT_N_OF };
 
 struct fault {

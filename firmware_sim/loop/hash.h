@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Computes stream_sha256 of all released frames: a reader of the stream, with a thread of its own.
+/* Computes stream_sha256 of the released ticks: a reader of the stream, with a thread of its own.
  *
  * In: the stream. Out: SHA-256 of the frames that drivers/protocol/COUNTS.md names, in hexadecimal. */
 #ifndef FIRMWARE_SIM_LOOP_HASH_H

@@ -26,8 +26,8 @@
 #include "core/err.h"
 #include "core/line.h"
 
-/* Readers: eight sessions of each of nine links, and the hash. Marks: 10,000 lines per second in ticks of 10 ms, and
- * the two that device_tick_lines adds. */
+/* Readers: eight sessions of each of nine links, and the hash. Marks: 10,000 lines per second in ticks of 10 ms, the
+ * two that device_tick_lines adds, and two to spare. */
 enum { RING_MAX_READERS = 73, RING_MAX_MARKS = 104 };
 
 /* The members count echoes, shots without echo, hits that gave none, and samples of waveforms without room (struct

@@ -7,7 +7,7 @@
  *
  *   a good answer         sets the clock at once, by the offset in the answer, in a step
  *   beyond max_offset_s   is refused, once the clock was set: error 107
- *   no answer in 1 s      is counted; the clock runs on. Error 107 where one had come before
+ *   no answer in 1 s      is counted; the clock runs on. Error 107
  *   not synchronised      is counted as refused: error 107
  *   kiss-o'-death         DENY and RSTR: the server is asked no more, until a setting changes or power comes again;
  *                         RATE: from then on it is asked half as often. Other kisses are counted as refused, and

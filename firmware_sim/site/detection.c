@@ -162,8 +162,8 @@ static int casts_footprints(const struct site *site)
     return site->cfg->beam.mode != BEAM_SINGLE || site->measures;
 }
 
-/* Sets three kinds of noise: the instrument's, which is that of the angles; that of the range; and the ball within
- * which each point is moved (noise.ball). */
+/* Sets the instrument with its errors and the noise of its angles, whether the noise of ranges follows the signal, and
+ * the ball within which each point is moved (noise.ball). */
 static void set_up_noise(const struct config *cfg, struct site_detect *d)
 {
     set_up_instrument(cfg, &d->instrument);

@@ -242,7 +242,7 @@ static void draw_heights(struct height_range range, long column, long row, struc
 {
     enum { LENGTH = 160, HEIGHT = 12 };
     char text[48];
-    pen->begin(pen->on, "legend", "height of the lowest point above the lowest of the map");
+    pen->begin(pen->on, "legend", "height of each pixel's lowest point above the low end of the colours");
     for (long i = 0; i < LENGTH; i += 2) {
         uint8_t rgb[3];
         colour_of(0.15, (double)i / (LENGTH - 2), rgb);

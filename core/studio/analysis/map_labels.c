@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Places the labels of stations. Each one tries places about its station, the nearest first, and takes the one that
- * costs least: it must lie in the map, cover no other label and no station, and should cover few walls. */
+/* Places the labels of stations. Each label tries places about its station, the nearest first, and takes the one that
+ * costs least. A label may reach into the margins at the map's left, right and upper edge, but not below the map. It
+ * must cover no other label and no station, and should cover few walls. */
 #include <math.h>
 
 #include "core/studio/analysis/map_inside.h"

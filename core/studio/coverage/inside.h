@@ -30,8 +30,8 @@ struct coverage {
     uint32_t *piece;    /* [n_pieces] its cell */
     uint64_t n_columns, n_pieces;
     uint32_t n_cells, n_stations;
-    uint64_t *duplicate; /* bits: triangles that lie on others */
-    double duplicate_m2, silent_m2;
+    uint64_t *duplicate;            /* bits: triangles that lie on others */
+    double duplicate_m2, silent_m2; /* area left out: of duplicate faces; of faces without echo */
     struct cell *cell;
     struct cell_hits *hits; /* of the last scan, until it is kept or dropped */
 };

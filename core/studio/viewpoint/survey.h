@@ -76,7 +76,8 @@ int survey_floors(struct survey *s, const struct sh_report *report, struct surve
 
 /* outside.c: finds the best place outside. Returns 0 where the view holds none of the scene from any place. */
 int survey_outside(struct survey *s, struct viewpoint *out);
-/* Sets the bounds to those of the part that has the most surface: a cell of a quarter of the range. */
+/* Sets the bounds to those of the part that has the most surface. A part is a cell, a quarter of the range wide. Cells
+ * are wider where a side of the scene would have more than 64 of them. */
 int survey_narrow(struct survey *s, struct sh_err *err);
 
 #endif

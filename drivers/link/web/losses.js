@@ -8,7 +8,7 @@ const IN_SCAN = ['scanning', 'spin-down'];
 export class Losses {
   leftOutFrames = 0; // by the head, since this page was too slow (READER_LOST)
   leftOutPulses = 0;
-  missing = 0; // pulses of the scans that ended: delivered, and not received
+  missing = 0; // pulses of the scans that ended, which the head delivered and this page did not receive
   #byOverruns = 0; // pulses that the head lost, by OVERRUN events
   #byScanEnds = 0; // the same, by the ends of scans; events of either kind may be missing
   #damaged = 0; // missing frames that no READER_LOST explains, and that were reported
@@ -105,8 +105,8 @@ export class Losses {
     return t !== null && t.scan === scan && STATES[t.state] === 'spin-down' ? t : null;
   }
 
-  // counts: a telemetry's; null: they were lost. If this page joined the scan late, the pulses before that are missing,
-  // too.
+  // counts: those of a telemetry, or of SCAN_END without the pulses cast; null: all were lost. If this page joined the
+  // scan late, the pulses before that are missing, too.
   #end(scan, counts, shots) {
     if (!this.#isRunning || scan !== this.#scan) return;
     this.#isRunning = false;

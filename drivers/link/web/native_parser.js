@@ -31,8 +31,8 @@ class Frame {
 
 const isPrintable = (byte) => byte >= 0x20 && byte <= 0x7e;
 
-/** A Parser takes bytes as they come. It keeps the bytes of a frame or line that is not whole yet: fewer than the
- * longest frame has, 64 KiB. */
+/** A Parser takes bytes as they come. It keeps the bytes of a frame or line that is not whole yet. These are fewer than
+ * the longest frame has: a header, and 64 KiB of payload. */
 export class Parser {
   /** Callbacks, each of which may be left out: frame(frame), text(line without its end), notice({kind, at_byte, seq,
    * n, t_ns}). A notice comes before the frame or text that follows the damage. kind is gap, repeated, late, restarted,
@@ -154,7 +154,7 @@ export class Parser {
     this.bad = {kind, at_byte, t_ns, seq, most, n: 0};
   }
 
-  // The header at hand is right, and what follows it is not its payload.
+  // The header at hand is right, but its payload is wrong, or is cut off by the end.
   #beginBadFrame(kind, view, at) {
     this.#beginBad(kind, this.from + at, view.getBigInt64(at + 16, true), view.getUint32(at + 8, true),
       HEADER + view.getUint32(at + 4, true));
@@ -176,8 +176,9 @@ export class Parser {
     this.bad.n = n - own;
   }
 
-  // Gives the notice of the bad bytes at hand. A frame or a line follows them; with atEnd no more bytes follow. A
-  // frame that seemed to be cut by the end is a broken one if other frames stood within its length.
+  // Gives the notice of the bad bytes at hand. A frame, a line or bad bytes of another notice follow them; with atEnd
+  // no more bytes follow. A frame that seemed to be cut by the end is a broken one if anything else stood within its
+  // length.
   #endBad(atEnd) {
     if (!this.bad) return;
     const {at_byte, n, seq, t_ns} = this.bad;

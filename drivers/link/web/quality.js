@@ -17,7 +17,7 @@ const DEVIATION = [
   ['dev-bound', 'Bound', 'The largest that the methods and the noise allow'],
   ['dev-far', 'Far', 'Points with no surface within 10 m, which are in no other figure'],
   ['dev-along', 'In range', 'RMS along the beam, of points on smooth faces'],
-  ['dev-sigma', 'Expected', 'RMS along the beam that noise and counts give'],
+  ['dev-sigma', 'Expected', 'RMS along the beam that the noise and the rounding to counts give'],
 ];
 const WIDTH = 300, HEIGHT = 92, BASE = 74;
 

@@ -17,7 +17,7 @@ export class Recording {
   #view;
   #what = 'points';
   #abort = null;
-  #mesh = null; // it is {origin, positions, triangles, ratio, mean_edge_m} of the chosen scan
+  #mesh = null; // it is {origin, positions, triangles, ratio} of the chosen scan
   #parts = {};
 
   constructor(info, cloud, view) {

@@ -15,13 +15,14 @@ import {Overlay} from './view_overlay.js';
 import {Programs} from './view_gl.js';
 import {listenTo} from './view_events.js';
 
-const GONE_SHARE = 0.04; // if more than this share of the capacity is gone from the picture, it is drawn again
+// The picture is drawn again if it shows more points that are gone from the cloud than this share of the capacity.
+const GONE_SHARE = 0.04;
 
 export class View extends EventTarget {
   static keys = KEYS; // these are [[keys, their effect]], for a help text
   movable = true; // stations can be dragged
   camera = new Camera();
-  tool = null; // it takes clicks and keys on the picture: {tap(p), key(e)}, each returns whether it has used it
+  tool = null; // it takes clicks and keys on the picture: {tap(p), key(e)}; both return whether the tool used the event
   once = null; // it takes them before the tool does, as {tap, key}
   shading = true;
   #gl;
@@ -200,7 +201,8 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
-  // Returns {min, max} of the scene, or of the points without their far ends; null: there is nothing.
+  // Returns {min, max} around the stations and the scene. Without a scene the points take its place; of more than 500
+  // points the far ends are left out. null: there is nothing, not even a station.
   bounds() { return boxOf(this.cloud, this.stations.list, this.#solids, true); }
 
   fit() {

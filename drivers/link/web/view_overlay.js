@@ -46,7 +46,7 @@ export class Overlay {
     this.ratio = ratio;
   }
 
-  // all: {camera, colours: {ground, ink, accent}, stations (or null), marked: point or null}
+  // Takes {camera, colours: {ground, ink, accent}, stations (or null), marked: point or null}.
   draw({camera, colours, stations, marked}) {
     const c = this.context;
     c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);

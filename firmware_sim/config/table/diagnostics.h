@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Diagnostics while a file is read. Each call adds one to the reader's list and returns its code, SH_EINPUT. Reading
- * goes on after it. (given.h has those of checks.) */
+/* Diagnostics while a file is read. Each call adds one to the list and returns its code: SH_EINPUT, or the one that the
+ * caller gives. Reading goes on after it. (given.h has the diagnostics of checks.) */
 #ifndef FIRMWARE_SIM_CONFIG_TABLE_DIAGNOSTICS_H
 #define FIRMWARE_SIM_CONFIG_TABLE_DIAGNOSTICS_H
 

@@ -28,8 +28,8 @@ struct batch_provenance {
 /* Returns in words how `b` differs from `a`; NULL: it doesn't. */
 const char *batch_provenance_differs(const struct batch_provenance *a, const struct batch_provenance *b);
 
-/* SHA-256 of a whole file, and its length; SH_EINPUT where it isn't there or can't be read. Asks report whether to
- * stop. */
+/* Gives the SHA-256 of a whole file, and its length. SH_EINPUT: the file can't be opened. SH_EIO: a read failed. Asks
+ * report whether to stop. */
 int batch_sha_file(const char *path, char hex[BATCH_SHA_LEN], uint64_t *bytes, const struct sh_report *report,
                    struct sh_err *err);
 

@@ -172,7 +172,8 @@ static void count_groups(const struct match_index *index, struct match *m)
     }
 }
 
-/* With a large distance each point agrees with very many others, so it often asks whether to stop. */
+/* With a large distance each point agrees with very many others, and takes long. So the loop often asks whether to
+ * stop. */
 static int count_points(struct match_index *index, const struct match_input *in, const struct way *way, struct match *m,
                         struct sh_err *err)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The clients as the head sees them: sessions, requests, and the disturbances before them. In: calls of the links and
- * of the board of faults, from any thread. Out: how long each client was away after a disturbance; which frames each
- * session was given. */
+/* The clients as the head sees them: their sessions and requests, and the faults that disturbed them. In: calls of the
+ * links and of the board of faults, from any thread. Out: how long each client was away after a disturbance; which
+ * frames each session was given. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_WATCH_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_WATCH_H
 
@@ -27,14 +27,14 @@ struct watch_span {
     int64_t from_ns, to_ns; /* to_ns INT64_MAX: it is open */
 };
 
-/* A native frame that a session did not get as the head sent it. */
+/* A native frame that a drop or a truncation has destroyed for a session. */
 struct watch_spoiled {
     uint32_t session, seq;
 };
 
 struct watch_link {
     uint32_t open; /* sessions */
-    int acted;     /* a fault ends its sessions now, or soon: */
+    int acted;     /* a fault ends its sessions or silences them, now or soon: */
     enum fault_kind kind;
     int64_t over_ns;
 };
