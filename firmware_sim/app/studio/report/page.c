@@ -136,8 +136,8 @@ void page_number(FILE *out, double v)
 {
     if (!isfinite(v))
         fputs("\xe2\x80\x93", out);
-    else if (fabs(v) >= 1000.0 && fabs(v) < 1e15)
-        page_count(out, (uint64_t)llrint(fabs(v)));
+    else if (v >= 1000.0 && v < 1e15)
+        page_count(out, (uint64_t)llrint(v));
     else
         fprintf(out, "%.4g", v);
 }
