@@ -220,6 +220,18 @@ static void jobs_are_done_once(void **state)
     the_whole_manifest_is_right();
 }
 
+/* A job of the same name that writes another file is another job. */
+static void other_formats_are_other_jobs(void **state)
+{
+    (void)state;
+    batch("-o g --stations 1 --format obj", 0, "", NULL);
+    batch("-o g --stations 1 --format obj --list", 0, "done 0001_station-1 station 1\n", "");
+    batch(
+        "-o g --stations 1 --format las --list", 1, "",
+        "scanhead: g: its job 1 was made with another station, other values of keys or other options; --force repeats "
+        "such jobs, another -o begins another campaign\n");
+}
+
 /* A file that is too short is found by its size, a changed file by its checksum, and a missing one as well. Only the
  * jobs of such files are done again. */
 static void a_changed_file_is_made_again(void **state)
@@ -311,6 +323,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(jobs_are_listed),
         cmocka_unit_test(jobs_are_done_once),
+        cmocka_unit_test(other_formats_are_other_jobs),
         cmocka_unit_test(a_changed_file_is_made_again),
         cmocka_unit_test(another_campaign_is_refused),
         cmocka_unit_test(what_is_wrong_is_said_before_the_first_job),

@@ -231,11 +231,36 @@ static void cells_by_rays_and_memory(void **state)
     }
 }
 
+static int stops_later(void *ctx)
+{
+    return --*(int *)ctx < 0;
+}
+
+/* The regions after the first three are missing, so there is no map. */
+static void a_stop_leaves_no_map(void **state)
+{
+    (void)state;
+    int regions = 3;
+    const struct sh_report report = {.ctx = &regions, .stop = stops_later};
+    struct scene *scene = make_pieces();
+    struct bvh *bvh = made_bvh(scene);
+    struct sight *sight = NULL;
+    struct sh_err err;
+    struct sight_spec spec = {.bvh = bvh, .rays = 1e6, .memory_bytes = 1 << 24};
+    memcpy(spec.station_m, STATION_M, sizeof STATION_M);
+    assert_int_equal(sight_create(&spec, 1, &report, &sight, &err), SH_ESTOPPED);
+    assert_null(sight);
+    assert_true(regions < 0);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_cell_says_what_is_there),
         cmocka_unit_test(rays_through_each_cell),
+        cmocka_unit_test(a_stop_leaves_no_map),
         cmocka_unit_test(cells_by_rays_and_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
