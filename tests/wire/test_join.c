@@ -168,8 +168,13 @@ static void test_recording_is_whole(void **state)
     scanhead_hash_start(sh);
     int n = 0;
     uint64_t pulses = 0;
-    for (; scanhead_next(sh, &frame, 0) == SCANHEAD_OK; n++)
+    for (; scanhead_next(sh, &frame, 0) == SCANHEAD_OK; n++) {
         pulses += frame.type == SCANHEAD_POINTS ? frame.n_pulses : 0;
+        /* only what describes the stream comes again */
+        if (frame.type == SCANHEAD_POINTS || frame.type == SCANHEAD_TELEMETRY || frame.type == SCANHEAD_EVENT ||
+            frame.type == SCANHEAD_LINE_END)
+            assert_int_equal(frame.flags & SCANHEAD_REPEAT, 0);
+    }
     scanhead_hash_hex(sh, client);
     scanhead_close(sh);
     stats_hash(wire, head);
