@@ -22,7 +22,7 @@
 static atomic_int interrupted; /* lock-free, as a signal handler needs; other threads read it, too */
 
 /* Signals that come together are one wish to end: `timeout` sends two, one to the process and one to its
- * group. A third signal, or one more than a second after the first, ends the process at once. */
+ * group. A third signal ends the process at once, and so does a second one after more than a second. */
 enum { SIGNALS_TOGETHER = 2 };
 static const int64_t TOGETHER_NS = 1000000000;
 

@@ -26,7 +26,7 @@ static int column_of(double x, enum texture_wrap wrap)
 
 /* Row 0 is the upper one, at 1. A border of two rows belongs to the lower one. A border of two copies of a repeated
  * image belongs to the upper copy's last row. */
-static int row_of(double y, enum texture_wrap wrap)
+static int row_of(double y, enum texture_wrap wrap, int height)
 {
     double part = y - floor(y);
     if (wrap == TEXTURE_CLAMP) part = y < 0 ? 0 : y > 1 ? 1 : y;
@@ -35,27 +35,34 @@ static int row_of(double y, enum texture_wrap wrap)
         if (y < 0 || y > 1) return -1;
         part = y;
     }
-    const int row = (int)((1 - part) * HEIGHT);
-    return row < HEIGHT ? row : HEIGHT - 1;
+    const int row = (int)((1 - part) * height);
+    return row < height ? row : height - 1;
 }
 
 /* Places are in eighths: borders, middles, and whole numbers. */
+static void each_place(const struct texture_frame *frame)
+{
+    for (int i = -24; i <= 24; i++)
+        for (int j = -24; j <= 24; j++) {
+            const double uv[2] = {i / 8.0, j / 8.0};
+            const int column = column_of(uv[0], frame->wrap[0]);
+            const int row = row_of(uv[1], frame->wrap[1], (int)frame->height);
+            const int64_t want = column < 0 || row < 0 ? -1 : row * WIDTH + column;
+            const int64_t got = texture_at(frame, uv);
+            if (got != want)
+                fail_msg("%d %d, %u rows, at %g %g: %ld, not %ld", (int)frame->wrap[0], (int)frame->wrap[1],
+                         frame->height, uv[0], uv[1], (long)got, (long)want);
+        }
+}
+
+/* With three rows no place lies on a border of two rows within the image; with four rows some do. */
 static void each_way_beyond_the_sides(void **state)
 {
     (void)state;
     for (int a = TEXTURE_REPEAT; a <= TEXTURE_DECAL; a++)
-        for (int b = TEXTURE_REPEAT; b <= TEXTURE_DECAL; b++) {
-            const struct texture_frame frame = {WIDTH, HEIGHT, {(enum texture_wrap)a, (enum texture_wrap)b}};
-            for (int i = -24; i <= 24; i++)
-                for (int j = -24; j <= 24; j++) {
-                    const double uv[2] = {i / 8.0, j / 8.0};
-                    const int column = column_of(uv[0], frame.wrap[0]), row = row_of(uv[1], frame.wrap[1]);
-                    const int64_t want = column < 0 || row < 0 ? -1 : row * WIDTH + column;
-                    const int64_t got = texture_at(&frame, uv);
-                    if (got != want)
-                        fail_msg("%d %d at %g %g: %ld, not %ld", a, b, uv[0], uv[1], (long)got, (long)want);
-                }
-        }
+        for (int b = TEXTURE_REPEAT; b <= TEXTURE_DECAL; b++)
+            for (uint32_t height = HEIGHT; height <= HEIGHT + 1; height++)
+                each_place(&(struct texture_frame){WIDTH, height, {(enum texture_wrap)a, (enum texture_wrap)b}});
 }
 
 static struct texture_mask *mask_of(const uint8_t (*rgba)[4], int has_alpha, double solid, int by_light)

@@ -193,7 +193,7 @@ static void test_time(void **state)
         int scan = i / SHOTS, shot = i % SHOTS;
         if (shot == 3) continue;
         double want_s = 1e-9 * (double)gps_ns[scan] - 1e9 + 0.1 + 1e-3 * shot;
-        assert_true(fabs(rig_double(p + 22) - want_s) < 2e-7); /* steps of a double there, of 0.12 us */
+        assert_true(fabs(rig_double(p + 22) - want_s) < 2e-7); /* a double has steps of 0.06 us there */
         assert_int_equal((int16_t)rig_uint(p + 32, 2), scan == 0 ? INT16_MIN : 100 + shot);
         assert_int_equal(rig_uint(p + 34, 2), scan == 0 ? 0 : 500 + shot);
         p += 36;

@@ -426,7 +426,7 @@ static const char HELP_NOTES[] =
     "does not begin while one of these exists.\n"
     "\n"
     "Ctrl-C, or SIGTERM, ends a recording with complete files. A second signal within a second counts as the same\n"
-    "one. A third signal, or one more than a second after the first, ends the recording at once.\n";
+    "one. A third signal ends the recording at once, and so does a second one after more than a second.\n";
 
 const struct app_command app_record = {
     .name = "record",
