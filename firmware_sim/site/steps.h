@@ -31,9 +31,9 @@ double site_enclose(const struct scene *mesh, double centre_m[3]);
 double site_mesh_error_m(const struct site *site);
 
 /* ---- anchor_geotiff.c: the scene's frame from its GeoTIFF meshes (scene.anchor.source geotiff) */
-/* With a raster in UTM the scene has the coordinates of that grid, without error. Else the scene is tangent to the
- * Earth at the raster's middle, and a warning says how far its corners are from their place. SH_EINPUT: no such
- * mesh, several systems, or none that PROJ knows. */
+/* With a raster in UTM and an offset_m of [0, 0, scene.anchor.height_m] the scene has the coordinates of that grid,
+ * without error. Else the scene is tangent to the Earth at the raster's middle. A warning says how far its corners are
+ * from their place, from 1 cm on. SH_EINPUT: no such mesh, several systems, or none that PROJ knows. */
 int anchor_by_geotiff(const struct config *cfg, const struct sh_report *report, struct geoframe *frame,
                       struct sh_err *err);
 
