@@ -179,9 +179,10 @@ struct cast_counters {
     uint64_t hidden;       /* pulses into the tripod's cone: shots without echo */
     uint64_t lost_samples; /* of waveforms, for which a block had no room */
     /* with a beam */
-    uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
+    uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts, or that see glass or a mirror */
     uint64_t sub_rays; /* cast beyond the central ones */
-    uint64_t ragged;   /* adaptive: pulses with more outlines than BEAM_MAX_LINES, cast as rings */
+    uint64_t ragged;   /* adaptive: pulses with more outlines than BEAM_MAX_LINES, more parts than BEAM_MAX_PARTS, or
+                        * outlines that are not all known after a few passes: cast as rings */
 };
 
 struct caster;
