@@ -2,8 +2,8 @@
 /* Casting: a run of pulses -> echoes, as entries of a block.
  *
  * In: a setup (the settings that are the same for all pulses of a scan) and a run (angles and times of consecutive
- * pulses). Out: a block of line.h. The stages are aim, nearest, optics, sub-rays, echoes, points;
- * core/cast/caster.c has them in that order.
+ * pulses). Out: a block of line.h. The main stages are aim, nearest, optics, sub-rays, echoes, points;
+ * core/cast/caster.c has all stages in their order.
  *
  * Coordinate frames: the station is a point in prcs (m). Beams are directions in socs that are turned to prcs. On a
  * moving platform each pulse has its own origin and rotation, from its firing time alone; a head that stands still
@@ -179,9 +179,10 @@ struct cast_counters {
     uint64_t hidden;       /* pulses into the tripod's cone: shots without echo */
     uint64_t lost_samples; /* of waveforms, for which a block had no room */
     /* with a beam */
-    uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts */
+    uint64_t outlined; /* adaptive: pulses whose footprint an outline cuts, or that see glass or a mirror */
     uint64_t sub_rays; /* cast beyond the central ones */
-    uint64_t ragged;   /* adaptive: pulses with more outlines than BEAM_MAX_LINES, cast as rings */
+    uint64_t ragged;   /* adaptive: pulses with more outlines than BEAM_MAX_LINES, more parts than BEAM_MAX_PARTS, or
+                        * outlines that are not all known after a few passes: cast as rings */
 };
 
 struct caster;
@@ -194,9 +195,10 @@ int caster_add_waves(struct caster *caster, struct sh_err *err);
 
 /* Fills block from the run, with attributes where it has room for them. Returns the number of echoes. Allocates
  * nothing. The echo of a single ray has the width of the pulse. The echo of a footprint, or of returns merged from
- * glass and mirrors, has the width that core/footprint.h defines. An amplitude needs a signal model. Range noise moves
- * echoes, and doesn't widen them. The block has capacity for run->n times the echoes that a pulse may have: 1 + depth
- * with a single ray, beam->max_echoes with a beam, and max_echoes with either where echoes are found in waveforms. */
+ * glass and mirrors, has the width that core/footprint.h defines. An echo that is found in a waveform has the width
+ * that the detector finds. An amplitude needs a signal model. Range noise moves echoes, and doesn't widen them. The
+ * block has capacity for run->n times the echoes that a pulse may have: 1 + depth with a single ray, beam->max_echoes
+ * with a beam, and max_echoes with either where echoes are found in waveforms. */
 uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct line_block *block);
 

@@ -21,8 +21,8 @@ static inline void *together_main(void *together)
     return NULL;
 }
 
-/* Calls work on that many threads. The caller's thread is one of them. `reports` is 1 in the caller's thread, which may
- * report progress, and 0 in the others. */
+/* Calls work on that many threads, but on TOGETHER_MAX + 1 at most. The caller's thread is one of them. `reports` is 1
+ * in the caller's thread, which may report progress, and 0 in the others. */
 static inline void together(unsigned threads, void (*work)(void *ctx, int reports), void *ctx)
 {
     struct together t = {work, ctx};

@@ -3,7 +3,7 @@
  *
  * Inside the program there is one continuous scale: TAI in nanoseconds since 1970-01-01T00:00:00 TAI, as CLOCK_TAI
  * counts. Dates from 1972 to 2199 are allowed, well within int64. UTC is TAI less a whole number of seconds
- * that a table gives; during a leap second the time of day reads 23:59:60. GPS time is TAI less 19 s, counted
+ * that a table gives; during one of its leap seconds the time of day reads 23:59:60. GPS time is TAI less 19 s, counted
  * from 1980-01-06T00:00:00Z in weeks of 604,800 s (IS-GPS-200, 3.3.4 and 6.2.4); GPS time needs no table. POSIX time
  * has no leap seconds: 23:59:60 has the number of the second after it (POSIX.1, 4.16).
  *
@@ -45,15 +45,15 @@ struct utc_gps {
 /* The leap seconds that were known when the program was written. */
 const struct utc_table *utc_table_builtin(void);
 /* The text of a leap-seconds.list (IERS, NIST, tzdata): NTP seconds and TAI-UTC, `#@` the expiry. On failure
- * out is unspecified; the error names the line. */
+ * out is unspecified. The error names the line, unless only the whole table is wrong: no entry, or no later expiry. */
 int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err);
 /* Adds a leap second before this POSIX second, which need not be a full minute. 0: there is one already, or the table
  * is full. */
 int utc_table_add(struct utc_table *table, int64_t posix_s);
 
 void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time *out);
-/* SH_EINPUT for a date outside 1972..2199, a date or time of day that does not exist, or a second 60 where
- * the table has none. */
+/* SH_EINPUT for a date outside 1972..2199, a date or time of day that does not exist, or a second 60 other than that of
+ * a leap second at the end of a day. A leap second within a day (utc_table_add) counts from the next midnight on. */
 int utc_to_tai(const struct utc_table *table, const struct utc_time *utc, int64_t *tai_ns, struct sh_err *err);
 
 int64_t utc_posix_from_tai(const struct utc_table *table, int64_t tai_ns); /* ns since 1970 */

@@ -16,7 +16,7 @@ struct wave_work;
 struct caster {
     struct nearest nearest;
     struct sub_ray_work *sub_rays; /* touched only where pulses have a footprint */
-    struct wave_work *waves;       /* NULL: no setup has waveforms */
+    struct wave_work *waves;       /* NULL: without caster_add_waves */
     struct bvh_profile *profile;
     struct cast_counters counters;
     struct kernel_steps steps; /* of the run at hand */

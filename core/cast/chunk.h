@@ -12,7 +12,7 @@ struct chunk {
     struct line_block *block;
     const uint32_t *dt_ns; /* of its pulses */
     uint64_t pulse0;       /* number of its first pulse in the scan */
-    uint32_t first, n;     /* pulses first .. first + n of the run */
+    uint32_t first, n;     /* pulses first .. first + n - 1 of the run */
     uint32_t at;           /* the block's entry that comes next */
     struct bvh_origins from;
     int linear;     /* the directions that the encoders read are turned into the CRS already */

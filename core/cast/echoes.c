@@ -236,7 +236,7 @@ static uint32_t drop_weakest(struct pulse_echo *h, uint32_t n)
     return n - 1;
 }
 
-/* Keeps only the echo that is asked for. */
+/* Keeps only the echo that is asked for, or all echoes with BEAM_ALL. */
 static uint32_t choose(struct pulse_echo *h, uint32_t n, enum beam_select select)
 {
     uint32_t best = select == BEAM_LAST ? n - 1 : 0;

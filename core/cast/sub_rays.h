@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to core/cast/sub_ray*.c: working memory for pulses with a footprint. */
+/* Private to core/cast: working memory for pulses with a footprint. caster.c allocates it, sub_ray*.c use it. */
 #ifndef CORE_CAST_SUB_RAYS_H
 #define CORE_CAST_SUB_RAYS_H
 

@@ -26,7 +26,7 @@ struct weld {
     struct slot *slot;
     uint8_t *sides; /* of a slot, bits: 1 and 2: a triangle on that side; 4: triangles of two kinds */
     const uint16_t *kind;
-    uint16_t *of; /* of a slot: kind of its first triangle; NULL: not asked for */
+    uint16_t *of; /* of a slot: kind of its first triangle that is not seen edge-on; NULL: not asked for */
     uint64_t mask;
 };
 

@@ -49,10 +49,10 @@ struct quarters {
     quad first, plane[3], slope, slack;
 };
 
-/* Flags of a candidate: outside, covers. Each has four bits, one for each quarter. A group covers the parts that its
- * rectangle covers. */
+/* Flags of a candidate: outside and covers, each with four bits, one for each quarter; then one bit that says whether
+ * the candidate is a group. A group covers the parts that its rectangle covers. */
 enum { OUTSIDE_BITS = 15, COVERS_SHIFT = 4, GROUP_SHIFT = 8 };
-/* A square of this many cells is not divided where groups alone may be seen. */
+/* A square up to this many cells wide is not divided where groups alone may be seen. */
 enum { GROUPS_SIZE = SIGHT_TILE / 2 };
 
 VEC_INLINE void at_middles(const double f[3], const struct quarters *four, quad *out)

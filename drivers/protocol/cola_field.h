@@ -68,12 +68,13 @@ uint32_t cola_inputs_at(const struct cola_fields *fields, int64_t t_ns, int64_t 
  * counted from the first beam, in others from 0. */
 void cola_field_describe(const struct cola_field *field, const struct planar_head *head, int from_first,
                          struct cola_record *out);
-/* Reads a record of a request. COLA_INVALID_DATA: the record is of a radial or dynamic field, has a comment, or has the
- * part of another type than its own. */
+/* Reads a record of a request. COLA_INVALID_DATA: the record is of a radial or dynamic field, has a comment, has the
+ * part of another type than its own, has more than COLA_SHAPE_LINKS points, or has a flag other than 0 and 1. */
 enum cola_error cola_record_take(struct cola_args *args, struct cola_record *record);
 void cola_record_put(const struct cola_record *record, struct cola_out *out);
 /* The shape of a record. A record on the head's own grid has the exact directions of beams. COLA_INVALID_DATA:
- * its directions don't ascend, or span more than a turn; or a length or a direction is too large for a shape. */
+ * its directions don't ascend, or span more than a turn; a point's start lies beyond its stop; or a length or a
+ * direction is too large for a shape. */
 enum cola_error cola_record_shape(const struct cola_record *record, const struct planar_head *head, int from_first,
                                   struct cola_shape *shape);
 

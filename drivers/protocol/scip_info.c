@@ -117,7 +117,7 @@ const char *scip_info_state(struct scip *s)
     return NULL;
 }
 
-/* Answers %ST. A UTM-30LX-EW has the same numbers in MESM. */
+/* Answers %ST. MESM of a UTM-30LX-EW has the same numbers, but neither 002 (time mode) nor 005 (asleep). */
 const char *scip_info_state_number(struct scip *s)
 {
     const enum protocol_head_state head = protocol_ask_state(&s->host);

@@ -19,7 +19,8 @@
     {KEY(cast.sight), CFG_ENUM, .def = "auto",
      WORDS([CHOICE_AUTO] = "auto", [CHOICE_OFF] = "off", [CHOICE_ON] = "on"),
      .help = "on: before a scan the head makes a visibility map of its station and looks rays up in it. This works "
-             "only where head and beam stand still, and no texture cuts holes. Hits are the same, to the last bit. "
+             "only where head and beam stand still, the beam is not rings, and no texture cuts holes. Copies of "
+             "meshes rule it out, unless a page needs them as triangles. Hits are the same, to the last bit. "
              "off: each ray goes to the BVH. auto: on where the map saves more time than it takes, as `scanhead plan` "
              "says."},
     {KEY(cast.sight_mib), CFG_REAL, "MiB", "64", 1, 65536,
@@ -68,7 +69,7 @@
     {"signal", .type = CFG_MAP, .help = "The returned signal: amplitude, reflectance, detection threshold."},
     {"signal.model", IN_CONFIG(signal.on), CFG_BOOL, .def = "off",
      .help = "on: amplitude by the range equation, reflectance in the points, and targets beyond the profile's "
-             "reaches are not detected; off: each hit within the largest range is an echo, without reflectance."},
+             "reaches are not detected; off: each hit within the head's ranges is an echo, without reflectance."},
     {"signal.detection", IN_CONFIG(signal.sharp), CFG_ENUM, .def = "noisy", WORDS("noisy", "sharp"),
      .help = "noisy: detection is random near the threshold, half of the pulses at the profile's reach; sharp: all "
              "pulses up to the reach, none beyond."},

@@ -142,9 +142,10 @@
     {TRIPOD(legs_heading_deg), CFG_REAL, "deg", "0", -360, 360,
      .help = "legs: direction of the first leg, clockwise from the scene's y axis; the others follow by 120 deg."},
     {"stations[].scanner", 0, sizeof(struct config_station), CFG_MAP, .example = "{}",
-     .help = "The scanner of this station: sections head, beam, cast, plan, noise, signal, surfaces, optics, "
-             "instrument with keys that differ from the file's. With its own head.profile it takes nothing from the "
-             "file's head and instrument. --set stations.1.scanner.head.lines_hz=10 works, too."},
+     .help = "The scanner of this station: sections head (without station, start), beam, cast (without sight_mib), "
+             "plan, noise, signal, surfaces, optics, instrument with keys that differ from the file's. With its own "
+             "head.profile it takes nothing from the file's head and instrument. --set "
+             "stations.1.scanner.head.lines_hz=10 works, too."},
 
     {"platform", .type = CFG_MAP, .help = "What carries the head: a tripod, or something that moves."},
     {KEY(platform.kind), CFG_ENUM,

@@ -31,9 +31,9 @@ double site_enclose(const struct scene *mesh, double centre_m[3]);
 double site_mesh_error_m(const struct site *site);
 
 /* ---- anchor_geotiff.c: the scene's frame from its GeoTIFF meshes (scene.anchor.source geotiff) */
-/* With a raster in UTM the scene has the coordinates of that grid, without error. Else the scene is tangent to the
- * Earth at the raster's middle, and a warning says how far its corners are from their place. SH_EINPUT: no such
- * mesh, several systems, or none that PROJ knows. */
+/* With a raster in UTM and an offset_m of [0, 0, scene.anchor.height_m] the scene has the coordinates of that grid,
+ * without error. Else the scene is tangent to the Earth at the raster's middle. A warning says how far its corners are
+ * from their place, from 1 cm on. SH_EINPUT: no such mesh, several systems, or none that PROJ knows. */
 int anchor_by_geotiff(const struct config *cfg, const struct sh_report *report, struct geoframe *frame,
                       struct sh_err *err);
 
@@ -58,7 +58,8 @@ int site_set_up_tripods(struct site *site, const struct sh_report *report, struc
 
 /* ---- detection.c: from a hit to a point: signal, surfaces, instrument, noise */
 /* Called after the scene and its movers are loaded. With mirrors, site->n_surfaces grows by the labels of ghosts. Warns
- * of entries of `surfaces` that fit no surface. */
+ * of entries of `surfaces` for which no surface remains, of textures that are not used, and of surfaces without a
+ * reflectance of their own. */
 int site_set_up_detect(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_detect(struct site *site);
 /* Makes the parts of detection again that depend on ranges and noise. site is a copy of one that is set up, with
@@ -75,8 +76,8 @@ double site_range_noise_m(const struct site *site);
 /* ---- platform.c: a head that moves while it scans, or that scans where its platform stops (platform.kind: stops) */
 /* Replaces the stations, once they are placed, by the stops. Without a trajectory there is a stop for each station and
  * each time: first all stations at the first time, then all stations at the second time. Along a trajectory there is
- * one station, and the head stops on the way. If the scene has no anchor, that station gives the scene's place on the
- * Earth: the station counts as an anchor at its position, with the scene's y axis to true north. */
+ * one station, and the head stops on the way. If the scene has no anchor and that station has a place on the Earth, the
+ * station counts as an anchor at its position, with the scene's y axis to true north. */
 int site_load_stops(struct site *site, const struct sh_report *report, struct sh_err *err);
 /* Reads the trajectory, and cuts the path into stretches. */
 int site_load_platform(struct site *site, const struct sh_report *report, struct sh_err *err);

@@ -108,7 +108,7 @@ static void warn_digits(const struct config *cfg, const struct waveform_spec *sp
         cfg->file, count, spec->bits, 0.1 * floor(100.0 * log10(spec->full_scale / count)));
 }
 
-/* The least level, in sigma of the noise. A sample of noise alone reaches 5 sigma once in 3 million times. */
+/* The least level, in sigma of the noise. A sample of noise alone reaches 5 sigma once in 3.5 million times. */
 #define LEAST_SNR 5.0
 
 /* Returns the receiver's bandwidth, to 10 %, with which the pulse's peak is `least` of the outgoing one; 0: the
@@ -248,7 +248,7 @@ void site_free_waves(struct site *site)
 
 /* ---- room */
 
-/* A block has room for this many windows a pulse, on average, and for this many samples, so that 32 bits can count its
+/* A block has room for up to this many windows a pulse, on average, and for this many samples. So 32 bits can count its
  * bytes. At 10 MHz and 100 ticks a second there is room for 9000 samples a pulse. */
 enum { MOST_WINDOWS = 4, MOST_SAMPLES = 1 << 30 };
 

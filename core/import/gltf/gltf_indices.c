@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks indices of the whole file, also in parts that no scene draws. Indices of elements that don't exist are
- * counted, and the first one is named. In drawn parts such an index is an error when it is read, so this warns of the
- * other parts. */
+/* Checks the indices of a file, also in parts that no scene draws. Animations, extras and extensions that are not read
+ * are left out. Indices of elements that don't exist are counted, and the first one is named. In drawn parts such an
+ * index is an error when it is read, so this warns of the other parts. */
 #include "core/import/gltf/gltf_indices.h"
 
 #include <math.h>

@@ -7,7 +7,7 @@
 
 struct ifc_records;
 
-/* Fills the marks of all products. */
+/* Fills the marks of all products. Products that are air (is_air) get opens_nothing alone. */
 int ifc_walk(struct ifc_records *r, struct sh_err *err);
 
 #endif

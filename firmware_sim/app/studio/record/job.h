@@ -44,7 +44,8 @@ struct record_job {
 int record_job_check(struct record_job *job, struct config *cfg, struct sh_err *err);
 /* The head of cfg runs off line in this process, and so do those of other scanners that the stations have. cfg is
  * changed. The texts of --set that cfg was loaded with must still be in memory. SH_EINPUT: an option that such a
- * recording can't have. SH_ELOST and others as of recording_check_complete: the files keep the points that came. */
+ * recording can't have. SH_ELOST and others as of recording_check_complete: the files keep the points that came,
+ * unless only_whole is 1. */
 int record_job_off_line(struct record_job *job, struct config *cfg, struct sh_err *err);
 /* Records a head on a wire, or a raw stream in a file. */
 int record_job_stream(struct record_job *job, struct sh_err *err);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A page gets this beside the stream of a running head: the head and its stations (/head), a coarse scene (/scene), the
- * plan (/plan), and how good the scan is while it is on (/quality). README.md has the formats.
+ * plan (/plan), how good the scan is while it is on (/quality), the points so far (/past, /save), and previews.
+ * README.md has the formats.
  *
  * In: configuration and site. Out: a link for the loop (a client like any other, whose other end the observer
  * reads), and a source for web links. README.md describes the observer. Where nobody opens a watch, nothing of this
