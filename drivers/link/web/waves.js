@@ -62,7 +62,8 @@ export class WavePlot {
     this.#box.hidden = windows.length === 0;
     if (windows.length === 0) return;
     const place = layOut(windows), ranges = rangesOf(this.#cloud, this.#point);
-    const most = Math.max(1.2, ...windows.map(({samples}) => Math.max(...samples)));
+    const highest = Math.max(...windows.map(({samples}) => Math.max(...samples)));
+    const most = Math.max(1.2, highest); // of the drawing: the threshold is always in it
     const least = Math.min(0, ...windows.map(({samples}) => Math.min(...samples)));
     const y = (value) => BASE - (value - least) / (most - least) * (BASE - TOP);
     const parts = [makeSvg('line', {class: 'axis', x1: 0, x2: WIDTH, y1: y(0), y2: y(0)}),
@@ -77,7 +78,7 @@ export class WavePlot {
     for (const x of marks) parts.push(makeSvg('line', {class: 'echo', x1: x, x2: x, y1: TOP, y2: BASE}));
     this.#svg.replaceChildren(...parts);
     this.#svg.setAttribute('aria-label', `Waveform over range, ${windows.length} part${windows.length === 1 ? '' : 's'}; `
-      + `echoes at ${ranges.map((range_m) => `${range_m.toFixed(3)} m`).join(', ')}; highest ${short(most)} detection thresholds`);
-    say(this.#title, `Waveform, up to ${short(most)} thresholds`);
+      + `echoes at ${ranges.map((range_m) => `${range_m.toFixed(3)} m`).join(', ')}; highest ${short(highest)} detection thresholds`);
+    say(this.#title, `Waveform, up to ${short(highest)} thresholds`);
   }
 }
