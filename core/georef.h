@@ -85,7 +85,8 @@ void georef_free(struct georef *georef);
 
 /* Makes a georef about another centre, for a head that moves or ranges that no longer fit. Scene frame,
  * CRS, zone and false origin are the same; polynomials and anchor are about centre_m (prcs). SH_EINPUT
- * where the zone does not reach. The method stays the same, but its bound may change. */
+ * where the zone does not reach, or where the method needs a polynomial and there is none, as close to a pole. The
+ * method stays the same, but its bound may change. */
 int georef_recentre(const struct georef *georef, const double centre_m[3], struct georef **out, struct sh_err *err);
 
 /* The centre in the CRS, to which the differences are added. */

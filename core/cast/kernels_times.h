@@ -5,7 +5,8 @@
 
 #include "core/schedule.h"
 
-/* Computes firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). */
+/* Computes firing times after the run's first pulse: j * quot + floor((acc + j * rem) / den). j is the number of pulses
+ * since then; in a run with a table of offsets it is the number of the sequence's ticks. */
 void kernel_times(const struct schedule_run *run, uint32_t *dt_ns);
 
 #endif

@@ -175,7 +175,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     if (job->centre.energy > 0.0) add_centre(c, k->s, job);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
         add_hits(c, k, job, i);
-    /* With detection all echoes are kept here, since it chooses among them later. */
+    /* With detection as many echoes are kept here as a pulse can have, since it chooses among them later. */
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;

@@ -2,11 +2,11 @@
 /* The map as a polynomial: fit and bound.
  *
  * Fit. GeographicLib computes the map at 7 x 7 x 7 Chebyshev nodes of a cube about the centre. The map is interpolated
- * by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are kilometres apart. So a
- * coefficient of degree k has the nanometres of rounding in GeographicLib's figures, divided by (20 km)^k. The
- * coefficient's term has (scene / 20 km)^k of these nanometres. Derivatives by small differences would amplify the
- * rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. For the form `meridian` all nodes lie in the
- * meridian's plane.
+ * by products of Lagrange polynomials, whose coefficients are made in long double. The nodes are kilometres apart: half
+ * a side is 20 km, and less near a pole. So a coefficient of degree k has the nanometres of rounding in GeographicLib's
+ * figures, divided by (half side)^k. The coefficient's term has (scene / half side)^k of these nanometres. Derivatives
+ * by small differences would amplify the rounding. Terms up to degree 6 are kept, up to 3 or 5 are used. For the form
+ * `meridian` all nodes lie in the meridian's plane.
  *
  * Bound. Points lie in a cylinder about the centre: up to radius_m from its axis, and up to height_m above and
  * below. The error of an order, at every point of the cylinder, is at most the sum of four parts: the absolute

@@ -11,7 +11,8 @@ int plan_holds(const struct plan_option *option, const struct plan_tolerance *to
            option->echo_share <= tolerance->echo_share;
 }
 
-/* Returns how far an option misses the tolerance; an unknown bound is worst. */
+/* Returns how far an option misses the tolerance. An unknown bound is worse than any known one, and an option that
+ * can't be used is worst. */
 static double excess(const struct plan_option *option, const struct plan_tolerance *tolerance)
 {
     if (option->why_not[0] != '\0') return (double)INFINITY;
@@ -67,7 +68,7 @@ uint32_t plan_choose(const struct plan_choice *choice, struct plan_row *row)
         chosen = i;
         holds = 1;
     }
-    /* Where options miss the tolerance equally, the last is taken, which is the most exact. */
+    /* Where options of known bounds miss the tolerance equally, the last is taken, which is the most exact. */
     for (uint32_t i = 0; i < choice->n && !holds; i++) {
         double over = excess(&option[i], tolerance), least = excess(&option[chosen], tolerance);
         if (over < least || (over == least && over < 1e300)) chosen = i;

@@ -38,8 +38,8 @@ static const struct plan_ray_cost plan_ray_costs[] = {
 #define PLAN_COST_SIGHT_FEW   35.0  /* a look-up among a few triangles */
 #define PLAN_COST_SIGHT_ASK   150.0 /* the BVH is asked ray by ray, since such rays go to different leaves */
 #define PLAN_COST_SIGHT_SMALL 12.0  /* the BVH is asked for small triangles, neighbours together */
-/* Extra in a scene of a million triangles, whose planes fit into no cache; it grows with the root of their
- * number. */
+/* Extra in a scene of a million triangles or more, whose planes fit into no cache. Up to there it grows with the root
+ * of their number. */
 #define PLAN_COST_MILLION 10.0
 /* Costs of making the map: a fixed part, a part per triangle, more for a triangle that is examined by itself, and a
  * part per cell that shows more than one. The last two lines are the memory of such cells. */

@@ -80,11 +80,12 @@ struct figures_on_scene {
     const struct scene *scene;
     const float *range_m; /* [cloud->n] as deviation_points has it */
 };
-/* Counts the points in their cells. Points without a triangle take no part. Up to 3 million cells, in 96 MiB. */
+/* Counts the points in their cells. Points without a triangle take no part. Up to 3 million cells, in 96 MiB;
+ * while their table grows, in 144 MiB. */
 int figures_density_of(const struct figures_on_scene *in, double cell_m, const struct sh_report *report,
                        struct figures_density *out, struct sh_err *err);
 /* Does the same with a cell that it chooses: first_m is doubled until a square of that side has 16 points at the median
- * density (p50), or is wider than 50 m. all: the figures of all its cells. */
+ * density (p50). It is not doubled beyond 50 m. all: the figures of all its cells. */
 int figures_density_fit(const struct figures_on_scene *in, double first_m, const struct sh_report *report,
                         struct figures_density *out, struct figures_density_row *all, struct sh_err *err);
 void figures_density_free(struct figures_density *density);

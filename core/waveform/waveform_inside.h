@@ -15,7 +15,7 @@ struct waveform_pulse {
     double *h;
     uint32_t phases, length, pitch; /* pitch = length + 1 */
     double lead, lag;               /* from its first step to the centroid, from there to its last one; in samples */
-    double scale;                   /* in samples: sigma of the Gaussian whose spectrum falls to 1e-5 where h's does */
+    double scale; /* in samples, at least 0.3: sigma of the Gaussian whose spectrum falls to 1e-5 where h's does */
     double area_s;
 };
 /* Makes the pulse of a spec. The caller has checked the spec's limits, and scaled its table to a peak of 1. Also after

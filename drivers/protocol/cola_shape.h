@@ -71,7 +71,7 @@ int cola_shape_cut(const struct cola_shape *shape, double turns, int32_t *near_u
 /* The outline of a polygon or a sector as corners, the arcs of a sector in steps. Returns how many corners, up to
  * COLA_SHAPE_CORNERS; 0: the shape has none. */
 uint32_t cola_shape_outline(const struct cola_shape *shape, double out_m[COLA_SHAPE_CORNERS][2]);
-/* Adds a corner of a polygon. Returns -1 where it is farther than COLA_SHAPE_REACH_UM, or there are too many. */
+/* Adds a corner of a polygon. Returns -1 where x or y is beyond COLA_SHAPE_REACH_UM, or there are too many. */
 int cola_shape_add(struct cola_shape *shape, double x_um, double y_um);
 /* Adds a link. The link's direction must be beyond the last one's, at most a turn beyond the first one's, and near not
  * above far: else -1, as also for the reasons above. All links of a shape have the same steps. */

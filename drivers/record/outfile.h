@@ -47,7 +47,7 @@ int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t le
 void outfile_yield(struct outfile *file);
 /* OUTFILE_KEEP: flushes, syncs and renames; where that fails, PATH.part is removed. OUTFILE_KEEP_PART: does the same,
  * but after a failure PATH.part stays, unless it is empty. OUTFILE_LEAVE: flushes what it can; PATH.part stays and is
- * not renamed. OUTFILE_DROP: PATH.part is removed. Everything is freed in any case. */
+ * not renamed, but an empty one is removed. OUTFILE_DROP: PATH.part is removed. Everything is freed in any case. */
 enum outfile_end { OUTFILE_DROP = 0, OUTFILE_KEEP = 1, OUTFILE_KEEP_PART, OUTFILE_LEAVE };
 int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err);
 /* Checks that no earlier recording has left data in `part`, which is PATH.part of `path`. The check is for files that a

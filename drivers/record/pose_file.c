@@ -6,8 +6,8 @@
  * are geodetic, the position is NaN and the axes are east, north, up.
  *
  * A head that moves has one row per pose, each time once, in the scene frame, with times since the scan's
- * start. So the file is a trajectory file (core/pose.h). Lines of comment say where stream frames were lost, and
- * how the scene frame lies in the CRS of the geo layout.
+ * start. So the file is a trajectory file (core/pose.h). Lines of comment say where poses are missing, and how
+ * the scene frame lies in the CRS of the geo layout.
  *
  * Scans are numbered from 1 on in the file, as in .waves.csv and .e57. */
 #include <math.h>

@@ -21,7 +21,7 @@ struct json {
     int depth;
     char closer[JSON_MAX_DEPTH];  /* what ends each open level */
     char has_one[JSON_MAX_DEPTH]; /* the level has a member: the next needs a comma */
-    int misused;                  /* a key in an array, none in an object, a level closed wrongly or left open */
+    int misused; /* a key in an array, none in an object, a second value, a level too deep or closed wrongly */
 };
 
 void json_begin(struct json *json, FILE *out);

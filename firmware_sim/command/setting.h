@@ -61,7 +61,7 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
                             enum head_state state);
 
 /* Gives the number in call->value in the row's unit. Outside of the range it returns -1, after error -222 with the
- * allowed range. */
+ * allowed range. So it does for a number that is too fine for the unit; that error has the allowed multiples. */
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);
 
 #endif

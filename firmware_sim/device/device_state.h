@@ -47,7 +47,7 @@ struct device_machine {
         uint64_t tick;
         enum head_state state;
     } change[DEVICE_MAX_CHANGES];
-    uint32_t n_changes; /* since power-up */
+    uint32_t n_changes; /* in the whole run, power cycles included */
 };
 
 /* When power last went, and when it came back or will. */
@@ -105,7 +105,7 @@ struct device {
     struct device_machine machine;
     struct device_power power;
     struct device_scan scan;
-    uint32_t *station_scans; /* [n_stations] since power-up */
+    uint32_t *station_scans; /* [n_stations] in the whole run, power cycles included */
     struct device_events events;
     struct device_overrun overrun;
     struct device_live live;

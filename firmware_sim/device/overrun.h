@@ -31,8 +31,9 @@ struct device_overrun {
 void device_say_overrun(struct device_overrun *overrun, uint64_t pulse_next, uint64_t tick);
 /* Adds an event for lines that files lack, once a second at most. */
 void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick);
-/* Counts a lost tick, and keeps its events for later ticks. Events of ticks before off_tick, at which the head last
- * lost power, are dropped. */
+/* Counts a lost tick, and keeps its events for later ticks, as far as there is room. An overrun event is taken back:
+ * the next one has its losses, too. Other events of ticks before off_tick, at which the head last lost power, are
+ * dropped. */
 void device_count_lost(struct device_overrun *overrun, const struct device_work *work, uint64_t off_tick);
 
 #endif

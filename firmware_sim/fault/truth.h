@@ -2,7 +2,7 @@
 /* The truth: a file that says what was injected, where, and when.
  *
  * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: a writer may be
- * called by any number of threads, and waits for nothing: a thread of its own writes the file (line_writer.h). Where
+ * called by any number of threads, and never waits for the file: a thread of its own writes that (line_writer.h). Where
  * the file is slower than faults strike, {"missing":n} stands for n lines that were dropped. */
 #ifndef FIRMWARE_SIM_FAULT_TRUTH_H
 #define FIRMWARE_SIM_FAULT_TRUTH_H
@@ -42,7 +42,7 @@ int truth_is_filling(const struct truth *truth);
  * be NULL. */
 int truth_close(struct truth *truth, struct sh_err *err);
 
-/* "fault 1 drop: t_ns 1, link 1, ...": at most 256 characters of printable ASCII. */
+/* "fault 1 drop: t_ns 1, link 1, ...": at most 255 characters of printable ASCII. */
 enum { TRUTH_TEXT_LEN = 256 };
 void truth_text(const struct fault_note *note, char text[TRUTH_TEXT_LEN]);
 

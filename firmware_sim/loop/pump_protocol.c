@@ -3,8 +3,8 @@
  *
  * In real time the protocol keeps up with the head, whether its client reads or not, as the firmware of a device does.
  * A unit is lost as a whole where it has no room, or where another one has waited for longer than loop.queue_ms.
- * Answers are lost only where they have no room. In the paces that wait for readers nothing is lost: the
- * session takes no further tick until there is room. */
+ * Answers are lost only where they have no room. In the paces that wait for readers no unit of the
+ * stream is lost: the session takes no further tick until there is room. */
 #include <stdio.h>
 #include <string.h>
 
@@ -141,9 +141,9 @@ static void give_frames(const struct protocol_ops *ops, struct session *s, const
     }
 }
 
-/* A device has watched its fields before the client came. So a new session begins with earlier ticks: those that the
- * ring still has, but none from before power came. Then results are there at once. The session
- * sends nothing meanwhile: its client has asked for nothing. */
+/* A device has watched its fields before the client came. So where a head has fields, a new session in real time begins
+ * with earlier ticks: up to three quarters of those that the ring holds, but none from before power came. Then results
+ * are there at once. The session sends nothing meanwhile: its client has asked for nothing. */
 static void look_back(const struct pump *pump, struct session *s)
 {
     const struct loop_source *source = pump->links->source;
@@ -253,7 +253,8 @@ static void pass_time(struct pump *pump, struct session *s)
     pump->protocol->time(s->protocol, time_of(pump, s->cursor));
 }
 
-/* Gives the next tick to the protocol. Returns 0 when there is none. */
+/* Gives the next tick to the protocol. Returns 0 when there is none, when files have to catch up first, or when power
+ * goes with that tick. */
 static int take_tick(struct pump *pump, struct session *s)
 {
     struct ring *ring = &pump->stream->ring;

@@ -35,9 +35,10 @@ struct replay_options {
     const struct sh_report *report; /* warnings while it is played, from the player's thread */
 };
 
-/* Opens the recording and reads it up to its first anchor. Of cfg, links, loop and faults are used; its profile and
- * settings are set from the recording, as far as links need them. cfg, and what options points to, must live until
- * replay_free. SH_EINPUT: faults in the head, or links of another protocol; SH_EFORMAT: the file has no descriptor. */
+/* Opens the recording and reads it until a descriptor and an anchor have come, or to its end. Of cfg, links, loop and
+ * faults are used; its profile and settings are set from the recording, as far as links need them. cfg, and what
+ * options points to, must live until replay_free. SH_EINPUT: faults in the head, or a link whose protocol can't show
+ * the recorded head; SH_EFORMAT: the file has no descriptor. */
 int replay_open(struct config *cfg, const struct replay_options *options, struct replay **out, struct sh_err *err);
 void replay_free(struct replay *replay);
 

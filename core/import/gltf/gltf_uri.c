@@ -42,7 +42,7 @@ static int sextet_of(char c)
                                   : -1;
 }
 
-/* Decodes base64. Returns the first character that is not base64; NULL: all are. */
+/* Decodes base64 up to the first '=' or the end. Returns the first character that is not base64; NULL: all are. */
 static const char *decode_base64(const char *in, uint8_t *out, size_t *n)
 {
     uint32_t bits = 0;

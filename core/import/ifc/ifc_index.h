@@ -15,9 +15,9 @@ struct ifc_index {
     size_t n, room;
 };
 
-/* ifc_index_close is due in any case. Errors (SH_EINPUT) name file, line and record: a file that is cut off, a number
- * that two records have, a reference to a record that is not there. The programs that read the file's
- * geometry (ifc_bodies.h) report none of these errors. */
+/* ifc_index_close is due in any case. Errors (SH_EINPUT) name the file: a file that is cut off, a number that two
+ * records have, a reference to a record that is not there. The last two also name line and record. The programs that
+ * read the file's geometry (ifc_bodies.h) report none of these errors. */
 int ifc_index_open(struct ifc_index *x, const char *path, struct sh_err *err);
 void ifc_index_close(struct ifc_index *x);
 

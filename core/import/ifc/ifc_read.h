@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* IFC files into a scene, each body by two independent readers. README.md has the rules. */
+/* IFC files into a scene: each body by two independent readers, unless scene.ifc_reader names one or they are not
+ * installed. README.md has the rules. */
 #ifndef CORE_IMPORT_IFC_IFC_READ_H
 #define CORE_IMPORT_IFC_IFC_READ_H
 

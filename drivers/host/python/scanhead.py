@@ -15,7 +15,7 @@ points are numpy arrays where numpy is installed, else lists; the numbers are th
 of libscanhead. Units are in names: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels.
 NaN: no value. Errors are exceptions. A Head belongs to one thread at a time.
 
-Memory is bounded: one frame of bytes (64 KiB), 64 MiB of frames that came while a reply was awaited,
+Memory is bounded: a frame and a chunk of bytes (128 KiB), 64 MiB of frames that came while a reply was awaited,
 8192 poses, 65535 names.
 """
 import array
@@ -369,8 +369,8 @@ class _Bad:
 
 
 class Parser:
-    """Takes bytes as they come and gives frames and reply lines. Holds one frame of bytes at most. on_notice
-    gets a Notice of each thing that is wrong, before the item that follows it."""
+    """Takes bytes as they come and gives frames and reply lines. Once next() gives None, it holds less than one frame.
+    on_notice gets a Notice of each thing that is wrong, before the item that follows it."""
 
     def __init__(self, on_notice: Optional[Callable[[Notice], None]] = None) -> None:
         self._bytes, self._at = bytearray(), 0
@@ -1127,7 +1127,8 @@ def _is_identity(reply: str) -> bool:
 
 class Head:
     """A head or a recording. State (descriptor, anchor, names, poses, clock, hash) is that of the frame that
-    frames() gave last; points(), to_scene() and to_crs() belong to that frame."""
+    frames() gave last; points(), to_scene() and to_crs() belong to that frame. Frames that are dropped while a reply is
+    awaited change the state, too."""
 
     def __init__(self, source: _Source) -> None:
         self._source, self.parser = source, Parser(self._hand_on)
@@ -1393,8 +1394,9 @@ class Head:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
-        """The next frame; None at a recording's end. Nobody waits for reply lines here, so each gives a notice.
-        timeout_s 0: only a frame that has come whole, even if it came in many pieces."""
+        """The next frame; None at a recording's end. Nobody waits for reply lines here, so each gives a notice,
+        except answers to questions of _settle. timeout_s 0: only a frame that has come whole, even if it came in many
+        pieces."""
         deadline_s = None if timeout_s is None else _NO_WAIT if timeout_s <= 0 else time.monotonic() + timeout_s
         frame = None  # type: Union[Frame, str, None]
         if self._queue:

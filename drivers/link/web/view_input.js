@@ -2,7 +2,8 @@
 // This module turns pointer, touch, wheel and keys on the picture into turns, shifts and zooms of the camera.
 //
 //   drag, one finger          orbit about what is under the pointer; look round from inside
-//   right or middle button, Shift or Ctrl and drag, two fingers     shift; two fingers also zoom
+//   right or middle button, Shift or Ctrl and drag, two fingers     shift; two fingers also zoom, and from inside they
+//                             look round
 //   wheel, pinch              zoom, at the pointer
 //   double click or tap       look at what is there
 //   a station                 drag it; its handle turns it

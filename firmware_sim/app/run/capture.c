@@ -21,8 +21,8 @@ static int is_wanted(const struct run_options *o, const struct capture_place *pl
     return o->device_port == 0 || o->device_port == place->port;
 }
 
-/* A link for each port of the capture, in YAML. The system chooses TCP ports, as the device's own port may need a
- * privilege. */
+/* A link for each port of the capture, or for that of --device-port alone, in YAML: up to CONFIG_MAX_LINKS. The system
+ * chooses TCP ports, as the device's own port may need a privilege. */
 static void default_links(const struct capture_run *run, char *text, size_t cap)
 {
     size_t n = 0;

@@ -2,7 +2,8 @@
 /* A connection that `record --raw` has between two ends, and its frames.
  *
  * End 0 asked for the connection: a client that is relayed, or this program itself with its --send. End 1 is the
- * device. Bytes that come from one end are written to the capture, and then sent to the other one. */
+ * device. Bytes that come from one end are written to the capture, and then sent to the other one. Where end 0 is this
+ * program, the device's bytes are only written. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_TALK_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RAW_TALK_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The figures of a report: reads, compares, counts. Nothing is printed here but progress. */
+/* The figures of a report: reads, compares, counts. Nothing is printed here but progress and warnings of loading. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
