@@ -33,7 +33,7 @@ export class Stations {
   fields = []; // the head's monitored fields are {number, name, outline_m}
   selected = null; // number
   moved = null; // {number, x, y, z, heading_deg} is the station that is moved, at its new place
-  dragged = null; // it is called with the place of a station while the station is dragged
+  dragged = null; // it is called with the place of a station that is dragged; after a cancel with its old place
   pending = false; // the moved station was let go, but setStations() has not confirmed its place yet
   #changed;
   #tell;
