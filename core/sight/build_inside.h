@@ -4,7 +4,7 @@
  * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as Warnock's
  * algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square is a leaf where no triangle may be seen in
  * it, or where one covers it and hides the others. It is also a leaf where a few triangles all cover it, and where
- * only groups may be seen in it and one fills it, or it is small. Else its quarters are examined, down to a cell
+ * only groups may be seen in it and one fills it, or the square is small. Else its quarters are examined, down to a cell
  * (region.c).
  *
  * Triangles that follow each other in the scene's list make a group. Where a group's triangles are so small that too
