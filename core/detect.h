@@ -74,9 +74,9 @@ struct detect_signal {
     uint64_t signal_key, range_key;
 };
 
-/* Fails with SH_EINPUT where no air explains the reaches (a darker target is seen further, or the signal falls less
- * than with the square of the range), or where sigma_floor_m is above sigma_m. The error's text does not name a file.
- * Reaches may come in any order. */
+/* Fails with SH_EINPUT where no air explains the reaches, or where sigma_floor_m is above sigma_m. Air does not explain
+ * them where two have the same range, or where the signal falls less than with the square of the range. Some 10 % less
+ * are taken for the data sheet's rounding. The error's text does not name a file. Reaches may come in any order. */
 int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err);
 
 /* Returns the amplitude A of the light that comes back from range_m. rho: the product E rho(i). */

@@ -113,7 +113,7 @@ struct ply_user {
  * bytes after the last row. */
 int ply_walk(struct ply_rows *r, const struct ply_user *user, struct sh_err *err);
 
-/* Fails with "FILE, line L: ELEMENT N of M: what", or the byte instead of the line in a binary. */
+/* Fails with "FILE, line L: ELEMENT N of M: what"; for a binary with "FILE: ELEMENT N of M, byte B: what". */
 int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what);
 
 /* The line of a text, 0 in a binary. */

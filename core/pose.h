@@ -78,7 +78,7 @@ struct trajectory;
 
 struct pose_sample {
     double t_s;
-    struct pose pose; /* quat of any length but 0 */
+    struct pose pose; /* quat of any length above 1e-6 */
     double frame;
 };
 
@@ -101,8 +101,9 @@ int trajectory_read_csv(const char *path, const struct sh_report *report, struct
  * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
  * the last point needs a speed, which is not used. At a point with pause_s the platform comes to rest smoothly, stands
  * for that time and starts smoothly. The platform heads along the path, with pitch and roll 0, about the axes that a
- * station has there: geoframe_level of frame, or the scene's own where frame is NULL. Samples are 0.02 s apart, or
- * 0.01 m of the way where that takes longer. SH_EINPUT is also returned for more than POSE_MAX_KNOTS samples. */
+ * station has there: geoframe_level of frame, or the scene's own where frame is NULL. Samples are at most 0.02 s apart,
+ * or 0.01 m of the way where that takes longer. A way shorter than 0.64 m has up to 64 samples, which may lie closer
+ * together than 0.01 m. A pause has none within it. SH_EINPUT is also returned for more than POSE_MAX_KNOTS samples. */
 int trajectory_read_waypoints(const char *path, const struct geoframe *frame, const struct sh_report *report,
                               struct trajectory **out, struct sh_err *err);
 

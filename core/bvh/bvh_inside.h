@@ -13,8 +13,7 @@
  *
  * How far. The range is that of the triangle's plane, in double (planes.c). The nearest of the triangles that a ray
  * meets is the hit. Hits within 1e-12 of its range count as equal: the one with the lowest number wins, in whatever
- * order they were tried. Where the order may have mattered, the ray is cast again from the nearest range on
- * (packet.c).
+ * order they were tried. Where the order may have mattered, the ray is cast again, up to the nearest range (packet.c).
  *
  * Why no leaf is left out. Embree works in float. Errors are in units of 2^-24 here. o is the start of a ray and h its
  * hit, both counted from the BVH's origin. At h Embree's ray is at most 2 |o| + |h| away from the real ray. One |o| is
@@ -81,7 +80,8 @@ int bvh_create_whole(const struct scene *scene, int in_one, unsigned threads, co
 void bvh_set_plane(const struct bvh *bvh, uint32_t triangle, struct bvh_plane *plane);
 /* Notes where the leaves have the plane of each triangle: at_plane. */
 int bvh_find_planes(struct bvh *bvh, const struct sh_report *report, struct sh_err *err);
-/* Fills labels and steepness of all rays; those that hit nothing get the values of a miss. */
+/* Fills labels and steepness of all rays, each where its array is given. Rays that hit nothing get the values of a
+ * miss. */
 void bvh_refine(const struct bvh *bvh, const struct bvh_rays *rays);
 
 /* ---- copies.c: copies of meshes, each of which has a BVH of its own */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to core/cast: these loops over arrays find where the pulses of a run go. Compilers turn them into vector
- * code. */
+ * code, but for the loop of a run with a table. */
 #ifndef CORE_CAST_KERNELS_AIM_H
 #define CORE_CAST_KERNELS_AIM_H
 

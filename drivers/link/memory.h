@@ -17,7 +17,7 @@ enum { MEMORY_ROOM = 4096, MEMORY_PIECES = 16 /* between two turns */ };
 /* Both ends share this struct, which begins as zeros and outlives the link. */
 struct link_memory {
     /* The link's owner sets this function, which works until there is something for the client, or for at most
-     * timeout_ms (-1: for ever). NULL: the owner has not begun. */
+     * timeout_ms (-1: for ever). NULL: the owner has not begun, or has ended. */
     void (*turn)(void *owner, int timeout_ms);
     void *owner;
     struct {

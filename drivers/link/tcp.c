@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* The TCP link: a listener and up to max_sessions clients.
  *
- * A session is over when its peer resets the connection, has closed its socket, or vanishes (keep-alive, about 25 s). A
- * peer that shuts down its sending side is reported as LINK_SHUT, and goes on reading. A peer that has closed its
- * socket looks the same until something is written to it.
+ * A session is over when its peer resets the connection, has closed its socket, or vanishes. Keep-alive finds a
+ * vanished peer after about 25 s. With bytes under way to the peer, the session ends when the system gives up
+ * repeating them (socket_tune). A peer that shuts down its sending side is reported as LINK_SHUT, and goes on reading.
+ * A peer that has closed its socket looks the same until something is written to it.
  * A client that finds all sessions taken is accepted and closed at once, so that it does not wait. Where
  * clients come for one request, the session that has been silent for longest ends instead. Where a client has shut down
  * its sending side, the session of that client ends instead, once the owner has read what the client sent. */

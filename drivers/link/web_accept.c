@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Serves connections until their request is whole. The request is judged here as it comes, without taking it out of the
- * socket. A wrong request is answered at its first wrong byte, and libwebsockets never sees it. For a correct request
+ * socket. A line that HTTP does not allow is answered at its first wrong byte. Other wrong requests are answered once
+ * they are whole; one from another site's page gets no byte. libwebsockets sees no wrong request. For a correct request
  * libwebsockets gets a new request with only the fields that it needs, and no byte from after the request. Given the
  * client's own request, libwebsockets would act on fields that we don't support (h2c). It would also close the
  * connection without an answer if the request had more fields or arguments than it has room for. */

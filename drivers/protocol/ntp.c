@@ -32,7 +32,7 @@ void ntp_write_request(uint8_t packet[NTP_LEN], int64_t t1_ns)
     put_time(packet + TRANSMIT, t1_ns);
 }
 
-/* RFC 4330, section 5: the root delay and the root dispersion must each be below a second. */
+/* RFC 4330, section 5, suggests this check: the root delay and the root dispersion are each below a second. */
 static int is_synchronised(const uint8_t *packet)
 {
     static const uint8_t none[8] = {0};

@@ -9,9 +9,9 @@
 #ifndef DRIVERS_SOCKET_SILENCE_H
 #define DRIVERS_SOCKET_SILENCE_H
 
-/* Silences a listener and n connections; descriptors below 0 are left out. First it waits for up to 200 ms until the
- * peers have confirmed what was sent to them. Keep-alive probes stop, so that a connection lasts. Returns 0, or
- * SH_ESTATE: the system can't do it, and all sockets are as before. */
+/* Silences a listener, and then n connections; descriptors below 0 are left out. Between the two it waits for up to
+ * 200 ms until the peers have confirmed what was sent to them. Keep-alive probes stop, so that a connection lasts.
+ * Returns 0, or SH_ESTATE: the system can't do it, and all sockets take bytes as before. */
 int sockets_silence(int listener, const int *fds, int n);
 /* Ends the silence: the connections go on. */
 void sockets_speak(int listener, const int *fds, int n);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames that a reader lost: counted here (reader_lost_frames), announced to the reader in an event of its
- * own, and reported to the error queue. Pulses that the head could not compute in time are in device/overrun.c. */
+/* Frames that a reader lost: counted here (reader_lost_frames), and reported to the error queue. A reader of the native
+ * stream gets an event of its own about them. Pulses that the head could not compute in time are in
+ * device/overrun.c. */
 #include <stdio.h>
 #include <string.h>
 

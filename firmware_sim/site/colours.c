@@ -56,8 +56,9 @@ static void widen(struct colour_scale *scale, double v)
     scale->high = fmax(scale->high, v);
 }
 
-/* Finds the smallest and the largest value that a stream may have. Where the quantity is the frame number,
- * these are of the frames in the part of the trajectory that is used. */
+/* Finds limits: the head's limits of range, the lowest and the highest place of meshes that stand, or the smallest and
+ * the largest frame number in the part of the trajectory that is used. Points beyond them (a mesh that moves, a ghost,
+ * noise) get the colour of the limit. */
 static void find_limits(const struct site *site, struct colour_scale *scale)
 {
     scale->low = INFINITY;

@@ -19,7 +19,7 @@ struct ifc_product {
     struct text_span type; /* as the file has it, in capitals */
     char *guid, *name;     /* UTF-8, whole; may be empty */
     uint64_t shape;        /* its IfcProductDefinitionShape; 0: none */
-    bool is_air;           /* an opening, a space, a grid or an annotation: no surface */
+    bool is_air;           /* a type without a surface: air, a drawing or a connection (ifc_records.c) */
     bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
     bool has_body;         /* its shape, walked through, has a solid or a surface */
     bool is_curved;

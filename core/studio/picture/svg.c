@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SVG 1.1: a text that grows in memory, written at the end. Numbers don't depend on the locale. */
+/* SVG 1.1, and paint-order of SVG 2 where a text has a halo: a text that grows in memory, written at the end. Numbers
+ * don't depend on the locale. */
 #include <math.h>
 #include <nettle/base64.h>
 #include <stdlib.h>
@@ -34,7 +35,7 @@ static void put_colour(FILE *out, const char *name, const uint8_t rgb[3])
     fprintf(out, " %s=\"#%02x%02x%02x\"", name, rgb[0], rgb[1], rgb[2]);
 }
 
-/* Returns the length of a whole UTF-8 character that XML allows; 0: it is none. */
+/* Returns the length of a whole UTF-8 character that XML allows; 0: it is none, or it is a control character. */
 static int character(const char *p)
 {
     const int is_control = (unsigned char)*p < 0x20 || *p == 0x7f;
@@ -42,7 +43,7 @@ static int character(const char *p)
     return is_control || is_none ? 0 : text_utf8_len(p, 4);
 }
 
-/* Bytes that are no character of XML become U+FFFD, the sign for that. */
+/* Bytes that are no character of XML, and control characters, become U+FFFD, the sign for that. */
 void picture_put_escaped(FILE *out, const char *text)
 {
     for (const char *p = text; *p != '\0';) {

@@ -42,7 +42,7 @@ export class Poses {
     for (let f = this.frames.length - 1; f >= 0; f--) {
       const poses = this.frames[f], last = poses.length - 1;
       if (!(poses[0].time <= t_ns && t_ns <= poses[last].time)) continue;
-      let low = 0, high = last; // poses[low].time <= t_ns, and the next one's is later
+      let low = 0, high = last; // poses[low].time <= t_ns, and the next one's is later, or the last one's
       while (high - low > 1) {
         const middle = (low + high) >> 1;
         if (poses[middle].time <= t_ns) low = middle;

@@ -20,7 +20,8 @@ export function parseScene(buffer) {
   return {origin: [16, 24, 32].map((at) => view.getFloat64(at, true)), positions: new Float32Array(bytes, 0, 3 * nVertices), triangles};
 }
 
-// Returns edges where faces meet at more than `least` radians, and borders, as pairs of vertices, the longest first.
+// Returns edges where the planes of faces meet at more than `least` radians, and borders, as pairs of vertices, the
+// longest first. Faces that are folded onto each other lie in one plane, so their edge is none.
 export function featureEdges(positions, triangles, least = 0.6) {
   const same = new Map(); // vertices at the same place are one
   const id = new Uint32Array(positions.length / 3);

@@ -33,14 +33,15 @@ export class Stations {
   fields = []; // the head's monitored fields are {number, name, outline_m}
   selected = null; // number
   moved = null; // {number, x, y, z, heading_deg} is the station that is moved, at its new place
-  dragged = null; // it is called with the place of a station while the station is dragged
+  dragged = null; // it is called with the place of a station that is dragged; after a cancel with its old place
   pending = false; // the moved station was let go, but setStations() has not confirmed its place yet
   #changed;
   #tell;
   #timer = 0;
   #hold = null; // a drag is {number, what, x, y, began}, and reach, off, turn, steep once it has begun
 
-  // changed() says that the picture must be drawn again; tell(move) says that a station was let go.
+  // changed() says that the picture must be drawn again; tell(move) says that a station was let go, or that a suggested
+  // one was taken.
   constructor(changed, tell) {
     this.#changed = changed;
     this.#tell = tell;
@@ -81,8 +82,8 @@ export class Stations {
       {at: [station.x_m, station.y_m, station.z_m], heading_deg: station.heading_deg, ghost: false};
   }
 
-  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: the station is out of
-  // sight.
+  // Returns the ring around a station, of 0.75 m or, if that is more, 46 px on the screen; null: the station is less
+  // than 5 cm before the eye, or behind it.
   ring(camera, station) {
     const {at, heading_deg} = this.placeOf(station);
     const {w} = camera.project(at);

@@ -80,7 +80,8 @@ int raw_record(int argc, char **argv);
 
 /* ---- inside */
 
-/* Makes the recording. SH_ELOST: something is missing, the file keeps the rest. */
+/* Makes the recording. SH_ELOST, SH_ECLOSED: something is missing or was not sent, and the file keeps the rest.
+ * SH_ETIMEOUT: no packet came, and there is no file; or the device itself sent nothing. */
 int raw_run(struct raw *r, struct sh_err *err);
 /* Writes a frame to the file. payload: how many of its bytes count as received. */
 int raw_write(struct raw *r, const struct capture_frame *frame, size_t payload, struct sh_err *err);

@@ -14,7 +14,7 @@ struct checks {
     const struct client *client;
     int has_sessions;           /* clients of the link connect to it; 0: it sends to whoever is there */
     int is_open;                /* the client has a session at the end, before it is ended */
-    int scans, holds;           /* points came until the end; the client keeps a dead connection */
+    int scans, holds;           /* points came for 0.1 s after the faults; the client keeps a dead connection */
     int64_t start_ns, ended_ns; /* when the client was started, and when it was asked to end */
     int was_there;              /* the client had not ended by itself until then */
 };

@@ -97,7 +97,7 @@ static void put_expected(struct json *json, const struct watch_scan *s)
 }
 
 /* Writes the members of a scan into the open object: counts, expected errors, figures. `all` and `verdict` are those of
- * `report --json`. */
+ * `report --json`; `all` also has `max_at`. */
 static void put_scan(struct json *json, const struct watch_scan *s)
 {
     put_counts(json, s);
