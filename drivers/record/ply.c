@@ -184,8 +184,8 @@ static void put_binary(struct ply *ply, struct ply_rows rows)
 /* ---- rows of text */
 
 /* On the wire, micrometres (1e-11 degrees) are the finest scale. The units are 0.01 dB, nanoseconds for times, and
- * 0.01 ns for widths of echoes. So more digits would add nothing. NaN is written without a sign, since some readers know
- * only "nan". */
+ * 0.01 ns for widths of echoes. So more digits would add nothing. NaN is written without a sign, since some readers
+ * know only "nan". */
 static char *put_number(char *to, unsigned decimals, double v)
 {
     to = isnan(v) ? stpcpy(to, "nan") : decimal_put_fixed(to, v, decimals);
