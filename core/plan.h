@@ -179,7 +179,8 @@ struct plan_head {
 };
 enum { PLAN_HEAD_ROWS = 6 };
 
-/* Stages that are left out have the method "none" and say why. Returns how many rows. */
+/* Stages that are left out have the method "none" and say why. Only ball-shaped noise has no row then. Returns how many
+ * rows. */
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS]);
 /* Returns the processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and
  * the rest of the work for each pulse. Rows have the cost of methods beyond that. */

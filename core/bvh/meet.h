@@ -20,7 +20,8 @@ void bvh_meet_wide(struct bvh_query *query, float *tfar, const struct bvh_leaf *
 /* ---- meet_one.c: one ray and one triangle */
 
 /* Decides in double whether the ray meets the triangle, and at what range. Packets call it where single precision
- * leaves doubt, or where the plane's range is of no use. which: 0 or 1, the triangle of the leaf. */
+ * leaves doubt. Where the plane's range is of no use, the range lies between the edges that the ray passes. which: 0 or
+ * 1, the triangle of the leaf. */
 void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which);
 /* Notes a hit whose range is at most that of the nearest hit so far, or counts as equal. A hit in a texture's hole is
  * not noted. */

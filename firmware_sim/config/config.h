@@ -264,8 +264,8 @@ double config_cast_hz(const struct config *cfg);
 /* Returns the number of threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
-/* Says why the beams of a scan do not all begin at one place of a scene that stands still, as an adaptive beam needs;
- * NULL: they do. */
+/* Says why an adaptive beam is not possible: the beams of a scan do not all begin at one place of a scene that stands
+ * still, or a tripod has legs, whose outlines are not looked for. NULL: it is possible. */
 const char *config_beam_moves(const struct config *cfg);
 
 /* Says why rays do not all begin at the head's station, as a visibility map (core/sight.h) needs; NULL: they do. */
