@@ -3,11 +3,11 @@
  * Out: the method, and a row with its error bound (m), its cost (ns per pulse), the options that were left out, and the
  * reasons.
  *
- * Each stage takes the cheapest option whose bounds hold the tolerance. Where none does, it takes the one
- * with the least error, and the row says so. Bounds are proven (georeferencing) or found by sampling:
- * some thousands of the head's own pulses, drawn with a fixed key, are cast with the option and with the
- * reference. Costs are rounded figures (core/plan/cost.h). They are not measured while planning, so that the
- * same scene, head and tolerance always have the same plan. No clock, no files. */
+ * Each stage takes the cheapest option whose bounds hold the tolerance. Where none does, it takes the one with the
+ * least error, and the row says so. The configuration can force an option, whatever its bounds are. Bounds are proven
+ * (georeferencing) or found by sampling: some thousands of the head's own pulses, drawn with a fixed key, are cast with
+ * the option and with the reference. Costs are rounded figures (core/plan/cost.h). They are not measured while
+ * planning, so that the same scene, head and tolerance always have the same plan. No clock, no files. */
 #ifndef CORE_PLAN_H
 #define CORE_PLAN_H
 
@@ -92,9 +92,10 @@ struct plan_places {
 
 struct plan_sample;
 
-/* Draws equally many pulses of all places. 61 sub-rays show which footprints lie on one smooth surface. Such footprints
- * are many and alike: only some of them are cast with the reference. The places must outlive the sample. Where report
- * asks to stop, sampling ends at once, and its figures mean nothing. */
+/* Makes a sample without pulses: the functions below draw them, from one place after the other in turn. A pulse outside
+ * the field of view is drawn anew, from the next place. 61 sub-rays show which footprints lie on one smooth surface.
+ * Such footprints are many and alike: only some of them are cast with the reference. The places must outlive the
+ * sample. Where report asks to stop, sampling ends at once, and its figures mean nothing. */
 int plan_sample_create(const struct plan_places *places, const struct sh_report *report, struct plan_sample **out,
                        struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
@@ -107,7 +108,8 @@ void plan_sample_free(struct plan_sample *sample);
 void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* Finds the error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
- * pulse whose way goes on after CAST_MAX_DEPTH surfaces counts as wrong: the rest of its way is not known. */
+ * pulse whose way goes on after CAST_MAX_DEPTH surfaces counts as wrong: the rest of its way is not known. Sets
+ * error_m, echo_share and cost_ns of option. */
 void plan_sample_optics(struct plan_sample *sample, uint32_t depth, struct plan_option *option);
 
 /* ---- sight */
@@ -124,8 +126,8 @@ struct plan_sight_need {
 };
 
 /* Shares of the pulses, by the cell of the map that they lie in. The cell shows one triangle, nothing, a few triangles,
- * or more than a few: then the BVH is asked (ask). small: so few rays hit the cell's triangles that the map leaves them
- * to the BVH. */
+ * or more than a few: then the BVH is asked (ask). A candidate list decides about half of these last cells, so half of
+ * their share counts as few. small: so few rays hit the cell's triangles that the map leaves them to the BVH. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */
@@ -139,7 +141,8 @@ int plan_sight(const struct plan_sight_need *need, const struct plan_places *pla
 
 /* The steps of plan_sight. plan_sight_may_pay returns 0 where so few pulses don't pay for a map, whatever they hit. */
 int plan_sight_may_pay(const struct plan_sight_need *need);
-/* Casts rays around pulses of the head, at the corners of cells cell_rad across. rays: as in struct sight_spec. */
+/* Casts rays to pulses of the head, and to the corners of a cell around each, cell_rad across. rays: as in struct
+ * sight_spec. */
 void plan_sample_sight(struct plan_sample *sample, double cell_rad, double rays, struct plan_sight_found *found);
 /* Returns whether a map is made. found NULL: nothing was sampled. */
 int plan_sight_choose(const struct plan_sight_need *need, const struct plan_sight_found *found, struct plan_row *row);
@@ -176,7 +179,8 @@ struct plan_head {
 };
 enum { PLAN_HEAD_ROWS = 6 };
 
-/* Stages that are left out have the method "none" and say why. Returns how many rows. */
+/* Stages that are left out have the method "none" and say why. Only ball-shaped noise has no row then. Returns how many
+ * rows. */
 size_t plan_head(const struct plan_head *head, struct plan_row rows[PLAN_HEAD_ROWS]);
 /* Returns the processor time of a pulse, ns: one ray into a scene of n_triangles, in packets of that many rays, and
  * the rest of the work for each pulse. Rows have the cost of methods beyond that. */

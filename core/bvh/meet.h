@@ -20,16 +20,17 @@ void bvh_meet_wide(struct bvh_query *query, float *tfar, const struct bvh_leaf *
 /* ---- meet_one.c: one ray and one triangle */
 
 /* Decides in double whether the ray meets the triangle, and at what range. Packets call it where single precision
- * leaves doubt, or where the plane's range is of no use. which: 0 or 1, the triangle of the leaf. */
+ * leaves doubt. Where the plane's range is of no use, the range lies between the edges that the ray passes. which: 0 or
+ * 1, the triangle of the leaf. */
 void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which);
 /* Notes a hit whose range is at most that of the nearest hit so far, or counts as equal. A hit in a texture's hole is
  * not noted. */
 void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t triangle, double range_m);
 
 /* A sine of the angle between ray and plane. At larger sines the range comes from the plane, at smaller ones from the
- * edges. A ray that is inside for certain in single precision has a larger sine: each of its sides is at least 9 units
- * of 2^-24 of F L (see below). So the three sides, which add up to n . d, are at least 1.6e-6 L L, and |n| is at most
- * L L. */
+ * edges. A ray that is inside for certain in single precision has a larger sine: each of its sides is at least 8 units
+ * of 2^-24 of F L (see below: 24 units of doubt, and errors of 16 at most). So the three sides, which add up to n . d,
+ * are at least 1.4e-6 L L, and |n| is at most L L. */
 #define BVH_FLAT 1e-6
 
 /* ---- edges */

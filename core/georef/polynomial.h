@@ -41,8 +41,10 @@ void polynomial_fit(const struct shim_map *map, enum polynomial_form form, doubl
 /* Returns whether the polynomial has this order: 1 to 3, and in the form POLYNOMIAL_FLAT also 5. */
 int polynomial_has_order(const struct polynomial *p, int order);
 
-/* A bound of the terms above `order`, within radius_m and height_m of the centre; weight: metres on the
- * ground per unit of each output. INFINITY beyond half_m, and where the series does not converge. */
+/* A bound of the terms above `order`, within radius_m and height_m of the centre; weight: metres on the ground per unit
+ * of each output. INFINITY beyond half_m, where the series does not converge fast, and where the polynomial does not
+ * have this order. In the form POLYNOMIAL_MERIDIAN the bound is INFINITY, too, where points may lie on the Earth's
+ * axis. */
 double polynomial_bound_m(const struct polynomial *p, int order, double radius_m, double height_m,
                           const double weight[3]);
 

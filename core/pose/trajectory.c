@@ -20,7 +20,8 @@ static int stands(const struct trajectory *tr, size_t i)
                   sizeof tr->sample[i].pose.position_m) == 0;
 }
 
-/* Derivative at sample i of the parabola through it and its neighbours (at an end: through the nearest three). */
+/* Derivative at sample i of the parabola through it and its neighbours (at an end: through the nearest three). With two
+ * samples it is that of their straight line. Next to an interval in which the platform stands it is 0. */
 static double velocity(const struct trajectory *tr, size_t i, int axis)
 {
     size_t last = tr->n - 1;

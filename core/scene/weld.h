@@ -23,7 +23,7 @@ struct build_weld {
     uint32_t recent[BUILD_RECENT];
 };
 int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err);
-/* Adds the file's next vertex as build_vertex does, unless the scene has one at the same place, bit for bit. */
+/* Adds the file's next vertex as build_vertex does, unless this weld had one at the same place before, bit for bit. */
 int build_weld_vertex(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);
 /* The same, but numbers come later, many together, which is faster: build_weld_flush gives the last ones. */
 int build_weld_later(struct scene_build *b, struct build_weld *w, const double v[3], struct sh_err *err);

@@ -11,7 +11,8 @@ enum {
 };
 
 /* A mixture takes the samples from the foot before its first maximum to the foot after its last maximum. A foot is
- * where the signal has fallen near the noise, or where the samples of the maximum end. */
+ * where the signal has fallen near the noise or to 0.5 % of the maximum, or where the samples of the maximum end. The
+ * mixture takes a sigma of the pulse more on both sides. */
 static void decompose_range(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
                             struct finder_task *task)
 {
@@ -173,8 +174,8 @@ static int decompose_split(const struct finder_task *task, struct finder_mix *mi
     return 1;
 }
 
-/* Returns whether all components could be echoes: none is below the least peak, or explained by the tail of a larger
- * one. */
+/* Returns whether all components could be echoes: none is below the least peak, nearer to another one than 0.35 sigma
+ * of the pulse, or explained by the tail of a larger one. */
 static int decompose_sound(const struct finder_task *task, const struct finder_mix *mix, double least)
 {
     for (uint32_t j = 0; j < mix->n; j++)

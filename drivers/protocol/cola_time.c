@@ -154,7 +154,7 @@ enum cola_error cola_read_time_delay(struct cola *self, struct cola_args *args, 
 }
 
 /* The request has u16 year; u8 month, day, hour, minute, second; u32 us. The answer is u8 1 if the clock was set, else
- * 0. A client can't set the clock while a time server sets it. */
+ * 0. A client can't set the clock while TSCRole is 1, whether or not a time server answers. */
 enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     struct cola_date d = {.year = cola_arg_u(args, 2)};

@@ -4,7 +4,8 @@
  * A sentence is "$", talker and type, fields with commas between, "*", the XOR of all characters between "$"
  * and "*" as two upper-case hex digits, CR LF. As with survey receivers, minutes have 7 decimals (a step is
  * 0.19 mm) and heights 4. So a GGA may be longer than the 82 characters of the standard. A field that isn't
- * known is empty. Without a fix (quality 0) all fields of the position are empty. At rest the course is 000.0.
+ * known is empty. But GSA numbers its satellites from 1 on, since single satellites are not modelled. Without a fix
+ * (quality 0) all fields of the position are empty. At rest the course is 000.0.
  * Each function returns the length of the sentence with its end, and ends it by a NUL; 0 when cap is too
  * small. Pure; writes only into dst; allocates nothing; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_NMEA_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair of .obj. A mesh is held in memory until all scans are over. So only a recorder that was killed while it wrote
  * the file leaves something: lines of text, in which a triangle follows its vertices. All whole lines are kept. The
- * file of materials is written after the lines, so it is missing. */
+ * file of materials of a mesh with textures is written after the lines, so it is missing. */
 #include "drivers/record/repair.h"
 
 #include <stdlib.h>

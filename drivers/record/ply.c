@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* .ply: one vertex per echo. The format is described in the header's own comments.
+/* .ply: one vertex per echo, and with the option empty_shots one per shot without echo. The format is described in the
+ * header's own comments.
  *
  * Positions are in the stream's CRS (geo), or in the scene frame (polar), as scanhead_to_scene has it.
  *
@@ -182,8 +183,9 @@ static void put_binary(struct ply *ply, struct ply_rows rows)
 
 /* ---- rows of text */
 
-/* On the wire, micrometres (1e-11 degrees) are the finest scale, and 0.01 dB and nanoseconds are the units. So more
- * digits would add nothing. NaN is written without a sign, since some readers know only "nan". */
+/* On the wire, micrometres (1e-11 degrees) are the finest scale. The units are 0.01 dB, nanoseconds for times, and
+ * 0.01 ns for widths of echoes. So more digits would add nothing. NaN is written without a sign, since some readers
+ * know only "nan". */
 static char *put_number(char *to, unsigned decimals, double v)
 {
     to = isnan(v) ? stpcpy(to, "nan") : decimal_put_fixed(to, v, decimals);
@@ -258,8 +260,8 @@ static int set_gps(struct ply *ply)
     return facts->have_gps;
 }
 
-/* A float is rounded by up to 2^-24 of a number: 0.06 mm at 1 km from the origin of a scene, but 0.3 m at a northing of
- * UTM. */
+/* A float is rounded by up to 2^-24 of a number: 0.06 mm at 1 km from the origin of a scene, but 0.3 m at a UTM
+ * northing of 5,000 km. */
 static const double FLOAT_MOST_M = 1000, FLOAT_PART = 0x1p-24;
 
 static int fail_float(const char *path, double most, struct sh_err *err)

@@ -23,7 +23,7 @@ struct repair {
 
     /* out */
     uint64_t n_kept;    /* units kept */
-    const char *unit;   /* "frames", "packets", "points", "shots" */
+    const char *unit;   /* "frames", "packets", "points", "points and empty shots", "poses", "waveforms" */
     uint64_t n_scans;   /* scans of these units; 0: the format can't say */
     uint64_t cut_bytes; /* bytes at the end that were in no whole unit */
     int was_whole;      /* there was nothing to repair, and nothing was changed */
@@ -41,7 +41,8 @@ struct repaired {
     int was_whole;
 };
 /* SH_EINPUT: no such file, no such format; SH_ESTATE: the file is still being written, or FILE is named and FILE.part
- * exists, too; SH_EFORMAT: the file can't be repaired, and is unchanged. */
+ * exists, too; SH_EFORMAT: the file can't be repaired, and is unchanged; SH_EPERM: the file needs a repair, but is not
+ * ours to write. */
 int repair_file(const char *path, const struct sh_report *report, struct repaired *repaired, struct sh_err *err);
 void repair_free(struct repaired *repaired);
 

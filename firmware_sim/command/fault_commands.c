@@ -32,7 +32,7 @@ int command_fault_add(struct command_call *call)
     return command_reply(call, "%u", number);
 }
 
-/* Parses a fault's number, or ALL (0). Returns -1 when it failed. */
+/* Parses a fault's number, or ALL (0). No parameter means ALL. Returns -1 when it failed. */
 static int fault_commands_take_number(struct command_call *call, int64_t *number)
 {
     struct command_decimal decimal;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* `FAULt`: adds, lists and clears injected faults. */
+/* `FAULt`: adds, lists and clears injected faults, and says how often they have struck. */
 #ifndef FIRMWARE_SIM_COMMAND_FAULT_COMMANDS_H
 #define FIRMWARE_SIM_COMMAND_FAULT_COMMANDS_H
 

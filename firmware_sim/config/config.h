@@ -102,7 +102,7 @@ struct config_head {
     struct head_settings settings;
     char serial[32], name[32];
     char settings_file[CONFIG_PATH_LEN];
-    int start;        /* scan when booted; only the command run uses it */
+    int start;        /* scan when booted; run and soak use it, recordings do not */
     double motor_ppm; /* with emitter: beams, the error of the rotor's speed where nothing holds the rotor's phase */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
@@ -231,8 +231,9 @@ int config_serves(const struct config *cfg, uint32_t i);
 int config_is_alone(const struct config *cfg);
 /* Returns whether a link speaks that protocol, of enum protocol_id. */
 int config_speaks(const struct config *cfg, int protocol);
-/* Sets ranges, noise and step of a configuration, as if its keys had these values. cfg is a copy of a loaded one; the
- * settings must be allowed for it (command.h). SH_EINPUT: no ring of the sphere is left. */
+/* Sets the head's settings of a configuration, and the ranges, noise and step that follow from them, as if its keys had
+ * these values. cfg is a copy of a loaded one; the settings must be allowed for it (command.h). SH_EINPUT: no ring of
+ * the sphere is left. */
 int config_apply_settings(struct config *cfg, const struct head_settings *settings, struct sh_err *err);
 
 /* Returns whether head.range_min_m or range_max_m leaves less than the profile's range. */
@@ -263,8 +264,8 @@ double config_cast_hz(const struct config *cfg);
 /* Returns the number of threads that cast: loop.threads, or one per processor. */
 uint32_t config_threads(const struct config *cfg);
 
-/* Says why the beams of a scan do not all begin at one place of a scene that stands still, as an adaptive beam needs;
- * NULL: they do. */
+/* Says why an adaptive beam is not possible: the beams of a scan do not all begin at one place of a scene that stands
+ * still, or a tripod has legs, whose outlines are not looked for. NULL: it is possible. */
 const char *config_beam_moves(const struct config *cfg);
 
 /* Says why rays do not all begin at the head's station, as a visibility map (core/sight.h) needs; NULL: they do. */

@@ -113,9 +113,8 @@ static int complete_form(struct cfg_reader *rd, const struct config *cfg, struct
     return SH_OK;
 }
 
-/* Without an anchor a station needs its place in the scene, and for a CRS its place on the Earth, too. With an anchor
- * it needs one of them; the other follows.
- */
+/* Without an anchor a station needs its place in the scene. For a CRS, or a link's protocol that needs it, the station
+ * needs its place on the Earth, too. With an anchor the station needs one of them; the other follows. */
 static int check_station(struct cfg_reader *rd, const struct config *cfg, struct config_station *station, uint32_t i)
 {
     int code = find_form(rd, station, i);

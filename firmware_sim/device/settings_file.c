@@ -202,8 +202,8 @@ static int put_image(const void *source, FILE *out, struct sh_err *why)
     return SH_OK; /* newfile looks for errors of writing */
 }
 
-/* Writes each new image. When the file is closed, this thread writes what is new, or tries a failed write once more.
- * Then the thread ends. */
+/* Writes the newest image. An image that is replaced during a write is never written itself. When the file is closed,
+ * this thread writes what is new, or tries a failed write once more. Then the thread ends. */
 static void *settings_file_main(void *arg)
 {
     struct settings_file *file = arg;

@@ -2,7 +2,8 @@
 /* The last descriptor, emitter and anchor that were released, latched for clients that join later.
  *
  * In: stream frames, at release. Out: copies of them, with the flags of a repetition. One thread writes, any number of
- * others read. There are no locks, and writing never waits. Real-time safe. */
+ * others read. There are no locks. Writing never waits, and is real-time safe. A reader copies again, and yields the
+ * processor, while a frame is being latched. */
 #ifndef FIRMWARE_SIM_LOOP_LATCHED_H
 #define FIRMWARE_SIM_LOOP_LATCHED_H
 

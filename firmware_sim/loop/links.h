@@ -25,7 +25,9 @@ struct link_place {
 /* Counts of what the readers of a link got, and of what was left out for them. COUNTS.md defines the
  * words. */
 struct link_counts {
-    uint64_t received_pulses; /* in frames that were written out to the link as a whole */
+    /* Native: pulses in frames that were written out to the link as a whole. Other protocols: pulses that the protocol
+     * was given since the client came. */
+    uint64_t received_pulses;
     uint64_t left_out_pulses;
     uint64_t left_out_frames;
     /* of all protocols but the native one */
@@ -39,7 +41,8 @@ struct links_observer {
     void (*session)(void *ctx, uint32_t session, int begins, const char *peer, int64_t t_ns);
     /* The session's client sent these bytes. */
     void (*heard)(void *ctx, uint32_t session, const void *bytes, size_t len);
-    /* A request was answered with an error, or could not be read. reply: of a native line; NULL in other protocols. */
+    /* A request was answered with an error, or could not be read. line and reply: of a native request; NULL in other
+     * protocols. */
     void (*refused)(void *ctx, uint32_t session, const char *line, const char *reply);
 };
 
@@ -54,7 +57,7 @@ struct links {
     const struct links_observer *observer; /* NULL: none */
     struct protocol_identity identity;
     struct cola_fields fields; /* of the identity, where there are some */
-    char data_address[64];     /* where the first velodyne link sends; empty: there is none */
+    char data_address[64];     /* where the first velodyne link of type udp sends; empty: none */
     int data_port;
 
     struct pump *pump[STREAM_MAX_LINKS];
@@ -64,8 +67,8 @@ struct links {
     struct sh_err error; /* of the first link that failed, once failed is 1 */
 };
 
-/* Opens the links of the configuration, and one more where extra is not NULL. A link that carries less than
- * the stream needs is refused. links_close is needed after a failure, too. */
+/* Opens the links of the configuration, and one more where extra is not NULL. A link of the native protocol that
+ * carries less than the stream needs is refused. links_close is needed after a failure, too. */
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err);
 int links_start(struct links *links, struct sh_err *err);
 /* Waits until the links have written all that their readers take. */

@@ -44,7 +44,7 @@ void capture_free(struct replay_capture *capture);
 uint32_t capture_n(const struct replay_capture *capture);
 const struct capture_place *capture_place(const struct replay_capture *capture, uint32_t i);
 void capture_get_counts(const struct replay_capture *capture, struct capture_counts *counts);
-/* Returns the time from the first packet to the last. */
+/* Returns the time from the first packet to the last, without steps back of the capture's clock. */
 double capture_duration_s(const struct replay_capture *capture);
 
 #endif

@@ -45,8 +45,8 @@ struct recording {
 int recording_open_file(const char *path, struct scanhead **stream, struct sh_err *err);
 /* recording: zeros. SH_EINPUT, SH_EFORMAT, SH_EIO with the path. recording_close is needed after a failure, too. */
 int recording_open(struct recording *recording, const char *path, struct sh_err *err);
-/* Finds the device time of the last frame in a file of frames (.shs), and reads only the file's end. Returns 1; 0: that
- * end has no frame with a time, or the file is of another form. */
+/* Finds the device time of the last frame in a file of frames (.shs) that is not marked LOCAL, and reads only the
+ * file's end. Returns 1; 0: that end has no such frame, or the file is of another form, or can't be read. */
 int recording_last_ns(const char *path, int64_t *t_ns);
 /* Starts again at the beginning. */
 int recording_rewind(struct recording *recording, struct sh_err *err);

@@ -137,7 +137,7 @@ void gltf_close(struct gltf *g)
 
 /* ---- buffers */
 
-/* The path of a file in the mesh's folder; to be freed. NULL: no memory. */
+/* The path of a file in the mesh's folder, or of one whose name begins with /. To be freed. NULL: no memory. */
 static char *sibling_of(const struct gltf *g, const char *name)
 {
     const char *mesh = g->b->spec->file;

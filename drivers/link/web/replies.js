@@ -44,8 +44,9 @@ export class Replies {
   }
 
   /** Returns a promise of the reply to one line. The head answers one line after the other, so the time counts from
-   * when all lines before it have their replies. The promise is rejected with CommandError; number 0: no reply came, or
-   * the line is no command. */
+   * when all lines before it have their replies. A line that can't be sent yet may also wait for timeout_s at most. The
+   * promise is rejected with CommandError; number 0: no reply came, the line is no command, or the head is not
+   * connected. */
   ask(line, timeout_s) {
     return new Promise((resolve, reject) => {
       if (!/^[ -~]{1,256}$/.test(line) || line.trim() === '') {

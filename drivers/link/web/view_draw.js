@@ -2,8 +2,9 @@
 // This module draws parts piece by piece into a stored picture: a prefix of each part while the view moves, the rest
 // once it rests, and only new points as they come.
 //
-// A part is {n, drawn, weight, skip, draw(from, to)}. `drawn` of its elements are in the picture being worked on. The
-// amount per step follows from the time that the last steps took on the GPU (by fences), so that a step takes STEP_MS.
+// A part is {n, drawn, weight, skip, whole, draw(from, to)}. `drawn` of its elements are in the picture being worked
+// on. The amount per step follows from the time that the last steps took on the GPU (by fences). So a step takes
+// STEP_MS, and MOVE_MS while the view moves.
 
 import {Target} from './view_gl.js';
 
@@ -121,7 +122,8 @@ export class Painter {
     this.#shown = this.#work;
   }
 
-  // Draws up to `points` more points, and returns how many it drew. The function `of` is shares or restShares.
+  // Draws about `points` more points, and returns how many it drew: shares are rounded up, and a part that is `whole`
+  // is drawn whole. The function `of` is shares or restShares.
   draw(parts, points, of = restShares) {
     const upTo = of(parts, points);
     let did = 0;

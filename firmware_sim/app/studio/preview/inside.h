@@ -53,7 +53,7 @@ static inline size_t preview_words(const struct coverage *coverage)
 }
 
 /* A copy of a scanner's site, with the settings of a request and room for a place of its own. The copy shares all else
- * with the original. The struct is large. */
+ * with the original. The struct is large. free() releases it, after a failure, too: *out may then be NULL or not. */
 struct preview_site {
     struct site site;
     struct config cfg;

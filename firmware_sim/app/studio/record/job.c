@@ -261,7 +261,7 @@ int record_job_check(struct record_job *r, struct config *cfg, struct sh_err *er
     return rc == SH_OK ? check_meshes(r, cfg, err) : rc;
 }
 
-/* Checks before anything is loaded whether the files can hold the scans of all heads that will scan. */
+/* Checks before scenes are loaded whether the files can hold the scans of all heads that will scan. */
 static int check_heads(struct record_job *r, const struct heads *heads, uint32_t last, struct sh_err *err)
 {
     const struct config *cfg;

@@ -41,7 +41,7 @@ void soak_clean_close(struct soak *soak);
 /* 0: the frame is not known (any more, or not yet). */
 int soak_clean_get(struct soak *soak, soak_seq seq, struct soak_clean_frame *out);
 soak_seq soak_clean_top(struct soak *soak);
-/* Device time of the last frame. */
+/* Device time of the last frame. Frames that are marked LOCAL count nowhere here. */
 int64_t soak_clean_t_ns(struct soak *soak);
 uint64_t soak_digest(const struct scanhead_frame *frame);
 /* A number on the wire, as 64 bits. */

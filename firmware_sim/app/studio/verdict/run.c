@@ -139,7 +139,7 @@ static int has_points(struct run *r)
     return atomic_load(&r->stream.points_ns) != 0;
 }
 
-/* For waits that only the time ends. */
+/* For waits of a fixed time. The client's end and a signal end these waits, too. */
 static int never(struct run *r)
 {
     (void)r;
@@ -212,9 +212,9 @@ static int is_new(const struct run *r)
            now.st_mtim.tv_sec != r->before.st_mtim.tv_sec || now.st_mtim.tv_nsec != r->before.st_mtim.tv_nsec;
 }
 
-/* Returns by how much a link's protocol rounds coordinates, m. SCIP and CoLa: half a millimetre of range, and angles.
- * VLP-16: half of 2 mm, and half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream
- * does not. */
+/* Returns how far coordinates may differ, m: the option's figure if it is given. Else the figure has room for the
+ * rounding of the link's protocol. SCIP and CoLa: half a millimetre of range, and angles. VLP-16: half of 2 mm, and
+ * half of 0.01 degrees at 100 m. The native protocol rounds nothing that the head's stream does not. */
 static double match_of(const struct run *r)
 {
     if (r->options->match_m >= 0.0) return r->options->match_m;

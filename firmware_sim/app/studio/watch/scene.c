@@ -15,7 +15,8 @@
 #include "firmware_sim/site/plan_rows.h"
 
 enum { PLAN_LEN = 512, HEAD_BYTES = 40, VERTEX_BYTES = 12, TRIANGLE_BYTES = 12, VERSION = 1 };
-/* Each body that moves gets a tenth of the scene's triangles. */
+/* Each body that moves gets up to a tenth of the triangles that the scene may have, but up to DECIMATE_LEAST in any
+ * case. */
 enum { BODY_PART = 10 };
 
 /* ---- /scene */
