@@ -66,28 +66,43 @@ static void note_odd(struct gltf *g, const json_t *material, uint32_t number)
     note(g, are_shares(json_object_get(glossy, "diffuseFactor")), "diffuseFactor", number);
 }
 
+/* Returns base[number], or base[number][number] ... where another material has that name. NULL: no memory. */
+static char *name_with(const char *base, uint32_t number, const json_t *in_file, const json_t *given)
+{
+    char *name = NULL;
+    do {
+        char *shorter = name;
+        if (asprintf(&name, "%s[%u]", shorter != NULL ? shorter : base, number) < 0) name = NULL;
+        free(shorter);
+    } while (name != NULL && (json_object_get(in_file, name) != NULL || json_object_get(given, name) != NULL));
+    return name;
+}
+
 /* Two materials of one name would be one surface, with the colour of the first. So the later one gets its number, and
  * so does one without a name. */
 int gltf_name_materials(struct gltf *g)
 {
-    json_t *materials, *seen = json_object();
+    json_t *materials, *in_file = json_object(), *given = json_object();
     int rc = gltf_list(g, g->root, "materials", "", &materials);
     g->names = json_array();
     for (uint32_t i = 0; i < json_array_size(materials) && rc == SH_OK; i++) {
         const char *name = gltf_text(json_array_get(materials, i), "name");
-        const struct gltf_at number = gltf_at("materials[%u]", i);
-        char *own = NULL;
+        if (name != NULL) json_object_set_new_nocheck(in_file, name, json_true());
+    }
+    for (uint32_t i = 0; i < json_array_size(materials) && rc == SH_OK; i++) {
+        const char *name = gltf_text(json_array_get(materials, i), "name");
+        const int has_name = name != NULL && *name != '\0';
         note_odd(g, json_array_get(materials, i), i);
-        if (name != NULL && *name != '\0' && json_object_get(seen, name) != NULL &&
-            asprintf(&own, "%s[%u]", name, i) < 0)
-            own = NULL;
-        json_t *kept = json_string_nocheck(own != NULL ? own : name != NULL && *name != '\0' ? name : number.text);
-        if (json_object_set_nocheck(seen, json_string_value(kept) != NULL ? json_string_value(kept) : "", kept) != 0 ||
-            json_array_append_new(g->names, kept) != 0)
+        char *own = has_name && json_object_get(given, name) == NULL
+                        ? strdup(name)
+                        : name_with(has_name ? name : "materials", i, in_file, given);
+        if (own == NULL || json_object_set_new_nocheck(given, own, json_true()) != 0 ||
+            json_array_append_new(g->names, json_string_nocheck(own)) != 0)
             rc = build_fail(g->b, SH_ENOMEM, g->err, "no memory for the names of materials");
         free(own);
     }
-    json_decref(seen);
+    json_decref(in_file);
+    json_decref(given);
     return rc;
 }
 
