@@ -135,15 +135,15 @@ static const struct cfg_key config_keys[] = {
      .help = "Method of utm and geodetic points; auto: as `scanhead plan` says."},
     {KEY(output.attributes), CFG_BOOL, .def = "off",
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
-             "echoes, 4 bytes a point; .ply and .las recordings have them."},
+             "echoes, 4 bytes a point (6 where waveform.echoes is not model); .ply and .las recordings have them."},
     {KEY(output.colour), CFG_ENUM, .def = "none",
      WORDS([COLOUR_NONE] = "none", [COLOUR_SOLID] = "solid", [COLOUR_RANGE] = "range", [COLOUR_HEIGHT] = "height",
            [COLOUR_REFLECTANCE] = "reflectance", [COLOUR_LABEL] = "label", [COLOUR_FRAME] = "frame",
            [COLOUR_TEXTURE] = "texture"),
      .help = "Colours of points. With any value but none each points frame is followed by one with 3 bytes a point; "
-             "recordings have them. range, height, frame (of a trajectory): blue, green, yellow, red between two "
-             "limits; reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel that is hit; "
-             "without a texture the mesh's colour, without a colour grey."},
+             "recordings have them. range, height, frame (of a trajectory or stops): blue, green, yellow, red "
+             "between two limits; reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel "
+             "that is hit; without a texture the mesh's colour, without a colour grey."},
     {KEY(output.colour_rgb), CFG_VEC3, NULL, "[255, 255, 255]", 0, 255,
      .help = "solid: the colour, as red, green and blue, whole numbers."},
     {KEY(output.colour_limits), CFG_PAIR, NULL, "", -1e9, 1e9, .example = "[0, 30]",
@@ -259,7 +259,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(loop.queue_ms), CFG_REAL, "ms", "250", 10, 10000,
      .help = "How much of the stream is stored for a link whose reader is slow."},
     {KEY(loop.late_ms), CFG_REAL, "ms", "100", 0, 10000,
-     .help = "Blocks of points that are later than this are not sent: their pulses are lost, counted and announced."},
+     .help = "With pace: realtime, blocks of points that are later than this are not sent: their pulses are lost, "
+             "counted and announced."},
     {KEY(loop.threads), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_THREADS, .help = "Casting threads; 0: one per processor."},
     {KEY(loop.pace), CFG_ENUM, .def = "realtime",
      WORDS([PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"),
