@@ -119,7 +119,7 @@ static const struct cfg_key config_keys[] = {
      WORDS([GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", [GEOREF_GEODETIC] = "geodetic"),
      .help = "Coordinate reference system of the anchor and of geo points."},
     {KEY(output.utm_zone), CFG_COUNT, NULL, "0", 0, 60,
-     .help = "UTM zone, only with crs: utm; 0: by position, UPS near the poles."},
+     .help = "UTM zone, only with crs: utm; 0: that of a scene in UTM, else by position, UPS near the poles."},
     {KEY(output.layout), CFG_ENUM, .def = "polar", WORDS([LINE_POLAR] = "polar", [LINE_GEO] = "geo"),
      .help = "polar: range and encoder angles, as a head measures; geo: coordinates relative to the anchor."},
     {KEY(output.heights), CFG_ENUM, .def = "ellipsoid",
@@ -240,9 +240,9 @@ static const struct cfg_key config_keys[] = {
      .of = CFG_KIND(LINK_USB),
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
     {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB),
-     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits "
-             "that identify this head on this machine; with scip none, as the real device. Only the USB device has "
-             "these digits, not *IDN?."},
+     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight "
+             "hexadecimal digits that identify this head on this machine; with scip none, as the real device. Only the "
+             "USB device has these digits, not *IDN?."},
 
 #include "firmware_sim/config/measurement_rows.h"
 
@@ -303,9 +303,11 @@ static const struct cfg_key config_keys[] = {
     {KEY(time.ptp.jitter_ns), CFG_COUNT, "ns", "0", 0, 1e9,
      .help = "Largest random deviation of a measurement to either side (noise.seed)."},
     {KEY(time.ptp.first_step_threshold_ns), CFG_COUNT, "ns", "20000", 0, 1e15,
-     .help = "Before its first lock the servo steps the clock where the offset is larger; 0: it never does."},
+     .help = "Before its first lock the servo steps the clock where the offset is larger; 0: only "
+             "step_threshold_ns decides."},
     {KEY(time.ptp.step_threshold_ns), CFG_COUNT, "ns", "0", 0, 1e15,
-     .help = "Later, where the offset is larger, the servo unlocks and steps the clock; 0: it slews."},
+     .help = "At any time the servo steps the clock where the offset is larger; a locked servo unlocks first. 0: "
+             "after the first lock it slews."},
     {KEY(time.ptp.max_ppm), CFG_REAL, "ppm", "500", 1, 100000, .help = "The most that the servo changes the rate."},
 
     {"gnss", .type = CFG_MAP,
