@@ -25,8 +25,7 @@ void replay_keep_front(struct replay_front *front, const uint8_t *frame)
     front->len[place] = (uint32_t)len;
 }
 
-/* Reads until a descriptor, an anchor and a frame that is not LOCAL have come, or to the end: the recording may begin
- * anywhere. */
+/* Reads up to the first anchor that follows a descriptor, or to the end: the recording may begin anywhere. */
 static int read_front(struct replay *r, struct sh_err *err)
 {
     struct recording_frame frame;
