@@ -348,7 +348,8 @@ static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, stru
     return rc;
 }
 
-/* Warns of materials that no library has, unless a missing library has been reported. */
+/* Warns of materials that no library has, where textures are wanted. The caller has checked that no library is
+ * missing. */
 static void warn_of_materials(const struct mtl *m)
 {
     const struct scene *scene = m->b->scene;

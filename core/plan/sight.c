@@ -21,7 +21,7 @@ static const struct plan_ray_cost *ray_cost(uint32_t packet)
     return cost;
 }
 
-/* Returns the cost of reading a triangle's plane. A pulse needs it with a map and without one. */
+/* Returns the cost of reading a triangle's plane. A pulse that hits something needs it with a map and without one. */
 static double plane_ns(double n_triangles)
 {
     return PLAN_COST_MILLION * fmin(1.0, sqrt(1e-6 * n_triangles));

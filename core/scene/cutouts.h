@@ -5,9 +5,9 @@
 
 #include "core/scene.h"
 
-/* Finds holes in the textures of a complete scene. Warns of textures that can't be read. */
+/* Finds holes in the textures of a complete scene. Warns of textures that would cut holes but can't be read. */
 int scene_find_cutouts(struct scene *scene, const struct sh_report *report, struct sh_err *err);
-/* Drops texture coordinates and textures, unless they have holes. */
+/* Drops all textures. Texture coordinates stay where a surface has holes, whose masks the scene then holds. */
 void scene_drop_textures(struct scene *scene);
 
 #endif

@@ -155,7 +155,8 @@ int build_candidate(const struct build_shared *b, uint32_t face, uint32_t triang
 }
 
 /* Before the call, kept[i] is the number of regions that triangle i lies in. After the call, kept[i] is the triangle's
- * place in figures, or BUILD_NOT_KEPT. Where there is no memory for the figures, kept becomes NULL. */
+ * place in figures, or BUILD_NOT_KEPT. Where the figures need more than their share, or there is no memory for them,
+ * kept becomes NULL. */
 void build_figures(struct build_shared *b)
 {
     const uint32_t n = bvh_scene(b->sight->bvh)->n_triangles;

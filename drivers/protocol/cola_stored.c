@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* mEEwriteall stores the session's settings, which then outlast a power cycle. Each setting is a line, as a request in
- * CoLa-A writes it but with decimal numbers. Line rate, step and time server are the head's, and HEAD:STORe stores
- * them. */
+ * CoLa-A writes it, but with decimal numbers and without the length of LocationName. Line rate, step and time server
+ * are the head's, and HEAD:STORe stores them. */
 #include <stdio.h>
 #include <string.h>
 

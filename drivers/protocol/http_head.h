@@ -33,8 +33,9 @@ struct http_scan {
     int n_lines;
 };
 
-/* Looks at what has come since the last call. bytes: all of the head so far, from its request line on. A wrong line is
- * found as soon as its wrong byte is there. Returns an http_scan_result. */
+/* Looks at what has come since the last call. bytes: all of the head so far, from its request line on. A byte that no
+ * line may have at its place is found as soon as it is there. Other faults, such as a wrong version, are found at the
+ * line's end. Returns an http_scan_result. */
 int http_scan_head(struct http_scan *scan, const char *bytes, size_t len);
 
 /* Returns the line at *at of a whole head, without its line end, and moves *at to the next line. An empty line is the
@@ -54,7 +55,7 @@ struct http_field {
 /* "Host: localhost": 0 or 400. */
 int http_read_field(struct http_text line, struct http_field *out);
 
-/* Reads decimal digits. Numbers above a million stay above a million, but are not exact. 0 or 400. */
+/* Reads decimal digits. A number of ten million or more comes out as its first seven digits. 0 or 400. */
 int http_read_length(struct http_text text, size_t *out);
 
 struct http_place {

@@ -77,8 +77,9 @@ static int velodyne_create(const struct protocol_spec *spec, void **protocol, st
     return SH_OK;
 }
 
-/* The next pulse does not follow the last one, so the packet is dropped: the device has no packets with holes. The
- * packet's pulses count as unsent, not as lost by a slow reader: the pulses that would fill the packet never came. */
+/* The next pulse does not follow the last one, or another scan or head begins. So the packet is dropped: the device has
+ * no packets with holes. The packet's pulses count as unsent, not as lost by a slow reader: the pulses that would fill
+ * the packet never came. */
 static void fall_out_of_step(struct velodyne *v)
 {
     v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);

@@ -136,7 +136,7 @@ static int check_behind(const struct repair *r, const struct packets *p, struct 
     return rc > 0 || rc == SH_EFORMAT ? repair_fail_damaged(r, end, err) : rc;
 }
 
-/* Cuts the file after the last whole block; then puts a note. */
+/* Cuts the file after the last whole block. A file that was not whole then gets a note, unless it ends with one. */
 static int pcapng_repair(struct repair *r, struct sh_err *err)
 {
     struct packets *p = malloc(sizeof *p);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Recorders: stream frames go in, one file comes out. The file's ending decides its format.
  *
- * A format is one file of this folder with a `const struct recorder_ops`, and one row in the table in
- * recorder.c. Shared by all formats are the file that appears whole or not at all (outfile.h), the points and
- * poses of the stream (track.h), and the report of what was left out. A recorder's own struct begins with a
- * struct recorder. One thread per recorder. */
+ * A format is a `const struct recorder_ops` in a file of this folder, and one row in the table in recorder.c. A
+ * .ply that is a mesh has no row: recorder_shape chooses it. Formats may share a file (mesh.c). All formats
+ * share the file that appears whole or not at all (outfile.h), the points and poses of the stream (track.h), and the
+ * report of what was left out. A recorder's own struct begins with a struct recorder. One thread per recorder. */
 #ifndef DRIVERS_RECORD_RECORDER_H
 #define DRIVERS_RECORD_RECORDER_H
 
@@ -126,7 +126,8 @@ int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanh
 /* To be called about once a second: writes what waits in memory to the disk. */
 int recorder_save(struct recorder *rec, struct sh_err *err);
 /* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. After a
- * failure what reached the disk stays as PATH.part, if the format can be repaired; a note in the report says so. */
+ * failure what reached the disk stays as PATH.part, if the format can be repaired; a note in the report says so. Where
+ * the report's stop gave the file up, nothing stays. */
 int recorder_close(struct recorder *rec, int keep, struct sh_err *err);
 
 /* Warns of n things: "PATH: N WHAT". n 0: does nothing. For formats. */

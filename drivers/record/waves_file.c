@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A .waves.csv has the waveforms of all pulses, also of those without an echo. Each window is a row.
+/* A .waves.csv has the waveforms that the head sends, also those of pulses without an echo. Each window is a row.
  *
  * scan and station are as in .poses.csv; pulse is the pulse's number in the scan, and t_s its firing time since the
  * scan's start. Sample k of the n lies at range_m + k * step_m. The sample's signal, in units of the detection

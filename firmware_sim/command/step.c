@@ -6,8 +6,8 @@
  *     step of the pan   = pan speed / lines
  *
  * Rates are multiples of 1e-6 Hz and 1e-6 deg/s, so few steps are possible exactly: the nearest rates are set, and the
- * reply is the step that they give. A sphere has one step, for both. Other heads have a fixed pattern, so their step
- * can only be read. */
+ * reply is the step that they give. A sphere has one step, for both. A planar head takes the steps of its profile's
+ * geometries. Other heads have a fixed pattern, so their step can only be read. */
 #include "firmware_sim/command/call.h"
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/command/parse.h"

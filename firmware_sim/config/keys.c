@@ -119,7 +119,7 @@ static const struct cfg_key config_keys[] = {
      WORDS([GEOREF_LOCAL] = "local", [GEOREF_ECEF] = "ecef", [GEOREF_UTM] = "utm", [GEOREF_GEODETIC] = "geodetic"),
      .help = "Coordinate reference system of the anchor and of geo points."},
     {KEY(output.utm_zone), CFG_COUNT, NULL, "0", 0, 60,
-     .help = "UTM zone, only with crs: utm; 0: by position, UPS near the poles."},
+     .help = "UTM zone, only with crs: utm; 0: that of a scene in UTM, else by position, UPS near the poles."},
     {KEY(output.layout), CFG_ENUM, .def = "polar", WORDS([LINE_POLAR] = "polar", [LINE_GEO] = "geo"),
      .help = "polar: range and encoder angles, as a head measures; geo: coordinates relative to the anchor."},
     {KEY(output.heights), CFG_ENUM, .def = "ellipsoid",
@@ -135,15 +135,15 @@ static const struct cfg_key config_keys[] = {
      .help = "Method of utm and geodetic points; auto: as `scanhead plan` says."},
     {KEY(output.attributes), CFG_BOOL, .def = "off",
      .help = "on: each points frame is followed by one with amplitude (needs signal.model: on) and width of its "
-             "echoes, 4 bytes a point; .ply and .las recordings have them."},
+             "echoes, 4 bytes a point (6 where waveform.echoes is not model); .ply and .las recordings have them."},
     {KEY(output.colour), CFG_ENUM, .def = "none",
      WORDS([COLOUR_NONE] = "none", [COLOUR_SOLID] = "solid", [COLOUR_RANGE] = "range", [COLOUR_HEIGHT] = "height",
            [COLOUR_REFLECTANCE] = "reflectance", [COLOUR_LABEL] = "label", [COLOUR_FRAME] = "frame",
            [COLOUR_TEXTURE] = "texture"),
      .help = "Colours of points. With any value but none each points frame is followed by one with 3 bytes a point; "
-             "recordings have them. range, height, frame (of a trajectory): blue, green, yellow, red between two "
-             "limits; reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel that is hit; "
-             "without a texture the mesh's colour, without a colour grey."},
+             "recordings have them. range, height, frame (of a trajectory or stops): blue, green, yellow, red "
+             "between two limits; reflectance: grey, -30 to 0 dB; label: a hue for each surface; texture: the texel "
+             "that is hit; without a texture the mesh's colour, without a colour grey."},
     {KEY(output.colour_rgb), CFG_VEC3, NULL, "[255, 255, 255]", 0, 255,
      .help = "solid: the colour, as red, green and blue, whole numbers."},
     {KEY(output.colour_limits), CFG_PAIR, NULL, "", -1e9, 1e9, .example = "[0, 30]",
@@ -240,9 +240,9 @@ static const struct cfg_key config_keys[] = {
      .of = CFG_KIND(LINK_USB),
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
     {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB),
-     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight digits "
-             "that identify this head on this machine; with scip none, as the real device. Only the USB device has "
-             "these digits, not *IDN?."},
+     .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight "
+             "hexadecimal digits that identify this head on this machine; with scip none, as the real device. Only the "
+             "USB device has these digits, not *IDN?."},
 
 #include "firmware_sim/config/measurement_rows.h"
 
@@ -259,7 +259,8 @@ static const struct cfg_key config_keys[] = {
     {KEY(loop.queue_ms), CFG_REAL, "ms", "250", 10, 10000,
      .help = "How much of the stream is stored for a link whose reader is slow."},
     {KEY(loop.late_ms), CFG_REAL, "ms", "100", 0, 10000,
-     .help = "Blocks of points that are later than this are not sent: their pulses are lost, counted and announced."},
+     .help = "With pace: realtime, blocks of points that are later than this are not sent: their pulses are lost, "
+             "counted and announced."},
     {KEY(loop.threads), CFG_COUNT, NULL, "0", 0, CONFIG_MAX_THREADS, .help = "Casting threads; 0: one per processor."},
     {KEY(loop.pace), CFG_ENUM, .def = "realtime",
      WORDS([PACE_REALTIME] = "realtime", [PACE_FAST] = "fast", [PACE_STEP] = "step"),
@@ -302,9 +303,11 @@ static const struct cfg_key config_keys[] = {
     {KEY(time.ptp.jitter_ns), CFG_COUNT, "ns", "0", 0, 1e9,
      .help = "Largest random deviation of a measurement to either side (noise.seed)."},
     {KEY(time.ptp.first_step_threshold_ns), CFG_COUNT, "ns", "20000", 0, 1e15,
-     .help = "Before its first lock the servo steps the clock where the offset is larger; 0: it never does."},
+     .help = "Before its first lock the servo steps the clock where the offset is larger; 0: only "
+             "step_threshold_ns decides."},
     {KEY(time.ptp.step_threshold_ns), CFG_COUNT, "ns", "0", 0, 1e15,
-     .help = "Later, where the offset is larger, the servo unlocks and steps the clock; 0: it slews."},
+     .help = "At any time the servo steps the clock where the offset is larger; a locked servo unlocks first. 0: "
+             "after the first lock it slews."},
     {KEY(time.ptp.max_ppm), CFG_REAL, "ppm", "500", 1, 100000, .help = "The most that the servo changes the rate."},
 
     {"gnss", .type = CFG_MAP,

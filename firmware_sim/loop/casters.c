@@ -6,7 +6,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 
-static const int64_t SAY_NS = 2000000; /* a ready tick waits no longer than that for others in its batch */
+static const int64_t SAY_NS = 2000000; /* the first tick that is ready after this time ends its batch */
 
 /* With claim_lock held. */
 static int may_claim(struct loop *loop)

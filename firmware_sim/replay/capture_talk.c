@@ -69,7 +69,8 @@ static void end_streams(struct builder *b, const struct capture_said *s)
     b->n_streaming = n;
 }
 
-/* Looks at the last requests that have no answer yet. Returns the oldest one that this message answers. */
+/* Looks at the last MOST_PENDING requests. Returns the oldest one that has no answer yet and that this message
+ * answers. */
 static int find_answered(struct builder *b, const struct capture_said *s)
 {
     const uint8_t *bytes = b->store->bytes;

@@ -34,7 +34,7 @@ void site_free_waves(struct site *site);
  * without room are counted (core/line.h). */
 struct site_wave_room site_wave_room(const struct site *site, uint32_t n_pulses);
 /* Returns the windows and samples of so many usual pulses. Each has a return of 20 dB from a surface that is hit at a
- * right angle. */
+ * right angle. Where 20 dB do not reach waveform.keep_db, the return is stronger. */
 struct site_wave_room site_usual_waves(const struct site *site, uint32_t n_pulses);
 /* Bytes of waveforms per second that usual pulses make with the settings of power-up. */
 double site_wave_bytes_s(const struct site *site);

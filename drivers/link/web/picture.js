@@ -67,7 +67,7 @@ export function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000); // the browser reads it meanwhile
 }
 
-// Names a file by what it shows and by the time: "scanhead-2026-01-31-121530.png".
+// Names a file by the time and its ending: "scanhead-2026-01-31-121530.png".
 export function fileName(ending, date = new Date()) {
   const two = (n) => String(n).padStart(2, '0');
   const day = [date.getFullYear(), two(date.getMonth() + 1), two(date.getDate())].join('-');

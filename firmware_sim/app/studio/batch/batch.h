@@ -73,7 +73,8 @@ void batch_line_free(struct batch_line *line);
 /* ---- done.c */
 
 /* Finds out which jobs are done, by the manifests in the folder: job->is_done, entry, other. any_engine: jobs of other
- * kinds of machines count, too. SH_ESTATE: a job there has another provenance, and --force isn't given. */
+ * kinds of machines count, too. SH_ESTATE, without --force: a job there has another provenance, or a number
+ * beyond the last job. */
 int batch_find_done(struct batch *b, int any_engine, struct sh_err *err);
 /* Whether a done job's files are as its entry says; else why not. SH_ESTOPPED after a signal. */
 int batch_check_files(const struct batch *b, uint32_t job, struct sh_err *err);

@@ -335,8 +335,8 @@ static const struct app_option OPTIONS[] = {
              "float, within 1 km of the origin (default: all, in double)"},
     {APP_CALL, "colour", "BY", .apply = take_colour, OPTION_CHOICES(colour_words),
      .help = "value that red, green, blue in .ply, .las, .ptx, .e57 and the texture of meshes show: range, height, "
-             "reflectance (grey, -30 to 0 dB), label (a hue per surface), frame (of a trajectory), texture (of a "
-             "CONFIG); or solid; none. Default: the colours that the head sends, if any (output.colour)"},
+             "reflectance (grey, -30 to 0 dB), label (a hue per surface), frame (of a trajectory or stops), texture "
+             "(of a CONFIG); or solid; none. Default: the colours that the head sends, if any (output.colour)"},
     {APP_CALL, "colour-limits", "LOW,HIGH", .apply = take_colour_limits,
      .help = "limits of the colours of range and height (m) and frame: blue is LOW, red is HIGH. Default: the "
              "smallest and the largest value in the file, which is then written after the last scan"},
@@ -388,7 +388,8 @@ static const char HELP_NOTES[] =
     "SOURCE is one of\n"
     "\n"
     "  CONFIG               a configuration: the head runs off line in this process, as fast as it computes.\n"
-    "                       Only with it: --set, --crs, --threads, --scenario, --truth, --surfaces\n"
+    "                       Only with it: --set, --crs, --threads, --scenario, --truth, --surfaces,\n"
+    "                       --colour texture\n"
     "  usb                  a head on USB, as scanhead list shows it; one of several: usb:vid:pid or\n"
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"

@@ -71,10 +71,10 @@ struct viewed_surface {
 
 struct viewed {
     const char *path;
-    const char *format; /* "shs", "ply", "las" */
+    const char *format; /* "shs" (also of a .pcapng), "ply", "las" */
     struct viewed_points points;
     uint64_t n_empty, n_left_out; /* shots without echo; echoes that could not be placed */
-    int complete;                 /* .shs: nothing is missing, as far as the stream says; else 1 */
+    int complete;                 /* .shs, .pcapng: nothing is missing, as far as the stream says; else 1 */
     int64_t epsg;                 /* of the file; 0: scene frame; -1: not known */
     int turned;                   /* 1: points were turned to east, north, up of this place: */
     double lat_deg, lon_deg, height_m;
@@ -91,8 +91,8 @@ struct viewed {
     double low[VIEWED_COLUMNS], high[VIEWED_COLUMNS]; /* over values that are known; NaN: none */
 };
 
-/* Loads by the file's ending and first bytes. Errors name the file: SH_EINPUT where it is no recording, SH_ENOMEM,
- * SH_ESTOPPED. viewed_free is due in any case. path must live on. */
+/* Loads by the file's ending and first bytes. Errors name the file: SH_EINPUT where it is no recording, SH_EIO,
+ * SH_ENOMEM, SH_ESTOPPED. viewed_free is due in any case. path must live on. */
 int viewed_load(struct viewed *viewed, const char *path, const struct sh_report *report, struct sh_err *err);
 void viewed_free(struct viewed *viewed);
 
