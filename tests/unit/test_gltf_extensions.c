@@ -239,6 +239,25 @@ static void turned_textures(void **state)
 
 /* ---- materials */
 
+/* The names that a second material and one without a name would get are names of other materials already. */
+static void made_names_are_no_others(void **state)
+{
+    (void)state;
+    gltf_quad();
+    struct scene *s = gltf_load(
+        ONE_NODE "\"materials\":[{\"name\":\"a[2]\"},{\"name\":\"a\"},{\"name\":\"a\"},{},"
+                 "{\"name\":\"materials[3]\"}],"
+                 "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"material\":0},"
+                 "{\"attributes\":{\"POSITION\":0},\"material\":1},{\"attributes\":{\"POSITION\":0},\"material\":2},"
+                 "{\"attributes\":{\"POSITION\":0},\"material\":3},{\"attributes\":{\"POSITION\":0},\"material\":4}]}],"
+                 "\"accessors\":[" GLTF_QUAD_ACCESSORS "]");
+    static const char *const name[5] = {"a[2]", "a", "a[2][2]", "materials[3][3]", "materials[3]"};
+    assert_int_equal(s->n_surfaces, 5);
+    for (int i = 0; i < 5; i++)
+        assert_string_equal(s->surface[i].material, name[i]);
+    scene_free(s);
+}
+
 /* Two materials have one name, and one has none: three surfaces with three colours. Specular-glossiness has names of
  * its own. */
 static void each_material_is_a_surface(void **state)
@@ -289,7 +308,7 @@ int main(void)
         cmocka_unit_test(transparency_is_kept),     cmocka_unit_test(images_that_are_not_read),
         cmocka_unit_test(webp_is_decoded),          cmocka_unit_test(meshopt_is_unpacked),
         cmocka_unit_test(turned_textures),          cmocka_unit_test(each_material_is_a_surface),
-        cmocka_unit_test(names_and_data_of_images),
+        cmocka_unit_test(made_names_are_no_others), cmocka_unit_test(names_and_data_of_images),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
