@@ -30,7 +30,7 @@ enum {
 
 struct cloud {
     size_t n;
-    double (*xyz_m)[3]; /* [n] as in the file; three times NaN: a shot without echo */
+    double (*xyz_m)[3]; /* [n] as in the file, degrees with latitude first; three times NaN: a shot without echo */
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
@@ -47,7 +47,7 @@ struct cloud {
     float *amplitude_db;   /* [n] PLY alone; NaN: none */
     uint8_t *echo_count;   /* [n] echoes of the point's pulse; 0: shot without echo */
     uint8_t (*rgb)[3];     /* [n] sRGB */
-    int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
+    int64_t epsg;          /* of PLY's comment "epsg N" or LAS's WKT; 0: scene frame; CLOUD_EPSG_UNKNOWN: none */
 };
 
 /* Returns two units in the last place of v in single precision. */

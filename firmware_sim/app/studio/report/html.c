@@ -25,7 +25,8 @@ static const char *frame_name(const struct report *r)
     return names[r->cfg->output.crs];
 }
 
-/* Names the scanner. Where stations have different scanners, each is named with the first station that uses it. */
+/* Names the scanner. Where stations have different scanners, each change of the scanner is named, with its station. So
+ * a scanner may be named twice. */
 static void put_scanners(FILE *out, const struct report *r)
 {
     char what[48] = "Scanner", text[256];
