@@ -94,8 +94,8 @@ struct cloud_site {
 
 /* Sets for each point its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing within max_m)
  * and that triangle's number. The number is CLOUD_TRIANGLE_NONE where there is no triangle, and where it is one of a
- * moving body. Points without a station are of the first one. SH_EINPUT: a point's station is not among n_stations.
- * SH_ESTOPPED. */
+ * moving body. Points without a station are of the first one. SH_EINPUT: a point's station is not among n_stations,
+ * or the cloud's EPSG code is not that of the station's georef. SH_ESTOPPED. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
 
