@@ -256,7 +256,7 @@ static void put_words(FILE *out, const struct report *r)
         "each judged point from its range and incidence.</dd>\n"
         "<dt>Bound</dt><dd>Noise with a normal distribution has no bound. Without it no point may be farther from "
         "the scene than the sum of these: the errors that the plan allows, half a count per axis of the numbers on the "
-        "wire, and half a count of the encoders.</dd>\n",
+        "wire, half a count of the encoders, and the radius of the ball within which places are moved.</dd>\n",
         out);
     fprintf(
         out,
