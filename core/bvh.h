@@ -22,13 +22,14 @@
 struct bvh;
 
 struct bvh_info {
-    uint32_t packet; /* rays per Embree call: 16, 8 or 4 */
+    uint32_t packet; /* rays per Embree call: 16, 8, 4 or 1 */
     double build_s;
     uint64_t bytes; /* BVH and planes */
 };
 
 /* The scene must outlive the BVH. Built with `threads` threads (0: all). SH_ESTOPPED where report asks to stop,
- * SH_ENOMEM where Embree or this module gets no memory. */
+ * SH_ENOMEM where Embree or this module gets no memory, SH_EIO where Embree fails or does not support the processor,
+ * SH_EINPUT where the scene has too many leaves. */
 int bvh_create(const struct scene *scene, unsigned threads, const struct sh_report *report, struct bvh **out,
                struct sh_err *err);
 void bvh_free(struct bvh *bvh);
@@ -40,7 +41,8 @@ void bvh_set_packet(struct bvh *bvh, uint32_t rays);
  * same rays hit the same triangles. */
 void bvh_engine(char *text, size_t len);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
-/* The origin of the local frame: the middle of the scene, or where most triangles of a large scene are. */
+/* The origin of the local frame: the middle of the scene, or where most triangles of a large scene without copies
+ * are. */
 void bvh_origin(const struct bvh *bvh, double origin_m[3]);
 const struct scene *bvh_scene(const struct bvh *bvh);
 
@@ -139,7 +141,7 @@ void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, u
  * that it begins on. tests/accuracy measures the error of ranges. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* The range of one ray's first hit; NaN: none. */
+/* The range of one ray's first hit within 1e9 m; NaN: none. */
 double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3]);
 
 /* ---- for rays from one point whose triangles are known from elsewhere (core/sight); not for scenes with

@@ -11,7 +11,7 @@ enum colour_mode {
     COLOUR_NONE,
     COLOUR_SOLID,       /* one colour for all */
     COLOUR_RANGE,       /* metres: the ramp between two limits; so are height and frame */
-    COLOUR_HEIGHT,      /* metres, z of the scene's frame */
+    COLOUR_HEIGHT,      /* metres, z of the scene's frame; in recordings of a moving head in a CRS, z of that CRS */
     COLOUR_REFLECTANCE, /* colour_reflectance */
     COLOUR_LABEL,       /* colour_number of the surface */
     COLOUR_FRAME,       /* frame scalar (core/cast.h) of a trajectory's point or stop */

@@ -64,7 +64,7 @@ struct emitter {
 void emitter_set_planar(struct emitter *emitter, uint32_t steps, uint32_t first, uint32_t last, uint32_t front,
                         int turn);
 /* Makes a head of beams with a firing sequence of sequence_ps picoseconds. SH_EINPUT says what does not fit: no
- * beam, offsets that don't rise from 0, a sequence that ends before its last firing. */
+ * beam, more than EMITTER_MAX_BEAMS, offsets that don't rise from 0, a sequence that ends before its last firing. */
 int emitter_set_beams(struct emitter *emitter, const struct emitter_beam *beam, uint32_t n, uint64_t sequence_ps,
                       int turn, struct sh_err *err);
 /* Makes a sphere with steps and rings nearest to step_udeg (0.01 to 90 deg). A turn has 360 / step steps, and from

@@ -2,13 +2,13 @@
 /* Files that the program makes: recordings, streams, statistics, journals, maps. In: a path. Out: an empty
  * file behind a descriptor.
  *
- * The rule for links: a symbolic link at the last name of a path is always refused. In a folder like /tmp
- * anybody can put one there, and the program would write to its target. Links to folders are followed, and so
- * are the system's own, /dev/stdout, /dev/stderr and /dev/fd/N. A file with more than one name (hard links)
- * is not overwritten either.
+ * The rule for links: a symbolic link at the last name of a path is always refused. In a folder like /tmp anybody can
+ * put one there, and the program would write to its target. Links to folders are followed. newfile_open also follows
+ * the system's own: /dev/stdout, /dev/stderr, /dev/fd/N and /proc/self/fd/N. A file with more than one name (hard
+ * links) is not written in place either.
  *
- * Any thread. Errors name the path: SH_EINPUT (no such folder, a link, the wrong kind of file), SH_EPERM,
- * SH_EIO. */
+ * Any thread. Errors name the path: SH_EINPUT (no such folder, a link, the wrong kind of file, another writer),
+ * SH_EPERM, SH_EIO, SH_ENOMEM. Some functions also return SH_ESTATE, as their comments say. */
 #ifndef CORE_NEWFILE_H
 #define CORE_NEWFILE_H
 
@@ -18,8 +18,8 @@
 
 /* Opens a file that is written in place: it is made, or emptied. It is locked as long as *fd is open: a second
  * writer is refused before it empties the file. Devices are taken as they are, and pipes that have a reader. A file
- * behind /dev/stdout or /dev/fd/N is not emptied: *fd is then a duplicate of that descriptor, since others write there.
- * *fd is for writing, and blocks. */
+ * behind /dev/stdout, /dev/stderr or /dev/fd/N is neither emptied nor locked: *fd is then a duplicate of that
+ * descriptor, since others write there. *fd is for writing, and blocks. */
 int newfile_open(const char *path, int *fd, struct sh_err *err);
 
 /* Opens a file that grows line by line, for reading and appending: it is made, or stays as it is. It is locked as long
@@ -39,7 +39,7 @@ int newfile_write(const char *path, newfile_put *put, const void *source, struct
  * descriptor. SH_ESTATE: path no longer names the file of *fd. */
 int newfile_replace(const char *path, int *fd, newfile_put *put, const void *source, struct sh_err *err);
 /* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. The check leaves no
- * file behind. */
+ * file behind: a part that a killed writer has left is removed. */
 int newfile_check(const char *path, struct sh_err *err);
 /* Opens the `part` that a killed writer has left: an existing regular file, for reading and writing, locked as
  * newfile_part does. SH_EINPUT: there is none; SH_ESTATE: it is still being written. */

@@ -53,8 +53,9 @@ struct outline_prober {
     uint16_t kind[2 * PROBE_MOST];
     uint8_t counts[PROBE_MOST];
 };
-/* Divides the piece from p to q into equal parts, each about a footprint's radius. Returns the
- * number n of parts. Sets prober->counts[0] .. [n - 1]: 1 where the part counts as an outline. */
+/* Divides the piece from p to q into equal parts, each about a footprint's radius, or longer where PROBE_MOST parts
+ * would not be enough. Returns the number n of parts. Sets prober->counts[0] .. [n - 1]: 1 where the part counts as an
+ * outline. */
 uint32_t outline_probe(struct outline_prober *prober, const double p[3], const double q[3], double range_m);
 
 /* weld.c: finds the outlines among the edges of a scene, and sets o->edge and o->n_edges. */

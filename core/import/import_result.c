@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A scene as a file in memory, between two processes: head, textures, surfaces, vertices, triangles, labels,
  * texture coordinates, colours, one array after the other. The file is read by pread, not mapped: each value is checked
- * in its final place, and a file that has become shorter is an error of read. */
+ * in memory of this process alone, and a file that has become shorter is an error of read. */
 #include "core/import/import_result.h"
 
 #include <errno.h>
@@ -117,8 +117,8 @@ static int wrong(const struct result *r, const char *what, uint64_t number)
                       (unsigned long long)number);
 }
 
-/* Reads from any place of the file. The part that is read is cut out of the file, so that the scene is not
- * in memory twice. */
+/* Reads from any place of the file. A part of AT_ONCE bytes and more is cut out of the file once
+ * it is read, so that the scene is not in memory twice. */
 static int take_at(struct result *r, uint64_t at, void *data, size_t size)
 {
     if (at > r->size || size > r->size - at) return wrong(r, "it ends at byte", r->size);
@@ -139,8 +139,8 @@ static int import_result_take(struct result *r, void *data, size_t size)
     return rc;
 }
 
-/* The other process found the texture in the mesh's folder, so its path begins with that folder. build_texture adds the
- * folder again, so it is cut off here. */
+/* The other process found the texture in the mesh's folder, so a relative path begins with that folder. build_texture
+ * adds the folder again, so it is cut off here. An absolute path stays as it is. */
 static int add_texture(struct result *r, const char *file, const void *bytes, const struct result_texture *size,
                        uint32_t i)
 {
@@ -302,7 +302,7 @@ static int take_triangles(struct result *r, struct triangles *t)
 }
 
 /* The least size of a file with these counts: its textures have neither names nor bytes. This size is checked before
- * anything is allocated. */
+ * anything is allocated for these counts. */
 static uint64_t least_size(const struct result_head *head)
 {
     const struct scene *s = NULL;

@@ -43,7 +43,7 @@ static int axis_of(const struct aiScene *in, const char *key, const char *sign_k
 }
 
 /* The axes right (FBX: CoordAxis), up and front, in this order, are right-handed where they are an even permutation of
- * x, y and z with an even number of minus signs. */
+ * x, y and z with an even number of minus signs, or an odd one with an odd number. */
 static int is_left_handed(int right, int up, int front)
 {
     const int a = right < 0 ? -right : right, b = up < 0 ? -up : up, c = front < 0 ? -front : front;

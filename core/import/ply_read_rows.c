@@ -149,7 +149,8 @@ static int ply_read_rows_begin(struct ply_rows *r, int i, struct sh_err *err)
                      (unsigned long long)e->count, e->name, (unsigned long long)least, (unsigned long long)rest);
 }
 
-/* Reports progress. Rows are read once, in order, so memory of rows that were read is given back. */
+/* Reports progress. Memory of rows that were read is given back, unless faces that came before their vertices are read
+ * again. */
 static int end_stretch(struct ply_rows *r, struct sh_err *err)
 {
     if (!r->is_kept) text_drop_read(&r->t);

@@ -30,7 +30,7 @@ enum {
 
 struct cloud {
     size_t n;
-    double (*xyz_m)[3]; /* [n] as in the file; three times NaN: a shot without echo */
+    double (*xyz_m)[3]; /* [n] as in the file, degrees with latitude first; three times NaN: a shot without echo */
     uint16_t *station;  /* [n] from 1; NULL: the file has none */
     uint16_t *label;    /* [n] CLOUD_LABEL_NONE: none; NULL: the file has none */
     uint8_t *echo;      /* [n] 0: shot without echo; NULL: the file has none */
@@ -47,7 +47,7 @@ struct cloud {
     float *amplitude_db;   /* [n] PLY alone; NaN: none */
     uint8_t *echo_count;   /* [n] echoes of the point's pulse; 0: shot without echo */
     uint8_t (*rgb)[3];     /* [n] sRGB */
-    int64_t epsg;          /* of the header's comment "epsg N", 0: scene frame; CLOUD_EPSG_UNKNOWN: it has none */
+    int64_t epsg;          /* of PLY's comment "epsg N" or LAS's WKT; 0: scene frame; CLOUD_EPSG_UNKNOWN: none */
 };
 
 /* Returns two units in the last place of v in single precision. */
@@ -94,8 +94,8 @@ struct cloud_site {
 
 /* Sets for each point its distance from the nearest triangle (NaN: shot without echo; INFINITY: nothing within max_m)
  * and that triangle's number. The number is CLOUD_TRIANGLE_NONE where there is no triangle, and where it is one of a
- * moving body. Points without a station are of the first one. SH_EINPUT: a point's station is not among n_stations.
- * SH_ESTOPPED. */
+ * moving body. Points without a station are of the first one. SH_EINPUT: a point's station is not among n_stations,
+ * or the cloud's EPSG code is not that of the station's georef. SH_ESTOPPED. */
 int cloud_compare(const struct cloud *cloud, const struct cloud_site *site, const struct sh_report *report,
                   double *distance_m, uint32_t *triangle, struct sh_err *err);
 

@@ -11,7 +11,7 @@
 
 enum { HOST_QUEUE_BYTES = 64 << 20, HOST_TURN_PARTS = 256, HOST_BLOCK = 128 };
 
-/* A frame kept while a command waits for its reply. */
+/* A frame kept while a command waits for its reply, or from before a reattach. */
 struct host_node {
     struct host_node *next;
     size_t len;
@@ -26,7 +26,7 @@ struct host_surface {
     char *object, *material; /* NULL: not seen */
 };
 
-/* Frames that wait while a command waits for its reply. */
+/* Such frames, in their order. */
 struct host_kept {
     struct host_node *first, *last, *current; /* current was handed out last, and is not in the list any more */
     size_t bytes;
@@ -93,7 +93,8 @@ struct scanhead {
 void host_listen(struct scanhead *sh);
 /* Gives the notice for the parser's present line: nobody waits for it, or it echoes what was just sent. */
 void host_note_line(struct scanhead *sh, int is_echo);
-/* Gives the notice that the connection is over, once for each connection. The parser has given all items by then. */
+/* Gives the notice that the connection is over, once for each connection; for a recording there is none. The parser has
+ * given all items by then. */
 void host_note_closed(struct scanhead *sh);
 void host_note_reattached(struct scanhead *sh);
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The file link: one session, whose bytes go into a file unchanged.
  *
- * Regular files and character devices (/dev/null, /dev/full) are taken; a directory, a FIFO or a socket is
- * refused. A FIFO would block in open until a reader comes; a pty or TCP link doesn't. The first failed write
- * (disk full) ends the session; its LINK_CLOSED carries the reason as the peer. */
+ * Regular files and character devices (/dev/null, /dev/full) are taken; a directory, a FIFO, a socket or a block device
+ * is refused. A FIFO needs a reader that is there already; a pty or TCP link doesn't. The first failed write (disk
+ * full) ends the session; its LINK_CLOSED carries the reason as the peer. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>

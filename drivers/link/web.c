@@ -346,7 +346,7 @@ static int any_session(const struct web_link *web)
     return 0;
 }
 
-/* Sends what was written, and the reason of the end. Waits WEB_GOODBYE_MS for clients to take it. */
+/* Sends what was written, and the reason of the end. Waits until clients have taken it, for WEB_GOODBYE_MS at most. */
 static void say_goodbye(struct web_link *web)
 {
     for (int s = 0; s < web->n_sessions; s++) {

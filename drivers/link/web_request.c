@@ -52,7 +52,8 @@ static int is_number(const char *host)
     return inet_pton(AF_INET, host, address) == 1;
 }
 
-/* Whether Host is a name of this machine: a number, localhost, the name in the configuration or the machine's own. */
+/* Whether Host is a name of this machine: a number, localhost, the name in the configuration or the machine's own. Its
+ * port must be that of the link. */
 static int is_own_host(const struct web_link *web, const struct http_place *place)
 {
     char host[300], own[256] = "";

@@ -19,7 +19,7 @@
 #include <stdint.h>
 
 enum {
-    ETHERNET_MAX_HEADERS = 14 + 40 + 32, /* IPv6, and TCP with the options that are used here */
+    ETHERNET_MAX_HEADERS = 14 + 40 + 32, /* IPv6, and TCP with up to 12 bytes of options; here 8 are used */
     ETHERNET_MAX_DATAGRAM = 65535 - 8,   /* the payload of UDP over IPv6; over IPv4 20 less */
     ETHERNET_MAX_FRAME = ETHERNET_MAX_HEADERS + ETHERNET_MAX_DATAGRAM,
     ETHERNET_MAX_SEGMENT = 1440, /* of TCP: fits into frames of 1514 bytes, in IPv6, too */

@@ -53,7 +53,7 @@ static int is_text(struct http_text t)
     return 1;
 }
 
-/* Cuts a text at a mark, which neither part has. Returns 0 where there is no mark. */
+/* Cuts a text at its first mark, and leaves that one out. `after` may have more. Returns 0 where there is no mark. */
 static int cut(struct http_text t, char mark, struct http_text *before, struct http_text *after)
 {
     const char *at = t.len > 0 ? memchr(t.s, mark, t.len) : NULL;

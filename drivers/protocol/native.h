@@ -50,7 +50,7 @@ enum native_type {
 };
 
 enum native_flags {
-    NATIVE_REPEAT = 1 << 0, /* was sent before (descriptor, anchor): not in the stream hash */
+    NATIVE_REPEAT = 1 << 0, /* was sent before (descriptor, emitter, anchor): not in the stream hash */
     NATIVE_LOCAL = 1 << 1,  /* made for this reader alone: seq is 0 and not counted */
 };
 
@@ -95,8 +95,8 @@ enum native_emitter_kind {
     NATIVE_EMIT_PLANAR = 1, /* one plane, elevation 0: `steps` a turn; a line is a turn, from step 0 on */
     NATIVE_EMIT_BEAMS = 2,  /* a firing sequence of beams spins about the vertical; a line is a turn, from azimuth 0 */
     NATIVE_EMIT_SPHERE =
-        3, /* rings of one elevation each, `steps` a turn; a line is a ring, a pan sweep is all rings. The first and
-            * the last ring are poles, where one pulse is cast */
+        3, /* rings of one elevation each, `steps` a turn; a line is a ring, a pan sweep is all rings. Rings at -90
+            * and 90 degrees are poles, where one pulse is cast */
     NATIVE_EMIT_DIRECTIONS = 4, /* a list; a line and a pan sweep are the list once */
 };
 struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams of 12 */

@@ -4,10 +4,11 @@
  * older readers: format 1 (3), five returns, no labels, scan angles, attributes or waveforms. The file itself describes
  * its numbers (las_header.c).
  *
- * Coordinates are counts of the stream's own scale from the first scan's station. So coordinates of the first scan are
- * the numbers of the stream. Coordinates of other stations are rounded once, by half a count at most. Nothing
- * is clipped: a point too far for 32 bits is an error. Longitudes go on beyond 180 or -180 degrees where a
- * scan crosses the antimeridian: all lie within 180 degrees of the first station. */
+ * Coordinates are counts from the first scan's station, in the stream's own scale, or in a coarser one for a head that
+ * moves. In the geo layout of a head that stands, coordinates of the first scan are thus the numbers of the stream.
+ * Coordinates of other stations are rounded once, by half a count at most. Nothing is clipped: a point too far for 32
+ * bits is an error. Longitudes go on beyond 180 or -180 degrees where a scan crosses the antimeridian: all lie within
+ * 180 degrees of the first station. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

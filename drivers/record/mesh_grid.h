@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The grid of a scan that is being recorded: the line and row of each point, and where the head was. A grid spans one
- * sweep of the pan, or all rings of a sphere. In: points, as the track gives them. Out: a struct scan_grid. */
+ * sweep of the pan, or all rings of a sphere; where sweeps have one line each, it spans all of them. In: points, as the
+ * track gives them. Out: a struct scan_grid. */
 #ifndef DRIVERS_RECORD_MESH_GRID_H
 #define DRIVERS_RECORD_MESH_GRID_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Fills the frames in which the device describes itself: descriptor, anchor. */
+/* Fills the frames in which the device describes itself: descriptor, emitter, anchor. */
 #include <math.h>
 #include <string.h>
 

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* A session of a link: takes ticks from the stream into a buffer of its own, and writes that to the link.
  *
- * A long tick is written from where it lies in the ring, where the link's write() never waits. Short ticks, and bytes
- * that the link did not take, are copied first. So a slow reader holds up nobody. A session whose next tick is no
- * longer in the ring loses whole frames, and goes on with newer ones (lost_frames.c). */
+ * A long tick is written from where it lies in the ring, where the link's write() never waits. On a link whose write()
+ * is cheap each tick is. Other short ticks, and bytes that the link did not take, are copied first. So a slow reader
+ * holds up nobody. A session whose next tick is no longer in the ring loses whole frames, and goes on with newer ones
+ * (lost_frames.c). */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FOOTPRINT_OPTIONS = 9, MANY_TRIANGLES = 1000000 }; /* MANY_TRIANGLES or more: progress is reported */
+enum { FOOTPRINT_OPTIONS = 9, MANY_TRIANGLES = 1000000 }; /* more than MANY_TRIANGLES: progress is reported */
 
 /* ---- trying methods */
 

@@ -339,7 +339,7 @@ static int count_alone(struct raster *r, struct sh_err *err)
     return SH_OK;
 }
 
-/* Warns of heights that no place on the Earth has: such values usually mark cells without height. */
+/* Warns of heights that no place on the Earth has, and of -9999 m: such values usually mark cells without height. */
 static void warn_of_odd_heights(const struct raster *r)
 {
     const int is_low = r->lowest < -11500.0 || r->lowest == -9999.0;

@@ -406,9 +406,10 @@ const struct app_command app_map = {
     .options = OPTIONS,
     .notes =
         "Scans one frame from each station off line and draws the points. A pixel is darker where more heights were\n"
-        "hit, as on walls. Its hue shows the height of its lowest point. The area is that of the scene and the\n"
-        "stations. Each station has its name, its height (of its head above the ground or floor where it has a\n"
-        "tripod or instrument_height_m, else z) and a tick where its heading points.\n"
+        "hit, as on walls. Its hue shows the height of its lowest point. The area is that of the scene, the stations\n"
+        "and the monitored fields. Each station has its name, its height and a tick where its heading points. The\n"
+        "height is that of its head above the ground or floor where it has a tripod or instrument_height_m; else it\n"
+        "is z, or the height above the ellipsoid of a scene in ECEF.\n"
         "\n"
         "With --perspective the points are shown as seen from a place. Hidden ones are removed, and shading by depth\n"
         "(eye-dome lighting) gives them shape. CLOUD, or --cloud FILE with a CONFIG, is a recording.\n",

@@ -26,7 +26,7 @@
 enum { JOBS = 64, MOST_BYTES = 96 << 20, MOST_PASSED = 6 };
 static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
-static const int64_t LATELY_NS = 500000000;     /* it does so every 0.2 s, and the request takes some time, too */
+static const int64_t LATELY_NS = 500000000;     /* it does so after 0.2 s at most; requests take some time, too */
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
 

@@ -25,7 +25,8 @@ static const char *frame_name(const struct report *r)
     return names[r->cfg->output.crs];
 }
 
-/* Names the scanner. Where stations have different scanners, each is named with the first station that uses it. */
+/* Names the scanner. Where stations have different scanners, each change of the scanner is named, with its station. So
+ * a scanner may be named twice. */
 static void put_scanners(FILE *out, const struct report *r)
 {
     char what[48] = "Scanner", text[256];
@@ -255,7 +256,7 @@ static void put_words(FILE *out, const struct report *r)
         "each judged point from its range and incidence.</dd>\n"
         "<dt>Bound</dt><dd>Noise with a normal distribution has no bound. Without it no point may be farther from "
         "the scene than the sum of these: the errors that the plan allows, half a count per axis of the numbers on the "
-        "wire, and half a count of the encoders.</dd>\n",
+        "wire, half a count of the encoders, and the radius of the ball within which places are moved.</dd>\n",
         out);
     fprintf(
         out,

@@ -99,8 +99,8 @@ static void put_mark(FILE *out, const double at[2], const char *name)
     fputs("</title></polygon>\n", out);
 }
 
-/* Draws the marks of all stations, and those names that cover no other name and no mark. Returns how many names have no
- * room. */
+/* Draws the marks of all stations, and those names that cover no other name and no mark; none where there are more than
+ * MOST_NAMES stations. Returns how many names are left out. */
 static uint32_t put_stations(FILE *out, const struct view *v, const struct cloud_picture *p, double scale)
 {
     const struct site *site = v->r->site;

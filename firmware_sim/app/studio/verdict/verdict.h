@@ -64,7 +64,7 @@ struct verdict {
     struct verdict_result check[VERDICT_N_CHECKS];
     struct verdict_points points;
     struct verdict_figures figures;
-    struct verdict_break broken[VERDICT_MAX_BREAKS]; /* the first figures.breaks of them */
+    struct verdict_break broken[VERDICT_MAX_BREAKS]; /* the first of figures.breaks, which may be more */
 };
 
 struct verdict_options {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Points and meshes of a .shs. The file's frames go through drivers/record/track.h, as for recorders, and grids are
- * those of drivers/record/mesh.c. */
+ * those of drivers/record/mesh_grid.c. */
 #include "firmware_sim/app/studio/view/stream.h"
 
 #include <stdio.h>
@@ -30,8 +30,8 @@ static int place_station(struct viewed_stream *s, struct sh_err *err)
     return SH_OK;
 }
 
-/* Returns 0 where points of this track have no mesh. The reason is the text of mesh_grid_check, without the path at its
- * beginning and without the allowed formats at its end. */
+/* Returns 0 where points of this track have no mesh. For coordinates in degrees the reason is a text of its own. Else
+ * it is that of mesh_grid_check, without the path at its beginning and without the allowed formats at its end. */
 static int check_mesh(struct viewed_stream *s)
 {
     struct sh_err why = {0};
