@@ -15,9 +15,9 @@
  * port (MRPT, PCL) could not listen while the link has that port. So for a receiver on this machine the usual source
  * port of a protocol is not used, unless the link names its source or its interface.
  *
- * A receiver that is not there is no failure: datagrams to it are lost, as are those that the system has no room for.
- * Both losses are counted. A refused datagram counts when its refusal comes; several may share one refusal. Datagrams
- * that arrive at the socket can be read. */
+ * A receiver that is not there is no failure: datagrams to it are lost, as are those that the system has no route or no
+ * memory for. Both losses are counted. While the socket's buffer is full, udp_write takes nothing. A refused datagram
+ * counts when its refusal comes; several may share one refusal. Datagrams that arrive at the socket can be read. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <ifaddrs.h>
@@ -144,7 +144,7 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
     return SH_OK;
 }
 
-/* Sets the interface that packets go out on, and their TTL. */
+/* Sets the TTL of packets, and the interface that packets to a group go out on. */
 static int set_way(int fd, const struct link_spec *spec, const struct sockaddr *to)
 {
     const int ttl = spec->ttl, is_v4 = to->sa_family == AF_INET;

@@ -3,13 +3,13 @@
  *
  * In: the site, the device and the links of the configuration. Out: the stream on the links, and statistics.
  *
- * Casters claim ticks up to ahead_ms before their time and fill slots. The pacing thread sleeps on an
+ * Casters claim ticks up to ahead_ms before their time and fill slots. In real time the pacing thread sleeps on an
  * absolute clock, and releases each tick when its last pulse has fired. To release is to number the frames,
  * to publish the slot with one store, and to wake each link. A tick that is not ready late_ms after its time
  * is given up: it is announced on the wire and counted, and its pulse numbers are missing. In the paces fast
  * and step the head loses nothing: release waits for casters, and for readers of links that wait (enum link_waits).
  *
- * The pacing thread runs at SCHED_FIFO where that is permitted. It touches no lock, allocator or log. */
+ * In real time the pacing thread runs at SCHED_FIFO where that is permitted. It touches no lock, allocator or log. */
 #ifndef FIRMWARE_SIM_LOOP_LOOP_H
 #define FIRMWARE_SIM_LOOP_LOOP_H
 
