@@ -2,8 +2,8 @@
 /* Opens input files. In: a path. Out: a stream to read, or the reason why there is none, as text for a
  * message.
  *
- * Only regular files: a FIFO waits for a writer, perhaps for ever, and a device may have no end. Every reader
- * of files that a user names opens them here. */
+ * Only regular files: a FIFO waits for a writer, perhaps for ever, and a device may have no end. Readers of files that
+ * a user names open them here first. libscanhead opens recordings itself. */
 #ifndef CORE_INFILE_H
 #define CORE_INFILE_H
 

@@ -20,7 +20,7 @@ struct scene_object {
     uint64_t n_triangles; /* with those of copies */
     uint64_t n_open;      /* edges of an odd number of triangles; 0 where it is closed */
     double area_m2;
-    double volume_m3; /* above 0 where its faces look outward; NaN: it is not closed */
+    double volume_m3; /* above 0 where its faces look outward; NaN: it is open or turned; 0: it is empty */
     enum scene_object_state state;
 };
 
@@ -30,7 +30,7 @@ struct scene_objects {
     uint32_t *of; /* [n_surfaces] the object of each surface */
 };
 
-/* Receives each open edge that n_open counts, from a to b, prcs. */
+/* Receives each open edge that n_open counts, with its ends a and b in either order, prcs. */
 struct scene_open_edges {
     void *ctx;
     int (*take)(void *ctx, const double a[3], const double b[3], struct sh_err *err);

@@ -4,8 +4,9 @@
  *
  * PNG, JPEG, TGA and BMP are read through stb_image, WebP through libwebp, and images that Assimp gives are unpacked
  * already. An image has up to TEXTURE_MAX_SIDE texels a side, TEXTURE_MAX_TEXELS in all, and a file of up to
- * TEXTURE_MAX_FILE bytes; decoding takes up to TEXTURE_MAX_MEMORY bytes, whatever the file says of itself. Gamma that a
- * file names is not applied: values are sRGB. Rows count from the top; the coordinate 0, 0 is the lower left corner.
+ * TEXTURE_MAX_FILE bytes; decoding takes up to TEXTURE_MAX_MEMORY bytes, whatever the file says of itself. Only the
+ * memory that libwebp itself takes is not counted; it depends on the image's size. Gamma that a file names is not
+ * applied: values are sRGB. Rows count from the top; the coordinate 0, 0 is the lower left corner.
  * Images and masks are constant once they are made: any thread. */
 #ifndef CORE_TEXTURE_H
 #define CORE_TEXTURE_H
@@ -37,10 +38,10 @@ struct texture_source {
 struct texture_image {
     uint32_t width, height;
     uint8_t *rgba; /* NULL: not decoded */
-    int has_alpha; /* the file has an alpha channel */
+    int has_alpha; /* the file has an alpha channel, or a PNG a transparent colour; not one of zeros in TGA or BMP */
 };
 
-/* SH_EINPUT, naming the file: can't be read, or is larger than allowed. texture_image_free is due in any
+/* SH_EINPUT, naming the file: can't be read, or is larger than allowed; SH_ENOMEM. texture_image_free is due in any
  * case. */
 int texture_read(const struct texture_source *source, struct texture_image *image, struct sh_err *err);
 void texture_image_free(struct texture_image *image);

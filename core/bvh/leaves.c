@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Leaves: two triangles that share an edge make one leaf, where their common box is smaller than their two boxes
- * together. */
+/* Leaves: two triangles that share an edge and are near in the scene's list can make one leaf, where their common box
+ * is no larger than their two boxes together. */
 #include "core/bvh/leaves.h"
 
 #include <math.h>

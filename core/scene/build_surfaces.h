@@ -29,8 +29,8 @@ int build_texture(struct scene_build *b, const struct build_image *image, uint16
 /* Frees the index of names by which build_label finds surfaces. To be called when the scene is done, or given up. */
 void build_forget_surfaces(struct scene_build *b);
 
-/* A colour that a file says, times scale, as scene->rgb has it. Values beyond 0..255, and NaN, are limited and
- * counted. */
+/* A colour that a file says, times scale, as scene->rgb has it. Values beyond 0..255, and NaN, are limited; the colours
+ * that have such values are counted. */
 void build_rgb(struct scene_build *b, const double colour[3], double scale, uint8_t rgb[4]);
 
 /* A file may have colours as real numbers, from 0 to 1 or from 0 to 255. These counts show which. Zero-initialise. */

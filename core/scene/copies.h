@@ -5,7 +5,8 @@
 
 #include "core/scene.h"
 
-/* Adds the mesh, which the scene owns from then on, at all these places. */
+/* Adds the mesh, which the scene then owns, at all these places. After an error the mesh is still the caller's, but the
+ * scene may have its textures. */
 int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
                      const struct sh_report *report, struct sh_err *err);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Decodes the points of a stream frame into doubles: the hot path of every recorder.
+/* Decodes the points of a stream frame into doubles: the hot path of every recorder of points.
  *
  * A frame is taken in blocks of rows. The rows of a block become columns of words, and loops that compilers turn into
  * vectors make each column of figures from these. */

@@ -34,7 +34,7 @@ struct link_spec {
     char interface[32]; /* udp: its name; needed for broadcasts and multicast. Empty: the system chooses */
     char source[64];    /* udp: numeric address of this machine that packets come from; empty: the system chooses */
     int source_port;    /* udp: port that packets come from; 0: the system chooses */
-    int usual_port;     /* udp: 1: another source_port will do where this one can't be had; a notice says so */
+    int usual_port;     /* udp: 1: another source_port will do where this one can't be had, with a notice; see udp.c */
     int ttl;            /* udp: of the packets; 0: 1 to a multicast group, else the system's */
     int max_sessions;   /* tcp, web: 1..LINK_MAX_SESSIONS */
     int baud;           /* pty: of the head's UART; clients with another rate get, and send, other bytes. 0: any rate */

@@ -40,7 +40,8 @@ void pty_device_drop_output(struct pty_device *device)
 }
 
 /* Brings the slave to rest (pty_device.h). This opens and closes the slave once, so that the master reports the hang-up
- * from then on. */
+ * from then on. Where no descriptor or memory is left, the slave stays closed, and only its settings are brought to
+ * rest. */
 static int slave_rest(struct pty_device *device)
 {
     int fd = open(device->slave, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);

@@ -19,7 +19,8 @@ struct pty_line {
 };
 
 /* pty_line_read and pty_line_write work as read(2) and write(2) on the master, with errno. Where the rates differ, a
- * byte may be read as up to UART_MOST_PER_BYTE bytes: with less room than that, pty_line_read returns 0. */
+ * byte may be read as up to UART_MOST_PER_BYTE bytes: with less room than that, pty_line_read returns 0. pty_line_write
+ * returns 0 while bytes of an earlier write wait, or where there is no memory. */
 ssize_t pty_line_read(const struct pty_line *line, int master, void *buf, size_t len);
 ssize_t pty_line_write(struct pty_line *line, int master, const void *buf, size_t len);
 /* Writes what waits. 1: nothing waits any more. */

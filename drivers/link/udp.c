@@ -2,7 +2,8 @@
 /* The UDP link: one session, open from the start. Each write is one datagram to the receiver.
  *
  * The link sends unicast to any address, but broadcast only from an interface that the configuration names: to that
- * interface's own broadcast address, or to 255.255.255.255. The packets' source is then the interface's address. But
+ * interface's own broadcast address, or to 255.255.255.255. The packets' source is then the interface's address, unless
+ * the link names its source. But
  * the system's routes choose the interface for packets to 255.255.255.255, whatever their source is. So such packets
  * are sent to the named interface's own broadcast address instead. (SO_BINDTODEVICE would direct them, but takes a
  * privilege.) Multicast, too, goes out only on an interface that is named.
@@ -12,11 +13,11 @@
  * and port, since it would get its own packets. On the loopback, with the receiver's port as the source port, the
  * source is the next address: 127.0.0.2 for a receiver at 127.0.0.1. A receiver on this machine that doesn't share its
  * port (MRPT, PCL) could not listen while the link has that port. So for a receiver on this machine the usual source
- * port of a protocol is not used, unless the link names its source.
+ * port of a protocol is not used, unless the link names its source or its interface.
  *
- * A receiver that is not there is no failure: datagrams to it are lost, as are those that the system has no room for.
- * Both losses are counted. A refused datagram counts when its refusal comes; several may share one refusal. Datagrams
- * that arrive at the socket can be read. */
+ * A receiver that is not there is no failure: datagrams to it are lost, as are those that the system has no route or no
+ * memory for. Both losses are counted. While the socket's buffer is full, udp_write takes nothing. A refused datagram
+ * counts when its refusal comes; several may share one refusal. Datagrams that arrive at the socket can be read. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <ifaddrs.h>
@@ -143,7 +144,7 @@ static int check_receiver(const struct link_spec *spec, struct sockaddr *to, str
     return SH_OK;
 }
 
-/* Sets the interface that packets go out on, and their TTL. */
+/* Sets the TTL of packets, and the interface that packets to a group go out on. */
 static int set_way(int fd, const struct link_spec *spec, const struct sockaddr *to)
 {
     const int ttl = spec->ttl, is_v4 = to->sa_family == AF_INET;

@@ -17,7 +17,7 @@ static int has_come(const struct native_sequence *s, const struct native_header 
     return 0;
 }
 
-/* Remembers a range of missing frames, in place of the oldest one where there is no room. */
+/* Remembers a range of up to NATIVE_GAP_MOST missing frames, in place of the oldest one where there is no room. */
 static void add_gap(struct native_sequence *s, uint32_t first, uint32_t n)
 {
     if (n == 0 || n > NATIVE_GAP_MOST) return;

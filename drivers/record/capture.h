@@ -14,7 +14,7 @@ struct capture {
     uint64_t packets;
 };
 
-/* SH_EINPUT also where an earlier capture has left a PATH.part, which wants a repair. */
+/* SH_EINPUT also where an earlier capture has left a PATH.part with data, which wants a repair. */
 int capture_open(struct capture *capture, const char *path, struct sh_err *err);
 /* Adds an interface that frames come from; readers show its name. Interfaces are numbered from 0. */
 int capture_add_interface(struct capture *capture, const char *name, const char *comment, struct sh_err *err);

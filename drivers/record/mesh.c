@@ -2,11 +2,11 @@
 /* Meshes of scans: .obj, .gltf, .glb and .fbx, and .ply with --mesh; points spread over the mesh: .ply with --sparse.
  *
  * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/studio/scan_mesh.h makes triangles of
- * the grid. A mesh is made when its scan is over, and the file when all scans are. All points are held until then, with
- * about 110 bytes each, and triangles with 12, two a point.
+ * the grid. A mesh is made when its scan is over, and the file when all scans are. All points of the scan at hand, and
+ * points in triangles of earlier ones, are held until then, with about 110 bytes each; triangles with 12, two a point.
  *
  * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of
- * the file) by itself. So is each sweep of the pan. Where line numbers go back, another part begins, too. */
+ * the file) by itself. So is each sweep of the pan. Where line or row numbers go back, another part begins, too. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -289,7 +289,7 @@ static void mesh_report(const struct mesh_recorder *m)
     recorder_report(r, m->n_loose, "points left out that belong to no triangle");
     recorder_report(r, m->n_later, "echoes left out; a mesh holds the first of a shot");
     recorder_report(r, m->n_lost, "points left out whose pose was lost");
-    recorder_report(r, m->n_split, "additional meshes begun within a scan, since its line numbers went back");
+    recorder_report(r, m->n_split, "additional meshes begun within a scan, since its line or row numbers went back");
     if (m->every > 1) {
         snprintf(what, sizeof what, "lines and rows share one texel, since a texture has up to %d texels a side",
                  MESH_TEXTURE_SIDE);

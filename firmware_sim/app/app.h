@@ -38,12 +38,12 @@ APP_COMMANDS(APP_DECLARE, APP_DECLARE)
 void app_say(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 /* Prints an error as such a line, and returns the exit status for it. */
 int app_fail(const struct sh_err *err);
-/* The same for each error of a configuration. */
+/* The same for the first CONFIG_MAX_DIAGNOSTICS errors of a configuration; a last line counts the others. */
 int app_fail_config(const struct config_diagnostics *diagnostics);
 
-/* Loads the configuration that the first operand names, with the settings, and gives it to `work`. `work` may change
- * the configuration, which is freed afterwards. Returns the exit status. The reason of a failure is printed: each error
- * of a configuration is a line. */
+/* Loads the configuration that the first operand names, with settings and scenario, and gives it to `work`. `work` may
+ * change the configuration, which is freed afterwards. Returns the exit status. The reason of a failure is printed,
+ * errors of a configuration as by app_fail_config. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 /* The same for `links`, YAML that --link gives in place of a configuration. NULL: as app_with_config. */
@@ -55,8 +55,8 @@ int app_with_links(const struct app_input *in, const char *links,
  * warning, unless it is the same. */
 int app_and_also(int rc, int more, const struct sh_err *why, struct sh_err *err);
 
-/* Warns of a head.settings_file that is there but has no effect on the work. why is the reason, a clause such as "a
- * soak has the settings of the configuration". */
+/* Warns of a head.settings_file that is there and not empty, but has no effect on the work. why is the reason, a clause
+ * such as "a soak has the settings of the configuration". */
 void app_warn_settings_file(const struct config *cfg, const char *why);
 
 /* To be called before any file is opened. Checks that the command writes no file twice, and none that it reads. Files
@@ -87,7 +87,8 @@ extern const struct sh_report app_report_quiet;
 void app_set_quiet(int quiet);
 
 /* From now on warnings begin with the text `what`, the name of a part of the work. The text is not copied. A warning
- * that several parts give is printed once. NULL, as at first: warnings have no name, and each is printed. */
+ * that several parts give is printed once, while no more than 256 texts have come. NULL, as at first: warnings have no
+ * name, and each is printed. */
 void app_warn_of(const char *what);
 
 /* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second
@@ -96,7 +97,7 @@ void app_warn_of(const char *what);
 int app_interrupted(void);
 void app_catch_signals(void);
 
-/* Prints a warning for each kind of echoes that the head left out of the stream. */
+/* Prints a warning for each kind of echoes that the head left out of the stream, and one for samples of waveforms. */
 void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples);
 
 /* Whether a path has that ending, and something before it; case doesn't count. */
@@ -111,7 +112,7 @@ void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 /* Opens the file that a user names for output, empty; "-": standard output. */
 int app_open_new(const char *path, FILE **out, struct sh_err *err);
 /* Closes a file that was written, but not standard output. Returns the first error in writing it; its text begins with
- * the path. */
+ * the path, or with "standard output". */
 int app_close_new(const char *path, FILE *out, struct sh_err *err);
 
 /* Writes one JSON value, by `put`, to a file; path "-" is standard output. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead check --scene` prints the objects of the scene as a table. After the table it lists the names of open
- * objects, of turned objects, and of transparent surfaces. In a turned object neighbouring faces look to different
- * sides (core/scene_objects.h). */
+/* `scanhead check --scene` prints the objects of the scene as a table: the 50 largest, and the sum of all. After the
+ * table it lists the names of open objects, of turned objects, and of transparent surfaces, up to 50 of each. In a
+ * turned object neighbouring faces look to different sides (core/scene_objects.h). */
 #ifndef FIRMWARE_SIM_APP_CHECK_SCENE_H
 #define FIRMWARE_SIM_APP_CHECK_SCENE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* config_load: file, --set, profile, defaults, checks, in this order. */
+/* config_load: file, --set, the section `scanner` of the station, profile, defaults, checks, in this order. */
 #include "firmware_sim/config/check.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/keys.h"

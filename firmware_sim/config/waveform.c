@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Full waveforms: checks that concern more than one key. The limits of the digitiser and of the pulse are checked in
- * core/waveform, and the stream's rate in firmware_sim/site. */
+/* Full waveforms: checks that concern more than one key, and steps and gaps that a key's row can't have. The limits of
+ * the digitiser and of the pulse are checked in core/waveform, and the stream's rate in firmware_sim/site. */
 #include <math.h>
 
 #include "core/digits.h"

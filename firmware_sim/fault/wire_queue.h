@@ -42,7 +42,8 @@ struct wire_queue {
 /* Returns a new piece with a copy of the bytes; NULL: no memory. */
 struct wire_piece *wire_piece_new(enum wire_piece_kind kind, const void *bytes, size_t len);
 void wire_piece_free(struct wire_piece *piece);
-/* Puts a piece at the end, or into the last one's write if that is open; takes it over. SH_ENOMEM: it is lost. */
+/* Puts a piece at the end, or into the last one's write if that is open and of the same kind, and the piece is not
+ * alone; takes it over. SH_ENOMEM: it is lost. */
 int wire_queue_put(struct wire_queue *queue, struct wire_piece *piece);
 /* Holds a piece back; takes it over. */
 void wire_queue_hold(struct wire_queue *queue, struct wire_piece *piece);

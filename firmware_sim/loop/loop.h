@@ -3,13 +3,13 @@
  *
  * In: the site, the device and the links of the configuration. Out: the stream on the links, and statistics.
  *
- * Casters claim ticks up to ahead_ms before their time and fill slots. The pacing thread sleeps on an
+ * Casters claim ticks up to ahead_ms before their time and fill slots. In real time the pacing thread sleeps on an
  * absolute clock, and releases each tick when its last pulse has fired. To release is to number the frames,
  * to publish the slot with one store, and to wake each link. A tick that is not ready late_ms after its time
  * is given up: it is announced on the wire and counted, and its pulse numbers are missing. In the paces fast
- * and step nothing is lost: release waits for casters and readers.
+ * and step the head loses nothing: release waits for casters, and for readers of links that wait (enum link_waits).
  *
- * The pacing thread runs at SCHED_FIFO where that is permitted. It touches no lock, allocator or log. */
+ * In real time the pacing thread runs at SCHED_FIFO where that is permitted. It touches no lock, allocator or log. */
 #ifndef FIRMWARE_SIM_LOOP_LOOP_H
 #define FIRMWARE_SIM_LOOP_LOOP_H
 
@@ -45,12 +45,13 @@ struct loop_stats {
 int loop_create(const struct site *site, struct device *device, const struct loop_options *options, struct loop **out,
                 struct sh_err *err);
 
-/* The same for a source that makes its ticks itself. loop_create_of uses links, loop and the head's identity of cfg
- * alone. */
+/* The same for a source that makes its ticks itself. loop_create_of uses links, loop, monitored fields and the head's
+ * identity of cfg alone. */
 int loop_create_of(const struct config *cfg, const struct loop_source *source, const struct loop_options *options,
                    struct loop **out, struct sh_err *err);
 
-/* {"endpoints": [...]}: type and endpoint of each link, and of the socket for poses. */
+/* {"endpoints": [...]}: type, endpoint and protocol of each link that another program can open (not fd); type and
+ * endpoint of the socket for poses. */
 void loop_put_endpoints(const struct loop *loop, struct json *json);
 /* After loop_join: an array of the links, each with its endpoint and what its readers got and lost. */
 void loop_put_links(const struct loop *loop, struct json *json);
@@ -66,7 +67,7 @@ int loop_start(struct loop *loop, struct sh_err *err);
 int loop_is_over(const struct loop *loop);
 /* Ends the run early. Any thread. */
 void loop_end(struct loop *loop);
-/* Waits for the end, stops the threads, closes the links, fills stats. */
+/* Waits for the end, stops the threads, fills stats. loop_free closes the links. */
 void loop_join(struct loop *loop, struct loop_stats *stats);
 /* After loop_join: completes the files that the source writes; stats then counts the lines that they lack. Returns the
  * first error in writing them. */

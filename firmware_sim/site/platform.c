@@ -11,8 +11,9 @@
 #include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 
-/* Limits for the head's poses, in metres and ns: largest distance of its path from the trajectory, and largest steps
- * between poses. Recorded trajectories have such steps. */
+/* Limits for the head's poses: the largest distance of its path from the trajectory; and the longest time between poses
+ * where the head moves further than LONGEST_M from one to the next, or turns by over 0.01 rad. Recorded trajectories
+ * have such steps. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 

@@ -344,7 +344,7 @@ static void later_echoes_and_lines_that_go_back(void **state)
     char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .long_edge = 0}, NULL);
     has(text, "element face 14\n"); /* a cell, and the step */
     has(rig_notes, "2 echoes left out; a mesh holds the first of a shot\n");
-    has(rig_notes, "1 additional meshes begun within a scan, since its line numbers went back\n");
+    has(rig_notes, "1 additional meshes begun within a scan, since its line or row numbers went back\n");
     has(rig_notes, "2 points left out that belong to no triangle\n"); /* behind the empty shots */
     free(text);
 }

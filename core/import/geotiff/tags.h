@@ -20,9 +20,11 @@ struct tags {
 int tags_open(struct tags *tags, const char *path, struct sh_err *err);
 void tags_close(struct tags *tags);
 
-/* Reads up to `most` numbers of a tag, of any type. *n: how many; 0: there is no such tag. */
+/* Reads up to `most` numbers of a tag. *n: how many; 0: there is no such tag. SH_EINPUT also for a type other than the
+ * TIFF types 2, 3, 4, 12 and 16. */
 int tags_numbers(const struct tags *tags, unsigned tag, double *out, size_t most, size_t *n, struct sh_err *err);
-/* Reads the text of a tag; empty: there is none. SH_EINPUT: there is no room for the text and a NUL. */
+/* Reads the text of a tag; empty: there is none, or the tag has numbers. SH_EINPUT: there is no room for the text and a
+ * NUL. */
 int tags_text(const struct tags *tags, unsigned tag, char *out, size_t room, struct sh_err *err);
 
 #endif

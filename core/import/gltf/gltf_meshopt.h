@@ -14,7 +14,7 @@ struct gltf_packed {
     uint64_t stride, count;
     const char *mode, *filter; /* NULL: the extension names none */
 };
-/* at: the buffer view, for messages. *own is to be freed, even after an error. */
+/* at: the buffer view, for messages. *own is NULL before; afterwards it is to be freed, even after an error. */
 int gltf_meshopt(struct scene_build *b, const struct gltf_packed *packed, const char *at, void **own,
                  struct gltf_bytes *out, struct sh_err *err);
 

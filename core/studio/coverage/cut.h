@@ -33,7 +33,8 @@ struct cut {
 
 /* Columns are numbered through both parts, those of A first. */
 void cut_set_up(const double corner[3][3], double size_m, struct cut *cut);
-/* The number of pieces that cut_set_up would give, as a double, since a triangle may be of any size. */
+/* The number of pieces that cut_set_up would give, as a double, since a triangle may be of any size. For a part of more
+ * than 10,000 columns the number is an upper bound. */
 double cut_count(const double corner[3][3], double size_m);
 uint32_t cut_columns(const struct cut *cut);
 uint32_t cut_rows(const struct cut *cut, uint32_t column);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module finds the point under the pointer: the nearest one on the screen, where points near the eye win over
-// points behind them. The module is pure.
+// points behind them. The search is pure; searchSlowly, runSlowly and lookAt use timers, and lookAt moves the view.
 //
 // Only blocks whose box meets the cone around the ray are looked through, 10 ns a point.
 

@@ -2,7 +2,8 @@
 /* The scene that jobs of a campaign share. In: a combination of values. Out: its configuration and its site, which stay
  * loaded for further stations of the combination.
  *
- * The next combination takes over the meshes that it shares, and their BVHs. One thread. */
+ * The next combination takes over meshes and BVHs if all meshes are the same, and textures are wanted as before. Else
+ * all meshes are read again. One thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_BATCH_LOAD_H
 #define FIRMWARE_SIM_APP_STUDIO_BATCH_LOAD_H
 

@@ -3,7 +3,7 @@
  * asks for it. The head neither moves nor changes, so nobody needs control of it.
  *
  * In: requests of a page, as path and query (README.md has them and their answers). Out: bodies. A request that is
- * not answered yet gets an empty body at once, and the page asks again. One thread at the lowest priority does the
+ * not answered yet gets an empty body at once, and the page asks again. One thread of a low priority (`nice`) does the
  * work, within the limits that README.md has. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H
 #define FIRMWARE_SIM_APP_STUDIO_PREVIEW_PREVIEW_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The pulses of a recording: what came, and what the head says of the rest. COUNTS.md defines the words.
  *
- * In: each frame of the stream. Out: sums over the scans whose end is known, by SCAN_END or, where that was lost,
- * by telemetry of the idle head. */
+ * In: each frame of the stream. Out: sums over the scans whose end is known: by SCAN_END or, where that was lost, by
+ * telemetry of the idle head, by a frame of another scan, or by recording_count_end. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_COUNTS_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_COUNTS_H
 
