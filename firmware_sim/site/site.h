@@ -244,7 +244,7 @@ uint32_t site_n_served(const struct site *site);
  * Else an anchored scene has one grid for all its stations: the scene's own, or that of the anchor, or that of the
  * first station. Without an anchor zone is 0: each station has the grid of its position. side is the hemisphere from
  * which northings count: that of the scene's own grid; else of the first station, if its place is given in UTM; else of
- * the anchor; 0: by position. */
+ * the place that gave the zone; 0: by position. */
 void site_grid(const struct site *site, int *zone, int *side);
 
 /* Fills the schedule of its head with these settings. */
@@ -300,7 +300,7 @@ int site_scans(const struct site *site, uint32_t station, const double dir_socs[
 
 /* Fills in what casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);
-/* Sets the members that depend on the pulse rate: reach, echoes, smallest range. Allocates nothing. */
+/* Sets the members that depend on the pulse rate: reach, smallest range, echoes, detection. Allocates nothing. */
 void site_set_program(const struct site *site, int64_t prr_uhz, struct cast_setup *setup);
 
 #endif
