@@ -31,8 +31,9 @@ struct recording_options {
     int (*prepare)(void *ctx, uint32_t station, struct sh_err *err);
     /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-    /* At most once a second, also while no frames come; not while a command waits for its reply, or for a head that
-     * is away. NULL: not called. A negative SH_E ends the recording. */
+    /* About once a second, also while no frames come; but not while a command waits for its reply, or while the head is
+     * away. Where several heads make one recording, also after each part. NULL: not called. A negative SH_E ends the
+     * recording. */
     int (*second)(void *ctx, struct sh_err *err);
     void *ctx;
     /* Asked often: non-zero ends the recording in good order. NULL: never. */
