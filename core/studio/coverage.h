@@ -63,7 +63,8 @@ struct coverage_pulses {
     uint64_t hits, front; /* such hits; those on the front of a triangle */
 };
 
-/* Casts a scan. The scan's result waits until it is kept or dropped. Reports progress after a second. */
+/* Casts a scan. The scan's result waits until it is kept or dropped; casting another scan drops it. Reports progress
+ * after a second. SH_ENOMEM; SH_ESTOPPED where report asks to stop. */
 int coverage_look(struct coverage *coverage, const struct coverage_scan *scan, const char *what,
                   const struct sh_report *report, struct coverage_pulses *pulses, struct sh_err *err);
 /* Gives figures of the waiting scan: the area that it sees, and the part of it that no scan before has seen. */

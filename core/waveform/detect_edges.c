@@ -19,7 +19,7 @@ static double edges_centroid(const struct finder_run *run, uint32_t k, double le
     return below + u * (above - below);
 }
 
-/* A top that is limited, or at the window's end, has no peak to take a part of: its flanks are fitted. */
+/* A top that is limited, or at either end of the window, has no peak to take a part of: its flanks are fitted. */
 static int edges_hidden(const struct finder_run *run, const struct finder_peak *peak, struct finder_list *list)
 {
     if (!finder_limited(run, peak) && peak->top > 0 && peak->top + 1 < run->n) return 0;
@@ -30,8 +30,8 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
 }
 
 /* Another echo may begin only once the signal has been 5 sigma below the level: else noise on a slow tail would cross
- * the level again. Where the noise is larger than the level, the sample at the crossing may itself be below `again`.
- * That sample belongs to the echo all the same. */
+ * the level again. Where the level is below 6 sigma, one sigma is low enough. Where the noise is larger than the level,
+ * the sample at the crossing may itself be below `again`. That sample belongs to the echo all the same. */
 void finder_threshold(const struct finder_run *run, struct finder_list *list)
 {
     const double *y = run->y, at = run->finder->peak;

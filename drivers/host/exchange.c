@@ -9,7 +9,8 @@
 
 enum { COMMAND_MAX = 1024, STALE_READS = 32, ANSWERS_MS = 200, ASK_AGAIN_MS = 1000 };
 
-/* Keeps the frames that are in the parser. Returns 1 if the parser is at a line, 0 if it needs more bytes. */
+/* Keeps the frames that are in the parser. Returns 1 if the parser is at a line, 0 if it needs more bytes. Negative: an
+ * error. */
 static int take_items(struct scanhead *sh)
 {
     for (;;) {

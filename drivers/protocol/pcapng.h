@@ -3,9 +3,9 @@
  *
  * In and out: bytes of a file, in pieces of any size. Times are nanoseconds. Pure: no I/O, no clock, no allocation.
  *
- * The module writes one section of little-endian blocks, interfaces with times in nanoseconds, and enhanced packets. It
- * also reads what tshark, editcap and mergecap make of these: simple packets and other resolutions; blocks of other
- * kinds are skipped. Big-endian sections are refused. */
+ * The module writes one section of little-endian blocks: interfaces with times in nanoseconds, enhanced packets, and
+ * statistics of interfaces. It also reads what tshark, editcap and mergecap make of these: simple packets and other
+ * resolutions. Blocks of other kinds are skipped, and so are statistics. Big-endian sections are refused. */
 #ifndef DRIVERS_PROTOCOL_PCAPNG_H
 #define DRIVERS_PROTOCOL_PCAPNG_H
 
@@ -63,7 +63,7 @@ struct pcapng_reader { /* begins as zeros */
 struct pcapng_packet {
     uint16_t link; /* enum pcapng_link, or another link type */
     int has_time;
-    int64_t t_ns;               /* since 1970; negative: before it */
+    int64_t t_ns;               /* since 1970; negative: before it. INT64_MIN, INT64_MAX: farther than 292 years */
     const uint8_t *data;        /* within the bytes that were given */
     uint32_t len, original_len; /* original_len > len: the capture cut it */
 };
@@ -72,7 +72,8 @@ enum pcapng_item { PCAPNG_MORE = 0, PCAPNG_PACKET = 1, PCAPNG_OTHER = 2 };
 
 /* Takes the block that the bytes begin with. PCAPNG_MORE: they have no whole block yet; *used is 0, and reader->needed
  * says more. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
- * SH_EFORMAT: this is no block; err says at which byte of the file, and why. */
+ * SH_EFORMAT: this is no block, or a block that can't be read, as a packet of an interface that is not described; err
+ * says at which byte of the file, and why. */
 int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, struct pcapng_packet *packet,
                 size_t *used, struct sh_err *err);
 

@@ -225,7 +225,8 @@ static const struct talk_kind talk_scip = {.name = "SCIP",
 
 /* ---- which protocol a connection speaks */
 
-/* Two letters alone are no proof. A digit must follow the name, or the line's end after a command without digits. */
+/* Two letters alone are no proof. A digit must follow the name, or after a command without digits the line's end or a
+ * semicolon. */
 static int is_scip(const uint8_t *bytes, size_t len)
 {
     static const char *const bare[] = {"VV", "PP", "II", "BM", "QT", "RS", "RT", "RB", "%SL", "%ST", "SCIP2.0"};

@@ -19,7 +19,7 @@ struct las_packets {
 };
 
 /* Finds the packets of a file with this header. SH_EINPUT: they are not there; SH_ESTATE: the name that they get is
- * taken. */
+ * taken; SH_EFORMAT: the header can't be right about their place. */
 int las_packets_find(struct las_packets *packets, const struct repair *repair, const uint8_t *header,
                      struct sh_err *err);
 /* Takes each point's record that is kept. */
@@ -30,7 +30,7 @@ uint64_t las_packets_limit(const struct las_packets *packets, const struct repai
  * changed, 0 where nothing had to be, or a negative error. */
 int las_packets_repair(struct las_packets *packets, struct repair *repair, const struct repair_rows *points,
                        uint8_t *header, struct sh_err *err);
-/* Gives the .wdp its name; a .wdp without any packet is removed. */
+/* Gives the .wdp its name, if it gets one; without even the head of its record, that .wdp is removed instead. */
 int las_packets_settle(struct las_packets *packets, struct sh_err *err);
 void las_packets_free(struct las_packets *packets);
 

@@ -130,8 +130,10 @@ struct track {
 };
 
 /* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
- * kind of heights, a head that begins or ceases to move or to send (wanted) attributes, colours or waveforms, a
- * station number above 65535. SH_EFORMAT also if the points lack the figure that the colours show. */
+ * kind of heights; a head that begins or ceases to move, to stop on a trajectory, or to send (wanted) attributes,
+ * deviations, colours or waveforms; a station number above 65535; a line of more than 2^32 pulses. SH_EFORMAT also if
+ * the points lack the figure that the colours show, or if ops.metres does not allow their CRS. Errors of ops are passed
+ * on. SH_ENOMEM. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* For recorders: leaves only points index[0..n-1] of the batch in it; the indices rise. */
@@ -151,8 +153,9 @@ static inline int track_is_nowhere(struct track *track, double x, double y, doub
     return 1;
 }
 
-/* Writes the change of the recording's coordinates along a metre of range, for point i of the batch, which has a
- * window. Returns 1, or 0 if the pose of a moving head is lost. */
+/* Writes the change of the recording's coordinates along a metre of range, for point i of the batch. In the geo layout
+ * the point must have a window. Returns 1. Returns 0 in the polar layout, if the point's range is not above 0 or the
+ * pose of a moving head is lost. */
 int track_beam(const struct track *track, int i, double beam[3]);
 
 /* At the end: gives out the points that still wait. */

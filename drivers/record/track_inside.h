@@ -57,17 +57,19 @@ int track_begin_waiting(struct track *track, const struct scanhead_frame *frame,
 void track_keep(struct track *track, int n);
 /* Gives out the n points of the batch, with the colours that are computed here. */
 int track_give(struct track *track, int n, struct sh_err *err);
-/* Takes frames of attributes and of colours. Points are given out with the last frame that they wait for. Attributes
- * and colours of lost points are skipped. */
+/* Takes frames of attributes and of colours. Points are given out with the last frame that they wait for; points that
+ * wait for waveforms, too, come out at the end of their line. Attributes and colours of lost points are skipped. */
 int track_attributes(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
 int track_colours(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
 
 /* ---- windows of waveforms (track_waves.c) */
 
-/* Takes a frame of waveforms; a recorder without a place for them counts them. SH_ENOMEM, SH_EFORMAT. */
+/* Takes a frame of waveforms. Windows are only counted where the recorder has no place for them, or where the
+ * beginning of their scan was lost. SH_ENOMEM. */
 int track_waves(struct track *track, const struct scanhead_frame *frame, struct sh_err *err);
-/* Returns the window in which an echo of this pulse lies, NULL where there is none. *at: the echo's place in the
- * window, in samples. The caller asks for pulses in rising order, until it calls track_clear_waves. */
+/* Returns the window in which an echo of this pulse lies, NULL where there is none. NULL also where the echo's range is
+ * not known: in the geo layout, for a moving head in a CRS other than local. *at: the echo's place in the window, in
+ * samples. The caller asks for pulses in rising order, until it calls track_clear_waves. */
 const struct scanhead_wave *track_find_wave(struct track *track, const struct scanhead_point *point, uint64_t pulse,
                                             double *at);
 /* Forgets all windows, and counts those that no point was in. */

@@ -154,8 +154,8 @@ size_t usb_device_read(struct usb_device *device, uint8_t endpoint, void *data, 
 size_t usb_device_can_read(const struct usb_device *device, uint8_t endpoint, uint32_t *epoch);
 /* Drops what waits on an OUT endpoint from epochs before the present one. */
 void usb_device_drop(struct usb_device *device, uint8_t endpoint);
-/* A count that the function may raise between two sessions. OUT transfers are stamped with it. When it has
- * changed, a back end withdraws IN data that are still on their way. */
+/* A count that the function may raise between two sessions; the core raises it when the interface ends. OUT transfers
+ * are stamped with it. When it has changed, a back end withdraws IN data that are still on their way. */
 uint32_t usb_device_epoch(const struct usb_device *device, uint8_t endpoint);
 void usb_device_next_epoch(struct usb_device *device, uint8_t endpoint);
 

@@ -39,7 +39,8 @@ enum {
     DIR_IN = 1,
 };
 
-/* Place of head number N on the server's side: bus 1, device N + 1 (the root hub is device 1), port N, bus id "1-N". */
+/* Place of head number N on the server's side: bus 1, device N + 1 (the root hub is device 1), port N, bus id "1-N". A
+ * head without a number has the place of number 1. */
 enum { USBIP_BUS = 1 };
 
 /* ---- usbip_conn.c */
@@ -81,7 +82,7 @@ void usbip_conn_answer_slow(struct usbip_conn *conn, const struct usb_owner *own
 /* Sends the queue and waits until the peer has taken it and hung up, timeout_ms at most for each step
  * (usb_backend_hang_up). */
 void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
-/* Detaches the device if it was imported here, and frees everything. */
+/* Detaches the device if it was imported here, frees everything, and closes fd. */
 void usbip_conn_end(struct usbip_conn *conn);
 
 /* Limits of what the host has asked for and the device has not answered. A host that asks for more is cut

@@ -15,8 +15,9 @@ struct progress_pace {
     double fraction; /* then */
 };
 
-/* Seconds left, by the pace since the first report of the same work: `what` up to a colon names it. Negative
- * where it is not known: the first report, an unknown fraction, or nothing done since. */
+/* Seconds left, by the pace since the first report of the same work: `what` up to a colon names it. Where the fraction
+ * falls, the pace is measured anew from there. Negative where it is not known: the first report, an unknown fraction,
+ * or nothing done since. */
 double progress_left_s(struct progress_pace *pace, const char *what, double fraction, int64_t now_ns);
 
 /* Returns how long a scan lasts by its descriptor, from the first pulse on; 0: it has no end, or the frame is no

@@ -30,7 +30,8 @@ int config_load(const char *path, const char *const *sets, int n_sets, struct co
 int config_load_all(const char *path, const char *const *sets, int n_sets, struct config *cfg,
                     struct config_diagnostics *diagnostics);
 
-/* Does the same for a text that has only links, loop and faults. Errors call it `name`. The rest of cfg is zero. */
+/* Does the same for a text that has only links, loop and faults. Errors call it `name`. cfg->file becomes this name,
+ * and cfg->has_no_head 1; the rest of cfg is zero. */
 int config_load_links(const char *text, const char *name, const char *const *sets, int n_sets, struct config *cfg,
                       struct config_diagnostics *diagnostics);
 
@@ -38,15 +39,16 @@ int config_load_links(const char *text, const char *name, const char *const *set
  * scenario that comes with the program. The caller adds one scenario at most. With diagnostics nothing is added, and
  * the code of the first is returned. */
 int config_add_scenario(struct config *cfg, const char *name, struct config_diagnostics *diagnostics);
-/* Writes the names of the scenarios that come with the program, "a, b, c", as many as buf holds. */
+/* Writes the names of the scenarios that come with the program, "a, b, c", as many as buf holds; "none found" where
+ * their folder is missing. */
 void config_name_scenarios(char *buf, size_t len);
 /* Reads a fault from one line of YAML, "{kind: drop, every: 10}", for a head with this configuration. Takes 270 KiB of
  * stack. */
 int config_read_fault(const struct config *cfg, const char *text, struct fault *out, struct sh_err *err);
 
 /* Loads the configuration of a station's scanner into `out`. Stations count from 1. head.station of `out` is this
- * station, and `out` has no links. Output, loop and scenario are those of cfg as it is now. The texts of --set that cfg
- * was loaded with must still be there. */
+ * station, and `out` has no links. Output, loop and scenario are those of cfg as it is now, but output.tolerance_m is
+ * the scanner's own. The texts of --set that cfg was loaded with must still be there. */
 int config_load_scanner(const struct config *cfg, uint32_t station, struct config *out, struct sh_err *err);
 
 #endif

@@ -2,8 +2,8 @@
 /* Rows of the section `ntp`. Private to keys.c. */
 /* clang-format off */
     {"ntp", .type = CFG_MAP,
-     .help = "The time server that a SICK scanner (protocol: cola) asks. Clients change these values by telegrams; at "
-             "power-up they are those given here."},
+     .help = "The time server that a SICK scanner (protocol: cola) asks. Clients change role, address, update_s and "
+             "zone_h by telegrams; at power-up they are those stored in head.settings_file, else those given here."},
     {KEY(ntp.role), CFG_ENUM, .def = "none",
      WORDS([NTP_ROLE_NONE] = "none", [NTP_ROLE_CLIENT] = "client", [NTP_ROLE_SERVER] = "server"),
      .help = "TSCRole. client: the scanner's clock begins with 1970 at power-up, and answers of the server set it; it "
@@ -17,6 +17,5 @@
     {KEY(ntp.max_offset_s), CFG_REAL, "s", "18000", 0.001, 1e9,
      .help = "TSCTCmaxoffset: once the clock is set, an answer that is farther from it is refused."},
     {KEY(ntp.anywhere), CFG_BOOL, .def = "off",
-     .help = "on: a client may choose any server. off: only the one of ntp.address, or one on this machine, is "
-             "asked."},
+     .help = "on: a client may choose any server. off: only the one of ntp.address, or one at 127.x.x.x, is asked."},
     /* clang-format on */

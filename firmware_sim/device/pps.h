@@ -6,9 +6,10 @@
  * In: each pulse and each sentence as it arrives, in order of time, with the head's own clock at that moment. Out: the
  * state of the pulses and the counter, at a device time.
  *
- * Pulses are absent where none came for more than a second. A pulse agrees when the head's clock has counted a whole
- * number of seconds since the pulse before, within PPS_TOLERANCE_NS for each second. Any other pulse but the first is
- * an error. Pulses are locked after PPS_TO_LOCK pulses in a row that agreed, a second apart.
+ * Pulses are absent where none came for more than a second and PPS_TOLERANCE_NS. A pulse agrees when the head's
+ * clock has counted a whole number of seconds since the pulse before, within PPS_TOLERANCE_NS for each second. Any
+ * other pulse but the first is an error. Pulses are locked after PPS_TO_LOCK pulses in a row that agreed, a second
+ * apart.
  *
  *     power comes        the counter begins with hour_ns, and goes on by the head's own clock
  *     -> locked pulse    the counter's part of a second becomes 0

@@ -19,8 +19,8 @@
  * The servo is a PI controller. From the offset o, ns, and the Sync interval T it corrects the rate by 0.7 o / T, and
  * its estimate of the oscillator by 0.3 o / T. Both gains are linuxptp's for T = 1 s. The servo's states:
  *     s0 unlocked   an offset is measured
- *     s1 jump       with the second one the rate is known; the clock is stepped where the offset is too large
- *     s2 locked     each Sync corrects the rate
+ *     s1 jump       with the second one the rate is known, and the offset was too large: the clock was stepped
+ *     s2 locked     each Sync corrects the rate; without a step it follows s0
  *
  * In holdover the rate stays as it was last corrected, and a fault's drift is added (clock_faults.c). Offset, delay and
  * grandmaster stay those of the last master, as ptp4l reports them.

@@ -114,15 +114,16 @@ static int64_t scan_end_ns(const struct device *device)
 }
 
 /* A client that grants time and moves a live platform gets all pulses of a grant within that grant. In all other cases
- * an incomplete packet waits for the next tick, so that the stream is the same at any pace. */
+ * an incomplete packet waits for the next tick, so that the stream is the same at any pace. Only where the scan ends,
+ * or a fault begins or ends, it goes out at once. */
 static int is_lock_step(const struct device *device)
 {
     const struct config *cfg = device->site->cfg;
     return cfg->loop.pace == PACE_STEP && cfg->platform.kind == PLATFORM_LIVE;
 }
 
-/* Claims the pulses of this tick; ends the scan when it is complete or was told to stop. Returns 1 when the scan is
- * over. */
+/* Claims the pulses of this tick. Returns 1 when the scan is over: it is complete, its time is over, or it was told to
+ * stop. */
 static int claim_pulses(struct device *device, uint64_t tick, struct device_work *work)
 {
     struct schedule_segment *seg = &device->scan.segment;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A variant is the site, planned again after commands have changed ranges, noise or the step of a sphere. The command
- * makes the variant, and is refused where no plan is possible. The next scan uses the variant. The variant is freed
- * once no work of a scan needs it. */
+ * makes the variant, and is refused where no plan is possible. The next scan uses the variant. When another one is
+ * made, or a station moves, each variant is freed that no scan, work or observer needs. */
 #include <stdio.h>
 #include <stdlib.h>
 

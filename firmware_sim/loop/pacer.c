@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The pacing thread: releases each tick when its time has come. It takes no lock, allocates and logs nothing. In real
- * time it calls the system only for the clock, for wake-ups, and to wait for a tick that is late. In the paces `fast`
- * and `step` it also waits for casters, files and readers. */
+ * time it calls the system only for the clock, to sleep until a tick's time, for wake-ups, and to wait for a tick that
+ * is late. In the paces `fast` and `step` it waits for casters, files and readers instead. */
 #include <errno.h>
 #include <sched.h>
 #include <string.h>

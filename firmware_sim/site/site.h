@@ -220,8 +220,8 @@ void site_retire(const struct site *site);
  * Errors as of site_load. */
 int site_count_stations(const struct config *cfg, const struct sh_report *report, uint32_t *n, struct sh_err *err);
 
-/* A site holds the maps of so many stations at a time. With more stations a run has no maps, and a recording
- * has that of the station at hand. Whether a map is used changes no hit. */
+/* A site holds the maps of so many stations at a time. Where the site serves more stations, a run has no maps, and a
+ * recording has that of the station at hand. Whether a map is used changes no hit. */
 enum { SITE_MAX_SIGHTS = 16 };
 
 /* Makes the maps of n stations from `first` on, where the plan says so, and gives back those of others. The function
@@ -244,7 +244,7 @@ uint32_t site_n_served(const struct site *site);
  * Else an anchored scene has one grid for all its stations: the scene's own, or that of the anchor, or that of the
  * first station. Without an anchor zone is 0: each station has the grid of its position. side is the hemisphere from
  * which northings count: that of the scene's own grid; else of the first station, if its place is given in UTM; else of
- * the anchor; 0: by position. */
+ * the place that gave the zone; 0: by position. */
 void site_grid(const struct site *site, int *zone, int *side);
 
 /* Fills the schedule of its head with these settings. */
@@ -263,9 +263,10 @@ const struct scene_texture *site_texture(const struct site *site, uint32_t label
 /* ---- clear.c: surfaces that their file calls transparent and for which there is no rule. Zero-initialise. */
 #define SITE_CLEAR_LEAST 0.01 /* less transparency than this may be a file's rounding */
 struct site_clear {
-    uint32_t n, n_left_out;         /* surfaces; rules that had no room */
-    size_t room;                    /* for the rules; 0: all of them */
-    char rules[8 * SCENE_NAME_LEN]; /* "{material: "Glas", glass: 0.7}, ...", for `surfaces`; one rule always fits */
+    uint32_t n, n_left_out; /* surfaces; rules that had no room */
+    size_t room;            /* for the rules; 0: all of them */
+    /* "{material: "Glas", glass: 0.7}, ...", for `surfaces`. Where room is 0, one rule always fits. */
+    char rules[8 * SCENE_NAME_LEN];
 };
 void site_clear_add(struct site_clear *c, const struct scene_surface *s, const struct surface_rule *rule, uint32_t n);
 
@@ -285,7 +286,7 @@ const struct georef *site_georef(const struct site *site, uint32_t station, size
 int site_tripod_at(const struct site *site, uint32_t station, const double position_m[3], struct site_tripod *out,
                    struct sh_err *err);
 void site_free_tripod(struct site_tripod *tripod);
-/* "top 1.6 m above the ground, opening 27.3 deg, ...", for a station with a tripod. */
+/* "legs of 1.8 m, top 1.6 m above the ground; opening 27.3 deg, ...", for a station with a tripod. */
 void site_describe_tripod(const struct site_station *station, char *text, size_t len);
 
 /* Sets the poses of all movers at t_s, a time of the scan. site_mover_time returns the t_s to give: at a stop movers
@@ -299,7 +300,7 @@ int site_scans(const struct site *site, uint32_t station, const double dir_socs[
 
 /* Fills in what casters need to scan from a station (0..n_stations-1), at the configured pulse rate. */
 void site_cast_setup(const struct site *site, uint32_t station, struct cast_setup *setup);
-/* Sets the members that depend on the pulse rate: reach, echoes, smallest range. Allocates nothing. */
+/* Sets the members that depend on the pulse rate: reach, smallest range, echoes, detection. Allocates nothing. */
 void site_set_program(const struct site *site, int64_t prr_uhz, struct cast_setup *setup);
 
 #endif

@@ -42,8 +42,8 @@ int mesh_output_close(struct mesh_output *out, int keep, struct sh_err *err);
 /* Writes the images of parts into the mesh's folder. */
 int mesh_output_images(struct mesh_output *out, const struct mesh *mesh, struct sh_err *err);
 
-/* Copies a binary FBX file of Assimp's exporter, and adds the ends of lists that it lacks. SH_EIO: raw is not
- * such a file. */
+/* Copies a binary FBX file of Assimp's exporter, adds the ends of lists that it lacks, and sets the file's time of
+ * creation to 1970-01-01 10:00. SH_EIO: raw is not such a file, or the copy can't be written. */
 int mesh_fbx_copy(const uint8_t *raw, size_t n_raw, struct mesh_file *to, struct sh_err *err);
 
 /* The progress of long work. mesh_work_step reports it, and asks whether to stop, every 65536 steps. */
@@ -54,8 +54,8 @@ struct mesh_work {
 };
 int mesh_work_step(struct mesh_work *work, struct sh_err *err);
 
-/* Writes a coordinate in metres as decimals to the nanometre, without zeros at its end, in DECIMAL_GENERAL_ROOM bytes
- * (core/decimal.h). Returns the end. */
+/* Writes a coordinate in metres, in DECIMAL_GENERAL_ROOM bytes (core/decimal.h): up to 9e6 m as decimals to the
+ * nanometre, without zeros at its end; beyond, with 17 digits. Returns the end. */
 char *mesh_put_number(char *to, double v);
 
 /* Writes one line: the key, which ends with a blank, then the text. Control characters in the text become question

@@ -154,7 +154,7 @@ export class Cloud {
   origin = null;
   blocks = [];
   changed = null; // it is called after each change
-  window = null; // {from, to}: only points of these times are shown and found; times are as `latest_s`
+  window = null; // {from, to}: views and tools show and find only points of these times; times are as `latest_s`
   latest_s = -Infinity; // the time of the point that came last: device time, or that of a recording
   #scans = new Map(); // it has the newest scan of each station
   #outdated = 0; // the points before this one come from another run of the head
@@ -262,14 +262,16 @@ export class Cloud {
   }
 }
 
-// Returns whether no point of a block is within a window of times. Points without a time are in all of them.
+// Returns whether no point of a block that has a time is within a window of times. A block without times is in all of
+// them.
 export const isOutside = (window, block) => window !== null && block.span.from <= block.span.to &&
   (block.span.to < window.from - block.began_s || block.span.from > window.to - block.began_s);
 
 export const isPointOutside = (window, block, i) => window !== null &&
   (block.t[i] < window.from - block.began_s || block.t[i] > window.to - block.began_s);
 
-// Returns the point nearest to a place, up to reach_m away in each axis, as pointOf() does; null: there is none.
+// Returns the point nearest to a place, up to reach_m away in each axis, as pointOf() does; null: there is none. The
+// window of times does not matter.
 export function nearestTo(cloud, place, reach_m) {
   if (cloud.origin === null) return null;
   const p = place.map((v, a) => v - cloud.origin[a]);

@@ -14,7 +14,7 @@
 #include "firmware_sim/base/json.h"
 
 struct recording_options {
-    int listen; /* take the frames that come until the stream or the time ends; send nothing */
+    int listen; /* take the frames that come until the stream or the time ends; send nothing, unless replug_s is set */
     uint32_t first_station, last_station; /* scanned one after the other, from 1; 0: as the head is set */
     /* Where several heads make one recording: first and last station of the whole recording, for progress and for
      * naming what is missing. 0: this head makes the whole recording. */
@@ -31,7 +31,8 @@ struct recording_options {
     int (*prepare)(void *ctx, uint32_t station, struct sh_err *err);
     /* Gets each frame, in order. A negative SH_E ends the recording with it. */
     int (*frame)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
-    /* About once a second or more often, also while no frames come. NULL: not called. A negative SH_E ends the
+    /* About once a second, also while no frames come; but not while a command waits for its reply, or while the head is
+     * away. Where several heads make one recording, also after each part. NULL: not called. A negative SH_E ends the
      * recording. */
     int (*second)(void *ctx, struct sh_err *err);
     void *ctx;
@@ -57,7 +58,8 @@ struct recording_result {
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
                   struct sh_err *err);
 
-/* Adds the figures of another part of the recording; not those of its stream, nor its hash. */
+/* Adds the figures of another part of the recording; not its wall_s, those of its stream, nor its hash. `missing`
+ * becomes that of the other part. */
 void recording_add(struct recording_result *sum, const struct recording_result *more);
 /* Writes the result as one JSON object; ctx is the struct recording_result. */
 void recording_put(struct json *json, const void *ctx);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Charts of a page, as SVG. All places are in units of a picture of 640 by 272. The names of axes and series are text
- * below, which wraps. On a narrow page letters are larger (page.c), so every second figure of an axis is left out. */
+ * below, which wraps. On a narrow page letters are larger (page.c), so every second figure or name of the lower axis is
+ * left out. */
 #include <math.h>
 
 #include "core/studio/picture.h"

@@ -114,8 +114,8 @@ static void on_heard(void *ctx, uint32_t session, const void *bytes, size_t len)
     pthread_mutex_unlock(&w->lock);
 }
 
-/* Whether a request was refused only because the head was in another state, or another session had control. A client
- * can't know that beforehand. */
+/* Whether a request was refused because another session had control, or because it conflicted with the head's state or
+ * with another setting. A client can't always know that beforehand. */
 static int is_of_state(const char *reply)
 {
     const int number = strncmp(reply, "ERR ", 4) == 0 ? atoi(reply + 4) : 0;
