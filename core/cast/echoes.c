@@ -216,7 +216,7 @@ static uint32_t take_echoes(const struct echo_list *l, const double *strength, c
     return n;
 }
 
-/* Sorts by the range that is sent: the range ambiguity of DETECT_FOLDED may have changed the order. */
+/* Sorts by the range that is sent: noise, and the range ambiguity of DETECT_FOLDED, may have changed the order. */
 static void sort_echoes(struct pulse_echo *h, uint32_t n)
 {
     for (uint32_t i = 1; i < n; i++)
@@ -267,7 +267,7 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
         uint32_t n = take_echoes(l, strength, f, h);
         for (; n > most && n > 1; c->counters.crowded++)
             n = drop_weakest(h, n);
-        if (s->detect != NULL && s->detect->ambiguity == DETECT_FOLDED) sort_echoes(h, n);
+        if (s->noise_on || (s->detect != NULL && s->detect->ambiguity == DETECT_FOLDED)) sort_echoes(h, n);
         n = choose(h, n, s->echoes);
         *f = (struct secondary){f->pulse, end, n > 1 ? n - 1 : 0};
         end += f->n;

@@ -29,14 +29,17 @@ void replay_keep_front(struct replay_front *front, const uint8_t *frame)
 static int read_front(struct replay *r, struct sh_err *err)
 {
     struct recording_frame frame;
-    int got, is_first = 1;
+    int got, is_first = 1, is_anchored = 0;
     while ((got = recording_next(&r->recording, &frame, err)) == 1) {
         if (is_first && (frame.bytes[3] & NATIVE_LOCAL) == 0) {
             r->first_ns = frame.t_ns;
             is_first = 0;
         }
         replay_keep_front(&r->front, frame.bytes);
-        if (!is_first && r->front.len[0] != 0 && r->front.len[2] != 0) break;
+        /* The emitter is between the descriptor and the anchor, so an anchor before the descriptor ends nothing. */
+        if (frame.bytes[1] == NATIVE_DESCRIPTOR) is_anchored = 0;
+        if (frame.bytes[1] == NATIVE_ANCHOR) is_anchored = r->front.len[0] != 0;
+        if (!is_first && is_anchored) break;
     }
     if (got < 0) return got;
     if (r->front.len[0] == 0)

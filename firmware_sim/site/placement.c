@@ -218,7 +218,8 @@ static int site_placement_find(const struct config_station *s, const struct plac
     if (rc == SH_OK) rc = placement_level(anchor, out->position_m, level, err);
     if (rc == SH_OK && s->has_instrument_height) rc = stand_on_floor(s, level, bvh, out, err);
     if (rc == SH_OK && anchor->known) rc = geoframe_locate(&anchor->frame, out->position_m, &at, err);
-    if (!anchor->known) at.height_m += out->position_m[2] - s->position_m[2]; /* as far as stand_on_floor moved it */
+    if (!anchor->known && s->place != PLACE_NONE)
+        at.height_m += out->position_m[2] - s->position_m[2]; /* as far as stand_on_floor moved it */
     if (rc != SH_OK) return rc;
     out->on_earth = anchor->known || s->place != PLACE_NONE;
     out->place = at;

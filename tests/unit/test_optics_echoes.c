@@ -75,6 +75,7 @@ static void echoes_have_their_own_noise(void **state)
     static const double y[] = {2.0, 2.004, 5.0};
     struct optics o;
     struct schedule_line line;
+    int swapped = 0;
     open_optics(&o, window());
     o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
     o.table.has_optics = 1;
@@ -87,15 +88,22 @@ static void echoes_have_their_own_noise(void **state)
         o.detect.separation_m = merges ? 1e-6 : 0.0;
         schedule_get_line(&o.rig->segment, 0, &line);
         assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, 20), 60);
-        for (uint32_t i = 0; i < 60; i++) {
-            const uint64_t key = rng_echo(line.cast0 + 10 + i / 3, i % 3);
-            long double d[3];
-            direction(o.rig, &line, 10 + i / 3, d);
-            double range_m = (double)(((long double)y[i % 3] - (long double)STATION[1]) / d[1]);
-            detect_fixed_noise(0.01, 1e-4, o.rig->setup.noise_key ^ o.rig->setup.scan_key, 1, &key, &range_m);
-            near_range(o.rig, i, (long double)range_m);
+        for (uint32_t pulse = 0; pulse < 20; pulse++) {
+            double range_m[3];
+            for (uint32_t i = 0; i < 3; i++) {
+                const uint64_t key = rng_echo(line.cast0 + 10 + pulse, i);
+                long double d[3];
+                direction(o.rig, &line, 10 + pulse, d);
+                range_m[i] = (double)(((long double)y[i] - (long double)STATION[1]) / d[1]);
+                detect_fixed_noise(0.01, 1e-4, o.rig->setup.noise_key ^ o.rig->setup.scan_key, 1, &key, &range_m[i]);
+            }
+            swapped += range_m[0] > range_m[1]; /* core/line.h: in order of the ranges that are sent */
+            near_range(o.rig, 3 * pulse, (long double)fmin(range_m[0], range_m[1]));
+            near_range(o.rig, 3 * pulse + 1, (long double)fmax(range_m[0], range_m[1]));
+            near_range(o.rig, 3 * pulse + 2, (long double)range_m[2]);
         }
     }
+    assert_in_range(swapped, 2, 38); /* of 40 */
     close_optics(&o);
 }
 
