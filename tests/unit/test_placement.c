@@ -138,6 +138,9 @@ static void instrument_height_moves_the_height_on_the_earth(void **state)
             "utm"));
     assert_position(0, 0, 0, 2, 1e-9);
     assert_near(site->station[0].at.place.height_m, 80.5, 1e-9);
+    ok(load("", "  - {position_m: [0, 0, 1.5], instrument_height_m: 2}", "local"));
+    assert_false(site->station[0].at.on_earth);
+    assert_true(site->station[0].at.place.height_m == 0); /* placement.h: a place that is not known is 0 */
 }
 
 /* Two stations across a zone's border (12 deg E, 1 m and 40 m away) share the anchor's zone. */

@@ -223,6 +223,8 @@ static void it_describes_the_recorded_head(void **state)
         file_begin();
         put_event(S, NATIVE_LOCAL);
         put_event(S, 0);
+        put_anchor(40.0, S); /* of a lost descriptor */
+        front_len = 0;
         put_descriptor(&d, S);
         put_front(frame, native_encode_emitter(frame, sizeof frame, &e, NULL, S, 0));
         if (has_other) front_len = 0;
