@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The exact distance of a point to a scene's own triangles. Triangles of copies don't count; core/scene_copies.h
- * turns copies into own triangles. In: the scene's BVH, and a point in prcs (metres). Out: the nearest point of the mesh.
- * Embree's point query proposes triangles, double precision decides.
+ * turns copies into own triangles. In: the scene's BVH, and a point in prcs (metres). Out: the nearest point of the
+ * mesh. Embree's point query proposes triangles, double precision decides.
  *
  * The query runs in the BVH's float frame. Every radius is widened by that frame's rounding, so no triangle that could
  * be nearest is missed. The distance from point to triangle is computed in double, edges and face separately, since

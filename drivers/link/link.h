@@ -49,8 +49,8 @@ struct link_spec {
     const struct web_source *web; /* web: what it serves beside the page; outlives the link. NULL: nothing */
     int fd;                       /* fd: a connected stream descriptor (socket pair), taken over */
     struct link_memory *memory;   /* memory: what it shares with its client (memory.h); outlives the link */
-    /* usb: struct usb_backend_spec explains address, port, path, attach, retry_ms and udc. vid and pid are the vendor id
-     * and the product id of the device, 0x0000 to 0xffff. */
+    /* usb: struct usb_backend_spec explains address, port, path, attach, retry_ms and udc. vid and pid are the vendor
+     * id and the product id of the device, 0x0000 to 0xffff. */
     int backend; /* enum usb_backend_type */
     int speed;   /* enum usb_rate: the fastest the device can do */
     int attach, retry_ms, vid, pid;

@@ -61,8 +61,8 @@ static const struct status *status_of(int number)
     return &statuses[i];
 }
 
-/* Sends one answer, with a body of len bytes. No answer repeats a text that came from the client. Where the head refuses
- * a setting, the answer has the command line that was made of it. */
+/* Sends one answer, with a body of len bytes. No answer repeats a text that came from the client. Where the head
+ * refuses a setting, the answer has the command line that was made of it. */
 static void answer(struct server *s, int number, const char *type, const char *body, size_t len, const char *more)
 {
     const struct status *status = status_of(number);

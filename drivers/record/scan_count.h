@@ -12,8 +12,8 @@ struct scan_count { /* begins as zeros */
     int64_t t_ns;    /* of the last descriptor */
 };
 
-/* Takes each whole frame of a .shs or .pcapng, in order. A scan begins with a descriptor of another scan, or with points
- * before any descriptor. A descriptor of the same scan says that settings have changed within it. */
+/* Takes each whole frame of a .shs or .pcapng, in order. A scan begins with a descriptor of another scan, or with
+ * points before any descriptor. A descriptor of the same scan says that settings have changed within it. */
 void scan_count_frame(struct scan_count *count, const uint8_t *frame);
 
 struct point_scans { /* begins as zeros */

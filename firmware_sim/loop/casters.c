@@ -84,8 +84,8 @@ static int compute(struct loop_caster *caster, const struct device_work *work, s
     return 0;
 }
 
-/* A tick is ready. In the paces that wait, the pacing thread is notified once per batch: before the ticks ahead are used
- * up, after SAY_NS, and when this caster goes to sleep. */
+/* A tick is ready. In the paces that wait, the pacing thread is notified once per batch: before the ticks ahead are
+ * used up, after SAY_NS, and when this caster goes to sleep. */
 static void note_ready(struct loop_caster *caster, uint64_t tick)
 {
     struct loop *loop = caster->loop;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests: cmocka with the headers that it needs, and for many random cases a generator of the tests' own (xorshift64*,
- * Vigna 2016). The cases then have nothing in common with the random numbers under test. */
+/* For tests: cmocka with the headers that it needs, and for many random cases a generator of the tests' own
+ * (xorshift64*, Vigna 2016). The cases then have nothing in common with the random numbers under test. */
 #ifndef TESTS_COMMON_CASES_H
 #define TESTS_COMMON_CASES_H
 

@@ -31,8 +31,8 @@ const char *say(struct command_device *dev, uint32_t session, const char *line);
 /* A line of session 1 has this reply. */
 void expect(struct command_device *dev, const char *line, const char *reply);
 
-/* The line gives exactly one ERR reply with this number and part, puts the same text into the queue, and changes nothing
- * else. */
+/* The line gives exactly one ERR reply with this number and part, puts the same text into the queue, and changes
+ * nothing else. */
 void expect_error(struct command_device *dev, uint32_t session, const char *line, int number, const char *part);
 
 #endif

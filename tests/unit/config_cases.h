@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Cases of test_config.c: edits that make a loading configuration fail. test_config_messages.c has those whose message has
- * numbers. */
+/* Cases of test_config.c: edits that make a loading configuration fail. test_config_messages.c has those whose message
+ * has numbers. */
 #ifndef TESTS_UNIT_CONFIG_CASES_H
 #define TESTS_UNIT_CONFIG_CASES_H
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The run of a soak, alone: the head, the clean reader, the clients and the results are the test's. They write each call
- * to `trace`, with the time in ms. Each wait takes 20 ms. Words in capitals stand for a call that is not as it should
- * be. */
+/* The run of a soak, alone: the head, the clean reader, the clients and the results are the test's. They write each
+ * call to `trace`, with the time in ms. Each wait takes 20 ms. Words in capitals stand for a call that is not as it
+ * should be. */
 #ifndef TESTS_UNIT_SOAK_RUN_RIG_H
 #define TESTS_UNIT_SOAK_RUN_RIG_H
 

@@ -140,9 +140,9 @@ static void test_definitions(void **state)
     assert_true(beam_widening(BEAM_HALF_AT_1_E2) == 2.0);
 }
 
-/* By core/footprint.h ring k has 6 k sub-rays, even steps apart, where half of its annulus's energy is inside. Odd rings
- * are turned by half a step. With what each stands for, sub-rays spread as the whole footprint does: x^2 has a mean of
- * half of t's, for t distributed as exp(-2 t) on 0 .. 1. */
+/* By core/footprint.h ring k has 6 k sub-rays, even steps apart, where half of its annulus's energy is inside. Odd
+ * rings are turned by half a step. With what each stands for, sub-rays spread as the whole footprint does: x^2 has a
+ * mean of half of t's, for t distributed as exp(-2 t) on 0 .. 1. */
 static void test_rings(void **state)
 {
     (void)state;

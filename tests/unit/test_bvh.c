@@ -342,7 +342,8 @@ static struct scene *walls(void)
 }
 
 /* Float rays are 8 km long, so that each ray to a farther wall is cast in pieces, while others of its packet have hit.
- * Ranges end exactly at range_max_m. From the origin, or each from a point of its own, 30 km of a double are 4e-12 m. */
+ * Ranges end exactly at range_max_m. From the origin, or each from a point of its own, 30 km of a double are 4e-12 m.
+ */
 static void rays_go_on_beyond_their_first_piece(void **state)
 {
     (void)state;

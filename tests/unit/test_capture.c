@@ -153,8 +153,9 @@ static void test_turns(void **state)
     client_close(&c);
 }
 
-/* Where nothing shows a request's end, the longest one of the capture that the bytes begin with is taken. A beginning of
- * one waits for its rest. Other bytes are one unknown request. A request waits until the answer before it has begun. */
+/* Where nothing shows a request's end, the longest one of the capture that the bytes begin with is taken. A beginning
+ * of one waits for its rest. Other bytes are one unknown request. A request waits until the answer before it has begun.
+ */
 static void test_requests_without_ends(void **state)
 {
     (void)state;

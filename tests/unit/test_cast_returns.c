@@ -106,7 +106,8 @@ static void many_are_joined(void **state)
     }
 }
 
-/* A group ends a sixteenth of the pulse's integral after its first return: 4 ns sqrt(pi / (4 ln 2)) c / 32 = 39.89 mm. */
+/* A group ends a sixteenth of the pulse's integral after its first return: 4 ns sqrt(pi / (4 ln 2)) c / 32 = 39.89 mm.
+ */
 static void groups_are_short(void **state)
 {
     (void)state;

@@ -309,8 +309,8 @@ static int free_port(void)
     return ntohs(at.sin_port);
 }
 
-/* Returns the POSIX second at which the system's list of leap seconds ends; below 0: there is no list. The head takes the
- * list that reaches further. */
+/* Returns the POSIX second at which the system's list of leap seconds ends; below 0: there is no list. The head takes
+ * the list that reaches further. */
 static int64_t system_expires_s(void)
 {
     char line[512];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Surfaces that their file calls transparent, and the rules that are offered for them. Names come from files, so they may
- * have any bytes. */
+/* Surfaces that their file calls transparent, and the rules that are offered for them. Names come from files, so they
+ * may have any bytes. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

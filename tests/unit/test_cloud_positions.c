@@ -73,8 +73,8 @@ static void test_text(void **state)
     assert_non_null(strstr(err.text, "PTX is not read"));
 }
 
-/* The third column of 64 is read, and the last one; a line of names may have 64, too. The names begin with a # or don't,
- * and a column may be called #. */
+/* The third column of 64 is read, and the last one; a line of names may have 64, too. The names begin with a # or
+ * don't, and a column may be called #. */
 static void test_many_columns(void **state)
 {
     (void)state;

@@ -141,7 +141,8 @@ static void a_record_of_a_sector_spreads_its_points(void **state)
     cola_expect("sRN field000", want);
 }
 
-/* The corner of a rectangle is 500 m away, at 0 degrees or at the first beam. A ten-thousandth of a degree is 0.9 mm. */
+/* The corner of a rectangle is 500 m away, at 0 degrees or at the first beam. A ten-thousandth of a degree is 0.9 mm.
+ */
 static void a_rectangle_begins_at_zero_or_at_the_first_beam(void **state)
 {
     (void)state;
@@ -166,8 +167,8 @@ static void a_rectangle_begins_at_zero_or_at_the_first_beam(void **state)
     }
 }
 
-/* Two corners at one beam, 0.1 degrees apart, are one point: the nearest and the farthest of both, whichever comes first.
- * 90 degrees are beam 405, and 100 degrees beam 435. */
+/* Two corners at one beam, 0.1 degrees apart, are one point: the nearest and the farthest of both, whichever comes
+ * first. 90 degrees are beam 405, and 100 degrees beam 435. */
 static void corners_at_one_beam_are_one_point(void **state)
 {
     (void)state;

@@ -398,8 +398,8 @@ static void a_recording_without_rates_has_no_step(void **ctx)
     }
 }
 
-/* The client of the time server looks at the settings now and then: it must see that the role has changed, though it has
- * come back to what it was. */
+/* The client of the time server looks at the settings now and then: it must see that the role has changed, though it
+ * has come back to what it was. */
 static void each_change_of_a_role_counts(void **ctx)
 {
     (void)ctx;

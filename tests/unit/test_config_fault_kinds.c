@@ -207,7 +207,8 @@ static void kinds_need_what_they_change(void **state)
     }
 }
 
-/* Kinds that a link can have; others are not of links. A terminal can't fall silent, so there a cable is an unplugging. */
+/* Kinds that a link can have; others are not of links. A terminal can't fall silent, so there a cable is an unplugging.
+ */
 static void links_have_the_faults_that_they_can(void **state)
 {
     (void)state;

@@ -126,7 +126,8 @@ static void all_that_keys_say_is_there(void **state)
         assert_int_equal(made.field[i].shape.kind, COLA_SHAPE_NONE);
 }
 
-/* Equal radii, no width and a whole turn are allowed; corners that enclose less than half a square micrometre are not. */
+/* Equal radii, no width and a whole turn are allowed; corners that enclose less than half a square micrometre are not.
+ */
 static void shapes_have_limits(void **state)
 {
     (void)state;

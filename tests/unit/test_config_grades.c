@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The list of head profiles says how sure each figure is. For every profile that comes with the program this is compared
- * with what its file says, read here line by line. */
+/* The list of head profiles says how sure each figure is. For every profile that comes with the program this is
+ * compared with what its file says, read here line by line. */
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/reference.h"
 #include "firmware_sim/config/table/row.h"
@@ -21,8 +21,8 @@ static void note_grade(const char *path, const char *from)
         if (strncmp(from, grades[g], strlen(grades[g])) == 0) found[key - cfg_profile_table.keys][g] = 1;
 }
 
-/* Notes the grades of a file. A figure of a program has a path of its own; the other lists have one grade for each of their
- * elements. */
+/* Notes the grades of a file. A figure of a program has a path of its own; the other lists have one grade for each of
+ * their elements. */
 static void read_grades(char *text)
 {
     char section[CFG_PATH_MAX] = "", path[CFG_PATH_MAX] = "", word[64];

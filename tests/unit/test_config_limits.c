@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The limits of the configuration's numbers, from where they come: geometry, standards, the width of a field. All others
- * are 0 or a power of ten, so that a slip in the table shows. Each limit itself is allowed, and nothing beyond it. */
+/* The limits of the configuration's numbers, from where they come: geometry, standards, the width of a field. All
+ * others are 0 or a power of ten, so that a slip in the table shows. Each limit itself is allowed, and nothing beyond
+ * it. */
 #include "firmware_sim/config/keys.h"
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/table/reader.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Links of a configuration: what follows for a link from its kind, its protocol and the head, where its keys don't say it;
- * and what each protocol can be spoken on. */
+/* Links of a configuration: what follows for a link from its kind, its protocol and the head, where its keys don't say
+ * it; and what each protocol can be spoken on. */
 #include <limits.h>
 
 #include "drivers/protocol/protocol.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Diagnostics of head profiles, and of --set, each compared whole: place, key, what is wrong, and all numbers of what is
- * allowed. The numbers were worked out by hand from config/heads. */
+/* Diagnostics of head profiles, and of --set, each compared whole: place, key, what is wrong, and all numbers of what
+ * is allowed. The numbers were worked out by hand from config/heads. */
 #include "tests/unit/config_rig.h"
 
 /* clang-format off */

@@ -208,8 +208,8 @@ static uint32_t cell_towards(const struct cover *c, const double from_m[3], cons
     return s.cell;
 }
 
-/* All directions but the last meet one wall, and the last one the opposite wall: each counts, whatever their number. The
- * cells that are met have their bits, and no other. */
+/* All directions but the last meet one wall, and the last one the opposite wall: each counts, whatever their number.
+ * The cells that are met have their bits, and no other. */
 static void test_every_direction(void **state)
 {
     (void)state;

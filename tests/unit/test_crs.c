@@ -57,8 +57,9 @@ static void utm_is_that_of_geographiclib(void **state)
     }
 }
 
-/* The fundamental point of the Swiss grid, the old observatory of Bern, is at 2,600,000 1,200,000; swisstopo gives it as
- * 46 deg 57 min 3.9 s N, 7 deg 26 min 19.1 s E on WGS 84. Half a digit there is 1.6 m. The grid's north is true there. */
+/* The fundamental point of the Swiss grid, the old observatory of Bern, is at 2,600,000 1,200,000; swisstopo gives it
+ * as 46 deg 57 min 3.9 s N, 7 deg 26 min 19.1 s E on WGS 84. Half a digit there is 1.6 m. The grid's north is true
+ * there. */
 static void the_swiss_grid(void **state)
 {
     (void)state;
@@ -70,8 +71,8 @@ static void the_swiss_grid(void **state)
     assert_true(place.accuracy_m > 0.0 && place.accuracy_m <= 5.0);
 }
 
-/* New York's grid of Long Island is in US survey feet: 980,000 200,000 ft, by NOAA's formula of that zone (a Lambert cone) in
- * Battery Park, 40.7156 N, 74.0153 W. NAD83 and WGS 84 differ by a metre or two, 2e-5 degrees. */
+/* New York's grid of Long Island is in US survey feet: 980,000 200,000 ft, by NOAA's formula of that zone (a Lambert
+ * cone) in Battery Park, 40.7156 N, 74.0153 W. NAD83 and WGS 84 differ by a metre or two, 2e-5 degrees. */
 static void a_grid_in_feet(void **state)
 {
     (void)state;
@@ -126,9 +127,10 @@ static void units_of_systems(void **state)
     }
 }
 
-/* UTM's zone 32 is used from 6 to 12 deg E and from 0 to 84 deg N, and places up to 2 degrees beyond are taken. A meridian
- * is 110.57 km a degree at the equator and 10,001.97 km to the pole, where a degree has 111.69 km; its scale is 0.9996. A
- * degree of longitude on the equator is 111.32 km, and Mercator's projection lengthens 5 degrees of it by 0.12 %. */
+/* UTM's zone 32 is used from 6 to 12 deg E and from 0 to 84 deg N, and places up to 2 degrees beyond are taken. A
+ * meridian is 110.57 km a degree at the equator and 10,001.97 km to the pole, where a degree has 111.69 km; its scale
+ * is 0.9996. A degree of longitude on the equator is 111.32 km, and Mercator's projection lengthens 5 degrees of it by
+ * 0.12 %. */
 static void areas_of_use_have_a_margin(void **state)
 {
     (void)state;

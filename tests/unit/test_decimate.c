@@ -184,8 +184,9 @@ static void limit_holds(void **state)
     free_sheet(&s);
 }
 
-/* Two sheets nearer than a cell become one: of two triangles between the same cells one is left, whichever way they face.
- * A triangle up to z = 1 makes cells that high. The first guess has too few triangles; the second one is of 7 steps. */
+/* Two sheets nearer than a cell become one: of two triangles between the same cells one is left, whichever way they
+ * face. A triangle up to z = 1 makes cells that high. The first guess has too few triangles; the second one is of 7
+ * steps. */
 static void doubles_become_one(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Events on their way into ticks, and what the head says of its losses: numbers, texts, how many and when, at each limit
- * and one beyond. Ticks are the test's own, 100 a second. */
+/* Events on their way into ticks, and what the head says of its losses: numbers, texts, how many and when, at each
+ * limit and one beyond. Ticks are the test's own, 100 a second. */
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/device/events.h"
 #include "firmware_sim/device/overrun.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The frames in which a head describes itself: each field against the configuration, and against figures that were typed
- * from config/heads. */
+/* The frames in which a head describes itself: each field against the configuration, and against figures that were
+ * typed from config/heads. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The limits that a head has for its clients, from its profile and configuration. The expected numbers were typed from the
- * profiles in config/heads. */
+/* The limits that a head has for its clients, from its profile and configuration. The expected numbers were typed from
+ * the profiles in config/heads. */
 #include "firmware_sim/command/head.h"
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/device/limits.h"
@@ -30,7 +30,8 @@ static struct head_limits limits_with(const char *const *sets, int n)
     return limits_of(0);
 }
 
-/* The slowest program keeps 2 m free of echoes, so range_max_m is beyond that at all rates. The fastest reaches 250 m. */
+/* The slowest program keeps 2 m free of echoes, so range_max_m is beyond that at all rates. The fastest reaches 250 m.
+ */
 static void a_line_head_has_those_of_its_programs(void **state)
 {
     (void)state;

@@ -6,7 +6,8 @@
 #include "core/scene.h"
 #include "tests/common/cases.h"
 
-/* A square of two faces; vertices 4 and 5 lie at the places of 0 and 2. Vertex 6 differs from 0 in the sign of a zero. */
+/* A square of two faces; vertices 4 and 5 lie at the places of 0 and 2. Vertex 6 differs from 0 in the sign of a zero.
+ */
 static double vertex_m[][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 0}, {1, 1, 0}, {-0.0, 0, 0}};
 
 static struct sh_err err;

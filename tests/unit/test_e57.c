@@ -168,8 +168,8 @@ static void test_packets(void **state)
     }
 }
 
-/* A packet spans 0.1 s, up to the next multiple of 8 records. So little is missing at any moment, and a packet that ended
- * late does not shorten the next one. */
+/* A packet spans 0.1 s, up to the next multiple of 8 records. So little is missing at any moment, and a packet that
+ * ended late does not shorten the next one. */
 static void test_span_of_packets(void **state)
 {
     (void)state;
@@ -222,7 +222,8 @@ static void test_packets_begin_within_frames(void **state)
     }
 }
 
-/* Times of a broken stream may be any: the time from the first record of a packet wraps. Sanitizers see where it overflows. */
+/* Times of a broken stream may be any: the time from the first record of a packet wraps. Sanitizers see where it
+ * overflows. */
 static void test_far_times(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The end of an E57 file: the disk has all that its header describes before it gets the header. A disk that fails there is
- * an error, and the points stay for a repair. */
+/* The end of an E57 file: the disk has all that its header describes before it gets the header. A disk that fails there
+ * is an error, and the points stay for a repair. */
 #include <errno.h>
 #include <fcntl.h>
 #include <sys/syscall.h>

@@ -292,8 +292,8 @@ static void odd_heights_are_doubted(void **state)
     scene_free(s);
 }
 
-/* The map's scale of heights is not used where these have no system of their own, as in GDAL. A system of the file's own
- * is reported. */
+/* The map's scale of heights is not used where these have no system of their own, as in GDAL. A system of the file's
+ * own is reported. */
 static void what_is_left_out_is_said(void **state)
 {
     (void)state;

@@ -146,7 +146,8 @@ static void eight_joints_a_corner(void **state)
             if (!(fabs(s->vertex_m[k][r] - want[r]) < 1e-12))
                 fail_msg("corner %d: %g, %g", k, s->vertex_m[k][r], want[r]);
     }
-    /* Floats have errors up to 6e-8: those of the position, and of the inverse bind matrices. Two digits are rounded up. */
+    /* Floats have errors up to 6e-8: those of the position, and of the inverse bind matrices. Two digits are rounded
+     * up. */
     const double error_m = 2 * 6e-8 * most;
     if (!(s->error_m >= error_m && s->error_m < 1.1 * error_m)) fail_msg("%g m, not %g m", s->error_m, error_m);
     scene_free(s);

@@ -322,7 +322,8 @@ static void test_signal(void **state)
     }
 }
 
-/* Writes take so many bytes each, or fail with -errno. After the last one they take all. The head answers a whole line. */
+/* Writes take so many bytes each, or fail with -errno. After the last one they take all. The head answers a whole line.
+ */
 static struct {
     int write[8];
     int n_writes;

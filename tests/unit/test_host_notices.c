@@ -202,7 +202,8 @@ static void test_late_identity(void **state)
     scanhead_close(sh);
 }
 
-/* The head is silent, so the second command is never sent. Of the lines that come later, one answers the first command. */
+/* The head is silent, so the second command is never sent. Of the lines that come later, one answers the first command.
+ */
 static void test_never_sent(void **state)
 {
     (void)state;

@@ -43,8 +43,8 @@ static struct native_pose pose_at(int64_t t_ns, double x, double y, double turn_
         .t_ns = t_ns, .position_m = {x, y, 0}, .quat = {cos(half), 0, 0, sin(half)}, .frame = 10 + 1e-3 * (double)t_ns};
 }
 
-/* Where the head was between two poses: one frame of three poses, and one of two, with a loss between them. -1: the head's
- * place is not known. */
+/* Where the head was between two poses: one frame of three poses, and one of two, with a loss between them. -1: the
+ * head's place is not known. */
 static const struct {
     int64_t t_ns;
     double x, y, turn_deg;

@@ -189,7 +189,7 @@ static void schemas_units_and_places(void **state)
     needs_readers();
     ifc_write_text(text, "IFC2X3", NULL, NULL, wall, 2, NULL);
     must_read(1e-3);
-    assert_null(strstr(warnings, "take metres")); /* its unit is known */
+    assert_null(strstr(warnings, "take metres"));                /* its unit is known */
     assert_true(scene->says.unit_m == 1 && scene->says.up == 2); /* config/meshes.md: metres, up: y */
     assert_int_equal(scene->n_surfaces, 2);
     assert_string_equal(scene->surface[0].object, "IfcWall_M\xc3\xbcnchen_guid_of_product__00000");

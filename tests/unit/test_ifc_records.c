@@ -214,7 +214,8 @@ static void styles_are_found(void **state)
     ifc_records_close(&records);
 }
 
-/* Only radii count, not the heights of 30 m and 40 m of a cylinder and a cone, nor the 90 at which a pipe's curve ends. */
+/* Only radii count, not the heights of 30 m and 40 m of a cylinder and a cone, nor the 90 at which a pipe's curve ends.
+ */
 static void heights_are_no_radii(void **state)
 {
     (void)state;

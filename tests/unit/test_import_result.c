@@ -387,7 +387,8 @@ static void counts_beyond_the_size(void **state)
     }
 }
 
-/* A strip is longer than what is read at a time. Each triangle keeps its own corners, label, coordinates and colours. */
+/* A strip is longer than what is read at a time. Each triangle keeps its own corners, label, coordinates and colours.
+ */
 static void long_results_come_back(void **state)
 {
     (void)state;

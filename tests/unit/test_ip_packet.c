@@ -55,7 +55,8 @@ static void test_link_types(void **state)
     assert_true(p.from.port == 5 && p.to.port == 6);
 }
 
-/* Other payloads of one packet. A packet is its bytes up to `have`; offsets are those of RFC 791, 768, 8200 and 9293. */
+/* Other payloads of one packet. A packet is its bytes up to `have`; offsets are those of RFC 791, 768, 8200 and 9293.
+ */
 struct change {
     int at, value;
 };

@@ -324,7 +324,8 @@ static void test_lengths(void **state)
     assert_true(rig_uint(las + 100, 4) <= 2 + 255);
 }
 
-/* Windows wait for those of their last point. Meanwhile so much comes that the client's memory of frames is used anew. */
+/* Windows wait for those of their last point. Meanwhile so much comes that the client's memory of frames is used anew.
+ */
 static void test_long_wait(void **state)
 {
     (void)state;

@@ -86,8 +86,8 @@ static void put(struct las_waves *waves, const struct scanhead_wave *wave, uint3
     assert_int_equal(is_new, want_new);
 }
 
-/* A digitiser of its own takes a kind. When all 255 are taken, windows that fit none are counted, and left out. Points in
- * one window share its packet. */
+/* A digitiser of its own takes a kind. When all 255 are taken, windows that fit none are counted, and left out. Points
+ * in one window share its packet. */
 static void test_no_kind_left(void **state)
 {
     (void)state;

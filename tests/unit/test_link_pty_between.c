@@ -165,7 +165,8 @@ static void say_and_leave(void)
     leave();
 }
 
-/* A client writes and leaves after the look for bytes, and before that for a hang-up. What it wrote is of its session. */
+/* A client writes and leaves after the look for bytes, and before that for a hang-up. What it wrote is of its session.
+ */
 static void test_wrote_between_looks(void **state)
 {
     (void)state;

@@ -108,8 +108,8 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     rig_close(rig);
 }
 
-/* A USB link at full speed carries 19 packets of 64 bytes each ms (USB 2.0, table 5-9). The head fires 300 kHz in a turn
- * of 360 deg by 3 facets with a gain of 2, and 100 deg of the 240 of a sweep are cast: 125,000 points a second. */
+/* A USB link at full speed carries 19 packets of 64 bytes each ms (USB 2.0, table 5-9). The head fires 300 kHz in a
+ * turn of 360 deg by 3 facets with a gain of 2, and 100 deg of the 240 of a sweep are cast: 125,000 points a second. */
 static void what_a_link_carries_is_compared(void **state)
 {
     (void)state;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Losses of a reader with the shortest queue that the configuration allows: two ticks. The error queue gets an entry for
- * each episode, and an episode ends when the reader has caught up. Each loss is announced to its reader, and counted. */
+/* Losses of a reader with the shortest queue that the configuration allows: two ticks. The error queue gets an entry
+ * for each episode, and an episode ends when the reader has caught up. Each loss is announced to its reader, and
+ * counted. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

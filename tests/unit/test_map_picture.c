@@ -200,8 +200,8 @@ static uint8_t *drawn_rows(const struct site *site)
     return rgb;
 }
 
-/* A case: how the rows are coloured, and the legend. A legend without names is a scale. Limits that are not given are those of
- * what is seen. */
+/* A case: how the rows are coloured, and the legend. A legend without names is a scale. Limits that are not given are
+ * those of what is seen. */
 struct legend {
     const char *colour, *limits;
     int configured;

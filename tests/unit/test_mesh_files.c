@@ -344,8 +344,8 @@ static uint64_t get64(const char *p)
     return v;
 }
 
-/* After the last list come 16 bytes, 4 zeros, 1 to 16 zeros up to a multiple of 16, the version, 120 zeros, and the mark
- * of the end. Readers know the mark; Blender's exporter has its bytes. */
+/* After the last list come 16 bytes, 4 zeros, 1 to 16 zeros up to a multiple of 16, the version, 120 zeros, and the
+ * mark of the end. Readers know the mark; Blender's exporter has its bytes. */
 static void check_end(const char *fbx, size_t at, size_t end)
 {
     static const char zero[120];

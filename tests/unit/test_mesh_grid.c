@@ -64,7 +64,8 @@ static void test_lines(void **state)
     }
 }
 
-/* Rings at -90 and 90 degrees, also where they are rounded to a micro-degree. A line's ring is its number modulo rings. */
+/* Rings at -90 and 90 degrees, also where they are rounded to a micro-degree. A line's ring is its number modulo rings.
+ */
 static void test_poles(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* drivers/record/mesh_sparse.h: the figures of points that are spread over a mesh. The weights of a point are taken from
- * its place: the triangle's corners are the origin and the ends of x and y. */
+/* drivers/record/mesh_sparse.h: the figures of points that are spread over a mesh. The weights of a point are taken
+ * from its place: the triangle's corners are the origin and the ends of x and y. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -142,8 +142,8 @@ static void points_beyond_the_file(void **state)
     end();
 }
 
-/* More points than the memory holds are refused before they are made. The figure of the message is allowed, and the next
- * one of three digits isn't. A point takes 110 bytes. */
+/* More points than the memory holds are refused before they are made. The figure of the message is allowed, and the
+ * next one of three digits isn't. A point takes 110 bytes. */
 static void points_beyond_the_memory(void **state)
 {
     (void)state;

@@ -292,8 +292,8 @@ static void draw_marks(struct pen *pen)
     pen->end(pen->on);
 }
 
-/* Numbers are in hundredths, without zeros at their ends, and up to 1e9. U+FFFE and U+FFFF are no characters of XML: each
- * of their bytes becomes U+FFFD. */
+/* Numbers are in hundredths, without zeros at their ends, and up to 1e9. U+FFFE and U+FFFF are no characters of XML:
+ * each of their bytes becomes U+FFFD. */
 static void elements_of_an_svg(void **state)
 {
     (void)state;

@@ -141,8 +141,8 @@ static void test_sight_pays(void **state)
     choose_sight(&need, &(struct plan_sight_found){.one = 0.5, .few = 0.5}, "none", "a map saves nothing");
 }
 
-/* A fifth of the saving must be left after the cost (core/plan/README.md). Where all pulses hit one triangle each, a map
- * saves the difference of two costs (core/plan/cost.h); it may pay where all rays are near borders. */
+/* A fifth of the saving must be left after the cost (core/plan/README.md). Where all pulses hit one triangle each, a
+ * map saves the difference of two costs (core/plan/cost.h); it may pay where all rays are near borders. */
 static void test_sight_pays_to_a_pulse(void **state)
 {
     (void)state;
@@ -182,8 +182,9 @@ static void test_sight_packets(void **state)
     assert_true(saved_ns[0] < saved_ns[1] && saved_ns[1] < saved_ns[2] && saved_ns[3] == saved_ns[1]);
 }
 
-/* A map saves the cost of the BVH, and costs its own look-up, by the kinds of cells that pulses go to (core/plan/cost.h).
- * The map's making is shared by all pulses: 60 ns for each cell of several triangles, and what triangles cost. */
+/* A map saves the cost of the BVH, and costs its own look-up, by the kinds of cells that pulses go to
+ * (core/plan/cost.h). The map's making is shared by all pulses: 60 ns for each cell of several triangles, and what
+ * triangles cost. */
 static void test_sight_costs(void **state)
 {
     (void)state;

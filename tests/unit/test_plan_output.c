@@ -119,8 +119,8 @@ static void expect_line(const char **at, const char *method, const double is[3],
     *at = end + 1;
 }
 
-/* Methods that were left out. Where some that follow each other have no measured error and one reason, the first of them
- * stands for all. */
+/* Methods that were left out. Where some that follow each other have no measured error and one reason, the first of
+ * them stands for all. */
 static uint32_t expect_left(const char **at, const struct plan_option *left, uint32_t n)
 {
     uint32_t more = 0;

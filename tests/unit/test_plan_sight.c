@@ -109,8 +109,8 @@ static void a_plan_of_the_view(void **state)
     beam_rig_close(&rig);
 }
 
-/* In the half of the pulses that meet the pane, a depth of 0 misses the wall behind it. A depth of 1 is right. Where none
- * of 8,192 pulses was wrong, 95 % of Poisson's distributions with a mean of 2.996 would have had one; the limit's
+/* In the half of the pulses that meet the pane, a depth of 0 misses the wall behind it. A depth of 1 is right. Where
+ * none of 8,192 pulses was wrong, 95 % of Poisson's distributions with a mean of 2.996 would have had one; the limit's
  * formula is right to a hundredth. */
 static void a_pane_before_a_wall(void **state)
 {

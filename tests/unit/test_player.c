@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A source that makes its ticks itself, where there is no memory for one of them: the tick goes out empty, and its frames
- * with the next one. In the paces that wait, the run goes on. */
+/* A source that makes its ticks itself, where there is no memory for one of them: the tick goes out empty, and its
+ * frames with the next one. In the paces that wait, the run goes on. */
 #include "tests/unit/device_rig.h"
 #include "tests/unit/plain_source.h"
 

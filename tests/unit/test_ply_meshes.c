@@ -29,8 +29,8 @@ static void strips_are_triangles(void **state)
     scene_free(s);
 }
 
-/* Vertices that are not finite, in any axis, don't matter where no face uses them: neither where vertices are shared nor
- * where each triangle has its own. The others keep their numbers. */
+/* Vertices that are not finite, in any axis, don't matter where no face uses them: neither where vertices are shared
+ * nor where each triangle has its own. The others keep their numbers. */
 static void vertices_that_are_not_finite(void **state)
 {
     (void)state;

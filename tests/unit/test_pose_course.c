@@ -27,9 +27,9 @@ static double share(double f, int from_rest, int to_rest)
     return f;
 }
 
-/* Legs of 10 m at 2 m/s go along x; each point may have a pause of 1.5 s. Samples are every 0.02 s. Where two legs meet,
- * the acceleration jumps by up to 4 * 10 m / (5 s)^2. A quarter of it times 0.02 s is the error of the velocity there,
- * and 0.02 s / 8 of that the error halfway between two samples: 2e-5 m. */
+/* Legs of 10 m at 2 m/s go along x; each point may have a pause of 1.5 s. Samples are every 0.02 s. Where two legs
+ * meet, the acceleration jumps by up to 4 * 10 m / (5 s)^2. A quarter of it times 0.02 s is the error of the velocity
+ * there, and 0.02 s / 8 of that the error halfway between two samples: 2e-5 m. */
 static void test_rests(void **state)
 {
     (void)state;

@@ -47,9 +47,10 @@ static void next_within(struct room *r, uint32_t beside, const char *box, char j
     preview_release(r->preview, next.bytes);
 }
 
-/* Only the surface in a section counts. In the right leg the head misses at most floor and ceiling, which have 4 m2 each
- * there. In the upper leg it sees nothing; the section has 14.4 m2 of walls and 8 m2 of floor and ceiling there, which
- * cells of 0.2 m count to 0.1 m along their 6 m of edges. A box that is turned by 90 degrees has its sides exchanged. */
+/* Only the surface in a section counts. In the right leg the head misses at most floor and ceiling, which have 4 m2
+ * each there. In the upper leg it sees nothing; the section has 14.4 m2 of walls and 8 m2 of floor and ceiling there,
+ * which cells of 0.2 m count to 0.1 m along their 6 m of edges. A box that is turned by 90 degrees has its sides
+ * exchanged. */
 static void test_next_in_section(void **state)
 {
     (void)state;
@@ -135,8 +136,8 @@ static void ask_dragged(struct room *r, int i, int waits)
 }
 
 /* Pages that drag on and on neither keep the suggestion of another page waiting, nor take its preview out. 64 answers
- * are kept, and that preview is the oldest of 62 when the search is asked for. Only the newest of three places is waited
- * for each time, so that another one always waits. */
+ * are kept, and that preview is the oldest of 62 when the search is asked for. Only the newest of three places is
+ * waited for each time, so that another one always waits. */
 static void test_drag_beside_search(void **state)
 {
     (void)state;

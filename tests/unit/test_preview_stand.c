@@ -242,8 +242,8 @@ static void failures(void **state)
     assert_null(body.bytes);
 }
 
-/* What any place sees can be seen. Where at least half of the previews' hits are fronts, places that see fewer than half
- * lie within bodies. */
+/* What any place sees can be seen. Where at least half of the previews' hits are fronts, places that see fewer than
+ * half lie within bodies. */
 static void what_can_be_seen(void **state)
 {
     static const struct {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams that change: the part that one file can hold, and its notes; rows and grids of heads that are no line heads. */
+/* Streams that change: the part that one file can hold, and its notes; rows and grids of heads that are no line heads.
+ */
 #include "drivers/record/mesh_grid.h"
 #include "tests/unit/e57_rig.h"
 
@@ -253,8 +254,8 @@ static void test_rows_of_beams(void **state)
     }
 }
 
-/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. An eleventh is not, also after the
- * descriptor and what belongs to it were repeated. */
+/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. An eleventh is not, also after
+ * the descriptor and what belongs to it were repeated. */
 static void test_lines_of_rings(void **state)
 {
     (void)state;

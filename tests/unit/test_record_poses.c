@@ -118,7 +118,8 @@ static void test_other_settings(void **state)
     assert_int_equal(rig_count(at, "\n"), 4);
 }
 
-/* Two heads start again, so that each calls both of its scans 5. In the file they are 1 to 4, and no pose is left out. */
+/* Two heads start again, so that each calls both of its scans 5. In the file they are 1 to 4, and no pose is left out.
+ */
 static void test_same_numbers(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The steps of a recording: which commands it sends and when, how long it waits, how it ends a scan, and what it says is
- * missing. */
+/* The steps of a recording: which commands it sends and when, how long it waits, how it ends a scan, and what it says
+ * is missing. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

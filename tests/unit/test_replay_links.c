@@ -138,8 +138,8 @@ static void fixes_are_at_full_seconds(void **state)
     replay_end_of(r);
 }
 
-/* A recording may have any number there. Dates begin after 1970-01-01 and end with 2199-12-31 (date -u -d 2200-01-01 +%s).
- */
+/* A recording may have any number there. Dates begin after 1970-01-01 and end with 2199-12-31 (date -u -d 2200-01-01
+ * +%s). */
 static void dates_are_within_what_a_calendar_has(void **state)
 {
     (void)state;

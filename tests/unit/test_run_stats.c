@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A run says at its end what it did: each member of its statistics, of its links and of its endpoints, and the warnings,
- * is compared here. The source's counters are numbers of the test's own, each another one. */
+/* A run says at its end what it did: each member of its statistics, of its links and of its endpoints, and the
+ * warnings, is compared here. The source's counters are numbers of the test's own, each another one. */
 #include "firmware_sim/app/run/run.h"
 #include "tests/unit/device_rig.h"
 #include "tests/unit/output_rig.h"
@@ -312,8 +312,8 @@ static int limit_of_unit(void)
     return limit;
 }
 
-/* The pacing thread has the priority that the service's unit allows. Where the system does not allow it here, the warning
- * has that number. */
+/* The pacing thread has the priority that the service's unit allows. Where the system does not allow it here, the
+ * warning has that number. */
 static void the_pacing_thread_has_the_allowed_priority(void **state)
 {
     (void)state;

@@ -114,8 +114,8 @@ static void two_columns_do_not_close(void **state)
     assert_int_equal(t.faces.n_faces, 4 * 2);
 }
 
-/* Rows 0, 1, 2 go round the head. One of two columns lacks the last row: there is a cell of four points, and two more of
- * three, one of them across the turn's end. */
+/* Rows 0, 1, 2 go round the head. One of two columns lacks the last row: there is a cell of four points, and two more
+ * of three, one of them across the turn's end. */
 static void turns_close_beside_a_gap(void **state)
 {
     (void)state;

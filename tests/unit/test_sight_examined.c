@@ -45,8 +45,8 @@ static double examined(const uint32_t *at, double rays)
 }
 
 /* A group of 32 is left to the BVH where fewer than 32 * 64 rays come to its box, on the cube whose faces have 24 units
- * of area. The box of a row is 3.2 m by 1 cm, that of scattered triangles about 6.4 m by 3.2 m: of 4 million rays 13 and
- * about 8,500. */
+ * of area. The box of a row is 3.2 m by 1 cm, that of scattered triangles about 6.4 m by 3.2 m: of 4 million rays 13
+ * and about 8,500. */
 static void order_decides(void **state)
 {
     (void)state;

@@ -13,7 +13,8 @@
  * tile of 8 x 8 cells, one word is kept where all its cells say the same, else 64 more. */
 enum { FACES = 6, CELLS = 128, TILE = 8, TILES = CELLS / TILE, TRIANGLES = 4 };
 
-/* A triangle on a face: face 2 axis + 1 looks to the negative side. A corner lies at (sign, u, v) times its distance. */
+/* A triangle on a face: face 2 axis + 1 looks to the negative side. A corner lies at (sign, u, v) times its distance.
+ */
 struct piece {
     int face;
     double u[3], v[3], distance_m[3];
@@ -50,7 +51,8 @@ static struct scene *make_pieces(void)
                                              TRIANGLES, NULL, NULL, 0});
 }
 
-/* How a cell and a triangle of its face lie: all corners of the cell are beyond one edge; all are inside; or neither. */
+/* How a cell and a triangle of its face lie: all corners of the cell are beyond one edge; all are inside; or neither.
+ */
 enum lies { BESIDE, COVERS, CROSSES };
 
 static enum lies lies(const struct piece *p, int i, int j)
@@ -131,8 +133,8 @@ static struct sight *make_map(const struct bvh *bvh)
     return sight;
 }
 
-/* Kinds of cells, and the memory that they take: a word for each tile, 64 for a tile of different cells, 128 bytes for a
- * record. Where a tile's region is divided, equal lists are made once for each part, so there may be some more. */
+/* Kinds of cells, and the memory that they take: a word for each tile, 64 for a tile of different cells, 128 bytes for
+ * a record. Where a tile's region is divided, equal lists are made once for each part, so there may be some more. */
 static void each_cell_says_what_is_there(void **state)
 {
     (void)state;

@@ -42,7 +42,8 @@ static void expect_scale(const char *more, const char *output, enum colour_mode 
 
 #define PATH "platform: {kind: trajectory, file: path.csv}\n"
 
-/* Without limits a ramp covers the head's ranges, the scene's heights, or the frames that the path or the stops have. */
+/* Without limits a ramp covers the head's ranges, the scene's heights, or the frames that the path or the stops have.
+ */
 static void ramps_have_limits(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How far points may be from a station's place or from the middle of a stretch of a path, which decides the error of the
- * georeference. Also the worst stretch of a path, and the warnings. */
+/* How far points may be from a station's place or from the middle of a stretch of a path, which decides the error of
+ * the georeference. Also the worst stretch of a path, and the warnings. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>

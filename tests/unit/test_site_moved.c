@@ -76,9 +76,9 @@ static void a_place_is_taken_as_it_is(void **state)
     site_free(first);
 }
 
-/* Without an anchor the first place fixes the scene on the Earth: 100 m to the east, 40 m to the north, and up, are that on
- * the Earth, too. At 60 degrees of latitude a degree of longitude is 55.8 km, within half a percent of half of 111.3 km,
- * and one of latitude 111.4 km. */
+/* Without an anchor the first place fixes the scene on the Earth: 100 m to the east, 40 m to the north, and up, are
+ * that on the Earth, too. At 60 degrees of latitude a degree of longitude is 55.8 km, within half a percent of half of
+ * 111.3 km, and one of latitude 111.4 km. */
 static void on_the_earth_it_moves_along(void **state)
 {
     (void)state;
@@ -91,8 +91,8 @@ static void on_the_earth_it_moves_along(void **state)
     struct site *moved = move(first, first, &to);
     const struct georef_place *at = &moved->station[0].at.place;
     assert_true(fabs((at->lon_deg - 11.0) * 55650.0 / 100.0 - 1.0) < 5e-3);
-    /* The parallel bends away from the tangent, 100^2 / 2 / 6378 km times tan 60: 1.4 mm; the height by (100^2 + 40^2) /
-     * 2 / 6378 km, 0.9 mm. */
+    /* The parallel bends away from the tangent, 100^2 / 2 / 6378 km times tan 60: 1.4 mm; the height by (100^2 + 40^2)
+     * / 2 / 6378 km, 0.9 mm. */
     assert_true(fabs((at->lat_deg - 60.0) * 111412.0 / 40.0 - 1.0) < 5e-3 && fabs(at->height_m - 203.0) < 1e-3);
     assert_memory_equal(moved->station[0].at.position_m, to.position_m, sizeof to.position_m);
     site_free(moved);

@@ -60,8 +60,8 @@ static void expect_covered(const struct site *site)
     assert_true(site->stretch[site->n_stretches - 1].until_ns == INT64_MAX);
 }
 
-/* A straight way of 5.5 radii needs three stretches; each is as long as its limit but for a step of the poses, of 0.01 m
- * and 10 ms at most. At 20 m/s the head goes 2 m in 100 ms, and a step more at each end. */
+/* A straight way of 5.5 radii needs three stretches; each is as long as its limit but for a step of the poses, of 0.01
+ * m and 10 ms at most. At 20 m/s the head goes 2 m in 100 ms, and a step more at each end. */
 static void a_straight_way_has_as_few_stretches_as_possible(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Rows of a site's plan that say what is set, without a choice; the likely cause of a slow scan; the plan in one line. */
+/* Rows of a site's plan that say what is set, without a choice; the likely cause of a slow scan; the plan in one line.
+ */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The directions that a scan may look to: its window of line and pan angles, with a margin of 2e-3 rad (0.1146 deg) and the
- * head's own errors. Azimuths count clockwise from y. */
+/* The directions that a scan may look to: its window of line and pan angles, with a margin of 2e-3 rad (0.1146 deg) and
+ * the head's own errors. Azimuths count clockwise from y. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -165,7 +165,8 @@ static void rates(void **state)
     assert_int_equal(at->row[FAULT_MIRROR_STUCK].noticed, 2);
 }
 
-/* A rate within a fault is not the usual one. A fault that ended before is hidden: there was nothing to compare with. */
+/* A rate within a fault is not the usual one. A fault that ended before is hidden: there was nothing to compare with.
+ */
 static void scans_that_begin_with_a_fault(void **state)
 {
     const struct fault slow = {.kind = FAULT_MIRROR_SLOW, .factor = 0.6}, laser = {.kind = FAULT_LASER_OFF};

@@ -226,7 +226,8 @@ static void grants_add_up(void **state)
     assert_int_equal(stream.granted, 2);
 }
 
-/* Grants of two sessions may be passed on in any order, and so may one after the run's end, which lets all time pass. */
+/* Grants of two sessions may be passed on in any order, and so may one after the run's end, which lets all time pass.
+ */
 static void time_that_may_pass_is_not_taken_back(void **state)
 {
     (void)state;

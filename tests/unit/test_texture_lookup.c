@@ -86,8 +86,8 @@ static void expect_holes(const struct texture_mask *mask, const int hole[WIDTH *
         }
 }
 
-/* A texel is a hole below the share, not at it: half of 255 lies between 127 and 128. Luma is that of Rec. 601; an image
- * with alpha is no opacity map. */
+/* A texel is a hole below the share, not at it: half of 255 lies between 127 and 128. Luma is that of Rec. 601; an
+ * image with alpha is no opacity map. */
 static void texels_below_the_share_are_holes(void **state)
 {
     (void)state;

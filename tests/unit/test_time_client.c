@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The client of a time server: when it asks, what sets the clock, and what it reports. The times of requests and answers
- * are exact, and the expected offsets and delays are computed by hand from them (RFC 4330, section 5). */
+/* The client of a time server: when it asks, what sets the clock, and what it reports. The times of requests and
+ * answers are exact, and the expected offsets and delays are computed by hand from them (RFC 4330, section 5). */
 #include "firmware_sim/config/config.h"
 #include "tests/unit/time_client_rig.h"
 

@@ -270,8 +270,8 @@ static void test_serial_state(void **state)
     usb_device_free(rig.head.device);
 }
 
-/* Any bit rate is set as drivers do, and read back. PSTN 1.20, table 17: 1, 1.5 or 2 stop bits are 0 to 2, parities 0 to
- * 4; and there are 5 to 8 data bits, or 16. */
+/* Any bit rate is set as drivers do, and read back. PSTN 1.20, table 17: 1, 1.5 or 2 stop bits are 0 to 2, parities 0
+ * to 4; and there are 5 to 8 data bits, or 16. */
 static void test_line_coding(void **state)
 {
     (void)state;

@@ -247,8 +247,8 @@ static void test_gone(void **state)
     free(host);
 }
 
-/* Where an interface ends, what was under way ends with it: half-read transfers, short packets and a halt that were asked
- * for, a zero-length packet. The epoch is a new one. When it begins again, all is as at first. */
+/* Where an interface ends, what was under way ends with it: half-read transfers, short packets and a halt that were
+ * asked for, a zero-length packet. The epoch is a new one. When it begins again, all is as at first. */
 static void test_begun_again(void **state)
 {
     (void)state;

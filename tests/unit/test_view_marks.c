@@ -215,7 +215,8 @@ static void stations_beyond_the_image(void **state)
     view_free(view);
 }
 
-/* A name is to the right of its mark, or to the left where the image ends; it is written whole, on the mark's height. */
+/* A name is to the right of its mark, or to the left where the image ends; it is written whole, on the mark's height.
+ */
 static void names_beside_their_marks(void **state)
 {
     (void)state;

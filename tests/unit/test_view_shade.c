@@ -88,8 +88,8 @@ static void holes_are_closed(void **state)
 
 /* ---- smoothing */
 
-/* Depths that go up and down by e from place to place: of weights 1, 2, 2, 2 the means are e, -e, e, -e. So each pass takes
- * a seventh, and turns the sign round. An even slope stays, and so does a step from one surface to another. */
+/* Depths that go up and down by e from place to place: of weights 1, 2, 2, 2 the means are e, -e, e, -e. So each pass
+ * takes a seventh, and turns the sign round. An even slope stays, and so does a step from one surface to another. */
 static void surfaces_are_smoothed(void **state)
 {
     (void)state;

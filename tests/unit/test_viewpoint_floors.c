@@ -61,7 +61,8 @@ static struct survey_best find(void)
     return best;
 }
 
-/* A room of 1.5 m is the lowest one. The head stands at 0.6 of its height, at most at 1.6 m. It sees all of the room. */
+/* A room of 1.5 m is the lowest one. The head stands at 0.6 of its height, at most at 1.6 m. It sees all of the room.
+ */
 static void rooms_have_a_height(void **state)
 {
     (void)state;

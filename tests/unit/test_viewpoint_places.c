@@ -164,8 +164,8 @@ static void floors_lie_within_the_area(void **state)
     }
 }
 
-/* A grid lies in the middle of its area, and has as many steps as it holds. Places are rounded to millimetres, floors are
- * not. They come by x, then y, then from above. */
+/* A grid lies in the middle of its area, and has as many steps as it holds. Places are rounded to millimetres, floors
+ * are not. They come by x, then y, then from above. */
 static void the_grid_is_in_order(void **state)
 {
     (void)state;

@@ -214,7 +214,8 @@ static void *read_on(void *arg)
     return NULL;
 }
 
-/* Returns once nothing was released for a while. A machine that is too slow for that makes the test weaker, not wrong. */
+/* Returns once nothing was released for a while. A machine that is too slow for that makes the test weaker, not wrong.
+ */
 static void wait_held_back(const struct loop *loop)
 {
     for (uint64_t before = 0, now; (now = stream_released(&loop->stream)) == 0 || now != before; before = now)

@@ -296,8 +296,8 @@ static void what_comes_after_the_end_does_not_count(void **state)
     close_watch();
 }
 
-/* The floor is a mirror below a roof, so the roof is seen once more below the floor. Nothing is there: these points count
- * and are left out of the figures. */
+/* The floor is a mirror below a roof, so the roof is seen once more below the floor. Nothing is there: these points
+ * count and are left out of the figures. */
 static void points_in_mirrors_are_left_out(void **state)
 {
     (void)state;

@@ -101,7 +101,8 @@ static void the_head_and_its_stations(void **state)
     close_page();
 }
 
-/* The points of one run have its number, by which a page knows that a head is another one: 8 bytes after the first 8. */
+/* The points of one run have its number, by which a page knows that a head is another one: 8 bytes after the first 8.
+ */
 static void a_run_has_one_number(void **state)
 {
     (void)state;

@@ -211,8 +211,8 @@ static void the_sample_fits_the_budget(void **state)
 /* ---- the scene */
 
 /* The bodies of the page's scene are where they are at the first stop, 2 s after the trajectory's start. The first one
- * has then turned by 90 degrees, clockwise from above, about (5, 5), and moved by 2 m along x; the second by 1 m along z.
- * Corners are relative to the middle of what stands, (0.5, 0.5, 0). */
+ * has then turned by 90 degrees, clockwise from above, about (5, 5), and moved by 2 m along x; the second by 1 m along
+ * z. Corners are relative to the middle of what stands, (0.5, 0.5, 0). */
 static void bodies_are_where_they_are_at_the_first_stop(void **state)
 {
     (void)state;

@@ -271,9 +271,10 @@ static void three_surfaces_are_three_echoes(void **state)
     wave_close(&w);
 }
 
-/* Returns about a width apart or more, 0.6 m, without noise. Some of them take a term too many on the way, which has to go again;
- * others end where a fit with one term less is nearly as good. Digits of 14 bits are steps of 0.006 thresholds, which is
- * less than 0.1 mm at the slopes of these pulses. What remains is the fit's end, for which 10 mm are allowed. */
+/* Returns about a width apart or more, 0.6 m, without noise. Some of them take a term too many on the way, which has to
+ * go again; others end where a fit with one term less is nearly as good. Digits of 14 bits are steps of 0.006
+ * thresholds, which is less than 0.1 mm at the slopes of these pulses. What remains is the fit's end, for which 10 mm
+ * are allowed. */
 static void overlapping_surfaces_are_all_found(void **state)
 {
     (void)state;

@@ -73,8 +73,8 @@ static void each_figure_has_limits(void **state)
 }
 
 /* A return keeps its energy however wide it is, up to the widest spread that has nodes of its own and beyond. That of a
- * pulse of 4 ns is 231 m for a disc and 80 m for a bell. Steps of 1 m leave an error of about (1 m / extent)^1.5, at the
- * ends of the disc. */
+ * pulse of 4 ns is 231 m for a disc and 80 m for a bell. Steps of 1 m leave an error of about (1 m / extent)^1.5, at
+ * the ends of the disc. */
 static void wide_returns_keep_their_energy(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The calls that a module makes of functions that a test has replaced: each of them notes itself here, and one may fail.
- * The test compares the notes as a whole, so a call that is missing, or in the wrong place, shows. */
+/* The calls that a module makes of functions that a test has replaced: each of them notes itself here, and one may
+ * fail. The test compares the notes as a whole, so a call that is missing, or in the wrong place, shows. */
 #ifndef TESTS_UNIT_TRACE_RIG_H
 #define TESTS_UNIT_TRACE_RIG_H
 

@@ -198,8 +198,9 @@ static void test_next(void **state)
 
 /* Heads whose beams lie in planes or on cones, in the upper leg. All 682 pulses of the planar one are tried, so the
  * estimate is the gain; the exception is two cells of 0.25 m, because a ray lies on the border of one. At 5 turns a
- * second the other one has 57 869 pulses, and every 1.4th of them is tried all around. Rays of a beam then are at most 7 m *
- * 0.3 deg = 37 mm apart, and miss a cell only where the beam's way through it is shorter: 37 / 250 of the cells. */
+ * second the other one has 57 869 pulses, and every 1.4th of them is tried all around. Rays of a beam then are at most
+ * 7 m * 0.3 deg = 37 mm apart, and miss a cell only where the beam's way through it is shorter: 37 / 250 of the cells.
+ */
 static void test_next_of_pulses(void **state)
 {
     static const struct {

@@ -257,8 +257,8 @@ static void test_end_within_scan(void **state)
     assert_int_equal(stats_uint(wire, "scans"), 0);
 }
 
-/* A stream's head is known only when its frames come. The first points have no place in a .ptx: earlier recordings stay,
- * of the other format, too. */
+/* A stream's head is known only when its frames come. The first points have no place in a .ptx: earlier recordings
+ * stay, of the other format, too. */
 static void test_refused_by_one(void **state)
 {
     struct wire *wire = *state;

@@ -183,8 +183,8 @@ static void wait_closed(int port)
     }
 }
 
-/* Clients of a device's protocol that came and went are no longer there. The head finds that out with the first sentences
- * that it sends them, one a second. */
+/* Clients of a device's protocol that came and went are no longer there. The head finds that out with the first
+ * sentences that it sends them, one a second. */
 static void test_clients_that_are_gone(void **state)
 {
     enum { CLIENTS = 5, GONE = 3 };

@@ -203,8 +203,8 @@ static int lines_with(const char *text, const char *part)
 }
 
 /* Writes a capture of two ports and of packets that can't be served: two requests and an answer over TCP, three
- * datagrams, a packet of link type 147, one without an IP header, one fragment (RFC 791: an offset of 1), and a datagram
- * 2 s earlier than the others. A segment of 5 bytes is missing. */
+ * datagrams, a packet of link type 147, one without an IP header, one fragment (RFC 791: an offset of 1), and a
+ * datagram 2 s earlier than the others. A segment of 5 bytes is missing. */
 static const char *make_mixed(struct wire *wire)
 {
     const struct ethernet_end client = {.address = {10, 0, 0, 2}, .port = 40000},

@@ -310,7 +310,8 @@ static int64_t taken_ms(pid_t pid)
 }
 
 /* A client that reads nothing holds back a step, and its further lines fill the head's buffer for them. The head then
- * waits without using a processor: it rests 2 ms between two looks, so a tenth of the time is far more than it needs. */
+ * waits without using a processor: it rests 2 ms between two looks, so a tenth of the time is far more than it needs.
+ */
 static void test_lines_that_wait_for_a_step(void **state)
 {
     enum { WINDOW_MS = 500, WINDOWS = 40, MOST_MS = WINDOW_MS / 10 };

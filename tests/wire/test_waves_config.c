@@ -66,8 +66,8 @@ static void write_flat_pulse(struct wire *wire)
 }
 
 /* A link that can't carry the samples is refused, with the rate of both. 100 kHz of which 100 of 240 deg are used:
- * 41,667 pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 27 samples: 5 + 10 ns, and
- * 11.8 in which a Gaussian of 4 ns is within 26 dB of its peak. A measured pulse has its own length: its 201 ns make 216
+ * 41,667 pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 27 samples: 5 + 10 ns, and 11.8
+ * in which a Gaussian of 4 ns is within 26 dB of its peak. A measured pulse has its own length: its 201 ns make 216
  * samples, 28 + 2 x 216. */
 static void test_capacity(void **state)
 {
@@ -95,10 +95,10 @@ static void test_capacity(void **state)
     }
 }
 
-/* A usual return is one of 20 dB, so keep_db says how long its window is. A Gaussian of 4 ns falls by x dB in 4 ns sqrt(x /
- * 12.04): with -40 dB it is above for 17.9 ns, with -6 for 11.8, with 17 for 4. Before it lie 5 ns, behind it 10. The
- * asymmetric pulse works with all other keys left out. With its skew s of 1.5 it is above from -a to b, a = 4 ns (1 - s^-q)
- * / (s - 1 / s), b = 4 ns (s^q - 1) / (s - 1 / s), q = sqrt(26 / 3.01): for 14.3 ns. */
+/* A usual return is one of 20 dB, so keep_db says how long its window is. A Gaussian of 4 ns falls by x dB in 4 ns
+ * sqrt(x / 12.04): with -40 dB it is above for 17.9 ns, with -6 for 11.8, with 17 for 4. Before it lie 5 ns, behind it
+ * 10. The asymmetric pulse works with all other keys left out. With its skew s of 1.5 it is above from -a to b, a = 4
+ * ns (1 - s^-q) / (s - 1 / s), b = 4 ns (s^q - 1) / (s - 1 / s), q = sqrt(26 / 3.01): for 14.3 ns. */
 static void test_usual(void **state)
 {
     struct wire *wire = *state;

@@ -34,7 +34,8 @@ int cfg_fail_item(struct cfg_reader *rd, const char *path, uint32_t item, const 
     __attribute__((format(printf, 4, 5)));
 /* Does the same for a key that is not given and has no default. item: 0 where the path has no []. */
 void cfg_fail_missing(struct cfg_reader *rd, const char *path, uint32_t item);
-/* Cuts a text for an error. Control characters are replaced when the error is made (sh_fail). buf holds CFG_SHOW_MAX. */
+/* Cuts a text for an error. Control characters are replaced when the error is made (sh_fail). buf holds CFG_SHOW_MAX.
+ */
 enum { CFG_SHOW_MAX = 64 };
 const char *cfg_show(const char *text, char *buf);
 
