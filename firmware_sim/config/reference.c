@@ -213,7 +213,7 @@ static const char *value_of(const struct cfg_key *key, const struct config_profi
 
 static void print_example_key(const struct cfg_key *key, const struct config_profile *profile, FILE *out)
 {
-    char value[CONFIG_PATH_LEN + 2], allowed[CFG_ALLOWED_MAX], help[1024];
+    char value[CONFIG_PATH_LEN + 2], allowed[CFG_ALLOWED_MAX], help[1024 + CFG_ALLOWED_MAX];
     const int indent = indent_of(key->path), is_section = key->type == CFG_MAP || key->type == CFG_LIST;
     const char *dot = strrchr(key->path, '.'), *word = dot != NULL ? dot + 1 : key->path;
     const int is_element = strcmp(word + strlen(word) - 2, "[]") == 0;
