@@ -93,8 +93,7 @@ struct scanhead_usb_head {
     double speed_bit_s; /* 0: unknown */
     char problem[320];  /* why it can't be opened, for instance no permission; empty: it can */
 };
-/* Describes at most max heads that are on USB now. Returns how many there are, or SCANHEAD_EIO with the reason in err
- * (may be NULL). */
+/* Describes at most max heads on USB. Returns how many there are, or SCANHEAD_EIO with the reason in err (or NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
 /* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
@@ -270,8 +269,7 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
-/* A colour for each point, sRGB. The head's key output.colour decides what the colour shows. A shot without echo is
- * grey. */
+/* A colour for each point, sRGB, of what the head's key output.colour names. A shot without echo is grey. */
 struct scanhead_colour {
     uint8_t red, green, blue;
 };
@@ -290,8 +288,7 @@ int scanhead_deviations(struct scanhead *sh, const struct scanhead_frame *frame,
 /* Returns 1 if attributes have deviations; else as scanhead_has_attributes. */
 int scanhead_has_deviations(const struct scanhead *sh);
 
-/* A window of samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when the pulse
- * fires. */
+/* Samples of a pulse's waveform. All windows of a pulse have one grid; sample 0 is taken when the pulse fires. */
 struct scanhead_wave {
     uint64_t pulse;         /* its number in the scan */
     int64_t t_ns;           /* firing time since the scan's start */
@@ -388,8 +385,7 @@ struct scanhead_emitter {
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
 /* The place and attitude of a moving head at a time. Between two poses of one frame of SCANHEAD_POSES the head moves
- * along the straight line, and turns the shorter way about one fixed axis at constant rate (slerp). The motion is no
- * approximation: the head casts its pulses from these poses. */
+ * along the straight line, and turns the shorter way about one fixed axis at constant rate (slerp), as it casts. */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */

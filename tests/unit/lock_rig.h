@@ -4,7 +4,7 @@
 #ifndef TESTS_UNIT_LOCK_RIG_H
 #define TESTS_UNIT_LOCK_RIG_H
 
-/* Of this thread. */
+/* The counts are those of the calling thread. */
 extern _Thread_local int lock_rig_taken, lock_rig_held;
 
 /* Fails where a call takes other than n locks, or has one left. */

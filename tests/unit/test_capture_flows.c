@@ -60,7 +60,7 @@ static void datagrams_count_from_the_first_one_of_a_device(void **state)
     client_close(&c);
 }
 
-/* What a device sends unasked is repeated from its first message on, each time a mean period after the last one. */
+/* Messages that a device sends unasked are repeated from the first one on, a mean period after the last message. */
 static void an_unasked_stream_is_repeated(void **state)
 {
     (void)state;
@@ -109,7 +109,7 @@ static void a_repeated_syn_is_the_same_one(void **state)
     assert_int_equal(capture_is("/nowhere/a.pcap"), 0);
 }
 
-/* Of two connections in which the device speaks unasked, the longer one is played. */
+/* The longer one is played of two connections in which the device speaks unasked. */
 static void the_longest_unasked_stream_is_played(void **state)
 {
     (void)state;

@@ -117,7 +117,7 @@ static void groups_are_short(void **state)
             r[i] = return_at(100 + (i < 16 ? 0.001 * i : beyond ? 0.03993 : 0.03985), i + 1);
         assert_int_equal(take(r, 17), 1 + beyond);
     }
-    /* Of returns each 30 mm after the one before, the third begins the next group. */
+    /* The third return begins the next group where each comes 30 mm after the one before. */
     struct beam_return r[60];
     for (uint32_t i = 0; i < 60; i++)
         r[i] = return_at(100 + 0.03 * i, 1);

@@ -42,7 +42,7 @@ static void a_recording_keeps_its_settings(void **state)
     }
 }
 
-/* A recording may lack a value, be it of 64 bits or of 32. */
+/* A recording may lack a value of 64 bits, or one of 32 bits. */
 static void a_value_may_be_unknown(void **state)
 {
     (void)state;

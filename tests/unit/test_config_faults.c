@@ -85,7 +85,7 @@ static void faults_of_the_profile_come_last(void **state)
     snprintf(name, sizeof name, "%s/heads/mine.yaml:", dir);
     assert_int_equal(load_edited("any-rate\n  prr_hz: 500000\n  lines_hz: 100", "mine\n  frames: x"), SH_EINPUT);
     ASSERT_FAULTS("3: head.frames: ", name, name);
-    /* Those of --set stand between the file and its profile. */
+    /* Errors of --set stand between those of the file and those of its profile. */
     const char *const sets[] = {"gnss.quality=3", "links.0.port=x"};
     assert_int_equal(load_sets(sets, 2), SH_EINPUT);
     ASSERT_FAULTS("3: head.frames: ", "--set links[0].port: ", "--set gnss.quality: ", name, name);

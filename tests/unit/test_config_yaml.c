@@ -124,7 +124,7 @@ static void bytes_that_are_no_text_have_their_line(void **state)
     }
 }
 
-/* What is missing has the line of what is around it; at the top, that of the first key. */
+/* The error of a missing key names the line of the map around it; at the top, the line of the first key. */
 static void what_is_missing_has_a_line(void **state)
 {
     (void)state;

@@ -32,7 +32,7 @@ static int remove_files(void **state)
     return remove_folder(state);
 }
 
-/* What a triangle shows: its file's figures, whichever scene holds it. */
+/* These figures of a triangle are those of its file, whichever scene holds it. */
 struct shown {
     float uv[3][2];
     uint8_t rgb[3][4];

@@ -189,7 +189,7 @@ static void the_best_scan_is_chosen(void **state)
     end();
 }
 
-/* Of equal places the first one counts. */
+/* The first one counts where places are equal. */
 static void equal_places(void **state)
 {
     (void)state;

@@ -324,8 +324,7 @@ static void test_refused(void **state)
         assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
         char want[200];
         snprintf(want, sizeof want,
-                 "%s: bytes %zu to %zu are damaged, and the file goes on after them; a repair can only cut "
-                 "its end",
+                 "%s: bytes %zu to %zu are damaged, and the file goes on after them; a repair can only cut its end",
                  path, at / PAGE * PAGE, at / PAGE * PAGE + PAGE);
         assert_string_equal(err.text, want);
         uint8_t *now = rig_read(path, &len);

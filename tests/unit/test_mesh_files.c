@@ -214,8 +214,7 @@ static void points_alone(void **state)
     assert_true(mesh_takes_points("x.ply") && mesh_takes_points("x.obj") && !mesh_takes_points("x.fbx"));
 }
 
-/* A long file is written past the system's cache, in whole buffers. The file's end holds the vertices as they were
- * given. */
+/* A long file is written past the system's cache, in whole buffers, and ends with the vertices as given. */
 static void long_file(void **state)
 {
     enum { MANY = 700000, ROW = 24, AT_ONCE = 1000 };

@@ -254,24 +254,25 @@ static void test_rows_of_beams(void **state)
     }
 }
 
+static const struct native_emitter ten_rings = {.kind = NATIVE_EMIT_SPHERE,
+                                                .steps = 10,
+                                                .rings = 10,
+                                                .turn = 1,
+                                                .sequence_ns_den = 1,
+                                                .first_ring_udeg = -90000000};
+
 /* A sphere of ten rings has ten lines, and the first and the last one are in one grid. An eleventh is not, also after
  * the descriptor and what belongs to it were repeated. */
 static void test_lines_of_rings(void **state)
 {
     (void)state;
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
-    const struct native_emitter e = {.kind = NATIVE_EMIT_SPHERE,
-                                     .steps = 10,
-                                     .rings = 10,
-                                     .turn = 1,
-                                     .sequence_ns_den = 1,
-                                     .first_ring_udeg = -90000000};
     const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
     for (int eleven = 0; eleven < 2; eleven++) {
         rig_begin();
         for (int flags = 0; flags <= (eleven ? NATIVE_REPEAT : 0); flags += NATIVE_REPEAT) {
             rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, flags));
-            rig_put(out, native_encode_emitter(out, sizeof out, &e, NULL, 0, flags));
+            rig_put(out, native_encode_emitter(out, sizeof out, &ten_rings, NULL, 0, flags));
             rig_put(out, native_encode_anchor(out, sizeof out, &a, 0, flags));
             if (flags == 0) rig_points(0, 0, 0, &one, 1);
         }
@@ -289,18 +290,12 @@ static void test_a_line_beyond(void **state)
 {
     (void)state;
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
-    const struct native_emitter e = {.kind = NATIVE_EMIT_SPHERE,
-                                     .steps = 10,
-                                     .rings = 10,
-                                     .turn = 1,
-                                     .sequence_ns_den = 1,
-                                     .first_ring_udeg = -90000000};
     const struct native_descriptor d = descriptor("a,b,c,d", "model", 1);
     for (int emitter_first = 0; emitter_first < 2; emitter_first++) {
         rig_begin();
         rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
         if (!emitter_first) rig_anchor(&a);
-        put_emitter(&e, NULL);
+        put_emitter(&ten_rings, NULL);
         if (emitter_first) rig_anchor(&a);
         rig_points(0, 0, 0, &one, 1);
         rig_points(10, 100, 100, &one, 1);
