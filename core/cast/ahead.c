@@ -84,11 +84,8 @@ static void aim_window(struct caster *c, const struct schedule_run *run, uint32_
     struct cast_ahead *a = c->ahead;
     for (uint32_t q = 0; q < n_runs; q++) {
         if (w->n[q] == 0) continue;
-        struct chunk k = {.s = &a->setup,
-                          .run = &run[q],
-                          .pulse0 = run[q].pulse0 + w->first[q],
-                          .first = w->first[q],
-                          .n = w->n[q]};
+        struct chunk k = {
+            .s = &a->setup, .run = &run[q], .pulse0 = run[q].pulse0 + w->first[q], .first = w->first[q], .n = w->n[q]};
         caster_aim(c, &k);
         memcpy(a->line[q].x, c->d.x, w->n[q] * sizeof(double));
         memcpy(a->line[q].y, c->d.y, w->n[q] * sizeof(double));

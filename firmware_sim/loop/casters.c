@@ -7,7 +7,7 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 
-enum { MOST_TICKS = 128 }; /* that a caster claims together */
+enum { MOST_TICKS = 128 };             /* that a caster claims together */
 static const int64_t SAY_NS = 2000000; /* the first tick that is ready after this time ends its batch */
 
 /* With claim_lock held. */

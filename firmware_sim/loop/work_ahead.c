@@ -44,7 +44,8 @@ void worker_look_ahead(struct worker *worker, const struct device_work *work, ui
     for (uint64_t k = work->pulse0; k < end && n_runs < CAST_AHEAD_RUNS; k = part.end) {
         worker_get_part(&work->segment, k, end, &part);
         if (part.cast0 >= part.cast_end) continue;
-        schedule_get_run(&work->segment, &part.line, part.cast0, (uint32_t)(part.cast_end - part.cast0), &run[n_runs++]);
+        schedule_get_run(&work->segment, &part.line, part.cast0, (uint32_t)(part.cast_end - part.cast0),
+                         &run[n_runs++]);
     }
     caster_look_ahead(worker->caster, &worker->setup, run, n_runs > 1 ? n_runs : 0);
 }
