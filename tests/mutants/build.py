@@ -52,7 +52,7 @@ class Build:
 
     def environment(self, folder=None):
         """Makes the environment of a program, with the library in a folder or the one without a mutant."""
-        return {"LD_LIBRARY_PATH": folder or self.work, **({"ASAN_OPTIONS": f"hard_rss_limit_mb={MOST_MEMORY >> 20}"} if self.name == "asan" else {})}
+        return {"LD_LIBRARY_PATH": folder or self.work, **({"ASAN_OPTIONS": f"detect_odr_violation=0:hard_rss_limit_mb={MOST_MEMORY >> 20}"} if self.name == "asan" else {})}
 
     # ---- linking
 
