@@ -411,6 +411,7 @@ bench-panorama: deps-build
 	@$(MAKE) --no-print-directory -j2 $(BUILD)/tests/bench/panorama
 	@$(PANORAMA) --ending none,.ply,.las,.e57
 	@$(PANORAMA) --columns xyz,float
+	@$(PANORAMA) --lines --ending none,.las
 # This compares the speed with that of HELIOS++, which isn't part of scanhead and is named by
 # HELIOS="--helios PROGRAM --assets FOLDER". A round takes ten minutes.
 HELIOS ?=

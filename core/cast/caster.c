@@ -23,6 +23,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/cast/ahead.h"
 #include "core/cast/aim.h"
 #include "core/cast/caster.h"
 #include "core/cast/kernels_times.h"
@@ -47,6 +48,7 @@ int caster_create(struct caster **out, struct sh_err *err)
     c->nearest.sight = NULL;
     c->sub_rays = NULL;
     c->waves = NULL;
+    c->ahead = NULL;
     c->profile = NULL;
     c->steps.ready = 0;
     memset(&c->counters, 0, sizeof c->counters);
@@ -67,6 +69,7 @@ void caster_free(struct caster *caster)
     sight_work_free(caster->nearest.sight);
     free(caster->sub_rays);
     free(caster->waves);
+    ahead_free(caster->ahead);
     free(caster);
 }
 
@@ -147,7 +150,8 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
         caster_report(c, k);
         return caster_points(c, k);
     }
-    const struct ray_hits hits = centres(c, k);
+    struct ray_hits hits = centres(c, k);
+    hits.known = central && ahead_take(c, k, &hits.rays);
     if (central) caster_nearest(&c->nearest, s, &hits);
     if (s->tripod != NULL && s->beam == NULL) hide(c, k);
     if (hits.body != NULL && s->detect != NULL && s->detect->depth > 0) caster_follow(&c->nearest, s, &hits, &c->paths);

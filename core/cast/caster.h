@@ -10,6 +10,7 @@
 #include "core/cast/nearest.h"
 #include "core/cast/optics.h"
 
+struct cast_ahead;
 struct sub_ray_work;
 struct wave_work;
 
@@ -17,6 +18,7 @@ struct caster {
     struct nearest nearest;
     struct sub_ray_work *sub_rays; /* touched only where pulses have a footprint */
     struct wave_work *waves;       /* NULL: without caster_add_waves */
+    struct cast_ahead *ahead;      /* NULL: without caster_add_ahead */
     struct bvh_profile *profile;
     struct cast_counters counters;
     struct kernel_steps steps; /* of the run at hand */

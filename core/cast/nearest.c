@@ -78,7 +78,9 @@ static int is_from_station(const struct cast_setup *s, const struct bvh_origins 
 void caster_nearest(struct nearest *w, const struct cast_setup *s, const struct ray_hits *hits)
 {
     const struct bvh_rays *rays = &hits->rays;
-    if (s->sight != NULL && is_from_station(s, &rays->from))
+    if (hits->known)
+        ; /* looked ahead */
+    else if (s->sight != NULL && is_from_station(s, &rays->from))
         sight_hits(w->sight, w->bvh, s->sight, rays);
     else
         bvh_hits(w->bvh, s->bvh, rays);

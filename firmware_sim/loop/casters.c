@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Casters: threads that claim ticks ahead of their time, compute them and put them into the stream. */
+#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop_inside.h"
 
+enum { MOST_TICKS = 128 };             /* that a caster claims together */
 static const int64_t SAY_NS = 2000000; /* the first tick that is ready after this time ends its batch */
 
 /* With claim_lock held. */
@@ -18,33 +20,59 @@ static int may_claim(struct loop *loop)
     return pace != PACE_FAST || !device_is_idle(loop->device);
 }
 
-/* Claims the next tick. 1: work and slot are set (slot NULL: lost already); 0: not now; -1: the run is
- * over. */
-static int claim(struct loop *loop, struct device_work *work, struct ring_slot **slot)
+/* Whether as many ticks as the caster wants may be claimed now. Where none is on its way, fewer are enough: nothing
+ * would wake this thread. With claim_lock held. */
+static int has_room(const struct loop_caster *caster)
 {
+    const struct casters *casters = &caster->loop->casters;
+    const uint64_t released = stream_released(&caster->loop->stream);
+    return casters->next_tick + caster->wanted <= released + casters->ahead_ticks || casters->next_tick == released;
+}
+
+/* Claims the next tick, as number i of the caster's. 1: work and slot are set; 0: not now; -1: the run is over. With
+ * claim_lock held. */
+static int claim_tick(struct loop_caster *caster, uint32_t i)
+{
+    struct loop *loop = caster->loop;
     struct casters *casters = &loop->casters;
-    int got = 0;
+    struct device_work *work = &caster->work[i];
+    if (atomic_load(&loop->stopping)) return -1;
+    if (!may_claim(loop) || (i == 0 && !has_room(caster))) return 0;
+    if (device_claim(loop->device, work) != 0) {
+        /* A tick that is still being computed may be lost. Its events then need one more tick to go out with. So the
+         * run is over only once no tick is being computed. */
+        if (atomic_load(&casters->n_computing) != 0) return 0;
+        atomic_store(&loop->final_tick, casters->next_tick);
+        return -1;
+    }
+    atomic_fetch_add(&casters->n_computing, 1);
+    if (work->power != DEVICE_POWER_STAYS) stream_power(&loop->stream, work->tick);
+    caster->slot[i] = ring_claim(&loop->stream.ring, work->tick);
+    casters->next_tick = work->tick + 1;
+    return 1;
+}
+
+/* Sets how many ticks the caster wants, of which the first is claimed: those with pulses before `end`. */
+static void set_wanted(struct loop_caster *caster, uint64_t end)
+{
+    const struct device_work *first = &caster->work[0];
+    const uint64_t ticks = end != 0 ? (end - first->pulse0) / (first->pulse_end - first->pulse0) + 1 : 1;
+    caster->wanted = ticks < caster->room ? (uint32_t)ticks : caster->room;
+}
+
+/* Claims one tick, or several whose lines are cast together. Returns how many; -1: the run is over. */
+static int claim(struct loop_caster *caster)
+{
+    struct casters *casters = &caster->loop->casters;
     pthread_mutex_lock(&casters->claim_lock);
-    if (atomic_load(&loop->stopping)) {
-        got = -1;
-    } else if (may_claim(loop)) {
-        if (device_claim(loop->device, work) != 0) {
-            /* A tick that is still being computed may be lost. Its events then need one more tick to go out with. So
-             * the run is over only once no tick is being computed. */
-            if (atomic_load(&casters->n_computing) == 0) {
-                atomic_store(&loop->final_tick, casters->next_tick);
-                got = -1;
-            }
-        } else {
-            atomic_fetch_add(&casters->n_computing, 1);
-            if (work->power != DEVICE_POWER_STAYS) stream_power(&loop->stream, work->tick);
-            *slot = ring_claim(&loop->stream.ring, work->tick);
-            casters->next_tick = work->tick + 1;
-            got = 1;
-        }
+    int n = claim_tick(caster, 0);
+    if (n > 0 && caster->room > 1) {
+        set_wanted(caster, worker_end_ahead(caster->worker, &caster->work[0]));
+        while (n < (int)caster->wanted && claim_tick(caster, (uint32_t)n) > 0)
+            n++;
     }
     pthread_mutex_unlock(&casters->claim_lock);
-    return got;
+    return n;
 }
 
 /* Makes the tick in its slot. 0: the slot has no room, and there is no memory for more. The lack is reported once per
@@ -108,26 +136,43 @@ static void sleep_caster(struct loop_caster *caster)
     stream_wait_for_work(&caster->loop->stream);
 }
 
+static void make(struct loop_caster *caster, uint32_t i)
+{
+    struct loop *loop = caster->loop;
+    struct device_work *work = &caster->work[i];
+    if (!compute(caster, work, caster->slot[i])) device_lost(loop->device, work);
+    device_done(work);
+    atomic_fetch_sub(&loop->casters.n_computing, 1);
+    note_ready(caster, work->tick);
+}
+
 static void *caster_main(void *arg)
 {
     struct loop_caster *caster = arg;
-    struct loop *loop = caster->loop;
-    struct device_work work;
-    for (;;) {
-        struct ring_slot *slot = NULL;
-        int got = claim(loop, &work, &slot);
-        if (got < 0) break;
-        if (got == 0) {
-            sleep_caster(caster);
-            continue;
-        }
-        if (!compute(caster, &work, slot)) device_lost(loop->device, &work);
-        device_done(&work);
-        atomic_fetch_sub(&loop->casters.n_computing, 1);
-        note_ready(caster, work.tick);
+    for (int n; (n = claim(caster)) >= 0;) {
+        if (n == 0) sleep_caster(caster);
+        if (n > 1) worker_look_ahead(caster->worker, caster->work, (uint32_t)n);
+        for (int i = 0; i < n; i++)
+            make(caster, (uint32_t)i);
+        if (n > 1) worker_forget(caster->worker);
     }
-    stream_poke(&loop->stream); /* so that the other casters see the end, too */
+    stream_poke(&caster->loop->stream); /* so that the other casters see the end, too */
     return NULL;
+}
+
+/* Off line there is time to claim several ticks. All casters together claim half of the ticks ahead at most, so that
+ * there are always some on their way. */
+static int create_caster(struct loop *loop, uint32_t n, struct loop_caster *caster, struct sh_err *err)
+{
+    const uint64_t room = loop->casters.ahead_ticks / (2 * n);
+    caster->loop = loop;
+    caster->room = loop->cfg->loop.pace != PACE_FAST || room < 2 ? 1 : room < MOST_TICKS ? (uint32_t)room : MOST_TICKS;
+    caster->work = calloc(caster->room, sizeof *caster->work);
+    caster->slot = calloc(caster->room, sizeof *caster->slot);
+    if (caster->work == NULL || caster->slot == NULL) return sh_fail(err, SH_ENOMEM, "loop: no memory for a caster");
+    int rc = worker_create(loop->site, &caster->worker, err);
+    if (rc == SH_OK && caster->room > 1) rc = worker_add_ahead(caster->worker, err);
+    return rc;
 }
 
 int casters_create(struct loop *loop, uint32_t n, struct sh_err *err)
@@ -135,10 +180,8 @@ int casters_create(struct loop *loop, uint32_t n, struct sh_err *err)
     struct casters *casters = &loop->casters;
     int rc = SH_OK;
     pthread_mutex_init(&casters->claim_lock, NULL);
-    for (; casters->n < n && rc == SH_OK; casters->n++) {
-        casters->caster[casters->n].loop = loop;
-        rc = worker_create(loop->site, &casters->caster[casters->n].worker, err);
-    }
+    for (; casters->n < n && rc == SH_OK; casters->n++)
+        rc = create_caster(loop, n, &casters->caster[casters->n], err);
     loop->stream.n_casters = casters->n;
     return rc;
 }
@@ -162,7 +205,10 @@ void casters_join(struct loop *loop)
 
 void casters_free(struct loop *loop)
 {
-    for (uint32_t i = 0; i < loop->casters.n; i++)
+    for (uint32_t i = 0; i < loop->casters.n; i++) {
         worker_free(loop->casters.caster[i].worker);
+        free(loop->casters.caster[i].work);
+        free(loop->casters.caster[i].slot);
+    }
     pthread_mutex_destroy(&loop->casters.claim_lock);
 }

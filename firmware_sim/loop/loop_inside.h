@@ -21,6 +21,10 @@ struct loop_caster {
     pthread_t thread;
     uint64_t unsaid; /* ticks made since the pacing thread was last notified */
     int64_t said_ns; /* when it was last notified, clock_now_ns() */
+    /* ticks that it has claimed together; in other paces than `fast` there is room for one */
+    struct device_work *work;
+    struct ring_slot **slot; /* NULL: lost already */
+    uint32_t room, wanted;   /* most of them, and how many there should be */
 };
 
 /* casters.c */

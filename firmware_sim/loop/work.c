@@ -9,26 +9,8 @@
 #include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/native_waves.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/loop/work_inside.h"
 #include "firmware_sim/site/waves.h"
-
-struct worker {
-    const struct site *site; /* as it is for the tick at hand */
-    struct ring_slot *slot;  /* of the tick at hand, which is written there */
-    int no_memory;           /* the slot has no room for the rest of the tick */
-    struct ring_mark mark[RING_MAX_MARKS];
-    struct caster *caster;
-    struct cast_counters counted; /* the caster's counters when count_hits last added them to a slot */
-    struct line_block block;
-    struct line_waves *waves; /* the block's; block.waves is NULL while they are not sent */
-    struct cast_setup setup;
-    uint32_t setup_station; /* 1 + the station that setup is for; 0: none yet */
-    uint32_t setup_scan;    /* the scan that it is for */
-    size_t stretch;         /* of a moving head's path, that setup is for */
-    size_t anchored;        /* the one whose anchor went out last */
-    /* a moving head: its poses for the pulses at hand, and as they go out */
-    struct pose_knot knot[NATIVE_MAX_POSES];
-    struct native_pose pose[NATIVE_MAX_POSES];
-};
 
 enum {
     MAX_DT_NS = (1 << 24) - 1, /* a point's time within its frame has 24 bits */
@@ -269,18 +251,11 @@ static void count_hits(struct worker *worker, uint32_t echoes)
     ring_hits_add(&worker->slot->tick.tail, &hits);
 }
 
-/* Pulses of a tick that belong to one line. */
-struct part {
-    struct schedule_line line;
-    uint64_t end;             /* of the line or of the tick */
-    uint64_t cast0, cast_end; /* the rest is in the blind part of the sweep */
-};
-
-static void get_part(const struct device_work *work, uint64_t k, struct part *part)
+void worker_get_part(const struct schedule_segment *segment, uint64_t k, uint64_t end, struct worker_part *part)
 {
     struct schedule_line *line = &part->line;
-    schedule_get_line(&work->segment, schedule_line_of(&work->segment, k), line);
-    part->end = line->pulse_end < work->pulse_end ? line->pulse_end : work->pulse_end;
+    schedule_get_line(segment, schedule_line_of(segment, k), line);
+    part->end = line->pulse_end < end ? line->pulse_end : end;
     part->cast0 = k > line->cast0 ? k : line->cast0;
     part->cast_end = part->end < line->cast_end ? part->end : line->cast_end;
 }
@@ -295,7 +270,7 @@ static void add_points(struct worker *worker, const struct device_work *work)
     added(worker, native_encode_points(to.at, to.room, block, work->scan_t0_ns));
 }
 
-static void cast_run(struct worker *worker, const struct device_work *work, const struct part *part)
+static void cast_run(struct worker *worker, const struct device_work *work, const struct worker_part *part)
 {
     uint64_t k = part->cast0, end = part->cast_end;
     const uint64_t longest = schedule_longest_run(&work->segment, MAX_DT_NS);
@@ -367,29 +342,35 @@ static void end_line(struct worker *worker, const struct device_work *work, cons
     added(worker, native_encode_line_end(to.at, to.room, &mark->end, work->scan_t0_ns));
 }
 
-static void fill_pulses(struct worker *worker, const struct device_work *work)
+void worker_take_setup(struct worker *worker, const struct device_work *work)
 {
+    if (work->version != NULL) worker->site = device_site_of(work->version);
+    if (!work->scanning) return;
     if (worker->setup_station != work->station + 1 || worker->setup_scan != work->scan) {
         site_cast_setup(work->site, work->station, &worker->setup);
         worker->setup_station = work->station + 1;
         worker->setup_scan = work->scan;
         worker->stretch = SIZE_MAX;
     }
-    worker->anchored = work->stretch;
     worker->setup.sight = worker->site->station[work->station].sight; /* it may be new since the last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;
-    worker->block.waves = work->waves != 0 ? worker->waves : NULL;
     site_set_program(work->site, work->prr_uhz, &worker->setup);
     worker->setup.disturbance = work->disturbance.on ? &work->disturbance.cast : NULL;
     worker->setup.scan_key = rng_scan(work->station + 1, work->station_scan);
+}
+
+static void fill_pulses(struct worker *worker, const struct device_work *work)
+{
+    worker->anchored = work->stretch;
+    worker->block.waves = work->waves != 0 ? worker->waves : NULL;
     if (worker->site->n_movers != 0)
         site_move(worker->site,
                   site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),
                   &worker->setup);
     take_poses(worker, work);
-    struct part part;
+    struct worker_part part;
     for (uint64_t k = work->pulse0; k < work->pulse_end; k = part.end) {
-        get_part(work, k, &part);
+        worker_get_part(&work->segment, k, work->pulse_end, &part);
         if (part.cast0 < part.cast_end) cast_run(worker, work, &part);
         worker->slot->tick.n_fired += part.end - k;
         if (part.end == part.line.pulse_end) end_line(worker, work, &part.line, part.end);
@@ -405,7 +386,7 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
 
 int worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot)
 {
-    if (work->version != NULL) worker->site = device_site_of(work->version);
+    worker_take_setup(worker, work);
     worker->slot = slot;
     worker->no_memory = 0;
     ring_begin(slot);

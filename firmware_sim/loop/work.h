@@ -20,6 +20,15 @@ uint32_t worker_tick_bytes(const struct site *site);
 /* Bytes of a usual tick at the settings of power-up: the pulses of a tick with one echo each. */
 uint32_t worker_usual_bytes(const struct site *site);
 
+/* ---- lines ahead (core/cast.h): for a caster that claims several ticks before it makes the first one */
+int worker_add_ahead(struct worker *worker, struct sh_err *err);
+/* Returns the pulse up to which ticks should be claimed, of which `work` is the first. 0: only that one. */
+uint64_t worker_end_ahead(struct worker *worker, const struct device_work *work);
+/* Finds the hits of n consecutive ticks. worker_end_ahead of the first one was not 0. worker_fill then takes these hits,
+ * until worker_forget. */
+void worker_look_ahead(struct worker *worker, const struct device_work *work, uint32_t n);
+void worker_forget(struct worker *worker);
+
 /* Makes the tick in a slot, from ring_begin to ring_end. Allocates nothing but room for a tick longer than usual.
  * SH_ENOMEM: there was none; the tick is broken. */
 int worker_fill(struct worker *worker, const struct device_work *work, struct ring_slot *slot);

@@ -8,7 +8,7 @@
 #include "core/mat3.h"
 #include "tests/common/made.h"
 
-enum { MOST_VERTICES = 8000, MOST_TRIANGLES = 8000 };
+enum { MOST_VERTICES = 8000, MOST_TRIANGLES = 8000, ROOM_LINES_AHEAD = 5 };
 
 struct drawn {
     double vertex[MOST_VERTICES][3];
@@ -236,6 +236,7 @@ void seen_room_open(struct seen_room *r, uint64_t seed, const double at_m[3])
         must(line_block_alloc(&r->block[i], ROOM_PULSES * LINE_MAX_ECHOES, &err), &err);
         must(line_block_alloc_attributes(&r->block[i], &err), &err);
     }
+    must(caster_add_ahead(r->caster[1], ROOM_LINES_AHEAD * ROOM_PULSES, &err), &err);
 }
 
 void seen_room_close(struct seen_room *r)
@@ -260,7 +261,7 @@ static void same_blocks(const struct line_block *x, const struct line_block *y)
     assert_int_equal(n, y->n_points);
     for (uint32_t i = 0; i < n; i++)
         if (x->a[i] != y->a[i] || x->label[i] != y->label[i])
-            fail_msg("line %u, entry %u: %u, label %u; with sight %u, label %u", x->line, i, x->a[i], x->label[i],
+            fail_msg("line %u, entry %u: %u, label %u; in the other one %u, label %u", x->line, i, x->a[i], x->label[i],
                      y->a[i], y->label[i]);
     assert_memory_equal(x->b, y->b, n * sizeof *x->b);
     assert_memory_equal(x->c, y->c, n * sizeof *x->c);
@@ -271,6 +272,54 @@ static void same_blocks(const struct line_block *x, const struct line_block *y)
     assert_memory_equal(x->width_cns, y->width_cns, n * sizeof *x->width_cns);
 }
 
+/* Casts a run both ways, and compares. Returns the number of echoes. */
+static uint32_t cast_both(struct seen_room *r, const struct cast_setup *without, const struct cast_setup *with,
+                          const struct schedule_run *run)
+{
+    const uint32_t n[2] = {caster_cast(r->caster[0], without, run, &r->block[0]),
+                           caster_cast(r->caster[1], with, run, &r->block[1])};
+    assert_int_equal(n[0], n[1]);
+    same_blocks(&r->block[0], &r->block[1]);
+    return n[0];
+}
+
+/* Fills runs of pulses k .. end - 1, one for each line. Returns their number. */
+static uint32_t runs_of(const struct seen_room *r, uint64_t k, uint64_t end, struct schedule_run *run)
+{
+    uint32_t n = 0;
+    while (k < end) {
+        struct schedule_line line;
+        schedule_get_line(&r->segment, schedule_line_of(&r->segment, k), &line);
+        const uint64_t stop = line.cast_end < end ? line.cast_end : end;
+        schedule_get_run(&r->segment, &line, k, (uint32_t)(stop - k), &run[n++]);
+        k = stop;
+    }
+    return n;
+}
+
+/* The pulses ahead are those of two to five lines. They are cast in pieces that need not begin or end with a line. */
+int seen_room_compare_ahead(struct seen_room *r, const struct cast_setup *setup)
+{
+    struct schedule_run ahead[CAST_AHEAD_RUNS], piece[CAST_AHEAD_RUNS];
+    const uint64_t all = (uint64_t)ROOM_LINES * ROOM_PULSES;
+    uint64_t random = 5;
+    if (caster_room_ahead(r->caster[1], setup, NULL) == 0) return 0;
+    assert_int_equal(caster_room_ahead(r->caster[1], setup, NULL), ROOM_LINES_AHEAD * ROOM_PULSES);
+    for (uint64_t k = 0, end; k < all; k = end) {
+        end = k + 2 * ROOM_PULSES + (uint64_t)(case_unit(&random) * 3 * ROOM_PULSES);
+        if (end > all) end = all;
+        caster_look_ahead(r->caster[1], setup, ahead, runs_of(r, k, end, ahead));
+        for (uint64_t at = k, stop; at < end; at = stop) {
+            stop = at + 1 + (uint64_t)(case_unit(&random) * 2 * ROOM_PULSES);
+            const uint32_t n = runs_of(r, at, stop = stop < end ? stop : end, piece);
+            for (uint32_t i = 0; i < n; i++)
+                cast_both(r, setup, setup, &piece[i]);
+        }
+    }
+    caster_look_ahead(r->caster[1], setup, NULL, 0);
+    return 1;
+}
+
 uint64_t seen_room_compare(struct seen_room *r, const struct cast_setup *without, const struct cast_setup *with)
 {
     uint64_t echoes = 0;
@@ -279,11 +328,7 @@ uint64_t seen_room_compare(struct seen_room *r, const struct cast_setup *without
         struct schedule_run run;
         schedule_get_line(&r->segment, l, &line);
         schedule_get_run(&r->segment, &line, line.cast0, (uint32_t)(line.cast_end - line.cast0), &run);
-        uint32_t n[2] = {caster_cast(r->caster[0], without, &run, &r->block[0]),
-                         caster_cast(r->caster[1], with, &run, &r->block[1])};
-        assert_int_equal(n[0], n[1]);
-        same_blocks(&r->block[0], &r->block[1]);
-        echoes += n[0];
+        echoes += cast_both(r, without, with, &run);
     }
     return echoes;
 }

@@ -23,7 +23,7 @@ struct seen_room {
     struct cast_beam beam;
     struct schedule_segment segment;
     struct cast_setup setup; /* single rays, polar, no noise, without sight */
-    /* [0] is without the sight, [1] with it */
+    /* [0] is without the sight, and without hits ahead; [1] is with them */
     struct caster *caster[2];
     struct line_block block[2];
 };
@@ -32,6 +32,10 @@ struct seen_room {
  * to the outside. */
 void seen_room_open(struct seen_room *room, uint64_t seed, const double at_m[3]);
 void seen_room_close(struct seen_room *room);
+
+/* Casts all lines with and without hits that were found ahead, some lines at a time, which begin and end anywhere, and
+ * compares the blocks as below. Returns whether this setup can look ahead; else nothing is cast. */
+int seen_room_compare_ahead(struct seen_room *room, const struct cast_setup *setup);
 
 /* Casts all lines both ways and compares the blocks: each bit must be the same. Returns the number of echoes. */
 uint64_t seen_room_compare(struct seen_room *room, const struct cast_setup *without, const struct cast_setup *with);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Blocks with and without a sight are the same, byte by byte, whatever else a setup has. */
+/* Blocks with and without a sight are the same, byte by byte, whatever else a setup has. So are those with and without
+ * hits that were found ahead. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -238,6 +239,7 @@ static void compare(struct seen_room *r, const struct variant *v)
     assert_true(echoes > PULSES / 20);
     if (!v->from_station) assert_true(few == 0.0 && ask == 0.0);
     if (v->from_station) assert_true(few > 0.05 && few + ask < 0.4); /* most see one triangle */
+    assert_int_equal(seen_room_compare_ahead(r, &without), v->from_station);
 }
 
 static void everything_the_same(void **state)

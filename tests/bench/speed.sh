@@ -81,6 +81,7 @@ while [ "$turn" -le "$turns" ]; do
     for set in $sets; do
         bench=${folder[$set]}/tests/bench
         part panorama pinned "$bench/panorama" --set loop.threads=1 --rounds "$rounds" --ending none,.las,.ply,.e57 --raw
+        part panorama pinned "$bench/panorama" --set loop.threads=1 --rounds "$rounds" --lines --ending none,.las --raw
         part decode pinned "$bench/decode" --rounds "$rounds" --raw
         part live "$bench/live" --rounds "$rounds" --raw
     done

@@ -51,8 +51,11 @@ class Build:
         return f"{self.folder}/{name}.o"
 
     def environment(self, folder=None):
-        """Makes the environment of a program, with the library in a folder or the one without a mutant."""
-        return {"LD_LIBRARY_PATH": folder or self.work, **({"ASAN_OPTIONS": f"hard_rss_limit_mb={MOST_MEMORY >> 20}"} if self.name == "asan" else {})}
+        """Makes the environment of a program, with the library in a folder or the one without a mutant.
+
+        A test may have functions and variables of the library in its own form, which sanitizers would refuse."""
+        options = {"ASAN_OPTIONS": f"detect_odr_violation=0:hard_rss_limit_mb={MOST_MEMORY >> 20}"}
+        return {"LD_LIBRARY_PATH": folder or self.work, **(options if self.name == "asan" else {})}
 
     # ---- linking
 

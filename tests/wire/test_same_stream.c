@@ -53,11 +53,12 @@ static void scan(struct wire *wire, const char *config, const char *pace, const 
     finish(&head, sh, result);
 }
 
-static void record(struct wire *wire, const char *config, const char *threads, struct result *result)
+static void record(struct wire *wire, const char *config, const char *threads, const char *set, struct result *result)
 {
     char stats[352];
     snprintf(stats, sizeof stats, "%s", wire_path(wire, "stats.json"));
-    const char *const args[] = {"record", config, "--stats", stats, "--threads", threads, "--quiet", NULL};
+    const char *const args[] = {"record", config,    "--stats", stats, "--threads",
+                                threads,  "--quiet", "--set",   set,   NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
     stats_hash(wire, result->head);
     result->pulses = stats_uint(wire, "pulses");
@@ -75,7 +76,7 @@ static void test_pace_threads_link(void **state)
     char config[352];
     room_write(wire);
     snprintf(config, sizeof config, "%s", room_config_write(wire, &SHORT));
-    record(wire, config, "2", &first);
+    record(wire, config, "2", "cast.sight=auto", &first);
     struct oracle oracle = oracle_of(&SHORT, -40, 60, 240);
     assert_int_equal(first.pulses, oracle_count_cast(&oracle, 0, oracle_end(&oracle)));
     for (size_t i = 0; i < sizeof runs / sizeof runs[0]; i++) {
@@ -85,8 +86,13 @@ static void test_pace_threads_link(void **state)
         assert_int_equal(first.pulses, other.pulses);
         assert_int_equal(first.echoes, other.echoes);
     }
-    record(wire, config, "1", &other);
+    record(wire, config, "1", "cast.sight=auto", &other);
     assert_string_equal(first.head, other.head);
+    for (int i = 0; i < 3; i++) { /* off line, without a sight, several lines are cast together */
+        record(wire, config, i == 0 ? "1" : i == 1 ? "2" : "3", "cast.sight=off", &other);
+        assert_string_equal(first.head, other.head);
+        assert_int_equal(first.echoes, other.echoes);
+    }
 }
 
 /* A tick of 80 kB is more than a pty or a socket takes at once. The rest of it goes out later, and no byte is lost. */
@@ -100,7 +106,7 @@ static void test_ticks_longer_than_a_pty(void **state)
     room_write(wire);
     char path[352];
     snprintf(path, sizeof path, "%s", room_config_write(wire, &config));
-    record(wire, path, "1", &first);
+    record(wire, path, "1", "cast.sight=off", &first);
     for (int i = 0; i < 2; i++) {
         scan(wire, path, "fast", "1", links[i], &other);
         assert_string_equal(first.head, other.head);

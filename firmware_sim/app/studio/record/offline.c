@@ -14,6 +14,9 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/loop/loop.h"
 
+/* The longer this time, the slower lines can be that are cast together (firmware_sim/loop/casters.c). */
+static const double AHEAD_MS = 256.0;
+
 int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err)
 {
     int fd[2];
@@ -37,6 +40,7 @@ int offline_load(struct config *cfg, const struct site *beside, const struct sh_
                  struct sh_err *err)
 {
     cfg->loop.pace = PACE_FAST;
+    cfg->loop.ahead_ms = AHEAD_MS;
     cfg->n_links = 0;
     return site_load_for(cfg, SITE_FOR_SCANS, beside, report, site, err);
 }

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/* Lines ahead of the tick at hand: a caster that has claimed several ticks casts their lines together. */
+#include <string.h>
+
+#include "firmware_sim/loop/work_inside.h"
+
+enum {
+    LINES = 4,       /* that are cast together; more save little */
+    PULSES = 1 << 17 /* most of them. Their hits fit into the second-level cache, or nearly so */
+};
+
+int worker_add_ahead(struct worker *worker, struct sh_err *err)
+{
+    return caster_add_ahead(worker->caster, PULSES, err);
+}
+
+uint64_t worker_end_ahead(struct worker *worker, const struct device_work *work)
+{
+    const struct schedule_segment *segment = &work->segment;
+    if (!work->scanning || work->pulse_end == work->pulse0) return 0;
+    worker_take_setup(worker, work);
+    const uint64_t line_pulses = segment->den / segment->num,
+                   room = caster_room_ahead(worker->caster, &worker->setup, segment->spec.emitter),
+                   lines = room / line_pulses < LINES ? room / line_pulses : LINES;
+    return lines > 1 ? work->pulse0 + lines * line_pulses : 0;
+}
+
+/* Whether a tick goes on with the scan as it was. Padding may differ: then the lines are not cast together. */
+static int goes_on(const struct device_work *work, const struct device_work *first, uint64_t pulse)
+{
+    return work->scanning && work->scan == first->scan && work->pulse0 == pulse && work->site == first->site &&
+           work->version == first->version && work->prr_uhz == first->prr_uhz && !work->disturbance.on &&
+           memcmp(&work->segment, &first->segment, sizeof work->segment) == 0;
+}
+
+void worker_look_ahead(struct worker *worker, const struct device_work *work, uint32_t n)
+{
+    struct schedule_run run[CAST_AHEAD_RUNS];
+    struct worker_part part;
+    uint32_t n_runs = 0;
+    uint64_t end = work->pulse0;
+    for (uint32_t i = 0; i < n && goes_on(&work[i], work, end); i++)
+        end = work[i].pulse_end;
+    for (uint64_t k = work->pulse0; k < end && n_runs < CAST_AHEAD_RUNS; k = part.end) {
+        worker_get_part(&work->segment, k, end, &part);
+        if (part.cast0 >= part.cast_end) continue;
+        schedule_get_run(&work->segment, &part.line, part.cast0, (uint32_t)(part.cast_end - part.cast0),
+                         &run[n_runs++]);
+    }
+    caster_look_ahead(worker->caster, &worker->setup, run, n_runs > 1 ? n_runs : 0);
+}
+
+void worker_forget(struct worker *worker)
+{
+    caster_look_ahead(worker->caster, &worker->setup, NULL, 0);
+}
