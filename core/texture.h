@@ -38,7 +38,7 @@ struct texture_source {
 struct texture_image {
     uint32_t width, height;
     uint8_t *rgba; /* NULL: not decoded */
-    int has_alpha; /* the file has an alpha channel, or a PNG a transparent colour; not one of zeros in TGA or BMP */
+    int has_alpha; /* the file has an alpha channel, or a PNG a transparent colour. In TGA or BMP zeros don't count */
 };
 
 /* SH_EINPUT, naming the file: can't be read, or is larger than allowed; SH_ENOMEM. texture_image_free is due in any

@@ -29,7 +29,7 @@ struct ply {
     size_t n_colours, cap_colours;
     double rgb_scale;  /* of colours of vertices; 0: not known yet */
     double face_scale; /* of those of faces */
-    /* has_vertex_uv and has_texnumbers: the file has such figures. The others: they are wanted, too. */
+    /* has_vertex_uv and has_texnumbers say only what the file has. The other flags also say that it is wanted. */
     bool has_vertex_rgb;               /* colours of vertices */
     bool has_face_rgb;                 /* colours of faces, in the element at hand */
     bool has_uv;                       /* texture coordinates, by vertex, face or both */

@@ -76,7 +76,7 @@ int scene_write_out_copies(struct scene *s, uint64_t most, const struct sh_repor
         return sh_fail(
             err, SH_EINPUT,
             "scene.meshes[].copies: %u copies come to %u triangles; reports, coverage and the page of `run` need each "
-            "of them in memory: allowed there are %llu",
+            "of them in memory: allowed are %llu at most",
             s->n_copies, s->n_all, (unsigned long long)most);
     if (!write_out_make_room(s, vertices, s->n_all, uv, rgb, cutouts))
         return sh_fail(err, SH_ENOMEM, "no memory for the %u triangles of copies", s->n_all);

@@ -19,7 +19,7 @@ struct las_columns {
 };
 
 /* Sets one coordinate in counts of `scale` from `offset`, rounded. Returns the number of points before the first one
- * that is too far for 32 bits, or NaN. */
+ * that is NaN or too far for 32 bits. */
 int las_set_counts(const double *at, int n, double offset, double scale, int32_t *to);
 /* Sets 32768 + 100 times the reflectance; 0 where it is not modelled. */
 void las_set_intensities(const double *restrict reflectance_db, int n, uint16_t *restrict to);

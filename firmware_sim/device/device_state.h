@@ -173,7 +173,7 @@ int64_t device_path_end_ns(const struct device *device);
 /* The head's pose at a device time; 0: it stands at its station. A trajectory runs from the start of the
  * last scan to its end; then the platform stands there until the next scan begins. */
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
-/* Puts the poses of a live head for the work's pulses into it. */
+/* Gives the work the poses that a live head has at the work's pulses. */
 void device_take_poses(struct device *device, struct device_work *work);
 
 /* power.c */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Private to the files of the loop: struct loop, whose parts each belong to one of them. */
+/* Private to the files of the loop: struct loop. Each of its parts belongs to one of these files. */
 #ifndef FIRMWARE_SIM_LOOP_LOOP_INSIDE_H
 #define FIRMWARE_SIM_LOOP_LOOP_INSIDE_H
 

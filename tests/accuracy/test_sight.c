@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Rays of a standing station, by its map and by the BVH, have the same bits, in random odd scenes.
+/* In random odd scenes a station's map and the BVH give each ray the same hit, bit by bit.
  *
  * SIGHT_SCENES: how many scenes (default 400, THOROUGH=1: 1000). SIGHT_FIRST: the number of the first (0). SIGHT_RAYS:
  * rays from each station (1024). make test-sight: 50,000 scenes. */
@@ -19,7 +19,7 @@
 
 enum { MOST_RAYS = 1 << 16 };
 
-/* SH_SANITIZE: sanitizers are for the code, not for the count. */
+/* SH_SANITIZE: sanitizers check the code, and a few scenes run all of it. */
 #ifdef SH_SANITIZE
 #define SCENES 20
 #else
@@ -62,7 +62,7 @@ static int sees_cap(const void *ctx, const double dir[3], double radius_rad)
     return acos(fmax(-1.0, fmin(1.0, vec3_dot(cap->axis, dir)))) <= cap->angle_rad + radius_rad + 1e-6;
 }
 
-/* Prints the true hit where they disagree. */
+/* Prints the true hit of each kept ray where the sight and the BVH disagree. */
 static void print_truth(const struct look *look, const struct sight_beside *beside)
 {
     struct reference *reference =

@@ -6,8 +6,8 @@
  * The stream of a head of 20 million points a second is made beforehand. On sockets another process only writes its
  * bytes again and again, a megabyte at a time, on another processor where there is one. On USB the stand-in for libusb
  * of the unit tests copies them into each transfer, as the kernel does; no bus is in these figures. The client decodes
- * all points into columns, or into structs. Figures are processor time of the client's thread, kernel included, and the
- * clock's. */
+ * all points into columns or into structs, or none. Figures are the client's and the sender's processor time, the
+ * kernel's included, and the time that passes. */
 #include <arpa/inet.h>
 #include <getopt.h>
 #include <signal.h>

@@ -50,7 +50,7 @@ static void find(const char *name, int nr)
     if (i >= MOST_FOUND) return;
     found[i].nr = nr;
     found[i].at_sleep = atomic_load(&sleeps);
-    for (size_t k = 0; k + 1 < sizeof found[i].name && name[k] != '\0'; k++) /* no function that is looked at */
+    for (size_t k = 0; k + 1 < sizeof found[i].name && name[k] != '\0'; k++) /* strcpy might be one that is noted */
         found[i].name[k] = name[k];
 }
 
@@ -72,15 +72,15 @@ static void *next_of(const char *name)
     return f;
 }
 
-/* The replaced functions are found before main, since dlsym takes a lock for which the pacing thread would wait. What
- * runs even earlier finds its own. */
+/* The replaced functions are found before main, since dlsym takes a lock for which the pacing thread would wait. One
+ * that is called even earlier is found at its call. */
 #define FINDS(name)                                            \
     static void *next_##name;                                  \
     __attribute__((constructor)) static void find_##name(void) \
     {                                                          \
         if (next_##name == NULL) next_##name = next_of(#name); \
     }
-/* A function that notes its caller and then does its work. */
+/* A function that is noted where the pacing thread calls it, and then does its work. */
 #define LOOKED_AT(type, name, params, args) \
     FINDS(name)                             \
     type name params;                       \
@@ -108,11 +108,11 @@ ALLOCATES(void *, realloc, (void *p, size_t n), (p, n))
 extern void __libc_free(void *p);
 void free(void *p)
 {
-    if (p != NULL) note("free"); /* the end of a thread frees nothing */
+    if (p != NULL) note("free"); /* a thread that ends calls free(NULL) */
     __libc_free(p);
 }
 
-/* A thread that waits for a condition holds its mutex. */
+/* pthread_cond_wait is not here: its caller has locked a mutex before, which is noted. */
 LOOKED_AT(int, posix_memalign, (void **p, size_t align, size_t n), (p, align, n))
 LOOKED_AT(void *, aligned_alloc, (size_t align, size_t n), (align, n))
 LOOKED_AT(void *, memalign, (size_t align, size_t n), (align, n))
@@ -205,15 +205,15 @@ static size_t low_half(int arg)
     return __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__ ? at + 4 : at;
 }
 
-/* Lets this call pass, after its number is loaded. */
+/* Lets the call pass if the loaded value is `nr`. */
 static void let_pass(struct filter *filter, long nr)
 {
     compare(filter, (uint32_t)nr, 0, 1);
     end_with(filter, SECCOMP_RET_ALLOW);
 }
 
-/* Lets the calls of a semaphore pass: a wake-up, and a wait that is not one of a condition or mutex. Functions show
- * those. */
+/* Lets the calls of a semaphore pass: a wake-up and a wait. Waits for conditions and mutexes are noted by their
+ * functions. */
 static void let_semaphores(struct filter *filter)
 {
     compare(filter, SYS_futex, 0, 6);
@@ -252,8 +252,8 @@ static int list_eventfds(int *fd)
     return n;
 }
 
-/* Installs it for this thread alone, for ever. Returns the descriptor that shows its other calls; negative: there is no
- * such filter. */
+/* Installs the filter for this thread alone, for ever. Returns the descriptor that shows the thread's other calls;
+ * negative: there is no such filter. */
 static int install(void)
 {
     struct filter filter = {.n = 0};

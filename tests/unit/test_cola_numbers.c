@@ -127,7 +127,7 @@ static void numbers_in_b(void **state)
     assert_int_equal(cola_args_end(&two), COLA_OK);
 }
 
-/* After an error all values are 0, and the first one stays. Blanks after the last value are nothing, in CoLa-A. */
+/* After an error all values are 0, and a later error changes nothing. CoLa-A ignores blanks after the last value. */
 static void the_first_error_stays(void **state)
 {
     (void)state;

@@ -83,7 +83,7 @@ static void linear_light(void **state)
         assert_true(fabs(colour_srgb_encode(points[i][0]) - points[i][1]) < 1e-6);
         assert_true(fabs(colour_srgb_decode(points[i][1]) - points[i][0]) < 1e-6);
     }
-    assert_true(colour_srgb_encode(2.0) > 1.3 && colour_srgb_decode(1.5) > 2.0); /* beyond stays beyond */
+    assert_true(colour_srgb_encode(2.0) > 1.3 && colour_srgb_decode(1.5) > 2.0); /* above 1 stays above 1 */
 }
 
 static void words(void **state)

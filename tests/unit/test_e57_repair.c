@@ -5,8 +5,8 @@
 
 enum { PAGE = 1024, CONTENT = 1020, MAX_PACKETS = 128, MAX_SCANS = 4 };
 
-/* The complete recording, by its XML and the lengths of its packets: the begin of each scan's packets, the end of each
- * packet, without the CRCs, and the records up to there. */
+/* The complete recording, by its XML and the lengths of its packets: where each scan's packets begin, where each packet
+ * ends, and the records up to there. Places count the bytes without the pages' CRCs. */
 static struct {
     size_t end, n;
     int scan;
@@ -14,7 +14,7 @@ static struct {
 static int n_packets, n_scans;
 static const char MISSING[] = "; repaired: its end is missing";
 static size_t scan_begin[MAX_SCANS];
-static uint8_t *whole, *left; /* the complete file; the disk's contents just before */
+static uint8_t *whole, *left; /* the complete file; what the disk had before it was completed */
 static size_t whole_len, left_len;
 static int empty_shots, coloured;
 
@@ -62,8 +62,8 @@ static void keep_left(const char *path)
     left = rig_read(path, &left_len);
 }
 
-/* Lines have a second or more between them, so that packets are short. The last point of the stream comes too late for
- * any packet but that of the end. */
+/* Lines have a second or more between them, so that packets are short. The stream's last points are written in the
+ * packet that the end of the recording makes. */
 static void record_scans(void)
 {
     static struct rig_point p[40];
@@ -188,7 +188,7 @@ static int already_seen(int scans, int packets, const uint8_t *file, size_t len)
     return 0;
 }
 
-/* Bytes at the end that are in no whole unit: neither zeros that fill the last page, nor the XML, which is renewed. */
+/* Counts the bytes at the end that belong to no whole packet. Zeros of the last page and the XML don't count. */
 static size_t cut_of(const uint8_t *from, size_t len, int scans, int packets)
 {
     const size_t there = len / PAGE * CONTENT, begin = scan_begin[scans - 1];
@@ -240,7 +240,7 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     free(file);
 }
 
-/* Files are cut at the edges of pages, where anything changes, and a byte before. */
+/* Files are cut at the ends of pages, since only there the result changes, and a byte before. */
 static void test_cuts(void **state)
 {
     (void)state;
@@ -267,7 +267,7 @@ static char *xml_of(const char *path)
 }
 
 /* A file that was being completed, or a whole one whose end is missing. Once all points are there, the same file comes
- * out, and says that its end may be missing. */
+ * out, with the note that its end is missing. */
 static void test_end(void **state)
 {
     (void)state;
@@ -283,7 +283,7 @@ static void test_end(void **state)
     killed_rig_write(path, whole, whole_len);
     char *want = xml_of(path);
     const size_t end = packet[n_packets - 1].end / CONTENT * PAGE; /* pages before the XML */
-    for (int header = 0; header < 2; header++) { /* the file's own header, and those of the scans, are not there yet */
+    for (int header = 0; header < 2; header++) { /* not there yet: all headers; then only the file's own */
         size_t len;
         uint8_t *part = malloc(whole_len);
         memcpy(part, whole, whole_len);
@@ -344,7 +344,7 @@ static void reseal(uint8_t *page)
         page[CONTENT + i] = (uint8_t)(~crc >> (24 - 8 * i));
 }
 
-/* Bytes between our last packet and the XML section are another program's. The repair claims no number of points. */
+/* Bytes between our last packet and the XML section are another program's. Such a file is refused and stays. */
 static void test_elsewhere(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of georeferencing where the scene's frame is not level: far in the scene may be far up there. */
+/* Bounds of georeferencing where the scene's frame is not level: a place far along it may be high above the ground. */
 #include "core/angle.h"
 #include "core/geoframe.h"
 #include "tests/unit/georef_rig.h"
@@ -64,7 +64,7 @@ static void test_tilted(void **state)
     }
 }
 
-/* Scenes in a polar grid, whose degrees follow the meridian, too: at both poles, all around. */
+/* Scenes in a polar grid, whose points become degrees: at both poles, all around. */
 static void test_polar_grids(void **state)
 {
     (void)state;
@@ -93,8 +93,8 @@ static void test_polar_grids(void **state)
     }
 }
 
-/* A scene in a UTM grid, in the grid of the next zone: heights are the same, and order 5 is there, too. Its error is
- * seen where the scene is large. */
+/* A scene in a UTM grid, whose points go to the grid of the next zone. Heights stay the same, and order 5 is tested,
+ * too. The error of order 5 shows only in a large scene. */
 static void test_next_grid(void **state)
 {
     (void)state;

@@ -4,7 +4,7 @@
 #include "tests/common/thorough.h"
 #include "tests/unit/killed_rig.h"
 
-enum { EACH = SANITIZED ? 37 : 1 }; /* of the bytes */
+enum { EACH = SANITIZED ? 37 : 1 }; /* a cut after each byte, or each 37th */
 
 static char *whole;
 static size_t whole_len;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The test listens as the service manager does, on a path and on an abstract name. Names that are none are refused. */
+/* The test listens as the service manager does, on a path and on an abstract name. Names of no socket are refused. */
 #include "firmware_sim/base/notify.h"
 
 #include <setjmp.h>

@@ -42,7 +42,7 @@ static const char RINGS[] = "rings at other elevations; allowed are those of a V
                   TIMES[] = "another firing sequence; allowed is that of a VLP-16: clockwise, 55.296 us, with a beam "
                             "each 2.304 us";
 
-/* Profiles give elevations in hundredths of a degree, so a hundredth is allowed, and no more. */
+/* Profiles give elevations in hundredths of a degree, so they may be off by a hundredth, and no more. */
 static void heads_of_velodyne(void **state)
 {
     (void)state;
@@ -52,7 +52,7 @@ static void heads_of_velodyne(void **state)
         for (int i = 0; i < 16; i++)
             for (int sign = -1; sign <= 1; sign += 2) {
                 vlp16(is_hi_res);
-                beam[i].elevation_udeg += sign * (is_hi_res ? 9990 : 10000); /* the Hi-Res has no whole numbers */
+                beam[i].elevation_udeg += sign * (is_hi_res ? 9990 : 10000); /* thirds of a degree are rounded */
                 assert_string_equal(refusal_of(PROTOCOL_VELODYNE, 36000), "");
                 beam[i].elevation_udeg += sign * (is_hi_res ? 20 : 1);
                 assert_string_equal(refusal_of(PROTOCOL_VELODYNE, 36000), RINGS);

@@ -127,7 +127,7 @@ static void written_out_copies_are_as_they_were(void **state)
     assert_int_equal(scene_write_out_copies(s, s->n_all - 1, NULL, &err), SH_EINPUT);
     assert_string_equal(err.text,
                         "scene.meshes[].copies: 4 copies come to 11 triangles; reports, coverage and the page "
-                        "of `run` need each of them in memory: allowed there are 10");
+                        "of `run` need each of them in memory: allowed are 10 at most");
     scene_free(s);
 }
 

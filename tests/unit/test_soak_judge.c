@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The judge of a soak compares the faults of each frame with the client's view. A client that is wrong must show. */
+/* The judge of a soak compares the faults of each frame with the client's view. It has to notice a wrong client. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -96,8 +96,8 @@ static char *body_of(char *ply)
     return at + 11;
 }
 
-/* Attributes come between or not. If colours, attributes or points are lost, each point has its own colour or
- * grey. */
+/* Attributes come between points and colours, or not. If colours, attributes or points are lost, each point has its own
+ * colour or grey. */
 static void test_as_sent(void **state)
 {
     (void)state;
@@ -147,7 +147,7 @@ static void test_another_choice(void **state)
     free(text);
 }
 
-/* LAS format 7 (16 bits: 257 times), LAS 1.2 format 3, PTX with its empty places. */
+/* LAS 1.2 format 3, LAS 1.4 format 7 (16 bits: each value times 257), PTX with its empty places. */
 static void test_formats(void **state)
 {
     (void)state;
@@ -177,8 +177,8 @@ static void test_formats(void **state)
     free(ptx);
 }
 
-/* The ramp is blue, green, yellow, red over the limits. At 1 m it is blue, at 4 m a third towards green, at 10 m red.
- * Beyond the limits it is as at them. */
+/* The ramp is blue, green, yellow, red from 1.5 to 9 m. At 1 m it is blue, at 4 m, a third of the way, green, at 10 m
+ * red. Beyond the limits it is as at them. */
 static void test_range(void **state)
 {
     (void)state;
@@ -201,7 +201,7 @@ static void test_range(void **state)
     free(text);
 }
 
-/* The scan's anchor is at z = 5 m. The z of the points is worked out by hand, and as far along the ramp. */
+/* The station and the lower limit are at z = 5 m. So a point's height above the station gives its place on the ramp. */
 static void test_height(void **state)
 {
     (void)state;
@@ -297,7 +297,7 @@ static void test_frames_of_points(void **state)
     }
 }
 
-/* A file holds one kind, unless its colours are computed here. */
+/* A file holds points with colours or without, not both, unless the recorder computes the colours. */
 static void test_kinds(void **state)
 {
     (void)state;

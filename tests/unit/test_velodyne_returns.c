@@ -61,13 +61,13 @@ static void test_dual_returns(void **state)
         {{2, {10.0, 20.0}, {-300, -1000}, {0}}, 10000, 5000, 10, 50},
         /* The last is the stronger one: 7 dB more reflectance against 6 dB of range. */
         {{2, {10.0, 20.0}, {-1000, -300}, {0}}, 10000, 5000, 50, 10},
-        /* 5 dB of reflectance don't make up for 6 dB of range, but three do where the range is the same within a
+        /* 3 dB of reflectance don't make up for 6 dB of range, but do where the range is the same within a
          * metre. */
         {{3, {10.0, 20.0, 21.0}, {-1000, -700, -1000}, {0}}, 10500, 5000, 10, 10},
         {{3, {10.0, 20.0, 21.0}, {-1000, -550, -2000}, {0}}, 10500, 5000, 1, 10}, /* nor do 4.5 dB */
         {{3, {10.0, 20.0, 21.0}, {-2000, -700, -1000}, {0}}, 10500, 10000, 10, 20},
         {{3, {10.0, 11.0, 21.0}, {-1000, -700, 0}, {0}}, 10500, 5500, 100, 20},
-        /* The last is the strongest of three; then the first, of the two before it. */
+        /* The last is the strongest of three, and the first is the second strongest. */
         {{3, {10.0, 11.0, 12.0}, {-700, -1000, 0}, {0}}, 6000, 5000, 100, 20},
         /* Reflectances are not modelled, so the nearest is the strongest. */
         {{2, {10.0, 20.0}, {INT16_MIN, INT16_MIN}, {0}}, 10000, 5000, 0, 0},
@@ -145,7 +145,7 @@ static void test_reflectivities(void **state)
 }
 
 /* After pulses that the head did not send the next packet begins with the next firing sequence. The begun packet is not
- * sent, and its pulses are counted: no reader was too slow. */
+ * sent. Its pulses count as unsent, and not as a loss: no reader was too slow. */
 static void test_lost_pulses(void **state)
 {
     (void)state;
@@ -266,7 +266,7 @@ static void test_rpm_changes(void **state)
     }
 }
 
-/* This device can't be such a head: other beams, a line head, first echoes. Nothing is sent, and pulses are counted. */
+/* A VLP-16 can't be such a head: other beams, a planar head, first echoes. Nothing is sent, and pulses are counted. */
 static void test_other_heads(void **state)
 {
     (void)state;

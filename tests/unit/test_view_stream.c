@@ -154,7 +154,7 @@ static void stations_have_their_places(void **state)
 }
 
 /* A grid of 2 x 3 shots has a cell of 3 x 1 m and one of 1 x 1 m, with two triangles each. Before the filter of long
- * edges there are nine: 3 + 1 + 3 + 1 along the lines, three of 1 m across, and the diagonals root 10 and root 2. */
+ * edges there are nine edges: 3 + 1 + 3 + 1 m along the lines, three of 1 m across, and diagonals of root 10 and 2. */
 static void a_grid_is_a_mesh(void **state)
 {
     (void)state;
@@ -253,7 +253,7 @@ static void degrees_are_turned_to_metres(void **state)
         assert_true(fabs(xyz_m[0][0]) + fabs(xyz_m[0][1]) + fabs(xyz_m[0][2]) < 1e-6);
         assert_true(fabs(xyz_m[2 - wide][2] - 1.5) < 1e-6);
         const double r_m = 6367381.8 + 400.125, north_m = r_m * 0.001 * M_PI / 180.0;
-        if (!wide) /* the ellipsoid curves downwards by half a square over the radius */
+        if (!wide) /* the ellipsoid falls by half the distance squared, over the radius */
             assert_true(fabs(xyz_m[1][1] - north_m) < 2e-5 && fabs(xyz_m[1][2] + 0.5 * north_m * north_m / r_m) < 1e-6);
         assert_int_equal(strstr(rig_notes, ": 1 echoes left out, since their place is not known\n") != NULL, wide);
         viewed_free(&shown);

@@ -175,8 +175,8 @@ static void places_below_many_surfaces_are_found(void **state)
     scene_free(scene);
 }
 
-/* The figure of the message is taken, and to two digits it is the least one: a step shorter by a tenth is refused. The
- * last grid is shorter along x than a step. */
+/* The step that the message names is accepted. To two digits it is the least one: a step shorter by a tenth is refused.
+ * The last grid is shorter along x than a step. */
 static void the_step_that_a_large_grid_is_told_to_use_is_enough(void **state)
 {
     (void)state;
@@ -240,7 +240,7 @@ static void an_object_is_looked_at_from_the_front(void **state)
         assert_all_in_view(lo, hi);
         assert_true(at.seen > 0.1);
     }
-    assert_true(at.faces_out); /* 200 m wide and high: room for a head, but it would see backs */
+    assert_true(at.faces_out); /* a head has room in the last box, but would see the faces' backs */
 }
 
 /* A plate across x is not visible from a place before it in y. */
@@ -355,7 +355,7 @@ static void a_view_without_room_is_refused(void **state)
     assert_int_equal(viewpoint_find(NULL, &none, NULL, &at, &err), SH_EINPUT);
 }
 
-/* From above and from the front a box is below 45 degrees, which this view does not hold. */
+/* A head that sees the box from the front or from above has it below 45 degrees of elevation, outside this view. */
 static void a_view_that_holds_nothing_is_refused(void **state)
 {
     (void)state;

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The same scene, stations and step in Blender. tests/readers/blender_scan.py scans with geometry nodes, in single
- * precision and with no code of ours. scanhead records the same here, and each of its shots is compared with Blender's
- * ray of that direction. Shot and ray both meet something, at the same place, or neither does.
+/* Blender and scanhead scan the same scene, from the same stations, with the same step. In Blender
+ * tests/readers/blender_scan.py scans with geometry nodes, in single precision and with no code of ours. Each shot of
+ * scanhead is compared with Blender's ray of that direction. Both meet something, at the same place, or neither does.
  *
- * The bound of their distance, with e = 2^-23, at range r, where coordinates go up to C and the surface is met at an
- * incidence i: Directions come from float angles. An azimuth of up to 2 pi is rounded twice (12.6 e/2), an elevation of
- * up to pi once (6.3 e/2). Sines, cosines, their product and the turn by a matrix of floats add 6 e/2. Together that is
- * less than 13 e. At the surface vertices and the station are rounded (e/2 of C on each axis), and the intersection has
- * about ten roundings of differences of up to 2 C. Together that is less than 8 e C. On a slanted surface an error
- * across the ray is 1 / cos i of it along the ray: e (13 r + 8 C) / cos i. scanhead adds half a count of 1e-6 m.
+ * Their distance has a bound. e is 2^-23, r the range, C the largest coordinate, i the angle of incidence. Directions
+ * come from float angles. An azimuth of up to 2 pi is rounded twice (12.6 e/2), an elevation of up to pi once
+ * (6.3 e/2). Sines, cosines, their product and the turn by a matrix of floats add 6 e/2. Together that is less than
+ * 13 e. At the surface vertices and the station are rounded (e/2 of C on each axis), and the intersection has about ten
+ * roundings of differences of up to 2 C. Together that is less than 8 e C. On a slanted surface an error across the ray
+ * grows by up to 1 / cos i: e (13 r + 8 C) / cos i. scanhead adds half a count of 1e-6 m.
  *
  * Where a ray passes an edge within that bound, Blender may take the surface beside or behind it. Such rays are
  * counted, and each has to be that near to an edge of the mesh. */
@@ -24,7 +24,7 @@ enum { STEP_DEG = 2, SEGMENTS = 360 / STEP_DEG, GAPS = 180 / STEP_DEG, RAYS = (G
 
 enum { CELLS = 40, POSTS = 3, N_VERTICES = (CELLS + 1) * (CELLS + 1) + 8 * POSTS, N_QUADS = CELLS * CELLS + 6 * POSTS };
 static const double CELL_M = 0.61, FIRST_M = -12.3; /* of the ground's first corner, x and y */
-static const double FAR_M = 25;                     /* no two points of it lie farther apart as seen from a station */
+static const double FAR_M = 25;                     /* no point of the scene is farther from a station */
 static const double post_at[POSTS][2] = {{3.17, 1.93}, {-2.71, -4.39}, {-6.13, 5.57}};
 static const double post_lean[POSTS] = {-0.61, 0.0, 0.37};
 
@@ -141,7 +141,7 @@ static struct ray rays[STATIONS][RAYS];
 struct sums {
     int both, neither, hidden, edges, border;
     double most;    /* of the allowed distance */
-    double opening; /* cosine of the tripod's; 2 without one */
+    double opening; /* cosine of the tripod's opening; 2 without a tripod */
 };
 
 static void run_blender(struct wire *wire)
@@ -345,8 +345,8 @@ static void the_same_points_in_blender(void **state)
         sums[i].opening = opening_of(&stations[i]);
     compare_recording(wire, sums);
     for (int i = 0; i < STATIONS; i++) {
-        /* Rays are 35 mrad apart, and whether one is within 2e-5 m of an edge, or on the cone, is a matter of chance.
-         * There is none here. */
+        /* Rays are 35 mrad apart. Whether one is within 2e-5 m of an edge, or on the tripod's cone, is a matter of
+         * chance, so a few are allowed. */
         assert_true(sums[i].both > 3000 && sums[i].neither > 1000 && sums[i].edges <= 4 && sums[i].border <= 4);
         print_message("# station %d: %d shots at the same place, up to %.2f of what is allowed; %d without echo, %d "
                       "hidden; %d at edges, %d at the border of the cone\n",

@@ -145,7 +145,7 @@ static void test_objects_by_pipe(void **state)
     free(err);
 }
 
-/* Grey is for meshes without any colour. The others give the share that has one. */
+/* A warning of surfaces without colours is for those that have none. Surfaces with some get a warning of their own. */
 static void test_colours_in_part(void **state)
 {
     struct wire *wire = *state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Configurations that can't be recorded are refused before the first scan: one line, status 2, no file. Each case has
- * its error at the last of three stations, where earlier ones could be scanned. */
+/* Configurations that can't be recorded are refused before the first scan: one line, status 2, no file. Where a
+ * case has three stations, the error is mostly at the last one, and the earlier ones could be scanned. */
 #include "tests/wire/room.h"
 #include "tests/wire/usage_rig.h"
 
@@ -86,7 +86,7 @@ static void a_station_beyond_the_numbers_of_las(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
-/* 2 * 10^9 shots, as many as no machine has memory for. */
+/* These are 5.8 * 10^9 shots, more than a mesh may have vertices (MESH_MAX_VERTICES). */
 static void a_scan_of_too_many_points(void **state)
 {
     usage_complaints = 0;
@@ -101,7 +101,7 @@ static void colours_that_points_do_not_say(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
-/* Nothing is looked up by a station's number before it is known to be one. */
+/* A station's number is checked before anything is looked up by it. */
 static void a_station_that_is_not_there(void **state)
 {
     static const char *const fourth[] = {"--station", "4", "-o", "a.ply", NULL};

@@ -64,7 +64,7 @@ void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key)
 {
     const size_t row = cfg_row(rd, key);
-    if (rd->own[row]) return; /* the scanner has the key already, or an earlier element of the list */
+    if (rd->own[row]) return; /* the scanner's already, maybe by an earlier element of the list */
     if (key->type == CFG_LIST) {
         cfg_forget_list(rd, key->path);
         for (size_t i = 0; i < rd->table.n; i++)
