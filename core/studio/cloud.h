@@ -121,7 +121,7 @@ struct cloud_coverage {
     uint32_t surfaces_hit, triangles_hit;
 };
 
-/* Returns the surface of point i: its label, or where the file has none its nearest triangle's; CLOUD_LABEL_NONE when
+/* Returns the surface of point i: its label, or its nearest triangle's where the file has none; CLOUD_LABEL_NONE when
  * there is no such triangle. */
 uint16_t cloud_surface(const struct cloud *cloud, const struct scene *scene, const uint32_t *triangle, size_t i);
 

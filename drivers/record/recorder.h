@@ -76,7 +76,7 @@ struct recorder {
     const struct recorder_ops *ops;
     struct recorder_options options;
     struct outfile file;
-    struct track track; /* file.path is its path in messages */
+    struct track track; /* its messages name file.path */
     int has_failed;     /* a write failed: the file is not completed */
     int is_refused;     /* the format can't hold the first scan: no file is made */
 };

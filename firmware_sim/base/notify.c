@@ -21,7 +21,7 @@ int notify_is_wanted(void)
     return socket_name()[0] != '\0';
 }
 
-/* An abstract name begins with a NUL and ends with its length; a path ends with a NUL. */
+/* An abstract name begins with a NUL and ends where its length says; a path ends with a NUL. */
 static int read_address(const char *name, struct sockaddr_un *address, socklen_t *len, struct sh_err *err)
 {
     const size_t n = strlen(name);

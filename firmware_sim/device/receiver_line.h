@@ -32,7 +32,7 @@ void receiver_line_run(struct receiver_line *line, const struct gnss *gnss, stru
 /* Finds the last sentence that had arrived at t_ns. 0: there is none. */
 int receiver_line_last(const struct receiver_line *line, const struct gnss *gnss, int64_t t_ns,
                        struct receiver_sentence *out);
-/* Returns when the first sentence arrives at t_ns or later, as far as it is known; INT64_MAX: none ever does. A time
+/* Returns the time of the first arrival at t_ns or later, as far as it is known; INT64_MAX: none ever comes. A time
  * that no tick has reached yet may be too early, as a fault may still delay the sentence. So the caller has to ask
  * again at that time. */
 int64_t receiver_line_next_ns(const struct receiver_line *line, const struct gnss *gnss, int64_t t_ns);

@@ -12,8 +12,8 @@
 #include "firmware_sim/device/scan_state.h"
 #include "firmware_sim/device/versions.h"
 
-/* The site, planned again for settings that commands gave (site_vary). The variant is kept while a scan or a work uses
- * it. */
+/* The site, planned again for settings that commands gave (site_vary). The variant is kept while a scan or a tick's
+ * work uses it. */
 struct device_variant {
     struct device_variant *next;
     struct device_version *version; /* the variant is made from it, and counts as one of its users */
@@ -35,7 +35,7 @@ int device_find_variant(struct device_variants *variants, const struct head_sett
                         struct device_variant **out, struct sh_err *err);
 /* The same as command_device.can_plan; owner: the variants. */
 int device_can_plan(void *owner, const struct head_settings *settings, char *why, size_t len);
-/* Frees the variants that no work and no scan uses. */
+/* Frees the variants that no tick's work and no scan uses. */
 void device_free_unused_variants(struct device_variants *variants);
 void device_free_variants(struct device_variants *variants);
 

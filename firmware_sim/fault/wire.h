@@ -3,8 +3,8 @@
  *
  * In: frames of the native protocol, units of another one, reply lines, in the order in which the session would write
  * them; the clock. Out: pieces to be written, each with the time before which it must not go out; and acts (to hang up,
- * to unplug, and so on), which the owner carries out on its link once they are first in the queue. The wire notes each
- * fault that strikes on the board. The owner notes an act once it is carried out. Without faults a session has no wire.
+ * to unplug, and so on), which the owner carries out on its link once they are first in the queue. The wire notes on
+ * the board each fault that strikes. The owner notes an act once it is carried out. Without faults there is no wire.
  *
  * At a frame faults strike in this order: acts that end the session, and a pulled cable; drop, and on datagrams flips
  * without reseal; truncate; flips with reseal; all others, in the order of the list. A fault that finds nothing to do
@@ -62,7 +62,7 @@ int wire_put_rest(struct wire *wire, const uint8_t *bytes, size_t len);
 /* An act that should have ended the session could not be carried out. Items that were put since then are lost. */
 void wire_go_on(struct wire *wire);
 /* A command of this session changed the list. The next `ahead` replies answer the lines up to that command: new faults
- * count only the replies after these. Of all other items, new faults count from the next one. */
+ * count only the replies after these. They count all other items from the next one on. */
 void wire_renew(struct wire *wire, uint64_t ahead);
 /* All items from before device time t_ns were put. INT64_MAX: no more items come, so none is waited for. */
 int wire_time(struct wire *wire, int64_t t_ns);
@@ -81,8 +81,8 @@ int wire_is_full(const struct wire *wire, size_t cap, int64_t now_ns);
 int wire_is_empty(const struct wire *wire);
 /* Whether a fault holds back the next piece: a stall that is on or begins now, or a time that is still to come. */
 int wire_keeps_back(const struct wire *wire, int64_t now_ns);
-/* Counts the frames of the stream (without those for this reader alone) or units that were put and not written as a
- * whole, and the pulses in them. Dropped frames count as written; those after an act that ends the session do not. */
+/* Counts frames of the stream, or units, that were put and not wholly written, and their pulses. Frames for this reader
+ * alone are left out. Dropped frames count as written. Frames after an act that ends the session count as unwritten. */
 void wire_count_unwritten(const struct wire *wire, uint64_t *frames, uint64_t *pulses);
 
 #endif

@@ -52,7 +52,7 @@ void bench_schedule(uint32_t lines, uint32_t pulses, uint32_t frames, struct sch
 int bench_rays_room(const struct schedule_spec *spec, uint32_t lines, uint32_t line_pulses, struct bench_rays *out,
                     struct sh_err *err);
 void bench_rays_aim(struct bench_rays *rays, uint32_t first_line);
-/* Fills in the rays of the first `bundle` of each bundle * every lines. */
+/* Fills in the rays of the first `bundle` lines in each group of bundle * every lines. */
 void bench_rays_spread(struct bench_rays *rays, uint32_t bundle, uint32_t every);
 /* Makes the rays of a whole turn of so many lines. */
 int bench_rays_create(uint32_t lines, struct bench_rays *out, struct sh_err *err);
@@ -74,12 +74,12 @@ struct bench_case {
     struct bvh *bvh;
     double seconds; /* it measures for so long, but at least BENCH_MIN_ROUNDS */
 };
-#define BENCH_ENCODER 1048576.0 /* counts per turn of all profiles in config/heads */
+#define BENCH_ENCODER 1048576.0 /* counts per turn, as in most profiles with encoders in config/heads */
 /* Sets Embree up alone over a mesh, with the bench's longest range and all threads for the build. */
 int bench_embree(const struct scene *scene, const double origin_m[3], int robust, struct embree_alone *out,
                  struct sh_err *err);
 /* Prepares Embree for the packets at which it is fastest: 4, 8 or 16 rays, from memory or filled on the way. cost()
- * measures a pass with those that *width and *feed have at the time. */
+ * measures a pass with the present *width and *feed. */
 int bench_choose_embree(struct embree_alone *e, uint32_t *width, enum embree_feed *feed, double (*cost)(void *ctx),
                         void *ctx, struct sh_err *err);
 /* The station is at 52.5 N, 13.4 E, and positions are in ECEF. */

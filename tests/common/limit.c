@@ -38,7 +38,7 @@ static volatile sig_atomic_t ended_one; /* a thread has begun to print where all
 static volatile sig_atomic_t answered;
 
 #ifdef SH_SANITIZE
-/* The address sanitizer keeps its marks of memory mapped and writes them anew. To unmap them and fault them in again
+/* With these options the address sanitizer keeps its shadow memory mapped, and overwrites it. To unmap and map it again
  * takes a quarter of the time of a test that often makes large arrays. */
 const char *__asan_default_options(void);
 const char *__asan_default_options(void)
@@ -54,7 +54,7 @@ __attribute__((format(printf, 1, 2))) static void say(const char *format, ...)
     char text[512];
     va_list args;
     va_start(args, format);
-    int n = vsnprintf(text, sizeof text, format, args); /* without %f: glibc's needs no memory for these */
+    int n = vsnprintf(text, sizeof text, format, args); /* without %f glibc's vsnprintf needs no memory */
     va_end(args);
     if (n > (int)sizeof text - 1) n = (int)sizeof text - 1;
     for (ssize_t done = 0, w; done < n; done += w)

@@ -18,7 +18,7 @@ beam: {mode: adaptive}
 links: [{type: web, waits: yes}, {type: tcp}]
 `);
 
-/** Records the same scan and returns {points, shots, min, max, hash, file}. The page does not have the code that counts them. */
+/** Records the same scan and returns {points, shots, min, max, hash, file}. Code apart from the page's counts them. */
 export function recorded(name, settings, ...options) {
   const file = `${folder}/${name}.shs`;
   run('record', CONFIG, '-o', file, '--quiet', ...options, ...settings.flatMap((s) => ['--set', s]));

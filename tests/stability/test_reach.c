@@ -2,8 +2,8 @@
 /* The cost of a ray does not depend on where it begins, nor on how large the scene around a body is. Cost is counted in
  * leaves that a packet is tested against, and in triangles that are decided one by one. No clock is read.
  *
- * Some casts widen their float triangles for the head's place, over the cosine as seen from there. At a ball of 5,120
- * triangles 800 m away such a cast took 2,000 times as long for a ray as beside the ball. */
+ * Some casts widen their float triangles for the head's place: by a margin over the cosine of incidence from there. At
+ * a ball of 5,120 triangles such a cast took 2,000 times as long for a ray from 800 m away as from beside it. */
 #include <math.h>
 #include <string.h>
 
@@ -21,7 +21,7 @@ struct cost {
     uint32_t hits;
 };
 
-/* A ball on ground that reaches about so far, and further to one side. There is no ground with 0. */
+/* A ball on ground that reaches about so far, and further to one side. With 0 there is no ground. */
 static struct bvh *ball_on_ground(double ground_m, struct scene **scene)
 {
     static const double centre[3] = {0.0, 0.0, 0.0};
@@ -78,8 +78,8 @@ static struct cost in_scene(double ground_m, double from_m, int moves)
     return cost;
 }
 
-/* The ball's leaves are 0.1 m large. At 1 km boxes are larger than them by 0.5 mm, so a packet that is as wide meets
- * one in a hundred more on each side. A few rays in a thousand pass an edge there more closely than single precision
+/* The ball's leaves are 0.1 m large. Their boxes are larger by 2 micrometres, wherever rays begin: a ray from far away
+ * starts anew near the ball (hits.c). A few rays in a thousand pass an edge there more closely than single precision
  * can tell. */
 static void far_away_costs_as_near_by(void **state)
 {
@@ -94,8 +94,8 @@ static void far_away_costs_as_near_by(void **state)
     }
 }
 
-/* On ground of up to 1,000 km boxes are larger by 4 mm, 9 x 2^-24 of the 8 km that a float ray is long. On 1 km it is
- * 1.3 mm, 16 x 2^-24 of its radius. The ball's leaves are 0.1 m large. */
+/* On ground of up to 1,000 km boxes are larger by 4 mm, 9 x 2^-24 of the 8 km that a float ray is long. On 1 km they
+ * are larger by 1.3 mm, 16 x 2^-24 of the scene's radius. The ball's leaves are 0.1 m large. */
 static void ground_around_costs_little(void **state)
 {
     (void)state;

@@ -23,7 +23,7 @@ uint64_t seal_count(const struct protocol_ops *ops, const uint8_t *unit, size_t 
     return n;
 }
 
-/* The contents of a unit, in which these bits are changed. */
+/* The contents of a unit, as its reader returns them. */
 struct said {
     uint8_t bytes[MAX_SAID];
     size_t size;

@@ -37,7 +37,7 @@ static void each_copy_has_its_mesh_and_place(void **state)
     assert_true(last->at_m[1] == 4.0 && last->at_m[2] == 5.0 && last->turn_deg == 6.0 && last->scale == 7.0);
 }
 
-/* A list, a mesh, all meshes or the whole scene that is set takes its copies with it, and no others. */
+/* Where --set replaces a list, a mesh, all meshes or the whole scene, the copies there go, and no others. */
 static void what_is_replaced_loses_its_copies(void **state)
 {
     (void)state;

@@ -10,7 +10,7 @@ static const struct kind {
     double n_max;        /* 0: it has no n */
     int n;               /* where n is not given */
     const char *most_ms; /* NULL: for_ms is not needed */
-    char needs;          /* t: a time of day, p: a follower of PTP, s: who asks a time server */
+    char needs;          /* t: a time of day, p: a follower of PTP, s: a scanner that asks a time server */
 } kinds[FAULT_N_KINDS] = {
     {"drop", "", 'f', 0, 1, NULL, 0},
     {"duplicate", "n", 'f', 100, 1, NULL, 0},
@@ -207,8 +207,8 @@ static void kinds_need_what_they_change(void **state)
     }
 }
 
-/* Kinds that a link can have; others are not of links. A terminal can't fall silent, so there a cable is an unplugging.
- */
+/* Kinds that a link can have; others are not of links. A terminal can't fall silent: there `cable` does what `unplug`
+ * does. */
 static void links_have_the_faults_that_they_can(void **state)
 {
     (void)state;

@@ -87,7 +87,7 @@ static void sigma_of_a_ball(void **state)
     near_to(deviation_bound_m(&head, 100.0), 0.02);
     ball.factor[1] = 3.0; /* of the scene: y */
     near_to(sigma(&head, &HEAD_ON), 0.06 / sqrt(5.0));
-    ball.local = 1; /* along the beam, right, up: now right */
+    ball.local = 1; /* factors are along the beam, to the right, up: the 3 is to the right */
     near_to(sigma(&head, &HEAD_ON), 0.02 / sqrt(5.0));
     near_to(sigma(&head, &TURNED), 0.04 / sqrt(5.0) * sqrt(0.25 + 0.75 * 9.0));
     near_to(deviation_bound_m(&head, 100.0), 0.06);
@@ -176,7 +176,7 @@ static void terms_give_the_same_sigma(void **state)
     near_to(counts_m,
             sqrt((pow(t.range_step_m, 2) + pow(2.0 * t.place_step_m, 2) + pow(pan * t.angle_step_rad[1], 2)) / 12.0));
     assert_true(isnan(t.range_jitter_m) && t.ball_local == 1 && t.angle_sigma_rad[0] == 1e-5);
-    head.setup.noise_on = 0; /* by the signal: 3 mm at any, 40 mm at the threshold */
+    head.setup.noise_on = 0; /* noise by the signal: a floor of 3 mm, and 40 mm at the threshold */
     assert_true(deviation_terms_of(&head, &t));
     near_to(t.range_floor_m, 0.003);
     near_to(t.range_jitter_m, 0.04);
@@ -193,7 +193,7 @@ static const struct {
     {{-3, 10, 1}, 0.003, 0.003},   {{-3, 10, 1}, -0.002, -0.002}, {{3, 8, 1}, 0.001, 0.001},
     {{5, 10, -1}, 0.004, 0.004}, /* seen through the pane: the nearest surface counts */
     {{5, 10, -1}, -0.004, -0.004}, {{-0.0001, 10, 0}, -1.5, NAN}, /* a mixed point: its beam meets the wall, and the pane's edge at x = 0 is nearer */
-    {{-3, 10, 1}, 40.0, NAN},                                     /* nothing is that near */
+    {{-3, 10, 1}, 40.0, NAN},                                     /* no surface is within max_m */
     {{NAN, NAN, NAN}, 0.0, NAN},
 };
 enum { N = sizeof POINT / sizeof POINT[0] };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: waits of a source without a head, which a signal interrupts or which have a script. */
+/* libscanhead waits at a source without a head. A signal interrupts the wait, or a script says what writes take. */
 #include <errno.h>
 #include <poll.h>
 
@@ -19,7 +19,7 @@ static ssize_t write_all(struct host_source *source, const void *data, size_t le
     return (ssize_t)len;
 }
 
-enum { MOST_WAITS = 1000 }; /* more of them are waits without end */
+enum { MOST_WAITS = 1000 }; /* more would be a wait without end */
 static int n_waits;
 
 static int interrupted_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)

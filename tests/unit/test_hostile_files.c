@@ -3,7 +3,7 @@
  * made huge, records of another type, or are cut off. Each file either gives a scene or one line that names the error.
  * This process neither dies nor hangs, whatever happens to Assimp's.
  *
- * HOSTILE_EVERY: only every so many of the 600 files are tried (default 1, with sanitizers 10; make test-hostile:
+ * HOSTILE_EVERY: only every so many of the 600 files are tried (default 1, with sanitizers 30; make test-hostile:
  * 1). */
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Parts of a head of HTTP by themselves: request lines and fields as RFC 9112 has them (tokens: RFC 9110, 5.6.2),
- * places as RFC 3986, 3.2. */
+/* Parts of an HTTP head, one by one: request lines and fields as RFC 9112 has them (tokens: RFC 9110, 5.6.2), and
+ * places (host and port) as RFC 3986, 3.2. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -302,7 +302,7 @@ static void a_head_may_end_within_a_scan(void **state)
     rig_close(rig);
 }
 
-/* Between two turns a client may work for longer than other readers are waited for at the end. The run is over
+/* Between two turns a client may work for longer than the head's last wait for other readers. The run is over
  * meanwhile: its queue has room for all ticks. */
 static void a_client_that_works_for_long_still_gets_the_end(void **state)
 {
@@ -336,7 +336,7 @@ static void a_client_that_works_for_long_still_gets_the_end(void **state)
     assert_true(got > 20 * stats.counters.pulses && stats.counters.pulses > 1000); /* 20 bytes for each, and more */
 }
 
-/* Waits until the head stops: each tick is claimed that its one reader leaves room for, or the scan is over. */
+/* Waits until the casters have claimed all ticks that the one reader leaves room for, or until the scan is over. */
 static void wait_full(struct loop *loop)
 {
     struct stream *stream = &loop->stream;
@@ -353,8 +353,8 @@ static void wait_full(struct loop *loop)
     }
 }
 
-/* Each line has two ticks of more bytes than a turn takes, a shorter one that is lent, and 97 empty ones, which the
- * same turn may take. The queue is long, and ticks that are 300 apart, three lines, have the same slot. */
+/* Each line has two ticks of more bytes than a turn of the link takes, a shorter one that is lent, and 97 empty ones,
+ * which the same turn may take. The queue is long: ticks that are 300 apart (three lines) have the same slot. */
 static void a_lent_tick_stays_while_its_client_reads(void **state)
 {
     (void)state;

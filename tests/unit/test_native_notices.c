@@ -193,7 +193,7 @@ static void check_cut_text(void)
 static void check_cut_later(void)
 {
     assert_int_equal(n_noticed, 4);
-    expect(0, NATIVE_BAD_PAYLOAD, at[1], 6, 28); /* the frames within its length show that it was not the end's doing */
+    expect(0, NATIVE_BAD_PAYLOAD, at[1], 6, 28); /* frames follow within its length: it lost bytes before the end */
     expect(1, NATIVE_GAP, at[2], 6, 1);
     expect(2, NATIVE_BAD_PAYLOAD, at[3], 8, FRAME);
     expect(3, NATIVE_CUT, at[4], 0, 10);
@@ -214,7 +214,7 @@ static void check_hidden(void)
 static void check_garbage_at_end(void)
 {
     assert_int_equal(n_noticed, 1);
-    expect(0, NATIVE_BAD_BYTES, at[1], 0, 4); /* the promise of its sync byte does not matter */
+    expect(0, NATIVE_BAD_BYTES, at[1], 0, 4); /* its sync byte does not begin a frame */
 }
 
 static void test_end(void **state)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames of a planar head become whole turns: the places of shots, and missing frames. The head has 16 steps a turn, of
- * which 3 to 14 are cast and 6 looks ahead, and 100 turns a second. */
+/* Frames of a planar head become whole turns: the places of shots, and missing frames. The head has 16 steps a turn:
+ * steps 3 to 14 are cast, and step 6 looks straight ahead. It makes 100 turns a second. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -18,7 +18,7 @@ static struct protocol_rig rig;
 static struct planar_scan scan;
 static struct planar_news news; /* of all frames since clear() */
 static struct protocol_rig_shot shot[N];
-static int left_out; /* drops the so many-th frame from now on, from 1; 0: none */
+static int left_out; /* the frame with this number from now on, from 1, is dropped; 0: none */
 
 static void frame(void *protocol, const uint8_t *bytes, size_t len)
 {
@@ -70,8 +70,8 @@ static void turn(uint32_t line)
     protocol_rig_turn_end(&rig, line, 0);
 }
 
-/* The rig looks to the right by turn * (step - 6) / 16 of a turn. To the left of the head, counter-clockwise, numbers
- * are higher, and the number ahead is `front`. */
+/* The rig looks to the right by turn * (step - 6) / 16 of a turn. The scan's numbers rise to the left,
+ * counter-clockwise, and `front` is the number straight ahead. */
 static void echoes_stand_where_they_look(void **state)
 {
     (void)state;
@@ -115,7 +115,7 @@ static void coarse_encoders(void **state)
         b.line = (uint32_t)k;
         b.echo[0] = 0x11;
         for (uint32_t i = 0; i < steps; i++) {
-            const uint32_t right = (steps + 7 - i) % steps; /* in steps; in counts: to the nearest */
+            const uint32_t right = (steps + 7 - i) % steps; /* in steps; c is the nearest count */
             b.c[0] = (right * counts + steps / 2) / steps % counts;
             b.a[0] = i + 5000 * (uint32_t)k;
             planar_scan_frame(&scan, (native_encode_points(bytes, sizeof bytes, &b, 0), bytes));
@@ -252,7 +252,7 @@ static void turns_are_missing(void **state)
     expect(1, 1, 2);
 }
 
-/* These turns were never to be whole. */
+/* These turns were never to be whole, but for the last one. */
 static void what_is_no_loss(void **state)
 {
     (void)state;
@@ -269,7 +269,7 @@ static void what_is_no_loss(void **state)
     turn(9);
     expect(2, 1, 0);
     open_head(-1, 0);
-    part(0, 0, 3); /* from its first step on, so it is the client's */
+    part(0, 0, 3); /* the client was there from its first step on */
     protocol_rig_turn_end(&rig, 0, 0);
     expect(1, 0, 1);
 }

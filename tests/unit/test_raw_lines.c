@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What a command line of `record --raw` becomes: its place, its ports and what it sends; and the exit status. The
- * recording is the test's. Wrong lines are in test_record_lines. */
+ * test has its own raw_run, which records nothing. Wrong lines are in test_record_lines. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -135,7 +135,7 @@ static void exit_statuses(void **state)
     run_rc = SH_OK;
 }
 
-/* Whether it is a recording of raw data, before anything else is read: after -- there are no options. */
+/* It is known whether raw data are wanted before anything else is read. After -- there are no options. */
 static void who_wants_raw_data(void **state)
 {
     static const struct {

@@ -259,7 +259,7 @@ static void test_unplugged_after_a_lost_end(void **state)
     record(after, &result);
     assert_int_equal(result.replugs, 1);
     assert_int_equal(result.broken_scans, 0);
-    /* In the two seconds of silence came reports: for a source of a million bytes, of two frames. */
+    /* The two seconds of silence had reports of progress: two frames of a source of a million bytes. */
     assert_true(last_fraction > 0 && last_fraction < 0.01);
 }
 
@@ -328,7 +328,7 @@ static void test_broken_once_more_after_a_lost_end(void **state)
     assert_int_equal(result.broken_scans, 2);
 }
 
-/* A hostile stream: the sanitizer sees a difference that does not fit. */
+/* A hostile stream: 64 bits do not hold the difference of two times, and a sanitizer would report that. */
 static void test_times_far_apart(void **state)
 {
     (void)state;

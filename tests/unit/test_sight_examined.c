@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How many triangles a sight would examine one by one. A wall of 2,048 small triangles is seen from 20 m: listed row by
- * row, 32 that follow each other lie close together, and no more rays come to them than the BVH should have. Listed at
+/* How many triangles a sight would examine one by one. A wall of 2,048 small triangles is seen from 20 m. Listed row by
+ * row, 32 that follow each other lie close together, and so few rays come to them that the BVH takes those. Listed at
  * random, the same 32 span the wall, and each of them has to be examined. */
 #include "core/sight.h"
 #include "core/vec3.h"
@@ -45,8 +45,8 @@ static double examined(const uint32_t *at, double rays)
 }
 
 /* A group of 32 is left to the BVH where fewer than 32 * 64 rays come to its box, on the cube whose faces have 24 units
- * of area. The box of a row is 3.2 m by 1 cm, that of scattered triangles about 6.4 m by 3.2 m: of 4 million rays 13
- * and about 8,500. */
+ * of area. From 4 million rays, 13 come to the box of a row (3.2 m by 1 cm), and about 8,500 to that of scattered
+ * triangles (about 6.4 m by 3.2 m). */
 static void order_decides(void **state)
 {
     (void)state;
@@ -57,7 +57,7 @@ static void order_decides(void **state)
     }
     assert_true(examined(in_order, 4e6) == 0.0);
     assert_true(examined(scattered, 4e6) == N);
-    assert_true(examined(scattered, 4e5) == 0.0); /* so few rays pay for none */
+    assert_true(examined(scattered, 4e5) == 0.0); /* for so few rays none is worth it */
 }
 
 int main(void)

@@ -6,8 +6,8 @@
 
 #include "tests/wire/batch_rig.h"
 
-/* Waits until a file whose name ends so has come, or changed, in the folder, `n` times. Returns 0 when the program
- * ended before. */
+/* Waits for `n` events of files in the folder whose names have this ending. Returns 0 when the program ended
+ * before. */
 static int wait_for(int notify, pid_t pid, const char *ending, int n)
 {
     char buf[8192] __attribute__((aligned(8)));
@@ -172,7 +172,7 @@ static void test_nothing_is_mixed(void **state)
     free(text);
     batch_change(manifest, engine, "Embree 3.0.0, packets of 2, abacus");
     batch_expect(wire, "one", WITH("--shard", "2/3"), 1, "processor");
-    /* the shards are of two kinds, which --merge finds, wherever it runs */
+    /* --merge finds that the shards come from two kinds of processor, wherever it runs */
     batch_expect(wire, "one", WITH("--force", "--shard", "2/3"), 0, "shard 2/3");
     batch_expect(wire, "one", WITH("--merge"), 1, "abacus");
     batch_change(manifest, "Embree 3.0.0, packets of 2, abacus", engine);

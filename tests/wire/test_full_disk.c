@@ -61,7 +61,7 @@ static int record(struct wire *wire, const char *ending, unsigned kib)
     return status;
 }
 
-/* Disks go from the smallest on, each a third larger than the one before, until all has room. */
+/* Each disk is about twice as large as the one before (with THOROUGH=1 a third larger), until all has room. */
 static void nothing_is_left(void **state)
 {
     static const char *const endings[] = {".obj", ".gltf", ".glb", ".fbx", ".ply"};

@@ -69,8 +69,8 @@ static uint32_t little_endian(const uint8_t *at)
     return at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
 }
 
-/* VLP-16: a packet's stamp, whole us rounded down, is its first firing. The packet is whole 1.327104 ms later at the
- * most. */
+/* VLP-16: a packet's stamp, whole us rounded down, is its first firing. The packet is complete at most 1.327104 ms
+ * later. */
 static size_t data_unit(const uint8_t *bytes, size_t len, int64_t *due_ns)
 {
     if (len == 0) return 0;
@@ -110,13 +110,13 @@ static void take_units(struct client *c, int64_t before_ns)
     memmove(c->bytes, c->bytes + at, c->len -= at);
 }
 
-/* Takes all units that are there. The OK of before_ns was there when it was emptied last. */
+/* Takes all units that are there. The client was last emptied after the OK of the step up to before_ns. */
 static void empty(struct client *c, int64_t before_ns)
 {
     if (c->native != NULL) {
         struct scanhead_frame frame;
         int rc;
-        /* A descriptor or anchor that is repeated for those who join has the time of its first. */
+        /* A descriptor or anchor that is repeated for readers that join has the time of the first one. */
         while ((rc = scanhead_next(c->native, &frame, 0)) == SCANHEAD_OK)
             note(c, frame.type == SCANHEAD_POINTS ? frame.t_ns : INT64_MIN, before_ns);
         assert_int_equal(rc, SCANHEAD_ETIMEOUT);
