@@ -54,8 +54,8 @@ options_are_there() {
     [ $n -gt 150 ] || { echo "only $n options were found"; return 1; }
 }
 
-# The text of each is there, too: the words of the help in their order, whatever the line breaks. A page may have '-'
-# for a break.
+# The texts of options are in the pages, too: the words of the help in their order, whatever the line breaks. The pages
+# have no hyphenation (-rHY=0).
 texts_are_there() {
     for command in $(commands_of); do
         "$program" "$command" --help | sed '/^Configuration keys:/,$d' | sed -n '/^  /,$p' | tr -s ' \n' '\n\n' |

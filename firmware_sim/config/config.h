@@ -103,7 +103,7 @@ struct config_head {
     char serial[32], name[32];
     char settings_file[CONFIG_PATH_LEN];
     int start;        /* scan when booted; run and soak use it, recordings do not */
-    double motor_ppm; /* with emitter: beams, the error of the rotor's speed where nothing holds the rotor's phase */
+    double motor_ppm; /* error of a rotor's speed (`emitter: beams`) where nothing holds the rotor's phase */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;
     /* of a sphere (core/emitter.h); also copied into the profile's emitter */

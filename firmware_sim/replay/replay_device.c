@@ -22,7 +22,7 @@ static const char *lacks(const struct replay *r, const struct protocol_ops *ops,
     if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && first)
         return "has first echoes alone; required is all, last or strongest";
     if ((ops->needs & PROTOCOL_NEEDS_TIME) != 0 && r->utc0_ns == INT64_MIN)
-        return "has no time of day; required is one of a head with time.epoch";
+        return "has no time of day; required is a recording of a head with time.epoch";
     if ((ops->needs & PROTOCOL_NEEDS_PLACE) != 0 && (!stands || r->anchor.lat_deg == 0.0))
         return "has no place on the Earth where it stands; required is a station with one";
     return NULL;

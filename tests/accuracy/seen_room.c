@@ -83,7 +83,7 @@ static void draw_walls(struct drawn *d, const double at_m[3])
         }
 }
 
-/* Draws a point in a ball around at_m, not nearer than 0.7 m. */
+/* Chooses a random place from 1.5 to 4 m away from at_m. */
 static void any_place(uint64_t *random, const double at_m[3], double out[3])
 {
     double r;

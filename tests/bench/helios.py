@@ -40,7 +40,7 @@ LINE_PULSES = 1000
 
 
 class Window:
-    """This has lines from lowest_deg to highest_deg, line_deg apart: pans of HELIOS++ in degrees, and a sweep of ours."""
+    """Lines go from lowest_deg to highest_deg, line_deg apart. HELIOS++ pans short_deg or long_deg, ours in sweeps."""
 
     def __init__(self, lowest_deg, highest_deg, pan_deg, line_deg, short_deg, long_deg, sweep_lines, ours):
         self.lowest_deg, self.highest_deg, self.pan_deg, self.line_deg = lowest_deg, highest_deg, pan_deg, line_deg

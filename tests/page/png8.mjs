@@ -10,7 +10,7 @@ function* chunks(png) {
   }
 }
 
-// Returns {width, height, size: bytes of a pixel, out: these}. Undoes the filter of each row (PNG specification,
+// Returns {width, height, size: bytes of a pixel, out: all pixels}. Undoes the filter of each row (PNG specification,
 // 9.2).
 export function pixelsOf(png) {
   const all = [...chunks(png)], head = all[0].bytes, width = head.readUInt32BE(0), height = head.readUInt32BE(4);

@@ -163,7 +163,7 @@ test('picking: the nearer of two under the pointer, and none beside them', () =>
 
 test('limits: robust, and the same while points come unless they miss much', () => {
   const values = Array.from({length: 1001}, (_, i) => i / 100).concat([1e6, -1e6]);
-  const [lo, hi] = robustLimits(values); // these are percentiles 0.1 and 9.9, and 2 % of their difference
+  const [lo, hi] = robustLimits(values); // percentiles 1 and 99: 0.1 and 9.9; 2 % of 9.8 is added
   near(lo, 0.1 - 0.196, 0.03, 'lo');
   near(hi, 9.9 + 0.196, 0.03, 'hi');
   same(robustLimits([]), null, 'of none');
@@ -252,7 +252,7 @@ test('outlines of fields: right, forward and up of a head that is turned', () =>
   points({}, [0, 2, 3, 0]).forEach((v, i) => near(v, [12, 20, 1, 10, 17, 1][i], 1e-12, 'east and south'));
   points({pitch_deg: 90}, [0, 2, 3, 0]).forEach((v, i) => near(v, [10, 20, 3, 10, 17, 1][i], 1e-12, 'forward rises'));
   points({roll_deg: 90}, [0, 2, 3, 0]).forEach((v, i) => near(v, [12, 20, 1, 10, 20, -2][i], 1e-12, 'right sinks'));
-  // with the pitch before it, what sinks by the roll goes forward, which is east
+  // by the roll the right sinks; by the pitch the head's down points forward, which is east
   points({pitch_deg: 90, roll_deg: 90}, [3, 0]).forEach((v, i) => near(v, [13, 20, 1][i], 1e-12, 'both'));
 });
 
@@ -264,7 +264,7 @@ test('a station that is grabbed beside its middle does not jump; keys turn it', 
   stations.grab({number: 4, what: 'move'}, from.x + 6, from.y);
   stations.drag(c, from.x + 20, from.y);
   stations.drag(c, to.x + 6, to.y);
-  near(stations.moved.x, 1, 0.02, 'x'); // 6 pixels are 0.09 m here, and a tenth more or less half a metre on
+  near(stations.moved.x, 1, 0.02, 'x'); // 6 pixels are 0.09 m here; half a metre further on they differ by a tenth
   near(stations.moved.y, 0.5, 0.02, 'y');
   stations.drop(true);
   stations.select(4);
@@ -286,8 +286,8 @@ function lab(rgb) {
     (0.0193339 * r + 0.119192 * g + 0.9503041 * b) / 1.08883].map(f);
   return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
 }
-// People who lack a kind of cones see these colours (Machado, Oliveira and Fernandes 2009, severity 1, in linear
-// light).
+// Matrices give the colours that people see who lack a kind of cones (Machado, Oliveira and Fernandes 2009, severity 1,
+// in linear light).
 const SIGHTS = {
   all: [1, 0, 0, 0, 1, 0, 0, 0, 1],
   protan: [0.152286, 1.052583, -0.204868, 0.114503, 0.786281, 0.099216, -0.003882, -0.048116, 1.051998],
@@ -307,7 +307,7 @@ test('the even scales: every step is brighter, also for the colour-blind, and st
       same(Math.min(...steps) > 2.3, true, `${scale}, ${sight}: steps of ${steps.map((v) => v.toFixed(1))}`);
     }
   }
-  // The usual one of heights fails here: what is its use without red and green?
+  // The usual scale of heights fails here: to eyes without the green cones its lightness does not always rise.
   const usual = Array.from({length: 17}, (_, i) => lab(seenBy(SIGHTS.deutan, rampAt('spectrum', i / 16).map(linear)))[0]);
   same(usual.slice(1).every((v, i) => v > usual[i]), false, 'spectrum');
 });

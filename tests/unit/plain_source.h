@@ -9,7 +9,7 @@ struct plain_source {
     struct device_counters counters;
     uint64_t n_scans;
     int n_reports, n_closed;
-    void (*closed)(struct plain_source *self); /* when its files are closed, so after all threads; NULL: nothing */
+    void (*closed)(struct plain_source *self); /* called when its files are closed, after all threads; NULL: none */
     _Atomic int ending;
     /* Makes a tick, as source.h says; NULL: the run is over at once. */
     enum loop_source_tick (*next)(struct plain_source *self, uint64_t tick, int again, struct ring_tick *out);

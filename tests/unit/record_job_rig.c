@@ -261,7 +261,7 @@ int heads_record(struct heads *heads, const struct recording_options *o, struct 
 {
     if (heads != job.heads || o->prepare == NULL || !job.files.recorder.may_wait) say("RECORD ");
     *result = (struct recording_result){0};
-    /* Whether a file can hold a scan is asked of scans whose shots are not known beforehand. */
+    /* heads.c asks about every scan; this asks only with a duration, where the number of shots is not known. */
     if (o->duration_s > 0.0 && heads->fits(heads->ctx, &site, 2, e) != SH_OK) return SH_EIO;
     return record_it(o, result, e);
 }

@@ -72,7 +72,7 @@ static void test_long_pose(void **state)
     unlink(rig_path("a.ptx.grid"));
 }
 
-/* The angle comes from the pose taken back. If that is beyond any number, there is no angle. */
+/* The angle comes from the inverse of the pose. If that is beyond any number, there is no angle. */
 static void test_no_scan_angle(void **state)
 {
     (void)state;

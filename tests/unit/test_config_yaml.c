@@ -50,7 +50,7 @@ static void a_file_has_up_to_16_levels(void **state)
     }
 }
 
-/* Zeros at the beginning are no digits. The largest number has fewer than 2^96 units. */
+/* Zeros at the beginning are no digits. A number that an exponent enlarges has at most 2^96 units. */
 static void a_number_has_up_to_30_digits(void **state)
 {
     (void)state;

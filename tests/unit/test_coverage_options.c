@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the options of `coverage` for the next station become, with their defaults. The search is the test's, and ends
- * the command. */
+/* The options of `coverage` for the next station reach the search, with their defaults. This test replaces the search,
+ * whose failure ends the command. */
 #include "tests/unit/commands_rig.h"
 
 #include <math.h>

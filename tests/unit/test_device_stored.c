@@ -63,7 +63,7 @@ static void what_is_stored_is_that_of_power_up(void **state)
 
     file = open_settings();
     char text[SETTINGS_FILE_TEXT];
-    settings_file_get(file, "head", text); /* those alone that the configuration has not */
+    settings_file_get(file, "head", text); /* only values that differ from the configuration's */
     assert_string_equal(text, "HEAD:LINes 40\nSCAN:ECHoes LAST\n");
     rig = rig_open(&(struct device_options){.settings = file}, NULL, 0);
     rig_go_to(rig, 300);
@@ -121,8 +121,8 @@ static void a_protocol_has_its_own(void **state)
     close_settings(file);
 }
 
-/* In the file's order each of them is beyond what the others allow: 60 to 50 degrees is no line, and 150 lines a
- * second need more than 140 pulses. */
+/* In the file's order some are beyond what the configured ones allow: 50 to 10 degrees is no line, and 1500 lines a
+ * second need more than 1000 pulses. */
 static void limits_that_depend_on_each_other_are_no_matter(void **state)
 {
     (void)state;
@@ -192,7 +192,7 @@ static struct device_work *run(const struct device_options *options)
     return works;
 }
 
-/* A journal has what was stored as its first commands: the replay needs no file. */
+/* A journal begins with the stored settings as commands, so the replay needs no file. */
 static void a_replayed_journal_needs_no_file(void **state)
 {
     (void)state;

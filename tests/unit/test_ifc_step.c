@@ -215,7 +215,7 @@ static void the_end_is_near(void **state)
     static const char last[] = "END-ISO-10303-21;";
     static char text[4096];
     for (int size = 900; size <= 2000; size += size < 1020 || size >= 1030 ? 60 : 1)
-        for (int after = 1023; after <= 1026; after++) { /* bytes from the end's first one on */
+        for (int after = 1023; after <= 1026; after++) { /* bytes from the first one of `last` to the file's end */
             const int end = size > after + 40 ? size - after : 100;
             struct ifc_index x;
             memset(text, '\n', sizeof text);

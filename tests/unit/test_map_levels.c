@@ -22,8 +22,8 @@ static void add(struct map *map, int column, int row, double z_m)
     map_add_points(map, 1, &x, &y, &z_m);
 }
 
-/* Levels are 0.1 m high, or as high as a pixel is wide. Up to 4 of them are free, as a floor and a ceiling have; 14 are
- * a wall. They count from the first point on, wherever it is. */
+/* Levels are 0.1 m high, or as high as a pixel is wide. Up to 4 of them are no wall, as a floor and a ceiling have; 14
+ * are one. Levels are counted from the first point's height, whatever that is. */
 static void levels_make_a_wall(void **state)
 {
     (void)state;
@@ -47,7 +47,7 @@ static void levels_make_a_wall(void **state)
                 }
 }
 
-/* A pixel has 64 levels, which begin again above and below them. */
+/* A pixel has 64 levels. Heights above and below them count as the same levels again. */
 static void levels_repeat_after_64(void **state)
 {
     (void)state;
@@ -107,8 +107,8 @@ static void expect_pixel(const struct map *map, const struct picture *picture, u
         fail_msg("%u, %u: %d %d %d, not %d %d %d", column, row, got[0], got[1], got[2], want[0], want[1], want[2]);
 }
 
-/* Heights go from the lowest to the highest of the pixels' lowest points. Beyond these are half a percent at either
- * end: one of 200 pixels. A ceiling hides nothing. */
+/* Heights go from the lowest to the highest of the pixels' lowest points. Half a percent of the pixels at either end
+ * are left out: none of so few. A ceiling hides nothing. */
 static void heights_are_hues(void **state)
 {
     (void)state;

@@ -27,7 +27,7 @@ struct machine {
     uint64_t together; /* this many ticks go out together; 0: each one alone */
     int64_t now_ns;
     int64_t ready_ns[MAX_TICKS];                  /* when the tick is made */
-    int64_t let_ns[MAX_TICKS], out_ns[MAX_TICKS]; /* released or lost, and so may be followed; out: published */
+    int64_t let_ns[MAX_TICKS], out_ns[MAX_TICKS]; /* released or lost: the caster may go on; out: published */
 };
 
 static struct machine machine;
@@ -53,7 +53,7 @@ static int64_t after(const struct machine *m, int64_t from_ns, int64_t for_ns)
     return end_ns > at_ns && from_ns <= at_ns ? end_ns + m->still_ns : end_ns;
 }
 
-/* An event at that time happens when the machine goes on. */
+/* Returns when an event due at t_ns happens: while the machine stands still, only once it goes on. */
 static int64_t when(const struct machine *m, int64_t t_ns)
 {
     const int64_t at_ns = m->pace.epoch_ns + m->still_at_ns;
@@ -231,7 +231,7 @@ static void credit_ends(void **state)
     assert_in_range(m->now_ns - m->pace.epoch_ns, 301 * MS + 5 * MS + 1, 301 * MS + 6 * MS + 1);
 }
 
-/* Credit is as long as the stall. When casters then make no more, the limit is that and late_ns. */
+/* Credit is as long as the stall. A tick that is never made is then given up after that credit and late_ns. */
 static void credit_is_as_long_as_the_stall(void **state)
 {
     (void)state;
@@ -243,8 +243,8 @@ static void credit_is_as_long_as_the_stall(void **state)
     m->still_ns = 200 * MS;
     run(m, 21);
     assert_int_equal(m->n_lost, 1);
-    /* Asleep up to 21 ms, the thread woke at 220.5, so it stood still for 199.5 ms. The last look before that sum is at
-     * 225 ms. */
+    /* Asleep up to 21 ms, the thread woke at 220.5, so it stood still for 199.5 ms. The limit is 21 + 199.5 + 5 = 225.5
+     * ms, and the last look before it is at 225 ms. */
     assert_in_range(m->now_ns - m->pace.epoch_ns, 225 * MS, 227 * MS);
 }
 

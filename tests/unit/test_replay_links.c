@@ -59,7 +59,7 @@ static void a_recording_is_the_devices_that_it_can_be(void **state)
         {PROTOCOL_NMEA, NATIVE_EMIT_SPHERE, .utc0_ns = SECOND_NS, .lat_deg = -50.0, .speed = 1.0},
         {PROTOCOL_NMEA, NATIVE_EMIT_BEAMS, 16, .utc0_ns = SECOND_NS, .lat_deg = 50.0, .speed = 1.0},
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = INT64_MIN, .lat_deg = 50.0, .speed = 1.0,
-         .says = "nmea: a.shs has no time of day; required is one of a head with time.epoch"},
+         .says = "nmea: a.shs has no time of day; required is a recording of a head with time.epoch"},
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .speed = 1.0, .says = "has no place on the Earth"},
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .lat_deg = 50.0, .moving = NATIVE_MOVING, .speed = 1.0,
          .says = "has no place on the Earth where it stands; required is a station with one"},
@@ -138,8 +138,8 @@ static void fixes_are_at_full_seconds(void **state)
     replay_end_of(r);
 }
 
-/* A recording may have any number there. Dates begin after 1970-01-01 and end with 2199-12-31 (date -u -d 2200-01-01
- * +%s). */
+/* A recording may have any number as its time. Dates begin after 1970-01-01 and end with 2199-12-31 (date -u -d
+ * 2200-01-01 +%s). */
 static void dates_are_within_what_a_calendar_has(void **state)
 {
     (void)state;

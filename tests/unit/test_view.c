@@ -70,7 +70,7 @@ static void test_pinhole(void **state)
         assert_int_equal(view_project(view, cases[i].p, place, &depth_m), 1);
         assert_true(fabs(place[0] - cases[i].column) < 1e-9 && fabs(place[1] - cases[i].row) < 1e-9);
         assert_true(fabs(depth_m - cases[i].depth) < 1e-12);
-        /* A point a pixel wide colours its own pixel, and those that it reaches over to, no farther than one. */
+        /* A point that is a pixel wide colours its own pixel and the next ones, none farther. */
         add(view, cases[i].p[0], cases[i].p[1], cases[i].p[2], red);
         struct picture picture = draw(view, 0);
         double sum[2] = {0, 0}, weight = 0;
@@ -83,7 +83,7 @@ static void test_pinhole(void **state)
                 sum[1] += w * (row + 0.5);
                 weight += w;
             }
-        assert_true(weight > 0); /* its middle is the point's place, to half a place of which two make a pixel */
+        assert_true(weight > 0); /* the colour's centre is the point, to half a sample; a pixel is two samples wide */
         assert_true(fabs(sum[0] / weight - cases[i].column) <= 0.3 && fabs(sum[1] / weight - cases[i].row) <= 0.3);
         picture_free(&picture);
         view_free(view);
@@ -130,7 +130,7 @@ static void test_counts(void **state)
     view_free(view);
 }
 
-/* A wall is 10 m away, and a sheet of 4 x 4 m 2 m before it. Without shading all have their colour. With it the wall is
+/* A wall is 10 m away; 2 m before it is a sheet of 4 x 4 m. Without shading all have their colour. With it the wall is
  * even away from the edges, and dark beside the sheet. The sheet is not dark there. */
 static void test_shade(void **state)
 {
@@ -149,8 +149,8 @@ static void test_shade(void **state)
     for (uint32_t row = 20; row < 40; row++) /* seen straight on: the light is the same everywhere; steps are 3 */
         for (uint32_t column = 20; column < 60; column++)
             assert_true(abs(at(&lit, column, row)[0] - wall) <= 3);
-    /* The sheet's last point is at 100 + 100 * 1.95 / 8 = 124.4, and half a pixel wide. The part beside it is dark, by
-     * half and more: all four distances reach over the edge there. */
+    /* The sheet's last point is at 100 + 100 * 1.95 / 8 = 124.4, and half a pixel wide. The wall beside it is
+     * dark: all four distances of the shading reach over the edge there. */
     const uint8_t beyond = at(&lit, 125, 75)[0], within = at(&lit, 122, 75)[0];
     assert_true(beyond < wall - 60);
     assert_true(abs(within - wall) <= 9);
@@ -301,7 +301,7 @@ static double hue_deg(const uint8_t rgb[3])
 }
 
 /* Views have paler colours than recordings and maps, so that shading is seen. Low and high mean the same: the hue goes
- * from blue to red. The two are within 60 of the 240 degrees; the other way round they would be that far apart. */
+ * from blue to red. Their hues are at most 60 degrees apart; the other way round the ends would be 240 apart. */
 static void low_and_high_mean_the_same_in_views(void **state)
 {
     (void)state;

@@ -45,7 +45,7 @@ const struct beam_run *beam_record_room(struct wire *wire, int slot, const struc
                                         const char *const *sets);
 /* The same for a stream and a truth that are there already. */
 const struct beam_run *beam_read(const struct wire *wire, int slot, const char *stream, const char *truth);
-/* Returns the n-th note of a kind, from 0, that begins or ends it. The call fails where there is no such note. */
+/* Returns note n, from 0, of a kind's begins (ended 0) or ends (1). The call fails where there is no such note. */
 const struct beam_note *beam_note(const struct beam_run *run, const char *kind, uint32_t n, int ended);
 
 #endif

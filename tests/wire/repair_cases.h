@@ -27,10 +27,10 @@ struct repair_row {
 
 extern const struct repair_row repair_cases[];
 
-/* Returns the ending of a file beside the recording, FILE + that, from which a repair makes the recording's rest. On a
- * full disk it needs more room. The file is gone after the repair. NULL: there is none. */
+/* Returns what follows FILE in the name of a second file, from which a repair makes the recording's rest. On a full
+ * disk the repair needs more room. The second file is gone after the repair. NULL: there is none. */
 const char *repair_row_beside(const struct repair_row *row);
-extern struct bytes repair_beside; /* the rest of that file */
+extern struct bytes repair_beside; /* the second file as the killed recorder left it */
 extern const size_t n_repair_cases;
 
 #endif

@@ -36,8 +36,8 @@ static const char *set_up(struct wire *wire)
     return set_up_with(wire, "full-sweep");
 }
 
-/* This is the same head without a footprint. `plan` has no beam to try then, which is four fifths of its time here;
- * georef and sight are chosen as before. */
+/* This is the same head without a footprint. `plan` then tries no beams, and that saves four fifths of its time here.
+ * Georef and sight are chosen as before. */
 static const char *set_up_without_footprint(struct wire *wire)
 {
     char *text = wire_read("config/heads/full-sweep.yaml", NULL);
@@ -83,8 +83,8 @@ static void expect_row(const char *json, const char *stage, int n, const char *m
     free(text);
 }
 
-/* The error of order n is a fraction of range^(n+1) / R^n with R = 6400 km: of order 1 at 430 m some of 0.03 m, of
- * order 2 some of 2 um, at 860 m of 16 um, of order 3 some of 2 nm. */
+/* The error of order n is a fraction of range^(n+1) / R^n with R = 6400 km. At 430 m that is 0.03 m for order 1 and
+ * 2 um for order 2. At 860 m it is 16 um for order 2 and 2 nm for order 3. */
 static void test_method_by_tolerance(void **state)
 {
     struct wire *wire = *state;
@@ -151,7 +151,7 @@ static void test_what_cannot_be(void **state)
     free(text);
 }
 
-/* The expected methods by stage, and a word of the reason. Forced ones are marked. */
+/* The expected method of a stage; a method that is left out there, and words of the reason why. */
 struct want {
     const char *stage, *method, *left_out, *why_left_out;
 };
@@ -217,7 +217,7 @@ static void test_three_plans(void **state)
     expect_plan(wire, "config/demo.yaml", demo, sizeof demo / sizeof demo[0]);
 }
 
-/* Checks the row of a head that may have a map: forced, or not possible. */
+/* Checks the row `sight`: its method, map or none, and words of the reason. */
 static void expect_sight(struct wire *wire, const char *config, const char *const *sets, const char *const *sight)
 {
     const char *const args[] = {"plan", config, "--json", "--set", sets[0], "--set", sets[1], NULL};
@@ -264,7 +264,7 @@ static void test_program(void **state)
     free(json);
 }
 
-/* The methods that a run reports are the planned ones. A tighter tolerance changes both. */
+/* The methods that a run reports are the planned ones. A wider echo tolerance changes both. */
 static void test_run_follows_plan(void **state)
 {
     struct wire *wire = *state;
@@ -347,8 +347,8 @@ static void test_forced(void **state)
 }
 
 /* The plan chooses single rays for the room with glass. Forced, they are tried on the same pulses and have the same
- * error. Memory for footprints, which are cast for comparison, changes
- * nothing else. */
+ * error. The plan also casts footprints, to compare with them. The memory that these need
+ * changes nothing else. */
 static void test_forced_as_chosen(void **state)
 {
     static const char *const keys[] = {"\"error_m\": ", "\"echo_share\": "};

@@ -14,7 +14,7 @@ enum { EXPERT_WARN = 6291456, EXPERT_ERROR = 8388608 }; /* values of _ws.expert.
 enum { N_RECORDINGS = 4, JOINED = 5, N_STREAMS = 7, LONG_POINTS = 3000, JOINED_AT = 200 };
 extern const char *const stream_name[N_STREAMS]; /* the recordings first */
 
-/* Makes them. The sequence numbers of each are its own, so that one may follow the other by a jump forward. */
+/* Makes these files. Their sequence numbers differ, so that one stream may follow another with a jump forward. */
 int wireshark_setup(void **state);
 
 /* Makes both checksums of a frame right again. */

@@ -30,7 +30,7 @@ export class Waves {
     this.#most = most;
   }
 
-  /** Copies the payload. Returns the samples that the head has lost; throws Refused. */
+  /** Copies the payload. Returns how many samples the head has lost; throws Refused. */
   add(view, scan) {
     const head = readWavesHead(view);
     let from = Infinity, to = -1;

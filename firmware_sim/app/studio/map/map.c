@@ -383,7 +383,7 @@ static const struct app_option OPTIONS[] = {
      .help = "colours to show: height (default), range, reflectance, label, station, rgb (of a recording, or "
              "output.colour)"},
     {APP_TEXT, "limits", "LOW,HIGH", .at = AT(view.limits),
-     .help = "limits of the colours of height or range (default: those of the points, without 1 %)"},
+     .help = "limits of the colours of height or range (default: those of the points, without 0.5 % at each end)"},
     {APP_NUMBER, "below", "Z", .min = -1e9, .max = 1e9, .at = AT(view.below_m), .help = "only points below this z"},
     {APP_NUMBER, "above", "Z", .min = -1e9, .max = 1e9, .at = AT(view.above_m), .help = "only points above this z"},
     {APP_NUMBER, "point-m", "M", .min = 0, .max = 1000, .at = AT(view.point_m),

@@ -16,7 +16,7 @@ struct preview;
 
 struct preview_options {
     const struct config *cfg;
-    const struct site *site; /* of the head that runs, copies written out; it and cfg outlive the preview */
+    const struct site *site; /* of the head that runs, loaded SITE_WRITTEN_OUT; it and cfg outlive the preview */
     /* This is the site's coverage. Only the preview adds scans and stations to the coverage. Other code may only ask in
      * which cell a place lies (coverage_cell_at). NULL: there is no coverage, and previews have points alone. */
     struct coverage *coverage;
