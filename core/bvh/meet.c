@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A packet at a leaf: finds which of its rays hit the leaf's triangles, and at what range. Single precision decides
- * which rays hit where its result is certain; elsewhere double decides. Ranges are computed in double. */
+/* A packet at a leaf: finds which of its rays hit the leaf's triangles, and at what range. Where single precision is
+ * certain, it decides which rays hit; elsewhere double decides. Ranges are computed in double. */
 #include "core/bvh/meet.h"
 
 #include "core/bvh/nearest.h"

@@ -269,7 +269,7 @@ int scanhead_attributes(struct scanhead *sh, const struct scanhead_frame *frame,
  * descriptor has come. */
 int scanhead_has_attributes(const struct scanhead *sh);
 
-/* A colour for each point, sRGB, of what the head's key output.colour names. A shot without echo is grey. */
+/* A colour for each point, sRGB. The head's key output.colour says what it shows. A shot without echo is grey. */
 struct scanhead_colour {
     uint8_t red, green, blue;
 };

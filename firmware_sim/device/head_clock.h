@@ -4,9 +4,9 @@
  * In: device time, ns from power-up. Out: TAI, ns (core/utc.h).
  *
  * Device time is exact: it is the simulation's own. Pulses, poses, moving meshes and the GNSS receiver follow
- * it. The key time.epoch gives the true time of day at power-up. The head's clock may be wrong:
- * it is the sum of the true time, time.offset_s, time.drift_ppm of the time since power-up, and,
- * from time.jump_at_s on, time.jump_s. While all of them are 0, the head's clock shows the true time. Injected
+ * it. The key time.epoch gives the true time of day at power-up. The head's clock may be wrong.
+ * It adds to the true time: time.offset_s, time.drift_ppm of the time since power-up, and
+ * time.jump_s from time.jump_at_s on. While these three are 0, the head's clock shows the true time. Injected
  * faults add jumps, gains and times in which it stands, and so does the servo of a PTP follower (ptp.h). All of these
  * are changes of one kind, and between two of them the clock runs evenly.
  *

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* A session of a link: takes ticks from the stream into a buffer of its own, and writes that to the link.
  *
- * A long tick is written from where it lies in the ring, where the link's write() never waits. On a link whose write()
- * is cheap each tick is. Other short ticks, and bytes that the link did not take, are copied first. So a slow reader
+ * If the link's write() never waits, long ticks are written straight from the ring. If write() is cheap, too, all ticks
+ * are written so. Other ticks, and bytes that the link did not take, are copied first. So a slow reader
  * holds up nobody. A session whose next tick is no longer in the ring loses whole frames, and goes on with newer ones
  * (lost_frames.c). */
 #include <stdio.h>
@@ -155,7 +155,7 @@ static int take_tick(struct pump *pump, struct session *s)
     if (end >= pump->out_cap || session_waits_for_files(pump)) return 0;
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
-    const uint64_t off_tick = session_off_tick(pump, s); /* after the read: it is set before its tick is released */
+    const uint64_t off_tick = session_off_tick(pump, s); /* after the read: off_tick is set before it is released */
     if (s->cursor >= off_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
@@ -187,8 +187,8 @@ static int follows(const struct session *s, const struct ring_copy *tick)
     return !s->lost.have_seq || tick->first_seq == s->lost.next_seq;
 }
 
-/* Returns whether ticks are lent to the link, which then reads them in the ring after this call (link_ops.lend). In the
- * paces that wait for this reader, the ring still has the last LENT_TICKS before its cursor. */
+/* Returns whether ticks are lent to the link: it reads them in the ring even after lend() has returned. In the paces
+ * that wait for this reader, the ring still has the last LENT_TICKS before its cursor. */
 static int lends(const struct pump *pump)
 {
     return pump->ops->lend != NULL && pump->holds && pump->stream->waits;
@@ -289,8 +289,8 @@ int session_pass(struct pump *pump, struct session *s, int is_last)
     return faulty_pass(pump->link, session_index(pump, s), t_ns);
 }
 
-/* Fills the buffer, all of which is written, if the link takes more now. Returns as session_pass does. Where nothing is
- * left to send, the buffer stays empty, and the cursor stays where it is. */
+/* Fills the buffer again if the link takes more now. All bytes in it have been written before. Returns as session_pass
+ * does. Where nothing is left to send, the buffer stays empty, and the cursor stays where it is. */
 static int fill_if_link_takes(struct pump *pump, struct session *s)
 {
     const int is_over = atomic_load(&pump->stream->over);

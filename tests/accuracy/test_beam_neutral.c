@@ -18,7 +18,7 @@ static void same_block(const struct line_block *b, const struct copy *c)
     assert_memory_equal(b->a, c->a, c->n * sizeof *c->a);
 }
 
-/* A railing, wires and leaves before a wall that is partly out of range. Pulses have no, one and several echoes. */
+/* Bars and wires in a box that is partly out of range. Pulses have no, one and several echoes. */
 static struct scene *railing(void)
 {
     struct generate_bar bar[48];
@@ -80,8 +80,8 @@ static void nothing_asked_for_changes_nothing(void **state)
     beam_rig_close(&rig);
 }
 
-/* The noise of an echo is its own, whichever of the pulse's echoes are sent. First, last and strongest are entries of
- * all. */
+/* The noise of an echo is its own, whichever of the pulse's echoes are sent. So the first and the last echo are as they
+ * are among all. */
 static void selection_keeps_the_noise(void **state)
 {
     (void)state;

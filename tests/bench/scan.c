@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* This describes a whole scan, and what a sight is made of for it. */
+/* This describes a whole scan, and the sight that is to be made for it. */
 #include <math.h>
 #include <string.h>
 #include <time.h>

@@ -77,7 +77,7 @@ sha256_of() {
     sed -n 's/.*"stream_sha256": "\([0-9a-f]*\)".*/\1/p' "$1"
 }
 
-# This records the same two scans over TCP, into tcp1 and tcp2. Every other wire must give the same.
+# This records the head's two scans over TCP. tcp1 and tcp2 are their hashes, and every other wire must give the same.
 record_reference() {
     check "the scans over TCP" scanhead record tcp:127.0.0.1:5025 --stats tcp1.json --quiet
     records_only || scanhead record tcp:127.0.0.1:5025 --stats tcp2.json --quiet

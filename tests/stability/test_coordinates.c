@@ -174,8 +174,8 @@ static void test_large_coordinates(void **state)
 
 /* The rough hull's facets stand at up to 80 degrees to the ray. Ours: 16 x 2^-53 x R / cos i is 1e-10 m at 10 km, and
  * vertices about the station round by 2^-53 x 1.2 km before. So the micrometre holds throughout, at 10 km too. Naive:
- * floats at 1.2 km are wrong by 6e-5 m at any range, and by 5e-4 m at 10 km. The BVH's own frame is about the scene's
- * middle. The scene's middle is the middle of the hull or, with a triangle beside the hull, more than 1.2 km from
+ * floats at 1.2 km are wrong by 6e-5 m even at short ranges, and by 5e-4 m at 10 km. The BVH's own frame is about the
+ * scene's middle. That is the middle of the hull or, with a small sphere beside the hull, more than 1.2 km from
  * there. */
 static void range_row(double radius_m, double rough, int beside)
 {
@@ -257,8 +257,8 @@ static void aim_along_slope(struct rig *rig, double range_m)
     }
 }
 
-/* Returns the error against the plane's range by its formula. The formula is in long double from the same station and
- * direction that were cast. */
+/* Returns the error of the ranges. The true range is that of the plane's formula, in long double, from the same station
+ * and in the same direction that were cast. */
 static double slope_error_m(const struct rig *rig)
 {
     long double z = (rig->station_m[0] - (long double)UTM_E_M) / 8 + (rig->station_m[1] - (long double)UTM_N_M) / 4;

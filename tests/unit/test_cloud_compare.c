@@ -40,7 +40,7 @@ static struct bvh *make_bvh(const struct scene *s)
 static void offsets_from_a_plate(void **state)
 {
     (void)state;
-    /* Whole binary fractions: differences, feet and 3-4-5 roots are exact. */
+    /* Whole binary fractions: differences, nearest points and 3-4-5 roots are exact. */
     static double xyz[][3] = {
         {3, 1, 0},   {3, 1, 0.0009765625}, {1, 6, -0.25},         {NAN, NAN, NAN}, {12, 4, 3},
         {-3, -4, 0}, {4, 1, 10},           {4, 1, 10.0009765625}, {4, 1, -1e300},  {1, 7, 0.0078125},
@@ -101,7 +101,7 @@ static void threads_change_nothing(void **state)
     free(triangle);
 }
 
-/* Each point is compared, also where one more begins another part of the work. */
+/* Each point is compared, also the last of a full part of the work, and one alone in a part. */
 static void the_last_point_counts(void **state)
 {
     (void)state;
@@ -229,7 +229,7 @@ static void coverage_is_counted(void **state)
     assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_OK);
     assert_int_equal(cover.surfaces_hit, 1);
     c.label = label;
-    c.n = 1; /* the first point by itself, and the last of five with its own */
+    c.n = 1; /* the first point alone; then five, the last on a triangle of its own */
     assert_int_equal(cloud_cover(&c, s, s->n_surfaces, triangle, &cover, &err), SH_OK);
     assert_true(cover.surfaces_hit == 1 && cover.triangles_hit == 1);
     c.n = 5;

@@ -52,8 +52,8 @@ static void expect_figure(const struct cloud_picture *p, double x_m, double y_m,
     assert_memory_equal(pixel_at(p, x_m, y_m), rgb, 3);
 }
 
-/* Few points have 160 pixels along the longer side, with 2 % of it around them. A pixel shows the mean of its figures;
- * white is a place without points, black one whose points have no figure. */
+/* For few points the longer side has 160 pixels, and a border of 2 % lies around them. A pixel shows the mean of its
+ * figures; white is a place without points, black one whose points have no figure. */
 static void a_few_points(void **state)
 {
     (void)state;
@@ -82,7 +82,7 @@ static void a_few_points(void **state)
     picture_free(&p.image);
 }
 
-/* The area holds what it is to include, as well, of which pixels stay white. */
+/* The area also holds what it is to include. Pixels there stay white. */
 static void an_area_includes_more(void **state)
 {
     (void)state;
@@ -106,7 +106,7 @@ static void an_area_includes_more(void **state)
     picture_free(&p.image);
 }
 
-/* The side has 0.8 pixels for each point of a square of them, up to 800. */
+/* The picture of n x n points in a square has 0.8 n pixels a side: at least 160, at most 800. */
 static void many_points_have_more_pixels(void **state)
 {
     (void)state;

@@ -33,7 +33,7 @@ static void a_lost_tick_says_its_events_again(void **state)
     rig_close(rig);
 }
 
-/* Two ticks are lost, one after the other, and with the second one the event about the first. */
+/* Ticks are lost one after the other, each with the event about those before. */
 static void a_lost_overrun_is_said_with_the_next(void **state)
 {
     (void)state;

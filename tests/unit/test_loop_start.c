@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The system has no thread left at the moment when the loop starts one of its own. Each of them is tried in turn. The
- * start fails with a line that says which, and all that had started ends. A loop that waits for ever is caught by the
- * limit of tests. */
+/* The system has no thread left at the moment when the loop starts one of its own. Each thread of the loop is the
+ * missing one in turn. The start fails with a line that names it, and the threads that had started end. The time limit
+ * of tests catches a loop that waits for ever. */
 #include "tests/unit/device_rig.h"
 #include "tests/unit/plain_source.h"
 
@@ -32,7 +32,7 @@ static int is_one_of(const char *text, const char *const *known)
     return *known != NULL;
 }
 
-/* Starts a loop, which it ends again, without its thread number `which`. Returns 0 where it has not so many. */
+/* Starts a loop without its thread number `which`, and ends it. Returns 0 where the loop has fewer threads. */
 static int start_without(int which, const char *const *sets, int is_made, const char *const *known)
 {
     static const struct link_spec null_link = {.type = LINK_NULL};

@@ -10,7 +10,7 @@ static int16_t amplitude[MOST];
 static uint16_t width[MOST];
 static uint8_t rgb[MOST][3];
 
-/* Amplitudes and widths count up, and so name the entry. */
+/* Amplitudes count up and widths count down, so that both name the entry. */
 static struct line_block with_attributes(uint32_t n_points, uint32_t echoes)
 {
     struct line_block block = make_pulses(n_points, echoes);
@@ -33,7 +33,7 @@ static struct line_block with_colours(uint32_t n_points, uint32_t echoes)
     return block;
 }
 
-/* POINTS.md, 9 and 11. Entry i is the n-th of the block. */
+/* Frames of type 9 or 11 (POINTS.md). `see` gets entry i of a frame, which is entry n of the block. */
 struct beside {
     uint8_t type;
     size_t entry_len;
@@ -142,7 +142,7 @@ static void test_colours(void **state)
     check_refused(&colours, &block, POINTS_LEN + 28 + 16 + 3 * 4);
 }
 
-/* There are as many frames as for the points, each with its own, in the room that is promised to be enough. */
+/* Each frame of points is followed by one of their attributes or colours. The promised room is enough for all. */
 static void check_cut(const struct beside *b, uint32_t n_points, uint32_t echoes)
 {
     const struct line_block block = b->make(n_points, echoes);
@@ -194,8 +194,8 @@ static void test_descriptor(void **state)
     assert_int_equal(back.content, 0);
 }
 
-/* A frame of a type that the parser does not know, as this one was before, is like any other: it counts, it is in the
- * sequence, and nothing is broken. */
+/* To the parser a frame of an unknown type is like any other: it counts, it is in the sequence, and nothing is broken.
+ * Attributes once were of an unknown type. */
 static void test_parser_passes_unknown_types(void **state)
 {
     (void)state;

@@ -54,7 +54,7 @@ void coverage_keep_cells(struct coverage *of, const uint64_t *bits)
     say(of == coverage ? "keep:%llx,%llx " : "KEEP ", (unsigned long long)bits[0], (unsigned long long)bits[1]);
 }
 
-/* Cell i has its middle at (i, 0, 0); it is two triangles, one of them beside it by as much as the other. */
+/* Cell i has its middle at (i, 0, 0). It has two pieces, whose middles are 8 m before and 8 m after that in x. */
 void coverage_pieces(const struct coverage *of, coverage_piece *piece, void *ctx)
 {
     assert_ptr_equal(of, coverage);
@@ -162,7 +162,7 @@ static void ask_next(const char *json, const char *calls)
     free(body.bytes);
 }
 
-/* What the named previews saw counts as seen. The grid has about 250 places: of 25 m by 10 m, 1 m each. */
+/* Cells that the named previews see count as seen. The grid has about 250 places: 1 m apart in 25 m by 10 m. */
 static void the_next_place(void **state)
 {
     static const char calls[] = "site forget keep:5,0 keep:a0,1 open find forget free ";
@@ -242,7 +242,7 @@ static void failures(void **state)
     assert_null(body.bytes);
 }
 
-/* What any place sees can be seen. Where at least half of the previews' hits are fronts, places that see fewer than
+/* A cell that any place sees can be seen. If at least half of the previews' hits are fronts, places that see fewer than
  * half lie within bodies. */
 static void what_can_be_seen(void **state)
 {

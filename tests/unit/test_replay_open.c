@@ -209,8 +209,8 @@ static void a_name_fills_its_fields(void **state)
 
 /* ---- the source */
 
-/* The description is that of the recording, also where it stands somewhere in it. A second descriptor that comes before
- * the first anchor takes the place of the first one, and the emitter of that is not its own. */
+/* The description is the recorded one, wherever it stands in the recording. A second descriptor before the first anchor
+ * replaces the first descriptor. The first descriptor's emitter then no longer counts. */
 static void it_describes_the_recorded_head(void **state)
 {
     (void)state;
@@ -255,7 +255,7 @@ static void the_loop_learns_its_sizes(void **state)
     struct replay *r = open_with(&plain);
     assert_true(replay_source.tick_ns(r) == 4000000);
     /* Each of 4,000 pulses a tick may have two points of 20 bytes. */
-    assert_int_equal(replay_source.usual_bytes(r), 131072); /* and no more than that */
+    assert_int_equal(replay_source.usual_bytes(r), 131072); /* the most: 128 KiB */
     assert_int_equal(replay_source.most_bytes(r), REPLAY_MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
     replay_free(r);
     cfg->loop.tick_hz = 1000;
@@ -337,7 +337,7 @@ static void a_stream_has_a_descriptor(void **state)
 /* ---- a device */
 
 /* Opens the recording as that of a GNSS receiver, which needs the time of day. The recording begins at device time t0.
- * Its telemetry comes so long after, and says a time of 2026. */
+ * Its telemetry comes after_ns later, and says a time of 2026. */
 static int open_receiver(int64_t t0_ns, int64_t after_ns, int is_first_local)
 {
     static const int64_t UTC_NS = INT64_C(1772366400) * S; /* date -u -d 2026-03-01T12:00:00 +%s */
@@ -371,7 +371,7 @@ static void the_time_of_day_is_that_of_the_first_telemetry(void **state)
     }
 }
 
-/* Other protocols report the firmware. It is that of the profile, if that has the recorded model. */
+/* Other protocols report the firmware. The profile's is reported if the profile has the recorded model. */
 static void a_device_has_the_firmware_of_its_profile(void **state)
 {
     (void)state;

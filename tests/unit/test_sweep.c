@@ -65,8 +65,8 @@ static double distance(const long double d[3], double x, double y, double z)
     return (double)sqrtl((d[0] - x) * (d[0] - x) + (d[1] - y) * (d[1] - y) + (d[2] - z) * (d[2] - z));
 }
 
-/* Each of the two sines and cosines has half its last bit and 4e-17 of the block's middle, and two products follow:
- * 4e-16 together. Taken one by one, angles are rounded before, to 1e-16 of a turn. */
+/* Each of the two sines and cosines errs by half its last bit, and by the 4e-17 of the block's middle. Two products
+ * follow: 4e-16 together. Taken one by one, angles are rounded before, to 1e-16 of a turn. */
 static void they_are_closer_to_the_schedule_than_one_by_one(void **state)
 {
     (void)state;
@@ -96,8 +96,8 @@ static void they_are_closer_to_the_schedule_than_one_by_one(void **state)
     assert_true(worst < 4e-16 && worst < worst_one && longest < 4e-16);
 }
 
-/* Directions of whole counts, where half a count's third power over 6 is far below the last bit. The error is that of a
- * rounded angle, as the counts are those of rounded angles. */
+/* Directions of whole counts. The kernel's own error, d^3/6 for d of half a count, is far below the last bit. The
+ * rest is the error of a rounded angle, as the counts are found from rounded angles. */
 static void encoders_read_whole_counts(void **state)
 {
     (void)state;

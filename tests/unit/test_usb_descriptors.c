@@ -57,7 +57,7 @@ static void test_configuration(void **state)
     check(host, 0x0600, 0, qualifier, sizeof qualifier);
     host_free(host);
     host = host_new(&pair_model, USB_RATE_SUPER, USB_RATE_SUPER);
-    check(host, 0x0200, 0, super, sizeof super); /* 100 mA in units of 8, up */
+    check(host, 0x0200, 0, super, sizeof super); /* 100 mA in units of 8, rounded up */
     assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0700, 0, 99, NULL), USB_STALL);
     assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0600, 0, 99, NULL), USB_STALL);
     host_free(host);
@@ -109,7 +109,7 @@ static void test_bos(void **state)
         check(host, 0x0f00, 0, bytes, sizeof bytes);
         host_free(host);
     }
-    /* A device without super speed does not claim it: its USB 2.0 extension would be empty. */
+    /* A device without super speed has neither its capability nor a USB 2.0 extension, which would be empty. */
     uint8_t high[33] = {5, 15, 33, 0, 1};
     memcpy(high + 5, bytes + 22, 28);
     struct host *host = host_new(&pair_model, USB_RATE_HIGH, USB_RATE_HIGH);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of the head's states, power, time and counters, as a client of the program sees them. The faults are those of
- * --truth, by number and by time. Most tests run in the pace step, where nothing depends on when a client connects. */
+/* Faults of the head's states, power, time and counters, as a client of the program sees them. --truth has the same
+ * counts and times. Most tests run in the pace step, where nothing depends on when a client connects. */
 #include "tests/wire/room.h"
 
 #define SECOND_NS INT64_C(1000000000)
@@ -169,7 +169,7 @@ static void test_pps_lost(void **state)
     assert_int_equal(truth_of(wire, "pps_lost", 1, "n"), missing);
 }
 
-/* Returns the change of the head's clock error since the first edge, at each edge. */
+/* Returns the change of the head's clock error from the first edge to edge i. */
 static int64_t error_ns(const struct edges *e, int i)
 {
     return (e->gps_s[i] - e->gps_s[0]) * SECOND_NS - (e->t_ns[i] - e->t_ns[0]);
@@ -185,7 +185,7 @@ static void test_clock(void **state)
     assert_true(jump_ns == 3100000000 && e.n == 6);
     for (int i = 0; i < e.n; i++)
         assert_int_equal(error_ns(&e, i), e.t_ns[i] < jump_ns ? 0 : 2250000000);
-    /* 100 ppm for 2 s are 200 us. An edge is the first whole nanosecond, so its error is less than one. */
+    /* 100 ppm for 2 s are 200 us. An edge is the second's first whole nanosecond, so it is less than 1 ns late. */
     run_clock(wire, "[{kind: clock_drift, from_s: 1, until_s: 3, ppm: 100}]", 6, &e);
     const int64_t from_ns = truth_of(wire, "clock_drift", 0, "t_ns"),
                   until_ns = truth_of(wire, "clock_drift", 1, "t_ns");
@@ -264,8 +264,8 @@ static int64_t until_hung_up(struct scanhead *sh, uint64_t *pulse_end, int *ends
     return t_ns;
 }
 
-/* In steps the time is exact to the tick. A step that goes beyond it is not answered, and its time passes all the
- * same. */
+/* In steps power goes at an exact tick. A step that goes beyond that tick is not answered, and its time passes all
+ * the same. */
 static void test_power_cycle_in_steps(void **state)
 {
     struct wire *wire = *state;
@@ -338,7 +338,7 @@ static void power_cycle_at(struct wire *wire, const char *pace, const char *link
     client_wait_state(sh, "idle");
     assert_string_equal(client_ask(sh, "SYST:ERR:COUN?"), "0");
     client_tell(sh, "SCAN:START");
-    client_until(sh, SCANHEAD_EV_SCAN_END, &(struct scanhead_frame){0}); /* struck once */
+    client_until(sh, SCANHEAD_EV_SCAN_END, &(struct scanhead_frame){0}); /* the fault came once */
     scanhead_close(sh);
     head_end(&head, SIGTERM);
 }
@@ -350,7 +350,7 @@ static void test_power_cycle(void **state)
     power_cycle_at(*state, "realtime", "pty");
 }
 
-/* The same faults give the same stream at any pace, with any number of threads, off line and on. */
+/* The same faults give the same stream at any pace, with any number of threads. Off line, a power cycle is the end. */
 static void test_same_stream(void **state)
 {
     struct wire *wire = *state;
@@ -410,7 +410,7 @@ static void test_file_goes_on(void **state)
     assert_string_equal(states, "boot idle spin-up scanning off boot idle spin-up scanning spin-down ");
 }
 
-/* Nothing reports the time, so it is refused. */
+/* A leap second is refused where the head has no time of day. */
 static void test_needs_time(void **state)
 {
     struct wire *wire = *state;

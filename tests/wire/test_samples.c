@@ -9,7 +9,7 @@
 
 static const char page_path[] = "drivers/protocol/SAMPLES.md";
 
-/* Returns the text after the `n`-th line that begins so; NULL: there are fewer. */
+/* Returns the text from line n on, counted from 0 among the lines that begin so; NULL: there are fewer. */
 static const char *find_line(const char *text, const char *begin, int n)
 {
     for (const char *at = text; (at = strstr(at, begin)) != NULL; at++)
@@ -34,7 +34,7 @@ static size_t read_hex(const char *page, int n, uint8_t *bytes, size_t room)
     return len;
 }
 
-/* Takes windows of a frame of waveforms into a block's. */
+/* Adds the windows in a frame of waveforms to those of a block. */
 static void take_waves(const uint8_t *frame, struct line_waves *waves)
 {
     struct native_waves head;
@@ -262,7 +262,7 @@ static void test_words(void **state)
     free(page);
     said = ask_python(wire, "tables", "drivers/protocol", stream);
     assert_string_equal(said,
-                        "6 1 2 3 9 11 12 4 5 10 5 6\n"); /* names and poses have no fixed part that is decoded so */
+                        "6 1 2 3 9 11 12 4 5 10 5 6\n"); /* the client has no fields of names and poses */
     free(said);
 }
 
@@ -353,7 +353,7 @@ static void test_session(void **state)
     head_end(&head, SIGTERM);
     int same = strncmp(session, played, played_len) == 0 && session[played_len] == '`';
     for (char *line = strtok(played, "\n"); !same && line != NULL; line = strtok(NULL, "\n"))
-        print_message("# %s\n", line); /* ready for the page, where the head is right */
+        print_message("# %s\n", line); /* in the page's form: if the head is right, the page needs them */
     assert_true(same);
     free(page);
 }

@@ -48,7 +48,7 @@ static void expect_setting(const struct head *head, const char *field)
     if (strstr(settings, field) == NULL) fail_msg("no %s in %s", field, settings);
 }
 
-/* After a power cycle. The other link may be back before this one has gone. */
+/* Waits after a power cycle. The other link may be back before this one has gone down. */
 static void await_setting(const struct head *head, const char *field)
 {
     const char *settings;
@@ -118,7 +118,7 @@ static void a_killed_head_has_them_too(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* Runs to the end of one turn, with the file or with a journal to replay. */
+/* Runs to the end of one turn, with the file, and with a journal to write or to replay. */
 static void run_turn(struct wire *wire, const char *journal, const char *says, char hash[65])
 {
     char set[400], path[400];

@@ -40,7 +40,7 @@ static void slats_write(const struct wire *wire)
     assert_int_equal(fclose(f), 0);
 }
 
-/* The head goes round the room, at another height each time. */
+/* The head goes along an arc in the room, and rises and turns. */
 static void ride_write(const struct wire *wire)
 {
     FILE *f = fopen(wire_path(wire, "ride.csv"), "w");

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* These tests give the dissector in Wireshark damage. Damaged frames are marked, and a damaged stream is read as
- * libscanhead reads it, in one pass and in two. */
+/* These tests give damaged frames to the dissector in Wireshark. It marks them, and reads a damaged stream as
+ * libscanhead does, in one pass and in two. */
 #include "tests/wire/wireshark_rig.h"
 
 #include "drivers/protocol/native.h"
@@ -53,7 +53,7 @@ static void put_hurt(struct capture *c, uint32_t interface)
     free(bytes[1]);
 }
 
-/* Writes one frame, damaged or not. Returns how many bytes there are. next: the frame after it, which comes first. */
+/* Writes one frame, damaged or not. Returns how many bytes there are. older: a frame that may come again before it. */
 static size_t put_one(uint8_t *out, const uint8_t *frame, const uint8_t *older, int what, uint64_t *random)
 {
     size_t to = 0;
@@ -74,8 +74,8 @@ static void set_round(uint8_t *frame, int round)
     seal_frame(frame);
 }
 
-/* Takes 1 to 3 frames from a frame of n bytes on, but no more than up to end. The last of them is sent now. The frames
- * between lie after the n bytes, in *between. Returns the length of all of them. */
+/* Takes the 1 to 3 frames after a frame of n bytes, but none beyond end. The last of them is to be sent first. The
+ * others lie after the n bytes, and *between is their length. Returns where the last one begins. */
 static size_t take_ahead(uint8_t *frame, size_t n, const uint8_t *end, int round, uint64_t *random, size_t *between)
 {
     size_t last = n;
@@ -149,7 +149,7 @@ static int take_good_header(size_t *n_bad_payloads)
     return 0;
 }
 
-/* Frames of a damaged stream are libscanhead's, in order. */
+/* The dissector finds the same frames of a damaged stream as libscanhead, in order. */
 static void expect_frames(const char *name, size_t *n_bad)
 {
     struct scanhead_frame frame;
@@ -195,7 +195,7 @@ static void expect_damaged(const char *name)
  * changed. */
 static const struct {
     uint8_t type;
-    uint32_t at, n, value; /* in the payload n bytes: 0: none, 4: a number, else each of them is `value` */
+    uint32_t at, n, value; /* changes n bytes of the payload; n is 4: value as a number; else each byte is value */
     int longer;            /* by so many bytes */
     const char *says;
 } wrong[] = {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* /next gives the place that adds most to the surface that the stations of a trial see (as `scanhead coverage
- * --next`, with coarse scans). /reach gives the surface that can be seen from any of its places. */
+ * --next`, with coarse scans). /reach gives the surface that can be seen from at least one place of the grid. */
 #include "firmware_sim/app/studio/coverage/next.h"
 
 #include <math.h>
@@ -46,7 +46,7 @@ static double grid_of(const struct scene *scene)
     return fmax(LEAST_GRID_M, sqrt(area_m2 / PLACES));
 }
 
-/* Marks the cells that the previews see as seen, and sums the previews' hits, in place of the stations' own ones. */
+/* Marks as seen the cells that the previews see, and sums the previews' hits. The stations' own ones don't count. */
 static void keep_seen(struct coverage *coverage, const struct preview_seen *seen, uint32_t n,
                       struct coverage_pulses *sum)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The frames of a recording, kept until the smallest and the largest value that its colours show are known. In: each
+/* Keeps the frames of a recording until its colours' limits are known: the smallest and the largest value. In: each
  * frame of the stream. Out: these two figures, and the frames again, in their order. The frames lie in a nameless file
  * beside the recording; memory holds none of them. One thread. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_COLOUR_SPOOL_H
@@ -22,8 +22,8 @@ struct colour_spool {
     struct scanhead *sh; /* reads the stored frames back */
 };
 
-/* mode: one with limits. The file is made in the folder of path, which must live on. SH_EIO, SH_EPERM, SH_EINPUT,
- * SH_ENOMEM. colour_spool_close is due in any case. */
+/* mode: one with limits. The file is made in the folder of path. The string path must live on. SH_EIO, SH_EPERM,
+ * SH_EINPUT, SH_ENOMEM. colour_spool_close is due in any case. */
 int colour_spool_open(struct colour_spool *spool, const char *path, enum colour_mode mode, struct sh_err *err);
 /* Errors as track_frame has them, or SH_EIO. */
 int colour_spool_frame(struct colour_spool *spool, struct scanhead *sh, const struct scanhead_frame *frame,
