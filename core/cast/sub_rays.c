@@ -64,7 +64,7 @@ static void cast_pool(struct caster *c, const struct chunk *k, uint32_t first)
         hits.rays.scattered = c->sub_rays->scattered;
         if (through) look_through(c, s, &hits, at);
         for (uint32_t i = at; i < at + n && caster_has_bodies(s); i++)
-            if (p->body[i] != 0) p->triangle[i] = BVH_NO_TRIANGLE; /* not of the scene */
+            if (p->body[i] != 0) p->triangle[i] = BVH_NO_TRIANGLE; /* a body's triangle, not the scene's */
     }
     weigh_pool(c, s, first);
 }
@@ -175,7 +175,7 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     if (job->centre.energy > 0.0) add_centre(c, k->s, job);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
         add_hits(c, k, job, i);
-    /* With detection as many echoes are kept here as a pulse can have, since it chooses among them later. */
+    /* Detection chooses among the echoes later. For it, as many are kept here as a pulse can have. */
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;
@@ -287,7 +287,7 @@ static void cast_whole(struct caster *c, const struct chunk *k, const uint32_t *
 }
 
 /* Returns the range up to which outlines may cut a footprint. The footprint's centre hits a surface at range_m; steep
- * is the incidence as 1 / cos^2. The limit lies 4 radii of the footprint beyond the hit, and 3 more times 1 / cos,
+ * is the incidence as 1 / cos^2. The limit lies 4 + 3 / cos radii of the footprint beyond the hit,
  * since the surface may bend away: a footprint on a plane reaches tan(incidence) radii beyond. */
 static double limit_m(const struct beam *beam, double range_m, float steep)
 {

@@ -74,8 +74,8 @@ static double largest_of(const double v[3], double largest)
     return largest;
 }
 
-/* Finds the largest coordinate, and its error, that one row of a matrix makes of vertices up to `most` in each
- * direction with errors up to `error`. The row's numbers were rounded to single precision, too; only 0 and 1 are
+/* Finds the largest coordinate, and its error, that one row of a matrix makes of vertices. These reach up to `most` in
+ * each direction, with errors up to `error`. The row's numbers were rounded to single precision, too; only 0 and 1 are
  * exact. */
 static void add_rounding(const ai_real row[4], const double most[3], const double error[3], double *out_most,
                          double *out_error)
@@ -210,7 +210,7 @@ static int add_node(struct import *im, const struct aiNode *node, int depth, str
     return rc;
 }
 
-/* Counts every instance, as add_mesh does where it reports progress. */
+/* Counts the faces of every instance, as add_mesh does for its progress. */
 static uint64_t count_faces(const struct aiScene *in, const struct aiNode *node)
 {
     uint64_t n = 0;

@@ -24,8 +24,8 @@ uint32_t sight_find_runs(const struct sight *sight, const struct vec3_in *dir, u
 
 /* ---- candidate_list.c */
 /* Finds which triangle of `list` each of the rays from .. to - 1 hits. triangle[0 ..] gets the hits, BVH_NO_TRIANGLE
- * where a ray hits nothing, and FEW_OPEN where the list can't decide: a ray is within the bounds of errors in struct
- * sight_record, or planes nearly coincide. Returns whether any ray has FEW_OPEN. */
+ * where a ray hits nothing, and FEW_OPEN where the list can't decide: a ray lies within the error bounds of struct
+ * sight_record, at an edge or nearly along a plane, or planes nearly coincide. Returns whether any ray has FEW_OPEN. */
 enum { FEW_OPEN = 0xfffffffe };
 int candidate_list_decide(const struct sight *sight, const struct bvh_rays *rays, const uint32_t *list, uint32_t from,
                           uint32_t to, uint32_t *triangle);

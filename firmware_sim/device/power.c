@@ -3,7 +3,7 @@
  *
  * Device time, scan numbers and the stations' places go on over a power cycle, and so does the time of day, which has a
  * battery. All else is as at power-up. A reboot by command is a power cycle of one tick. Protocols whose devices count
- * from power-up count from device_last_power(). */
+ * their time from power-up use device_last_power(). */
 #include <string.h>
 
 #include "firmware_sim/device/device_state.h"

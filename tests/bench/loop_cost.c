@@ -5,7 +5,7 @@
  *
  * A PROGRAM is a path of scanhead, and more of its options after blanks: 'build/scanhead --no-hash'. Each round runs
  * each program twice, for a short and for a long scan. The difference of both is the cost of the pulses between them.
- * Loading the scene is in neither. Processor time is that of all threads, from --stats. */
+ * Loading the scene is in both, so it cancels out. Processor time is that of all threads, from --stats. */
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
@@ -29,9 +29,9 @@ static const char HELP[] =
     "  --seconds S     of device time in the long scan, default 16; the short one has an eighth\n"
     "  --rounds N      default 9, at most 99\n\n"
     "A PROGRAM is a path of scanhead and more of its options, with blanks between. Columns: medians of the rounds,\n"
-    "the spread of the middle half, and the median of the ratios to the first program of the same round. Then medians\n"
-    "of the long scan: how often a second its threads were taken off a processor (switch/s), how late ticks were\n"
-    "released (us), and the frames that clients lost (lost).\n";
+    "the spread of the middle half, and the median of the ratios to the first program of the same round. Then, as\n"
+    "medians: how often a second its threads gave up or lost a processor (switch/s); and, of the long scan, how late\n"
+    "ticks were released (us), and the frames that clients lost (lost).\n";
 
 struct options {
     const char *config, *pace;

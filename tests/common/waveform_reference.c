@@ -145,7 +145,7 @@ uint32_t waveref_rings(const struct waveref_shape *shape, uint32_t rings, struct
     return pattern.n;
 }
 
-/* The part of the disc beyond the line x = h, on a plane of that slope, which is at_m at the line. */
+/* Returns the part of the disc beyond the line x = h. Its plane has slope_m, and the range at_m on that line. */
 static struct waveform_return part_of(const struct beam *beam, double h, double slope_m, double at_m)
 {
     double energy, moment, along, across;

@@ -6,9 +6,9 @@ import {createConnection} from 'node:net';
 import {forget, remember} from './work.mjs';
 
 export const PROGRAM = process.env.SCANHEAD || 'build/scanhead';
-const DEADLINE_MS = 300000; // only what waits for ever reaches this
+const DEADLINE_MS = 300000; // only an endless wait reaches this
 
-/** Starts the program (`run`, `view`) and waits for its ready line. The program ends with this one. */
+/** Starts the program (`run`, `view`) and waits for its ready line. The program is killed when this process ends. */
 export async function start(args, {nice = 0} = {}) {
   const child = spawn('nice', ['-n', String(nice), 'setpriv', '--pdeathsig', 'KILL', PROGRAM, ...args, '--ready-fd', '3'],
     {stdio: ['ignore', 'pipe', 'pipe', 'pipe']});

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 // make page-pictures: this makes pictures of the page in three widths and both themes, for people to look at. The
-// pictures show a scan in progress, that scan when it is done, stations that are tried, and its recording.
+// pictures show a scan in progress and when it is done, stations that are tried, the tools, and a recording.
 //   node tests/page/pictures.mjs [--out FOLDER] [--only WORD] [--best FILE]
-// --best makes only the picture of the first page: config/demo.yaml from its three stations, 1280 x 900.
+// --best makes only the picture of the README: config/demo.yaml from its three stations, 1280 x 900.
 import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
 import {parseArgs} from 'node:util';
 import {Browser} from './browser.mjs';

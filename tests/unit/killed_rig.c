@@ -36,7 +36,7 @@ void killed_rig_record(const char *path, struct recorder_options options, void (
 
 void killed_rig_write(const char *path, const void *data, size_t len)
 {
-    unlink(path); /* some file systems write a file that was emptied to the disk at once */
+    unlink(path); /* after a file was truncated, some file systems write it to the disk at once */
     FILE *out = fopen(path, "wb");
     assert_non_null(out);
     assert_int_equal(fwrite(data, 1, len, out), len);

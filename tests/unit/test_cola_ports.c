@@ -86,7 +86,7 @@ static void a_tim7_has_five_outputs(void **state)
     cola_expect_b("sRN LIDoutputstate", 18, outputs, sizeof outputs);
 }
 
-/* Unused inputs are 2, and three of eleven outputs are used. Outputs come once when they are asked for. */
+/* An unused input has the value 2. Three of eleven outputs are used. Outputs come once when they are asked for. */
 static void an_lms_says_what_is_not_used(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* HELP? of every command is compared whole: kind, unit, limits, default, step, states and values were worked out by
- * hand from the limits of command_device.c. A head with fixed pulse rates has them for HEAD:PRR, and no other
- * setting has. */
+ * hand from the limits of command_device.c. A head with fixed pulse rates lists them for HEAD:PRR, and for no
+ * other setting. */
 #include "tests/unit/command_device.h"
 
 #define ALL   "\"all\""
@@ -46,7 +46,7 @@ static const struct {
     {"SCAN:FRAMes", "number,\"\",0,1000000,1,1," ALL ",\"\""},
     {"SCAN:ECHoes", "word,\"\",,,ALL,," ALL ",\"ALL FIRSt LAST STRongest\""},
     {"SCAN:WAVeform", "word,\"\",,,OFF,," ALL ",\"OFF ON\""},
-    /* no settings; what depends on the state has the states of head.c */
+    /* no settings; commands that depend on the state list the states of head.c */
     {"*RST", "action,\"\",,,,,\"idle spin-up scanning spin-down fault\",\"\""},
     {"*CLS", "action,\"\",,,,," ALL ",\"\""},
     {"*IDN", "query,\"\",,,,," ALL ",\"\""},
@@ -84,7 +84,7 @@ static void every_setting_is_described_whole(void **state)
     assert_int_equal(n, 22);
 }
 
-/* A head with fixed rates takes for each setting but the pulse rate a number that is none of those rates. */
+/* On a head with fixed rates, all settings but the pulse rate still accept numbers other than those rates. */
 static void other_settings_take_any_value(void **state)
 {
     (void)state;

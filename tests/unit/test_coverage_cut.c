@@ -14,8 +14,8 @@
 #include "core/rng.h"
 #include "core/vec3.h"
 
-/* The triangles are a wall, a flat and a steep needle, one that is a single piece, and an equal-sided one. Two more
- * have a right angle at the base's end to double precision, and coordinates of UTM. */
+/* The triangles are a wall, a flat and a steep needle, one that is a single piece, and an equal-sided one. The
+ * last two: one has a right angle at the base's end to double precision, the other has coordinates of UTM. */
 static const double CASES[][3][3] = {
     {{0, 0, 0}, {10.2, 0, 0}, {10.2, 0, 4.24}},
     {{0, 0, 0}, {10, 0, 0}, {4, 0.01, 0.02}},
@@ -41,7 +41,7 @@ static double area_of(int n, const double corner[][3], double normal[3])
     return 0.5 * vec3_length(normal);
 }
 
-/* Coordinates of UTM are good to 1e-9 m: areas of pieces from 1 cm on to a part in 1e6. */
+/* Coordinates of UTM are good to 1e-9 m, so areas of pieces of 1 cm or more are good to a part in 1e6. */
 static void check_pieces(const double corner[3][3], double size_m)
 {
     struct cut cut;
@@ -78,7 +78,7 @@ static void test_partition(void **state)
             check_pieces(CASES[i], sizes_m[k]);
 }
 
-/* Returns whether the polygon holds the point to 1e-7 of the size: it is left of all its edges. */
+/* Returns whether the polygon holds the point, to slack_m: the point is left of all its edges. */
 static int holds(int n, const double corner[4][3], const double normal[3], const double p[3], double slack_m)
 {
     for (int i = 0; i < n; i++) {
@@ -130,7 +130,7 @@ static void test_border(void **state)
         }
 }
 
-/* Ten metres by a millimetre have one row, so columns of 0.25 / sqrt(5) m along two legs, each rounded up. */
+/* A needle of 10 m by 1 mm has one row. Columns are 0.25 / sqrt(5) m wide; each leg's number is rounded up. */
 static void test_needle(void **state)
 {
     (void)state;

@@ -12,7 +12,7 @@
 #ifdef __SIZEOF_FLOAT128__
 typedef __float128 quad;
 #else
-typedef long double quad; /* 113 bits, too, where there is no other: on ARM */
+typedef long double quad; /* on ARM, which lacks __float128, this has 113 bits, too */
 #endif
 
 /* Corner differences, relative to the query point, round by 2^-53 of themselves on each axis. Products, the foot and
@@ -57,7 +57,7 @@ static double reference_distance(const double p[3], const double ca[3], const do
         w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
         v = 1 - w;
     } else {
-        /* With v and w from the areas needles would lose precision even here. The distance from the plane does not. */
+        /* If v and w came from areas, needles would lose precision even here. The distance from the plane does not. */
         quad n[3] = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]};
         quad height = dotq(n, ap);
         return (double)sqrtl((long double)(height * height / dotq(n, n)));
@@ -81,7 +81,7 @@ static double brute_force(const struct scene *s, const double p[3], uint32_t *ne
     return best;
 }
 
-/* Returns the farthest corner of one triangle: the rounding of its distance is relative to that. */
+/* Returns the distance to the farthest corner of a triangle. A distance to the triangle rounds relative to it. */
 static double farthest_corner(const struct scene *s, uint32_t triangle, const double p[3])
 {
     double d = 0;
@@ -111,7 +111,7 @@ static struct bvh *make_bvh(const struct scene *scene)
     return bvh;
 }
 
-/* Compares one query with brute force, and with its own answer. */
+/* Compares one query with brute force. Then it asks again with limits just beyond and just within that distance. */
 static void check_query(const struct bvh *bvh, const struct scene *s, const double p[3])
 {
     struct distance_hit hit;
@@ -150,7 +150,7 @@ static void random_scene(const double origin[3], int queries)
     struct bvh *bvh = make_bvh(s);
     for (int i = 0; i < queries; i++) {
         double p[3];
-        /* Points are spread out, and then close to a surface, where a query prunes most. */
+        /* Every second point is close to a surface, where a query prunes most. The others are spread out. */
         const double *near = v[rand() % (COUNT * 3)];
         for (int k = 0; k < 3; k++)
             p[k] = i % 2 ? near[k] + uniform(-1, 1) * 1e-3 : origin[k] + uniform(-300, 300);
@@ -230,8 +230,8 @@ static void points_on_the_surface(void **state)
                 p[k] = v[0][k] + (v[1][k] - v[0][k]) * a + (v[2][k] - v[0][k]) * b;
             struct distance_hit hit;
             assert_int_equal(distance_query(bvh, p, 1, &hit), 1);
-            /* Three roundings at most on each of three axes, half a unit of the largest coordinate each, and
-             * of the differences (below 20) */
+            /* Each of three axes has at most three roundings of half a unit of the largest coordinate, and as
+             * many of the differences (below 20). */
             double largest = turn % 2 ? 5800010 : 10;
             double bound = sqrt(3) * (1.5 * largest * 0x1p-52 + 3 * 20 * 0x1p-53) + ROUNDING * 20;
             if (hit.distance_m > bound) fail_msg("%g m off the surface, bound %g", hit.distance_m, bound);
@@ -293,7 +293,7 @@ static void limits_and_ties(void **state)
     struct bvh *bvh = make_bvh(s);
     struct distance_hit hit;
     const double above_the_edge[3] = {0.5, 0.5, 2}, nowhere[3] = {NAN, 0, 0}, far[3] = {1e9, 0, 0};
-    assert_int_equal(distance_query(bvh, above_the_edge, 2, &hit), 1); /* a limit is within */
+    assert_int_equal(distance_query(bvh, above_the_edge, 2, &hit), 1); /* the limit itself counts as within */
     assert_true(hit.distance_m == 2 && hit.point_m[2] == 0 && hit.triangle == 0);
     assert_int_equal(distance_query(bvh, above_the_edge, 1.9999999, &hit), 0);
     assert_int_equal(distance_query(bvh, above_the_edge, 0, &hit), 0);

@@ -209,7 +209,7 @@ static void names_of_units(void **state)
     }
 }
 
-/* Blanks may follow a number, and alone they are none. */
+/* Blanks may follow a number. Blanks alone are not a number. */
 static void numbers_of_metadata(void **state)
 {
     (void)state;
@@ -232,7 +232,7 @@ static void numbers_of_metadata(void **state)
     }
 }
 
-/* The value of no data is a number, else there is none. The value's text has up to 63 characters. */
+/* A no-data value that is not a number is ignored. Its text has up to 62 characters and a NUL. */
 static void no_data_values(void **state)
 {
     (void)state;
@@ -266,7 +266,7 @@ static void set_keys(struct made *m, uint16_t keys[8], unsigned id, unsigned val
     add(m, 34735, SHORT, 8, keys);
 }
 
-/* Codes of 5001 to 5033 count from an ellipsoid. A code whose value stands elsewhere is no number here. */
+/* Codes of 5001 to 5033 count from an ellipsoid. A code whose value is in another tag is ignored. */
 static void codes_of_heights(void **state)
 {
     (void)state;
@@ -324,8 +324,8 @@ static void bounds_of_turned_cells(void **state)
     }
 }
 
-/* A ModelTransformation counts before the other two. Its third row is not used, and each of its numbers but a factor of
- * 1 is reported. With less than three rows there is nothing to report. */
+/* A ModelTransformation counts before scale and tie point. Its third row is not used. A number there is reported,
+ * unless it is 0 or a factor of 1 for heights. With less than three rows there is nothing to report. */
 static void rows_of_a_transformation(void **state)
 {
     (void)state;

@@ -48,7 +48,7 @@ static struct fault make(enum fault_kind kind, double from_s, double until_s)
         .kind = kind, .probability = 1.0, .until_pulse = UINT64_MAX, .from_s = from_s, .until_s = until_s};
 }
 
-/* Windows may begin between ticks. The clock's are exact, and the others are of whole ticks. */
+/* Windows may begin between ticks. Windows of clock faults are exact, and the others are of whole ticks. */
 static void begins_and_ends_at_its_times(void **state)
 {
     (void)state;
@@ -105,7 +105,7 @@ static void strikes_each_scan_at_its_pulses(void **state)
     fault_board_free(rig.board);
 }
 
-/* A change of the list does not change those that are at work, and ends those that are taken out. */
+/* A change of the list ends the active faults that it takes out, and leaves the others as they are. */
 static void follows_the_board(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Signals of the command line. One signal asks for an end in good order, and so do two at once; more ask for an end at
- * once. */
+/* Signals of the command line. One signal asks for an end in good order, and so do two within a second. Any other
+ * signal after the first one ends the program immediately. */
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -58,7 +58,7 @@ static void a_third_ends_at_once(void **state)
 static void a_second_that_comes_later_ends_at_once(void **state)
 {
     (void)state;
-    assert_int_equal(OUTCOME(SIGTERM, 0, SIGTERM), SIGTERM); /* by the clock: the second is what is tested */
+    assert_int_equal(OUTCOME(SIGTERM, 0, SIGTERM), SIGTERM); /* it has to wait: the limit of a second is tested */
 }
 
 int main(void)

@@ -83,7 +83,7 @@ static void check_lines(const struct map *map, const struct map_label *label, ui
 }
 
 /* 60 stations are at random places of 600 x 600 pixels. A label is about 110 x 35 pixels, so all of them would cover
- * two thirds of the map, and some find no room. All 12 on a grid of 150 pixels do. */
+ * two thirds of the map, and some find no room. On a grid of 150 x 200 pixels, all 12 labels find room. */
 static void test_labels(void **state)
 {
     (void)state;
@@ -371,8 +371,8 @@ static uint64_t ink_of(const char *text, double *width)
     return hash;
 }
 
-/* Each printable character of ASCII and each letter of Latin-1 looks different from all others. None is the box of an
- * unknown one, but for the few that the font lacks. */
+/* Each printable character of ASCII and each letter of Latin-1 looks different from all others. None is the box for
+ * unknown characters, except the few that the font lacks. */
 static void test_font(void **state)
 {
     (void)state;

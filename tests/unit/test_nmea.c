@@ -188,7 +188,7 @@ static void qualities(void **state)
     }
 }
 
-/* The longest sentence fits. With one byte less nothing is written, and nothing behind the end. */
+/* The longest sentences fit. With less room the call returns 0, and writes nothing beyond the end. */
 static void room_is_kept(void **state)
 {
     (void)state;

@@ -74,7 +74,7 @@ static void expect_edge(const struct site_view *view, double elevation_deg, doub
     }
 }
 
-/* The sweep ends up to a line beyond its window. At the horizon an azimuth's margin is the angle itself. */
+/* The pan stops at most a line (0.2 deg) beyond its window. At the horizon an azimuth's margin is the angle itself. */
 static void a_window_has_four_edges(void **state)
 {
     (void)state;

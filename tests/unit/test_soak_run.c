@@ -32,7 +32,7 @@ static void expect(const char *words, int status, const char *expected)
     assert_string_equal(trace, expected);
 }
 
-/* 0.1 s count from the first points on, at 40 ms. The faults end then, and the clients have 5 s. */
+/* The 0.1 s count from the first points on, which come at 40 ms. Then the faults end, and the clients have 5 s. */
 static void a_good_soak(void **state)
 {
     (void)state;
@@ -46,8 +46,8 @@ static void a_good_soak(void **state)
     free(json);
 }
 
-/* What does not come has limits: 30 s for a scan; then 2.5 s for faults of the head, 5 s for the clients, and 6 s for
- * the head's answer. */
+/* Each wait has a limit: 30 s for a scan; then 2.5 s for faults of the head, 5 s for the clients, and 6 s for the
+ * head's answer. */
 static void limits(void **state)
 {
     static const struct {
@@ -75,7 +75,7 @@ static void limits(void **state)
                         OPENED "end@30020 join free_loop join_clients join_clean judge0 head0 judge1 head1 " FREED);
 }
 
-/* The soak ends early where the clean reader fails, or where all clients that there are have ended. */
+/* The soak ends early where the clean reader fails, or once all clients have ended. */
 static void early_ends(void **state)
 {
     (void)state;
@@ -88,7 +88,7 @@ static void early_ends(void **state)
     has(trace, "no_faults@100 end@120 ");
 }
 
-/* With another pace than that of the machine the duration is device time, which is ten times as fast here. */
+/* With a pace other than realtime, the duration is device time, which is ten times as fast here. */
 static void device_time(void **state)
 {
     (void)state;
@@ -114,8 +114,8 @@ static void a_bad_soak(void **state)
     assert_string_equal(on_out, "{\n  \"wall_s\": 0.1\n}\n");
 }
 
-/* A head starts by itself where no client could start a scan: one of the native protocol on TCP, a terminal or USB. A
- * UDP link has a clean one beside it, where its packets come to this machine. */
+/* Clients of the native protocol on TCP, a pty or USB can start a scan. Without such a link the head starts itself.
+ * A UDP link has a clean link beside it, where its packets come to this machine. */
 static void who_starts_the_scan(void **state)
 {
     static const struct {

@@ -85,7 +85,7 @@ static void answers_that_are_none(void **state)
 static void an_offset_has_a_limit(void **state)
 {
     (void)state;
-    set_clock(1, 0, 1000 * S); /* the first one has none */
+    set_clock(1, 0, 1000 * S); /* the first offset has no limit */
     expect_state("SET", 999 * S, 0, 1, 0, 0);
     turn_after(S);
     expect_request(1001 * S);
@@ -170,7 +170,7 @@ static void kisses(void **state)
     expect_error("127.1.2.3: kiss-o'-death DENY, it is asked no more");
 }
 
-/* The rate is halved ten times at most. A wait is 1000 s at most. */
+/* The rate is halved ten times at most. One wait lasts at most 1000 s, so a period of 1024 s takes two. */
 static void it_slows_down_no_further(void **state)
 {
     (void)state;
@@ -284,7 +284,7 @@ static void injected_faults_strike_at_answers(void **state)
         turn_after(S);
         assert_true(has_asked());
         const int64_t t_ns = date_ns();
-        request[47] ^= 1; /* a foreign answer is none that a fault changes */
+        request[47] ^= 1; /* a fault does not change a foreign answer */
         answer_with(t_ns);
         request[47] ^= 1;
         answer_with(t_ns);

@@ -93,13 +93,13 @@ static void test_what_the_shell_leaves(void **state)
     assert_int_equal(kill(-client.pid, 0), -1);
 }
 
-/* Programs that leave the group: with a session of their own, or as timeout does. Each says its number once it has. */
+/* Programs that leave the group, with their own session or as timeout does. Then each prints its process number. */
 static void test_what_leaves_the_group(void **state)
 {
     (void)state;
     static const char *const lines[] = {
         "setsid sh -c 'echo $$; exec sleep 600' & wait", "timeout 600 sh -c 'echo $$; exec sleep 600'; true",
-        "(setsid sh -c 'echo $$; exec sleep 600' &) ; exit 0", /* its parent has ended: ours is the next */
+        "(setsid sh -c 'echo $$; exec sleep 600' &) ; exit 0", /* its parent ends, and our process takes its place */
     };
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         struct client client;
@@ -118,7 +118,7 @@ static void test_what_leaves_the_group(void **state)
     assert_int_equal(kill(pid, 0), -1);
 }
 
-/* Some programs end with their input, or at a key. This client would end by itself, with status 5. */
+/* Some programs end with their input, or at a key. If its input ended, this client would end with status 5. */
 static void test_its_input_stays_open(void **state)
 {
     (void)state;

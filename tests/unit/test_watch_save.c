@@ -30,7 +30,7 @@ int setpriority(__priority_which_t which, id_t who, int to)
     return 0;
 }
 
-/* Folders for temporary files are made in `t`, which is there, or in another one that is not. */
+/* Sets the folder for temporary files: `t`, which exists, or another one, which does not. */
 static void set_temporary(const char *name)
 {
     char path[600], here[512];
@@ -185,7 +185,7 @@ static void the_file_is_that_of_a_recording(void **state)
     assert_memory_equal(from, points, n);
     free(got);
     free(recorded);
-    assert_int_equal(files_below(folder), 1); /* the frames themselves are no file any more */
+    assert_int_equal(files_below(folder), 1); /* the file of the frames is gone */
 }
 
 /* The next file takes the place of the last one, in the same folder. */

@@ -67,7 +67,7 @@ static void test_scans_are_those_of_the_keys(void **state)
     assert_string_equal(again, kept);
 }
 
-/* A panel of knobs is made from HELP?: each setting's name and limits. Each end of them is accepted. */
+/* A panel of knobs is made from HELP?: each setting's name and limits. Both limits and the default are accepted. */
 static void test_knobs_draw_themselves(void **state)
 {
     struct wire *wire = *state;

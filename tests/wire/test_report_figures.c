@@ -90,7 +90,7 @@ static void next_times(const char **at, struct times t)
     next_number(at, "longest_gap_s", t.longest_s);
 }
 
-/* Normal noise has no bound, so no point is beyond it. Far points fail by themselves. */
+/* Normal noise has no bound, so no point is beyond it. One far point is enough for the verdict "beyond". */
 static void next_verdict(const char **at, const char *judgement, const char *text, double judged)
 {
     next_key(at, "verdict");

@@ -29,7 +29,7 @@ static const char CONFIG[] =
     "  - {kind: pps_lost, from_s: 9, until_s: 11}\n"
     "  - {kind: pps_jitter, for_ms: 3, from_s: 13, until_s: 15}\n";
 
-/* Between these device times, with a packet's width left out on each side, the packet says this. */
+/* Between these device times, a position packet says this. */
 static const struct {
     double from_s, until_s;
     int pps;
@@ -95,11 +95,11 @@ static double azimuth_deg(const uint8_t *packet, double us)
     return here + (blocks - b) * fmod(next - here + 360.0, 360.0);
 }
 
-/* At full seconds of the time stamps. Azimuths are rounded to 0.01 degree, which an extrapolation by one block may
- * double; a time stamp is rounded down to 1 us, in which the rotor turns 0.0036 degree. */
+/* The tolerance at full seconds of the time stamps. Azimuths are rounded to 0.01 degree. An extrapolation by one block
+ * may double that. A time stamp is rounded down to 1 us, in which the rotor turns 0.0036 degree. */
 static const double EDGE_DEG = 0.02 + 0.0036 + 0.0002;
 
-/* Pulses are locked from 2.5 s on, so the rotor is where the lock wants it from 3.5 s on, when the device's second 1
+/* The PPS is locked from 2.5 s on, so the rotor is where the lock wants it from 3.5 s on, when the device's second 1
  * begins. The rotor is let go 1 ms after 9.5 s, second 7, since that pulse and the next one are lost. From then on the
  * rotor gains 0.72 degree a second. */
 static void check_azimuths(const uint8_t *bytes, size_t len)
@@ -122,7 +122,7 @@ static void check_azimuths(const uint8_t *bytes, size_t len)
     assert_true(fabs(free_deg) > 0.5);
 }
 
-/* The receiver's own link: a sentence group each second that is not lost, as it arrives. */
+/* The receiver's own link has a group of sentences for each second, but for two that are lost. */
 static void check_receiver(const char *text)
 {
     static const char *const seconds[] = {"005958", "005959", "010000", "010001", "010002",

@@ -36,7 +36,7 @@ static inline int numbering_enlarge(struct numbering *t)
     return 1;
 }
 
-/* Returns the number of a key: a new key's is t->n as it was before. NUMBERING_NONE: no memory. */
+/* Returns the number of a key. A new key gets t->n, which then grows by 1. NUMBERING_NONE: no memory. */
 static inline uint32_t numbering_of(struct numbering *t, const uint64_t key[2])
 {
     if (2 * ((size_t)t->n + 1) > t->n_slots && !numbering_enlarge(t)) return NUMBERING_NONE;
