@@ -93,7 +93,7 @@ int web_http_begin(struct web_link *web, struct web_conn *conn)
     return web_http_answer(conn, 200, body.type);
 }
 
-/* libwebsockets calls when the socket has taken all of the piece before. */
+/* libwebsockets calls this when the socket has taken the whole previous piece. */
 int web_http_go_on(struct web_link *web, struct web_conn *conn)
 {
     unsigned char chunk[LWS_PRE + WEB_CHUNK];

@@ -24,7 +24,7 @@
 enum {
     COLA_SHAPE_CORNERS = 128,
     COLA_SHAPE_LINKS = 64,
-    COLA_SHAPE_REACH_UM = 1000000000, /* no coordinate is larger: 64 bits then hold each product of the predicate */
+    COLA_SHAPE_REACH_UM = 1000000000, /* no coordinate is larger: 64 bits then hold each product that decides */
     COLA_TURN_E4 = 3600000,
 };
 static const double COLA_TURN_RAD = 6.283185307179586;

@@ -5,8 +5,8 @@
  * numbered backward. A place is a step's number less `first`: 0..n-1.
  *
  * A turn is whole once each place has its pulse, and its attributes where the head sends them: that is when the
- * beam has passed the last step. A turn with something missing is broken: it never comes out, and is counted. Turns
- * within which the first frame came, the scan ended, the steps changed or a replay jumped are not counted.
+ * beam has passed the last step. A turn with something missing is broken: it never comes out, and is counted. A turn
+ * is not counted if the first frame came, the scan ended, the steps changed or a replay jumped within it.
  *
  * Pure. Nothing is allocated; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_PLANAR_SCAN_H

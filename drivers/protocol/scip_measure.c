@@ -200,7 +200,7 @@ static void send_scan(struct scip *s, const struct scip_request *q, const char *
     scip_send(s);
 }
 
-/* The last two digits of a stream's echo are the scans that are left; 00 stays where there is no end. */
+/* The last two digits of a stream's echoed request are the scans that are left; 00 stays where there is no end. */
 static void write_remaining(struct scip_request *q)
 {
     char *digits = q->echo + 13 + q->time_us;

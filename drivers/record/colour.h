@@ -17,8 +17,8 @@ struct colour_choice {
     struct colour_scale scale; /* not texture, which only the head knows */
 };
 
-/* Checks the scan that begins. SH_EFORMAT where its points have no such figure: frame without a trajectory; with a
- * moving head also ranges in the geo layout, and heights in ECEF. */
+/* Checks the scan that begins. SH_EFORMAT where its points have no such figure: frame without trajectory or stops;
+ * with a moving head also ranges in the geo layout, and heights in ECEF. */
 int colour_check(enum colour_mode mode, const struct track *track, struct sh_err *err);
 
 /* Returns the figure that range, height or frame shows for point i of the track's batch: metres, metres above the

@@ -22,7 +22,7 @@ static double wrap(double turn)
     return turn - round(turn);
 }
 
-/* Turns of the rotor's present sweep, at a time since the scan's start near the scan's pulse k. */
+/* Returns the rotor's place in its sweep, in turns. t_ns counts from the scan's start, and is near its pulse k. */
 static double turn_at(const struct schedule_segment *seg, uint64_t k, int64_t t_ns)
 {
     const double since_s = (double)(t_ns - schedule_time_ns(seg, k)) / SECOND_NS;

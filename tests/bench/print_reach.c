@@ -14,8 +14,8 @@ static int has_bound(const struct bench_reach *r)
     return r->of != &REACH_CASE[r->of->standing];
 }
 
-/* A body that moves may cost half as much again as one that stands, and a head three tenths. The distance that a head
- * goes, or of another station, may change nothing. */
+/* A body that moves may cost half as much again as one that stands, and a head that moves three tenths. How far a head
+ * goes, or how far away a station is, may add a tenth. */
 static struct bound bound_of(const struct bench_reach *r)
 {
     const struct reach_case *of = r->of;

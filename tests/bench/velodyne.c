@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* This measures the cost of a VLP-16's data packets. It runs the protocol alone, from the head's points frames of 76
- * packets, a turn at 600 rpm, to packets that go nowhere. Figures are medians of the rounds, in processor time of the
- * thread.
+/* This measures the cost of a VLP-16's data packets. It runs the protocol alone: points frames of a turn at 600 rpm
+ * go in, and 76 packets (152 if dual) come out and go nowhere. Figures are medians of the rounds, in processor time of
+ * the thread.
  *
  *   build/tests/bench/velodyne */
 #include <stdio.h>
@@ -38,7 +38,7 @@ static void count(void *ctx, enum protocol_count what, uint64_t n)
     (void)n;
 }
 
-/* Walls stand at 2 to 12 m. Every fifth firing has two returns if the protocol has a choice. */
+/* Walls stand at 2 to 12 m. Every fifth firing has two returns if dual. */
 static void add_firing(struct line_block *b, uint64_t pulse, int dual)
 {
     const uint32_t returns = dual && pulse % 5 == 0 ? 2 : 1;

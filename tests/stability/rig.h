@@ -43,7 +43,7 @@ void rig_rebuild(struct rig *rig, unsigned threads);
 /* Adds a ray from the station towards a point, or along a direction of any length. */
 void rig_aim(struct rig *rig, const double point_m[3]);
 void rig_direct(struct rig *rig, double x, double y, double z);
-void rig_aim_at_sphere(struct rig *rig, uint32_t n, uint64_t seed); /* all directions alike */
+void rig_aim_at_sphere(struct rig *rig, uint32_t n, uint64_t seed); /* directions equally likely */
 void rig_clear(struct rig *rig);
 
 /* Finds the true ranges. */

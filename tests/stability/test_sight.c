@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A visibility map of a station, as one would first write it: a face of a cube in cells, for each cell the triangles
- * that may be seen there, and rays decided by the sides of edges. Such a map sees the wrong triangle in three ways. */
+/* This is a visibility map of a station, as one would first write it. The faces of a cube are cut into cells. A cell
+ * lists the triangles that may be seen in it, and the sides of their edges decide rays. It fails in three ways. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -99,7 +99,7 @@ static int is_inside(const struct naive_triangle *it, const double dir[3])
 }
 
 /* Returns the map's answer for the cell: a triangle that covers it and hides all others, else the nearest one that may
- * be seen in it and is met. The cell is looked at when it is asked for, which makes no difference. */
+ * be seen in it and is met. The cell is filled only when a ray asks, which changes no answer. */
 static uint32_t naive_look(const struct naive_map *map, const double dir[3])
 {
     double corner[4][3], best = 0.0;
@@ -159,7 +159,7 @@ static struct wrong judge(const struct rig *rig)
     return wrong;
 }
 
-/* rig_cast asks the sight of the rig's station and its BVH. Ours are both. */
+/* rig_cast asks the BVH and the sight of the rig's station, so `ours` judges both. */
 static void look_both_ways(struct rig *rig, int of_corners, struct wrong *naive, struct wrong *ours)
 {
     static struct naive_map map;

@@ -94,8 +94,8 @@ static void compare(struct wave_echoes *w, double (*naive)(const double *, uint3
     worst->ours_m = fmax(worst->ours_m, ours_m);
 }
 
-/* 8 bits, and an echo of a few counts: the top is a plateau of equal samples, of which the first is the largest.
- * Noise is a quarter of a count, so digits are what there is: 1/sqrt(12) of one in about 4. */
+/* 8 bits, and an echo of 16 counts: the top is a plateau of equal samples, of which the first is the largest. The
+ * threshold is 4 counts. Noise is a quarter of a count, less than the rounding, 1/sqrt(12) of a count. */
 static void flat_tops(void **state)
 {
     (void)state;
@@ -138,8 +138,8 @@ static void walk(void **state)
             compare(&w, by_level, WAVEFORM_THRESHOLD, &r, p, &worst);
         }
         snprintf(regime, sizeof regime, "a level 1, an echo %d dB above it", db);
-        /* A digit is 0.0074 thresholds. Half of one, in a sample below the level that is not below 0.1 nor has a
-         * slope below 0.2 a sample, is 0.02 samples. */
+        /* A digit is 0.0074 thresholds. The sample below the level is at least 0.1, and the slope at least 0.2 a
+         * sample, so half a digit is 0.02 samples. */
         table_row(regime, "crossing, half a pulse later", worst.naive_m, worst.ours_m, 3e-3, "m");
     }
     wave_close(&w);

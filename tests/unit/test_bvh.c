@@ -87,7 +87,7 @@ static uint32_t wrong_of_crossing(const struct bvh *bvh, struct bvh_work *work, 
     return wrong;
 }
 
-/* The small sheet is seen at the slant y = 9 + slope x. The large one reaches so much further than 3 km. */
+/* The small sheet is seen at the slant y = 9 + slope x. The large one reaches 3 km x times. */
 struct sheets {
     double slope, times;
 };
@@ -196,8 +196,8 @@ static void any_axes(uint64_t *random, double u[3], double v[3])
     beam_axes(d, u, v);
 }
 
-/* Rays within the plane of a sheet, as far as double precision shows, do not meet it. The rays would meet surfaces on
- * the sheet's edges, and there are none here. The plane is turned in all directions, as float then has it at a small
+/* Rays within the plane of a sheet, as far as double precision shows, do not meet it. They would meet surfaces that
+ * join its edges, but there are none here. The plane is turned in all directions, as float then has it at a small
  * angle to the rays. */
 static void a_sheet_along_the_ray_is_not_met(void **state)
 {
@@ -323,7 +323,7 @@ static void no_number_of_plates_hides_a_wall(void **state)
 
 enum { WALLS = 4 };
 
-/* Wall k is 4 + 9 k km to the east. From the middle it takes a part of its own of the directions to the north of
+/* Wall k is 4 + 9 k km to the east. Seen from the middle, each wall covers other directions to the north of
  * east. */
 static struct scene *walls(void)
 {
@@ -342,8 +342,8 @@ static struct scene *walls(void)
 }
 
 /* Float rays are 8 km long, so that each ray to a farther wall is cast in pieces, while others of its packet have hit.
- * Ranges end exactly at range_max_m. From the origin, or each from a point of its own, 30 km of a double are 4e-12 m.
- */
+ * Ranges end exactly at range_max_m. Rays begin at the origin, or each at a point of its own. At 30 km a
+ * double is exact to 4e-12 m. */
 static void rays_go_on_beyond_their_first_piece(void **state)
 {
     (void)state;

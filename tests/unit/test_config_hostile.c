@@ -6,7 +6,7 @@
 
 enum { MOST_ANCHORS = 256 };
 
-/* Loads a mapping of n keys, each with an anchor, above what a configuration needs. */
+/* Loads a list of n elements, each with an anchor. */
 static void load_anchors(int n)
 {
     char *text = malloc(64 * (size_t)n + 64), *p = text;
@@ -28,7 +28,7 @@ static void anchors_have_a_limit(void **state)
     assert_says(":258: too many anchors; allowed 256");
 }
 
-/* Ten lists name the one before ten times each: that would be 10^10 elements. */
+/* Nine lists name the one before ten times each: that would be 10^10 elements. */
 static void lists_of_lists_are_not_followed(void **state)
 {
     (void)state;

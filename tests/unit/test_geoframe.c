@@ -66,7 +66,7 @@ static int see(const struct geoframe *frame, enum georef_crs crs, int zone, cons
     return epsg;
 }
 
-/* Any point of the scene has one place, from wherever it is seen: to the wanted 1e-6 m, and a hundredth of it. */
+/* A point of the scene has the same place from each station: within 2e-8 m, where 1e-6 m is wanted. */
 static void assert_agree(const struct geoframe *frame, int zone, const double first[3], const double second[3],
                          const double corner[3])
 {
@@ -151,7 +151,7 @@ static void a_far_station_leans(void **state)
     tangent(&frame, 52.5, 13.4, 0);
     ok(geoframe_to_enu(&frame, east, turn, &err));
     const double up[3] = {turn[2], turn[5], turn[8]};
-    /* Seen from there the anchor's plumb line leans to the west; 1e-9 rad: the second order, (500/N)^2 */
+    /* Seen from there the anchor's plumb line leans to the west; 1e-8 rad: the second order, (500/N)^2, is 6e-9 */
     assert_near(atan2(up[0], up[2]), -atan(500 / (n_m + 110)), 1e-8);
     assert_near(up[1], 0, 1e-8);
     assert_near(turn[0] * turn[0] + turn[3] * turn[3] + turn[6] * turn[6], 1, 1e-15);
@@ -171,7 +171,7 @@ static void north_is_clockwise_from_y(void **state)
     assert_near(at.lat_deg, 40 + 10 / (m_m + 110) * 180 / M_PI, 1e-11);
 }
 
-/* The rotation of a grid is its convergence: a step to true north, by the projection itself. */
+/* The rotation of a grid is its convergence. The test takes it from a step to true north, by the projection. */
 static void a_grid_is_turned_by_its_convergence(void **state)
 {
     (void)state;

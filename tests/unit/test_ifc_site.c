@@ -17,7 +17,7 @@ static char path[64];
 static struct ifc_site site;
 static struct sh_err err;
 
-/* Records come in an order in which references are late: a reader may not rely on an order. */
+/* Records come after those that refer to them: a reader may not rely on an order. */
 static const char base[] = "ISO-10303-21;\nHEADER;\nFILE_NAME('a;b''#1= IFCSITE(','x');\nENDSEC;\nDATA;\n"
                            "#1= IFCPROJECT('p',$,$,$,$,$,$,(#5),#2);\n"
                            "#2= IFCUNITASSIGNMENT((#4,#3));\n"
@@ -57,7 +57,7 @@ static void assert_loads(int code)
     if (code != SH_OK) fail_msg("%s", err.text);
 }
 
-/* The bound is one rounding for each term of the sum. */
+/* The bound allows some roundings for each term of the sum. */
 static void assert_near(double got, double want)
 {
     if (!(fabs(got - want) <= 1e-14 * (1.0 + fabs(want)))) fail_msg("%.17g instead of %.17g", got, want);
@@ -202,8 +202,8 @@ static void a_map_conversion(void **state)
     } good[] = {
         /* The system gives its unit. */
         {"2000.5,1000.25,30.,0.,1.,0.001", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},
-        /* The system gives no unit: Scale leads from millimetres to metres, or to the model's own millimetres. A grid's
-         * own scale of 0.9996 changes nothing. */
+        /* Where the system gives no unit, Scale shows it: 0.001 is metres, 0.0033 feet, a missing one the model's own
+         * millimetres. A grid's own scale of 0.9996 changes nothing. */
         {"2000.5,1000.25,30.,$,$,0.001", "'EPSG:2056',$,$,$,$,$,$", 2000.5, 0.0},
         {"2000.5,1000.25,30.,1.,-1.,0.0009996", "'EPSG:2056',$,$,$,$,$,$", 2000.5, -M_PI / 4},
         {"2000.5,1000.25,30.,0.,1.,0.0009996", "'EPSG:2056',$,$,$,$,$,#22", 2000.5, M_PI / 2},

@@ -126,7 +126,7 @@ static void one_reader_may_fail(void **state)
 }
 
 /* A product's object is its type, name and GlobalId, in up to 255 bytes. "IFCBUILDINGELEMENTPROXY_" and
- * "_guid_of_product__00000" take 47, so the name has 208. A longer one is cut between two letters, here of two bytes each, and is counted. */
+ * "_guid_of_product__00000" take 47, so the name has 208. A longer one is cut between two letters, and counted. */
 static void long_names_are_cut_between_letters(void **state)
 {
     (void)state;
@@ -169,7 +169,7 @@ static void missing_unit_is_said(void **state)
     assert_non_null(strstr(err.text, "no unit of length; scene.ifc_strict demands a unit"));
 }
 
-/* ifc-lite has levels, but no tolerance. */
+/* ifc-lite has levels of facets, but no tolerance. */
 static void facets_of_ifc_lite_are_said(void **state)
 {
     (void)state;

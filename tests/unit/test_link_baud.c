@@ -59,7 +59,7 @@ static void both_ways(void **state)
     exchange(&bench, 0, fd);
     expect(&bench, fd, "\x00", 1, "\x00", 1);
     expect_back(&bench, fd, "\x55", 1, "\x55", 1);
-    /* A client that does not set it has the terminal's own, which is another one. */
+    /* A client that sets no rate has the terminal's own, which is 38400. */
     set_rate(fd, B38400);
     expect(&bench, fd, "\x00", 1, "\xfc", 1); /* samples 1, 4, 7 are 0; those from 10 on lie in the resting line */
     close(fd);

@@ -224,7 +224,7 @@ static void who_asks_holds_the_site_of_now(void **state)
     device_get_station(rig->device, 1, &at);
     assert_true(!at.has_tripod && strcmp(at.name, "far") == 0 && rig->site->n_stations == 2);
     assert_true(at.served && at.place.position_m[0] == 0.5);
-    /* Who has asked holds nothing afterwards. */
+    /* The asker holds nothing afterwards. */
     expect_moved(rig, "SITE:POSE 1, 0,0,0.3,90,0,0");
     assert_true(rig_claim(rig));
     expect_moved(rig, "SITE:POSE 1, 0,0,0.2,90,0,0");
@@ -344,7 +344,7 @@ static void a_replayed_journal_moves_at_the_same_tick(void **state)
 }
 
 /* In real time all moves of a journal are planned before time begins, in order, each from the one before it. A refused
- * one is not among them, and one that is there already neither. */
+ * move is not among them, nor is a move to where the station is already. */
 static void a_journals_moves_are_planned_ahead(void **state)
 {
     (void)state;

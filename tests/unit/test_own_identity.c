@@ -145,7 +145,7 @@ static void test_machines_without_id(void **state)
     usb_give_up(&a.claims);
 }
 
-/* A long beginning leaves the rest its room, and a long text counts to its end. */
+/* A long beginning of a serial number is cut, so that the rest fits. A long text counts to its last byte. */
 static void test_long_texts(void **state)
 {
     (void)state;

@@ -225,7 +225,7 @@ static void hits_are_those_of_the_bvh(void **state)
         r.few = r.asked = 0;
         for (uint64_t seed = 0; seed < SCENES; seed++)
             run_kind(&r, kind, 1000 * kind + seed);
-        print_message("kind %u: %.2f %% of the rays few, %.2f %% asked\n", kind,
+        print_message("kind %u: %.2f %% of the rays met few triangles, %.2f %% the BVH\n", kind,
                       100.0 * (double)r.few / (1.0 * SCENES * RAYS), 100.0 * (double)r.asked / (1.0 * SCENES * RAYS));
     }
     assert_int_equal(r.differ, 0);
@@ -344,8 +344,8 @@ static void nothing_to_be_seen(void **state)
     assert_int_equal(r.differ, 0);
 }
 
-/* Two sheets are folded at a common edge, or cross at a common corner. Rays pass beside the edge, nearer to it than
- * float can tell the sheets apart. The nearer one is met. */
+/* Two sheets are folded at a common edge. Rays pass beside the edge, some so near that float can't tell the sheets
+ * apart. The nearer one is met. */
 static void folded_sheets_are_ordered(void **state)
 {
     (void)state;

@@ -130,7 +130,7 @@ static int await_connection(int fd)
     return usb_backend_connect_error(fd);
 }
 
-/* By TCP a connection is under way for a while. One that has met itself counts as refused. */
+/* By TCP a connection is under way for a while. A connection to its own port counts as refused. */
 static void test_tcp(void **state)
 {
     (void)state;
@@ -170,7 +170,7 @@ static void test_tcp(void **state)
     assert_int_equal(usb_backend_connect_error(own), EBADF);
 }
 
-/* What a peer still sends is read, in eight pieces at most, and the peer sees the end. */
+/* Bytes that a peer still sends are read, in eight pieces at most, and the peer sees the end. */
 static void test_hanging_up(void **state)
 {
     (void)state;

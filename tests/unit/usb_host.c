@@ -80,7 +80,7 @@ struct usb_transfer *host_submit(struct host *host, uint64_t id, uint8_t endpoin
 {
     struct usb_transfer *transfer = calloc(1, sizeof *transfer + length + 1);
     assert_non_null(transfer);
-    /* What the core sets itself may hold anything before. */
+    /* Fields that the core sets itself may hold anything before. */
     *transfer = (struct usb_transfer){.actual = 77, .status = USB_OVERFLOW, .zero_packet = 1, .next = transfer};
     transfer->id = id;
     transfer->endpoint = endpoint;

@@ -18,7 +18,7 @@ const uint8_t *velodyne_head_packet(uint32_t i);
 
 /* Returns the time of pulse k since the scan's start: 55.296 us a sequence, 2.304 us a firing. */
 int64_t velodyne_head_ns(uint64_t pulse);
-/* Returns the turns of the head at pulse k. rpm: 600. */
+/* Returns how far the head has turned at a pulse, in turns. rpm: turns a minute. */
 double velodyne_head_turns(uint64_t pulse, double rpm);
 /* Returns the elevation of a beam in degrees. */
 int velodyne_head_elevation_deg(uint32_t beam);

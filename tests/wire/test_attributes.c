@@ -148,8 +148,8 @@ static void keep_told(const struct wire *wire, const char *name)
     scanhead_close(sh);
 }
 
-/* Compares amplitude and width of each vertex of a PLY as text with the stream's. From `lost` (-1: none) to `end` they
- * are lost. */
+/* Compares amplitude and width of each vertex of a PLY as text with the stream's. From `lost` to `end` they are lost
+ * (0, 0: none). */
 static void check_ply(const struct wire *wire, const char *name, size_t lost, size_t end)
 {
     char *text = wire_read(wire_path(wire, name), NULL);

@@ -7,7 +7,7 @@ enum { LINES = 15 }; /* a scan of 150 ms of device time: 1500 pulses */
 
 /* The stream as a client receives it. */
 struct heard {
-    struct tape tape; /* without what was for it alone */
+    struct tape tape; /* without frames for this client alone */
     char hash[65];
     struct scanhead_stats stats;
 };
@@ -131,8 +131,8 @@ static void same_file(const struct wire *wire, const char *a, const char *b)
     free(second);
 }
 
-/* Our own recorder ends with the scan, three times in a row: each is a further repetition of the replay. For .pcapng
- * the frames are compared. */
+/* Our own recorder ends with the scan. It records twice in a row, each time a further repetition of the replay. The
+ * replay of a .pcapng has the bytes of the .shs that it was made from. */
 static void test_recorder(void **state)
 {
     struct wire *wire = *state;

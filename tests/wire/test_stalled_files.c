@@ -100,7 +100,7 @@ static uint64_t lost_lines(const struct scanhead_frame *frame)
     return t.lost_lines;
 }
 
-/* A scan without an end in a room of twelve triangles. late_ms is less than the time that the journal stands still. */
+/* A scan of 36 s in a room of twelve triangles. With THOROUGH=1 the journal stands still for longer than late_ms. */
 static const char *write_config(const struct wire *wire, double prr_hz, const char *links)
 {
     static char path[352], more[256];
@@ -276,7 +276,7 @@ static void test_end(void **state)
     free(text);
 }
 
-/* The head's messages go there. Each of these places causes a warning. */
+/* The head's messages go into the FIFO. Each pose is far from all surfaces, which causes a warning. */
 static void test_messages(void **state)
 {
     struct wire *wire = *state;

@@ -168,7 +168,7 @@ static int read_place(struct reader *r)
     if (rc == SH_OK) rc = tags_numbers(&r->tags, GEO_KEYS, r->key, 4 * MOST_KEYS, &r->n_key, r->err);
     if (rc == SH_OK) rc = read_system(r, &r->g->unit_m);
     if (rc != SH_OK) return rc;
-    /* A cell is an area, whose middle is half a cell from its corner, or a point. */
+    /* A cell is a point, or an area whose middle is half a cell from its corner. */
     const double middle = key(r, RASTER) == RASTER_IS_POINT ? 0.0 : 0.5;
     double *const axis[2] = {r->g->easting_m, r->g->northing_m};
     for (int k = 0; k < 2; k++) {

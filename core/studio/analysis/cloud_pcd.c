@@ -120,7 +120,7 @@ static int check_fields(struct pcd *g, struct sh_err *err)
         if (f->axis < 0) continue;
         axes |= 1U << f->axis;
         if (f->type != 'F' || (f->size != 4 && f->size != 8) || f->count != 1)
-            return pcd_fail(g, err, "x, y and z are not TYPE F of SIZE 4 or 8 and COUNT 1, as is allowed");
+            return pcd_fail(g, err, "x, y and z are not TYPE F of SIZE 4 or 8 and COUNT 1, the only form allowed");
     }
     if (axes != 7) return pcd_fail(g, err, "it has no fields x, y and z");
     if (g->n > g->t.size && strcmp(g->data, "binary_compressed") != 0) /* a point takes a byte at least */
