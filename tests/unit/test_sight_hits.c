@@ -113,12 +113,7 @@ static void aim_at_cell(struct rig *r, uint32_t i, uint64_t *state)
     d[axis] = case_between(state, 0, 1) ? 1.0 : -1.0;
     d[(axis + 1) % 3] = shaken(u, state);
     d[(axis + 2) % 3] = both ? shaken((double)case_between(state, -1024, 1024) / 1024.0, state) : between(state, -1, 1);
-    if (case_between(state, 0, 1)) { /* without the division that would shift it */
-        r->x[i] = d[0];
-        r->y[i] = d[1];
-        r->z[i] = d[2];
-    }
-    aim(r, i, d);
+    aim(r, i, d); /* divides by the length, which shifts it by a last place or not at all */
 }
 
 /* Aims at a corner, an edge or the inside of a triangle, to the last places. */

@@ -45,9 +45,7 @@ static void put_hurt(struct capture *c, uint32_t interface)
         memcpy(copy, frame, n);
         at[of] += n;
         if (at[of] == len[of]) at[of] = 0;
-        size_t hurt_len = hurt(copy, n, &random);
-        if (hurt_len == n && memcmp(copy, frame, n) == 0) copy[0] ^= 1; /* it was the same by chance */
-        capture_packet(c, interface, copy, hurt_len);
+        capture_packet(c, interface, copy, hurt(copy, n, &random));
     }
     free(bytes[0]);
     free(bytes[1]);
