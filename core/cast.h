@@ -201,14 +201,16 @@ struct emitter;
 int caster_add_ahead(struct caster *caster, uint32_t pulses, struct sh_err *err);
 /* Returns the number of pulses, in consecutive lines, whose hits a head of this setup can find ahead. It is 0 with a
  * sight, on a head that moves or has a disturbance, with beams of rings, with beams that begin beside the station, and
- * for all heads but line heads. emitter: the schedule's. */
+ * for all heads but line heads. A head that moves has its knots in the setup. emitter: the schedule's. */
 uint32_t caster_room_ahead(const struct caster *caster, const struct cast_setup *setup, const struct emitter *emitter);
-/* Finds the first hits of runs, each a line or a part of one. Later casts of these pulses take them, until the next
- * call. These casts must have the same setup, but for movers. Where the runs have more pulses than there is room for,
- * the last runs are left out. n_runs is at most CAST_AHEAD_RUNS; 0: forgets all hits. Call it only for a setup for which
- * caster_room_ahead was not 0, or with 0 runs for a caster that has the memory. Allocates nothing. */
+/* Finds the first hits of runs, each a line or a part of one. Later casts of pulses with these numbers take them, until
+ * the next call or caster_forget. These casts must have the same setup, but for movers. Where the runs have more pulses
+ * than there is room for, the last runs are left out. n_runs is at most CAST_AHEAD_RUNS. Call it only for a setup for
+ * which caster_room_ahead is not 0. Allocates nothing. */
 void caster_look_ahead(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                        uint32_t n_runs);
+/* Later casts find all their hits themselves. */
+void caster_forget(struct caster *caster);
 
 /* Fills block from the run, with attributes where it has room for them. Returns the number of echoes. Allocates
  * nothing. The echo of a single ray has the width of the pulse. The echo of a footprint, or of returns merged from

@@ -51,7 +51,7 @@ uint32_t caster_room_ahead(const struct caster *caster, const struct cast_setup 
 
 /* ---- a window */
 
-/* Pulses of each line. */
+/* A window has pulses of each line. */
 struct window {
     uint32_t first[CAST_AHEAD_RUNS], n[CAST_AHEAD_RUNS]; /* of the run; n 0: none */
 };
@@ -180,6 +180,11 @@ void caster_look_ahead(struct caster *caster, const struct cast_setup *setup, co
         const uint32_t pulses = open_window(run, a->n_runs, column, &w);
         if (pulses != 0) cast_window(caster, run, a->n_runs, &w, pulses);
     }
+}
+
+void caster_forget(struct caster *caster)
+{
+    if (caster->ahead != NULL) caster->ahead->n_runs = 0;
 }
 
 int ahead_take(const struct caster *c, const struct chunk *k, const struct bvh_rays *rays)

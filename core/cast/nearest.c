@@ -75,15 +75,18 @@ static int is_from_station(const struct cast_setup *s, const struct bvh_origins 
     return from->own.x == NULL && memcmp(from->at_m, s->station_m, sizeof from->at_m) == 0;
 }
 
-void caster_nearest(struct nearest *w, const struct cast_setup *s, const struct ray_hits *hits)
+static void find_first(struct nearest *w, const struct cast_setup *s, const struct bvh_rays *rays)
 {
-    const struct bvh_rays *rays = &hits->rays;
-    if (hits->known)
-        ; /* looked ahead */
-    else if (s->sight != NULL && is_from_station(s, &rays->from))
+    if (s->sight != NULL && is_from_station(s, &rays->from))
         sight_hits(w->sight, w->bvh, s->sight, rays);
     else
         bvh_hits(w->bvh, s->bvh, rays);
+}
+
+void caster_nearest(struct nearest *w, const struct cast_setup *s, const struct ray_hits *hits)
+{
+    const struct bvh_rays *rays = &hits->rays;
+    if (!hits->known) find_first(w, s, rays);
     if (hits->body != NULL) {
         bvh_cosines(s->bvh, rays->triangle, &rays->dir, rays->n, hits->cosine);
         memset(hits->body, 0, rays->n * sizeof *hits->body);

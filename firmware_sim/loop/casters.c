@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Casters: threads that claim ticks ahead of their time, compute them and put them into the stream. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,13 +21,12 @@ static int may_claim(struct loop *loop)
     return pace != PACE_FAST || !device_is_idle(loop->device);
 }
 
-/* Whether as many ticks as the caster wants may be claimed now. Where none is on its way, fewer are enough: nothing
- * would wake this thread. With claim_lock held. */
+/* Whether as many ticks as the caster wants may be claimed now. They are half of the ticks ahead at most, so the release
+ * of those that are on their way makes room for them. With claim_lock held. */
 static int has_room(const struct loop_caster *caster)
 {
     const struct casters *casters = &caster->loop->casters;
-    const uint64_t released = stream_released(&caster->loop->stream);
-    return casters->next_tick + caster->wanted <= released + casters->ahead_ticks || casters->next_tick == released;
+    return casters->next_tick + caster->wanted <= stream_released(&caster->loop->stream) + casters->ahead_ticks;
 }
 
 /* Claims the next tick, as number i of the caster's. 1: work and slot are set; 0: not now; -1: the run is over. With
@@ -52,12 +52,23 @@ static int claim_tick(struct loop_caster *caster, uint32_t i)
     return 1;
 }
 
-/* Sets how many ticks the caster wants, of which the first is claimed: those with pulses before `end`. */
+/* Sets how many ticks the caster wants, of which the first is claimed: about those up to the pulse `end`. */
 static void set_wanted(struct loop_caster *caster, uint64_t end)
 {
     const struct device_work *first = &caster->work[0];
-    const uint64_t ticks = end != 0 ? (end - first->pulse0) / (first->pulse_end - first->pulse0) + 1 : 1;
-    caster->wanted = ticks < caster->room ? (uint32_t)ticks : caster->room;
+    const double tick_pulses = 1e-15 * (double)first->prr_uhz * (double)caster->loop->stream.tick_ns;
+    const double ticks = end != 0 ? ceil((double)(end - first->pulse0) / tick_pulses) : 1.0;
+    caster->wanted = ticks < (double)caster->room ? (uint32_t)ticks : caster->room;
+}
+
+/* Notes how many pulses the caster has claimed, for the watch of the cost. With claim_lock held. */
+static void note_claimed(struct loop_caster *caster, uint32_t n)
+{
+    _Atomic uint64_t *most = &caster->loop->casters.most_claimed;
+    uint64_t pulses = 0;
+    for (uint32_t i = 0; i < n; i++)
+        pulses += caster->work[i].n_cast;
+    if (pulses > atomic_load(most)) atomic_store(most, pulses);
 }
 
 /* Claims one tick, or several whose lines are cast together. Returns how many; -1: the run is over. */
@@ -66,11 +77,15 @@ static int claim(struct loop_caster *caster)
     struct casters *casters = &caster->loop->casters;
     pthread_mutex_lock(&casters->claim_lock);
     int n = claim_tick(caster, 0);
+    caster->looks_ahead = 0;
     if (n > 0 && caster->room > 1) {
-        set_wanted(caster, worker_end_ahead(caster->worker, &caster->work[0]));
+        const uint64_t end = worker_end_ahead(caster->worker, &caster->work[0]);
+        caster->looks_ahead = end != 0;
+        set_wanted(caster, end);
         while (n < (int)caster->wanted && claim_tick(caster, (uint32_t)n) > 0)
             n++;
     }
+    if (n > 0) note_claimed(caster, (uint32_t)n);
     pthread_mutex_unlock(&casters->claim_lock);
     return n;
 }
@@ -136,7 +151,7 @@ static void sleep_caster(struct loop_caster *caster)
     stream_wait_for_work(&caster->loop->stream);
 }
 
-static void make(struct loop_caster *caster, uint32_t i)
+static void make_tick(struct loop_caster *caster, uint32_t i)
 {
     struct loop *loop = caster->loop;
     struct device_work *work = &caster->work[i];
@@ -151,16 +166,16 @@ static void *caster_main(void *arg)
     struct loop_caster *caster = arg;
     for (int n; (n = claim(caster)) >= 0;) {
         if (n == 0) sleep_caster(caster);
-        if (n > 1) worker_look_ahead(caster->worker, caster->work, (uint32_t)n);
+        if (caster->looks_ahead) worker_look_ahead(caster->worker, caster->work, (uint32_t)n);
         for (int i = 0; i < n; i++)
-            make(caster, (uint32_t)i);
-        if (n > 1) worker_forget(caster->worker);
+            make_tick(caster, (uint32_t)i);
+        if (caster->looks_ahead) worker_forget(caster->worker);
     }
     stream_poke(&caster->loop->stream); /* so that the other casters see the end, too */
     return NULL;
 }
 
-/* Off line there is time to claim several ticks. All casters together claim half of the ticks ahead at most, so that
+/* In the pace `fast` there is time to claim several ticks. All casters together claim half of the ticks ahead at most, so that
  * there are always some on their way. */
 static int create_caster(struct loop *loop, uint32_t n, struct loop_caster *caster, struct sh_err *err)
 {

@@ -75,6 +75,7 @@ static void *watch_main(void *arg)
         while (!atomic_load(&watch->ending) && !wakeup_sleep_until(&watch->wakeup, until_ns))
             continue;
         if (atomic_load(&watch->ending) || !take_sample(watch, &sample)) return NULL;
+        watch->figures.open_pulses = watch->n * atomic_load(&watch->loop->casters.most_claimed);
         ns = cost_add(&watch->figures, &sample);
     }
     cost_watch_warn(watch, ns);
@@ -89,8 +90,7 @@ struct cost_watch *cost_watch_start(struct loop *loop)
     if (watch == NULL) return NULL;
     watch->loop = loop;
     watch->n = casters->n_running;
-    watch->figures = (struct cost_figures){.planned_ns = given_ns > 0.0 ? given_ns : site_planned_ns(loop->site),
-                                           .open_pulses = (uint64_t)watch->n * device_tick_pulses(loop->cfg)};
+    watch->figures.planned_ns = given_ns > 0.0 ? given_ns : site_planned_ns(loop->site);
     int rc = 0;
     for (uint32_t i = 0; i < watch->n && rc == 0; i++)
         rc = pthread_getcpuclockid(casters->caster[i].thread, &watch->clock[i]);

@@ -24,7 +24,8 @@ struct loop_caster {
     /* ticks that it has claimed together; in other paces than `fast` there is room for one */
     struct device_work *work;
     struct ring_slot **slot; /* NULL: lost already */
-    uint32_t room, wanted;   /* most of them, and how many there should be */
+    uint32_t room, wanted;   /* there is room for so many ticks, and so many are wanted together */
+    int looks_ahead;         /* 1: the lines of the claimed ticks are cast together first */
 };
 
 /* casters.c */
@@ -33,11 +34,12 @@ struct casters {
     uint32_t n, n_running;
     uint64_t ahead_ticks; /* most ticks that are claimed and not released */
     pthread_mutex_t claim_lock;
-    uint64_t next_tick;           /* under claim_lock */
-    _Atomic uint32_t n_computing; /* claimed ticks that are neither ready nor reported lost yet */
-    _Atomic uint64_t drop_until;  /* ticks before this one are not worth computing any more */
-    _Atomic int in_vain;          /* the last tick that was computed came too late */
-    _Atomic int no_memory;        /* the last tick had no room in its slot, which is reported */
+    uint64_t next_tick;            /* under claim_lock */
+    _Atomic uint64_t most_claimed; /* pulses that one caster has claimed together, at most */
+    _Atomic uint32_t n_computing;  /* claimed ticks that are neither ready nor reported lost yet */
+    _Atomic uint64_t drop_until;   /* ticks before this one are not worth computing any more */
+    _Atomic int in_vain;           /* the last tick that was computed came too late */
+    _Atomic int no_memory;         /* the last tick had no room in its slot, which is reported */
 };
 
 /* pacer.c */

@@ -351,6 +351,7 @@ void worker_take_setup(struct worker *worker, const struct device_work *work)
         worker->setup_station = work->station + 1;
         worker->setup_scan = work->scan;
         worker->stretch = SIZE_MAX;
+        worker_forget(worker); /* the pulses of each scan count from 0 */
     }
     worker->setup.sight = worker->site->station[work->station].sight; /* it may be new since the last scan */
     worker->setup.echoes = (enum beam_select)work->echoes;

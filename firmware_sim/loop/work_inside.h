@@ -25,7 +25,7 @@ struct worker {
     struct native_pose pose[NATIVE_MAX_POSES];
 };
 
-/* Consecutive pulses that belong to one line. */
+/* A part is consecutive pulses of one line. */
 struct worker_part {
     struct schedule_line line;
     uint64_t end;             /* of the line or of the pulses asked for */

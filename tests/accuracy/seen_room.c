@@ -316,7 +316,7 @@ int seen_room_compare_ahead(struct seen_room *r, const struct cast_setup *setup)
                 cast_both(r, setup, setup, &piece[i]);
         }
     }
-    caster_look_ahead(r->caster[1], setup, NULL, 0);
+    caster_forget(r->caster[1]);
     return 1;
 }
 

@@ -2,6 +2,7 @@
 #include "firmware_sim/app/studio/record/offline.h"
 
 #include <errno.h>
+#include <math.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,7 +41,7 @@ int offline_load(struct config *cfg, const struct site *beside, const struct sh_
                  struct sh_err *err)
 {
     cfg->loop.pace = PACE_FAST;
-    cfg->loop.ahead_ms = AHEAD_MS;
+    cfg->loop.ahead_ms = fmax(cfg->loop.ahead_ms, AHEAD_MS);
     cfg->n_links = 0;
     return site_load_for(cfg, SITE_FOR_SCANS, beside, report, site, err);
 }
