@@ -11,12 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/cast/aim.h"
-#include "core/cast/caster.h"
-
-int caster_add_ahead(struct caster *caster, uint32_t pulses, struct sh_err *err)
+int ahead_create(uint32_t pulses, struct cast_ahead **out, struct sh_err *err)
 {
-    struct cast_ahead *a = caster->ahead = aligned_alloc(64, (sizeof *a + 63) / 64 * 64);
+    struct cast_ahead *a = *out = aligned_alloc(64, (sizeof *a + 63) / 64 * 64);
     if (a == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for lines ahead");
     a->n_runs = 0;
     a->room = pulses;
@@ -38,37 +35,7 @@ void ahead_free(struct cast_ahead *ahead)
     free(ahead);
 }
 
-/* The rings of a sphere gain nothing: their pulses lie side by side already. The next line of other heads with an emitter
- * goes in the same directions once more. */
-uint32_t caster_room_ahead(const struct caster *caster, const struct cast_setup *s, const struct emitter *emitter)
-{
-    const struct instrument *instrument = s->detect != NULL ? s->detect->instrument : NULL;
-    if (caster->ahead == NULL || s->sight != NULL || s->n_knots != 0 || s->disturbance != NULL) return 0;
-    if (s->beam != NULL && s->beam->mode != BEAM_ADAPTIVE) return 0;
-    if (emitter != NULL) return 0;
-    return instrument == NULL || !instrument_has_offset(instrument) ? caster->ahead->room : 0;
-}
-
 /* ---- a window */
-
-/* A window has pulses of each line. */
-struct window {
-    uint32_t first[CAST_AHEAD_RUNS], n[CAST_AHEAD_RUNS]; /* of the run; n 0: none */
-};
-
-/* Chooses the pulses whose place in their line is column .. column + AHEAD_WINDOW - 1. Returns how many there are. */
-static uint32_t open_window(const struct schedule_run *run, uint32_t n_runs, uint64_t column, struct window *w)
-{
-    uint32_t pulses = 0;
-    for (uint32_t q = 0; q < n_runs; q++) {
-        const uint64_t begin = run[q].in_line, end = begin + run[q].n, from = column > begin ? column : begin,
-                       to = column + AHEAD_WINDOW < end ? column + AHEAD_WINDOW : end;
-        w->first[q] = from < to ? (uint32_t)(from - begin) : 0;
-        w->n[q] = from < to ? (uint32_t)(to - from) : 0;
-        pulses += w->n[q];
-    }
-    return pulses;
-}
 
 /* Returns how many consecutive pulses of a line go into a tile. A tile is about as wide as it is long. Where lines are
  * far apart, its pulses are those of two lines. */
@@ -79,27 +46,53 @@ static uint32_t tile_of(const struct schedule_run *run, uint32_t n_runs)
     return line_turn > 2.0 * pulse_turn ? 2 * AHEAD_STEP : AHEAD_STEP;
 }
 
-static void aim_window(struct caster *c, const struct schedule_run *run, uint32_t n_runs, const struct window *w)
+uint32_t ahead_begin(struct cast_ahead *a, const struct schedule_run *run, uint32_t n_runs)
 {
-    struct cast_ahead *a = c->ahead;
-    for (uint32_t q = 0; q < n_runs; q++) {
-        if (w->n[q] == 0) continue;
-        struct chunk k = {
-            .s = &a->setup, .run = &run[q], .pulse0 = run[q].pulse0 + w->first[q], .first = w->first[q], .n = w->n[q]};
-        caster_aim(c, &k);
-        memcpy(a->line[q].x, c->d.x, w->n[q] * sizeof(double));
-        memcpy(a->line[q].y, c->d.y, w->n[q] * sizeof(double));
-        memcpy(a->line[q].z, c->d.z, w->n[q] * sizeof(double));
+    uint64_t column = UINT64_MAX;
+    uint32_t at = 0;
+    for (a->n_runs = 0; a->n_runs < n_runs && run[a->n_runs].n <= a->room - at; a->n_runs++) {
+        const struct schedule_run *r = &run[a->n_runs];
+        a->run[a->n_runs] = (struct ahead_run){.pulse0 = r->pulse0, .column = r->in_line, .n = r->n, .at = at};
+        at += r->n;
+        column = r->in_line < column ? r->in_line : column;
     }
+    a->column = column;
+    if (a->n_runs != 0) a->tile = tile_of(run, a->n_runs);
+    return a->n_runs;
+}
+
+uint32_t ahead_open_window(struct cast_ahead *a)
+{
+    uint32_t pulses = 0;
+    int more = 0;
+    for (uint32_t q = 0; q < a->n_runs; q++) {
+        struct ahead_run *run = &a->run[q];
+        const uint64_t begin = run->column, end = begin + run->n, from = a->column > begin ? a->column : begin,
+                       to = a->column + AHEAD_WINDOW < end ? a->column + AHEAD_WINDOW : end;
+        run->first = from < to ? (uint32_t)(from - begin) : 0;
+        run->in_window = from < to ? (uint32_t)(to - from) : 0;
+        pulses += run->in_window;
+        more |= a->column < end;
+    }
+    a->column += AHEAD_WINDOW;
+    return pulses == 0 && more ? ahead_open_window(a) : pulses;
+}
+
+void ahead_aimed(struct cast_ahead *a, uint32_t q, const struct vec3_in *d)
+{
+    const size_t bytes = a->run[q].in_window * sizeof(double);
+    memcpy(a->line[q].x, d->x, bytes);
+    memcpy(a->line[q].y, d->y, bytes);
+    memcpy(a->line[q].z, d->z, bytes);
 }
 
 /* Lists the window's pulses tile by tile. */
-static void order_window(struct cast_ahead *a, uint32_t n_runs, const struct window *w)
+static void order_window(struct cast_ahead *a)
 {
     a->n_steps = 0;
     for (uint32_t row = 0, at = 0; row < AHEAD_WINDOW; row += a->tile)
-        for (uint32_t q = 0; q < n_runs; q++) {
-            const uint32_t end = row + a->tile < w->n[q] ? row + a->tile : w->n[q];
+        for (uint32_t q = 0; q < a->n_runs; q++) {
+            const uint32_t n = a->run[q].in_window, end = row + a->tile < n ? row + a->tile : n;
             for (uint32_t i = row; i < end; i += AHEAD_STEP) {
                 a->step[a->n_steps++] = (struct ahead_step){q, i, at};
                 at += end - i < AHEAD_STEP ? end - i : AHEAD_STEP;
@@ -119,7 +112,7 @@ static void gather_window(struct cast_ahead *a)
     }
 }
 
-static void keep_window(struct cast_ahead *a, uint32_t n_runs, const struct window *w)
+static void keep_window(struct cast_ahead *a)
 {
     for (uint32_t j = 0; j < a->n_steps; j++) {
         const struct ahead_step t = a->step[j];
@@ -128,22 +121,17 @@ static void keep_window(struct cast_ahead *a, uint32_t n_runs, const struct wind
         memcpy(a->line[t.run].label + t.pulse, a->tile_label + t.at, AHEAD_STEP * sizeof(uint32_t));
         memcpy(a->line[t.run].steep + t.pulse, a->tile_steep + t.at, AHEAD_STEP * sizeof(float));
     }
-    for (uint32_t q = 0; q < n_runs; q++) {
-        const uint32_t at = a->run[q].at + w->first[q];
-        memcpy(a->range_m + at, a->line[q].range_m, w->n[q] * sizeof(double));
-        memcpy(a->triangle + at, a->line[q].triangle, w->n[q] * sizeof(uint32_t));
-        memcpy(a->label + at, a->line[q].label, w->n[q] * sizeof(uint32_t));
-        if (a->setup.beam != NULL) memcpy(a->steep + at, a->line[q].steep, w->n[q] * sizeof(float));
+    for (uint32_t q = 0; q < a->n_runs; q++) {
+        const uint32_t at = a->run[q].at + a->run[q].first, n = a->run[q].in_window;
+        memcpy(a->range_m + at, a->line[q].range_m, n * sizeof(double));
+        memcpy(a->triangle + at, a->line[q].triangle, n * sizeof(uint32_t));
+        memcpy(a->label + at, a->line[q].label, n * sizeof(uint32_t));
+        memcpy(a->steep + at, a->line[q].steep, n * sizeof(float));
     }
 }
 
-/* ---- all lines */
-
-static void cast_window(struct caster *c, const struct schedule_run *run, uint32_t n_runs, const struct window *w,
-                        uint32_t pulses)
+void ahead_cast(struct cast_ahead *a, const struct cast_setup *s, struct bvh_work *work, uint32_t pulses)
 {
-    struct cast_ahead *a = c->ahead;
-    const struct cast_setup *s = &a->setup;
     const struct bvh_rays rays = {.n = pulses,
                                   .from.at_m = {s->station_m[0], s->station_m[1], s->station_m[2]},
                                   .dir = VEC3_IN(a->d, 0),
@@ -152,44 +140,14 @@ static void cast_window(struct caster *c, const struct schedule_run *run, uint32
                                   .triangle = a->tile_triangle,
                                   .label = a->tile_label,
                                   .steep = s->beam != NULL ? a->tile_steep : NULL};
-    aim_window(c, run, n_runs, w);
-    order_window(a, n_runs, w);
+    order_window(a);
     gather_window(a);
-    bvh_hits(c->nearest.bvh, s->bvh, &rays);
-    keep_window(a, n_runs, w);
+    bvh_hits(work, s->bvh, &rays);
+    keep_window(a);
 }
 
-void caster_look_ahead(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
-                       uint32_t n_runs)
+int ahead_take(const struct cast_ahead *a, const struct chunk *k, struct bvh_work *work, const struct bvh_rays *rays)
 {
-    struct cast_ahead *a = caster->ahead;
-    uint64_t column = UINT64_MAX, end = 0;
-    uint32_t at = 0;
-    a->setup = *setup;
-    a->setup.layout = LINE_POLAR; /* what the encoders read is computed later */
-    for (a->n_runs = 0; a->n_runs < n_runs && run[a->n_runs].n <= a->room - at; a->n_runs++) {
-        const struct schedule_run *r = &run[a->n_runs];
-        a->run[a->n_runs] = (struct ahead_run){r->pulse0, r->n, at};
-        at += r->n;
-        column = r->in_line < column ? r->in_line : column;
-        end = (uint64_t)r->in_line + r->n > end ? (uint64_t)r->in_line + r->n : end;
-    }
-    if (a->n_runs != 0) a->tile = tile_of(run, a->n_runs);
-    for (; column < end; column += AHEAD_WINDOW) {
-        struct window w;
-        const uint32_t pulses = open_window(run, a->n_runs, column, &w);
-        if (pulses != 0) cast_window(caster, run, a->n_runs, &w, pulses);
-    }
-}
-
-void caster_forget(struct caster *caster)
-{
-    if (caster->ahead != NULL) caster->ahead->n_runs = 0;
-}
-
-int ahead_take(const struct caster *c, const struct chunk *k, const struct bvh_rays *rays)
-{
-    const struct cast_ahead *a = c->ahead;
     for (uint32_t q = 0; a != NULL && q < a->n_runs; q++) {
         const struct ahead_run *run = &a->run[q];
         if (k->pulse0 < run->pulse0 || k->pulse0 + k->n > run->pulse0 + run->n) continue;
@@ -199,7 +157,7 @@ int ahead_take(const struct caster *c, const struct chunk *k, const struct bvh_r
         memcpy(rays->label, a->label + at, k->n * sizeof(uint32_t));
         if (rays->steep == NULL) return 1;
         memcpy(rays->steep, a->steep + at, k->n * sizeof(float));
-        bvh_work_set_directions(c->nearest.bvh, &rays->dir, k->n);
+        bvh_work_set_directions(work, &rays->dir, k->n);
         return 1;
     }
     return 0;

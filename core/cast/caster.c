@@ -151,7 +151,7 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
         return caster_points(c, k);
     }
     struct ray_hits hits = centres(c, k);
-    hits.known = central && ahead_take(c, k, &hits.rays);
+    hits.known = central && ahead_take(c->ahead, k, c->nearest.bvh, &hits.rays);
     if (central) caster_nearest(&c->nearest, s, &hits);
     if (s->tripod != NULL && s->beam == NULL) hide(c, k);
     if (hits.body != NULL && s->detect != NULL && s->detect->depth > 0) caster_follow(&c->nearest, s, &hits, &c->paths);
@@ -195,4 +195,51 @@ uint32_t caster_cast(struct caster *caster, const struct cast_setup *setup, cons
     }
     block->n_points = chunk.at;
     return echoes;
+}
+
+/* ---- lines ahead */
+
+int caster_add_ahead(struct caster *caster, uint32_t pulses, struct sh_err *err)
+{
+    return ahead_create(pulses, &caster->ahead, err);
+}
+
+/* The rings of a sphere gain nothing: their pulses lie side by side already. The next line of other heads with an emitter
+ * goes in the same directions once more. */
+uint32_t caster_room_ahead(const struct caster *caster, const struct cast_setup *s, const struct emitter *emitter)
+{
+    const struct instrument *instrument = s->detect != NULL ? s->detect->instrument : NULL;
+    if (caster->ahead == NULL || s->sight != NULL || s->n_knots != 0 || s->disturbance != NULL) return 0;
+    if (s->beam != NULL && s->beam->mode != BEAM_ADAPTIVE) return 0;
+    if (emitter != NULL) return 0;
+    return instrument == NULL || !instrument_has_offset(instrument) ? caster->ahead->room : 0;
+}
+
+static void aim_window(struct caster *c, const struct cast_setup *s, const struct schedule_run *run)
+{
+    for (uint32_t q = 0; q < c->ahead->n_runs; q++) {
+        const struct ahead_run *part = &c->ahead->run[q];
+        struct chunk k = {
+            .s = s, .run = &run[q], .pulse0 = run[q].pulse0 + part->first, .first = part->first, .n = part->in_window};
+        if (k.n == 0) continue;
+        caster_aim(c, &k);
+        ahead_aimed(c->ahead, q, &VEC3_IN(c->d, 0));
+    }
+}
+
+void caster_look_ahead(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
+                       uint32_t n_runs)
+{
+    struct cast_setup s = *setup;
+    s.layout = LINE_POLAR; /* what the encoders read is computed later */
+    ahead_begin(caster->ahead, run, n_runs);
+    for (uint32_t pulses; (pulses = ahead_open_window(caster->ahead)) != 0;) {
+        aim_window(caster, &s, run);
+        ahead_cast(caster->ahead, &s, caster->nearest.bvh, pulses);
+    }
+}
+
+void caster_forget(struct caster *caster)
+{
+    if (caster->ahead != NULL) caster->ahead->n_runs = 0;
 }

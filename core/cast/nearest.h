@@ -9,7 +9,7 @@
 /* Rays, and their first hits among scene and bodies. */
 struct ray_hits {
     struct bvh_rays rays; /* a triangle's number is that in the body that was hit */
-    int known; /* 1: the rays have their first hits on what stands still already */
+    int known;            /* 1: the rays have their first hits on what stands still already */
     /* cosine and body are NULL where no later stage needs them: */
     double *cosine; /* of the incidence */
     uint8_t *body;  /* 0: what stands still; k + 1: mover k */

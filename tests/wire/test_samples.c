@@ -261,8 +261,7 @@ static void test_words(void **state)
     free(said);
     free(page);
     said = ask_python(wire, "tables", "drivers/protocol", stream);
-    assert_string_equal(said,
-                        "6 1 2 3 9 11 12 4 5 10 5 6\n"); /* the client has no fields of names and poses */
+    assert_string_equal(said, "6 1 2 3 9 11 12 4 5 10 5 6\n"); /* the client has no fields of names and poses */
     free(said);
 }
 
