@@ -175,11 +175,11 @@ static void *caster_main(void *arg)
     return NULL;
 }
 
-/* In the pace `fast` there is time to claim several ticks. All casters together claim half of the ticks ahead at most, so that
- * there are always some on their way. */
+/* In the pace `fast` there is time to claim several ticks. There is room for one more share of the ticks ahead than there
+ * are casters, so that a caster need not wait until all of its last ticks are released. */
 static int create_caster(struct loop *loop, uint32_t n, struct loop_caster *caster, struct sh_err *err)
 {
-    const uint64_t room = loop->casters.ahead_ticks / (2 * n);
+    const uint64_t room = loop->casters.ahead_ticks / (n + 1);
     caster->loop = loop;
     caster->room = loop->cfg->loop.pace != PACE_FAST || room < 2 ? 1 : room < MOST_TICKS ? (uint32_t)room : MOST_TICKS;
     caster->work = calloc(caster->room, sizeof *caster->work);

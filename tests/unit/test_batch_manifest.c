@@ -16,6 +16,7 @@
 #include "firmware_sim/app/sidecars.h"
 #include "firmware_sim/app/studio/batch/manifest.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/config/load.h"
 
 static char dir[64];
 
@@ -310,9 +311,37 @@ static void test_inputs(void **state)
     free(cfg);
 }
 
+/* The profile of another scanner's head is an input, too. */
+static void test_inputs_of_other_scanners(void **state)
+{
+    struct config *cfg = calloc(1, sizeof *cfg);
+    struct batch_provenance made[2];
+    struct sh_err err;
+    char copy[192];
+    (void)state;
+    assert_non_null(cfg);
+    snprintf(copy, sizeof copy, "cp config/heads/any-rate.yaml '%s'", path_of("own.yaml"));
+    assert_int_equal(system(copy), 0);
+    write_file("m.obj", "w", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write_file("two.yaml", "w",
+               "head: {profile: any-rate}\nscene: {meshes: [{file: m.obj, up: z, scale: 1}]}\nstations:\n"
+               "  - {position_m: [0, 0, 1]}\n"
+               "  - {position_m: [1, 0, 1], scanner: {head: {profile: own.yaml}}}\n");
+    for (int i = 0; i < 2; i++) {
+        struct batch_cache cache = {0};
+        if (config_load(path_of("two.yaml"), NULL, 0, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+        assert_int_equal(batch_provenance_of(cfg, &cache, &made[i], &REPORT, &err), SH_OK);
+        batch_cache_free(&cache);
+        write_file("own.yaml", "a", "# changed\n");
+    }
+    assert_string_not_equal(made[0].inputs, made[1].inputs);
+    free(cfg);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(test_inputs_of_other_scanners, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_torn, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_folder, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_other_lines, make_dir, remove_dir),
