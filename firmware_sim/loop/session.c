@@ -155,7 +155,8 @@ static int take_tick(struct pump *pump, struct session *s)
     if (end >= pump->out_cap || session_waits_for_files(pump)) return 0;
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
-    const uint64_t off_tick = session_off_tick(pump, s); /* after the read: off_tick is set before it is released */
+    /* After ring_read: where power goes with a tick, that is noted before the tick is released. */
+    const uint64_t off_tick = session_off_tick(pump, s);
     if (s->cursor >= off_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);

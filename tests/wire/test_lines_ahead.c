@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* In the pace `fast` a caster claims several ticks, and casts their lines together. The stream is the same for any number
- * of ticks: where scans follow each other within them, where a scan changes, and where the head moves. */
+/* In the pace `fast` a caster claims several ticks, and casts their lines together. The stream is the same for any
+ * number of ticks: where scans follow each other within them, where a scan changes, and where the head moves. */
 #include "tests/wire/room.h"
 
 /* The head starts and stops at once, so that scans follow each other within the ticks that are claimed together. */
