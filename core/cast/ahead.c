@@ -100,8 +100,8 @@ static void order_window(struct cast_ahead *a)
         }
 }
 
-/* Each copy has AHEAD_STEP elements, and may go beyond the end of the line's pulses. What it writes there is overwritten
- * by the next copies, or not read. */
+/* Each copy has AHEAD_STEP elements, and may go beyond the end of the line's pulses. What it writes there is
+ * overwritten by the next copies, or not read. */
 static void gather_window(struct cast_ahead *a)
 {
     for (uint32_t j = 0; j < a->n_steps; j++) {

@@ -255,8 +255,8 @@ static const struct cfg_key config_keys[] = {
              "stream. The points are the same, with two exceptions. A live platform has one pose per tick. Meshes that "
              "move stand still during each tick, where they are at its start."},
     {KEY(loop.ahead_ms), CFG_REAL, "ms", "64", 2, 90,
-     .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam. Off line it is 256 ms at "
-             "least."},
+     .help = "How far casting runs ahead of the beam; a command takes that long to reach the beam. Off line it is "
+             "256 ms at least."},
     {KEY(loop.queue_ms), CFG_REAL, "ms", "250", 10, 10000,
      .help = "How much of the stream is stored for a link whose reader is slow."},
     {KEY(loop.late_ms), CFG_REAL, "ms", "100", 0, 10000,

@@ -21,8 +21,8 @@ static int may_claim(struct loop *loop)
     return pace != PACE_FAST || !device_is_idle(loop->device);
 }
 
-/* Whether as many ticks as the caster wants may be claimed now. They are half of the ticks ahead at most, so the release
- * of those that are on their way makes room for them. With claim_lock held. */
+/* Whether as many ticks as the caster wants may be claimed now. They are half of the ticks ahead at most, so the
+ * release of those that are on their way makes room for them. With claim_lock held. */
 static int has_room(const struct loop_caster *caster)
 {
     const struct casters *casters = &caster->loop->casters;
@@ -175,8 +175,8 @@ static void *caster_main(void *arg)
     return NULL;
 }
 
-/* In the pace `fast` there is time to claim several ticks. There is room for one more share of the ticks ahead than there
- * are casters, so that a caster need not wait until all of its last ticks are released. */
+/* In the pace `fast` there is time to claim several ticks. The ticks ahead have one share more than there are casters,
+ * so that a caster need not wait until all of its last ticks are released. */
 static int create_caster(struct loop *loop, uint32_t n, struct loop_caster *caster, struct sh_err *err)
 {
     const uint64_t room = loop->casters.ahead_ticks / (n + 1);

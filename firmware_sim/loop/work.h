@@ -24,8 +24,8 @@ uint32_t worker_usual_bytes(const struct site *site);
 int worker_add_ahead(struct worker *worker, struct sh_err *err);
 /* Returns the pulse up to which ticks should be claimed, of which `work` is the first. 0: only that one. */
 uint64_t worker_end_ahead(struct worker *worker, const struct device_work *work);
-/* Finds the hits of n consecutive ticks. worker_end_ahead of the first one was not 0. worker_fill then takes these hits,
- * until worker_forget, or until another scan begins. */
+/* Finds the hits of n consecutive ticks. worker_end_ahead of the first one was not 0. worker_fill then takes these
+ * hits, until worker_forget, or until another scan begins. */
 void worker_look_ahead(struct worker *worker, const struct device_work *work, uint32_t n);
 void worker_forget(struct worker *worker);
 
