@@ -364,10 +364,23 @@ static void a_slot_in_use_is_not_claimed(void **state)
     assert_non_null(ring_claim(&ring, ring.n_slots + 2));
 }
 
+/* Each count is added to its own. */
+static void hits_add_up(void **state)
+{
+    const struct ring_hits a = {1, 20, 300, 4000, 50000, 600000}, b = {2, 30, 400, 5000, 60000, 700000};
+    struct ring_hits sum = {0};
+    (void)state;
+    ring_hits_add(&sum, &a);
+    ring_hits_add(&sum, &b);
+    assert_true(sum.echoes == 3 && sum.empty == 50 && sum.crowded == 700 && sum.faint == 9000);
+    assert_true(sum.unfit == 110000 && sum.lost_samples == 1300000);
+}
+
 int main(void)
 {
 #define WITH_RING(test) cmocka_unit_test_setup_teardown(test, open_ring, close_ring)
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(hits_add_up),
         WITH_RING(a_tick_is_read_once_it_is_released),
         WITH_RING(ticks_become_ready_in_any_order),
         WITH_RING(only_the_last_ticks_are_kept),
