@@ -46,20 +46,20 @@ static void begin_row(FILE *out, const char *name, const struct figures *f)
     page_count(out, f->points);
     for (int k = 0; k < 4; k++) {
         fputs("</td><td>", out);
-        page_length(out, length[k]);
+        page_length(out, length[k], 0);
     }
     fputs("</td><td>", out);
     page_count(out, f->along);
     fputs("</td><td>", out);
-    page_signed_length(out, f->along_mean_m);
+    page_length(out, f->along_mean_m, 1);
     fputs("</td><td>", out);
-    page_length(out, f->along_rms_m);
+    page_length(out, f->along_rms_m, 0);
     fputs("</td><td>", out);
     page_count(out, f->judged);
     fputs("</td><td>", out);
-    page_length(out, f->judged_rms_m);
+    page_length(out, f->judged_rms_m, 0);
     fputs("</td><td>", out);
-    page_length(out, f->expected_rms_m);
+    page_length(out, f->expected_rms_m, 0);
     fputs("</td>", out);
 }
 
