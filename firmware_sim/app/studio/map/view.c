@@ -10,7 +10,6 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
 #include "firmware_sim/app/studio/record/heads.h"
-#include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
 
 /* ---- a scan */

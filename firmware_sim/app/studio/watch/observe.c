@@ -5,8 +5,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "core/mat3.h"
-#include "core/vec3.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/base/clock.h"
