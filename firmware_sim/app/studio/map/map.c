@@ -290,8 +290,8 @@ static int set_scene_crs(struct app_sets *sets)
 static int draw_view(struct config *cfg, void *ctx, struct sh_err *err)
 {
     const struct map_run *run = ctx;
-    return run->view.cloud != NULL ? map_view_cloud(cfg, run->view.cloud, &run->plan, run->output, run->quiet, err)
-                                   : map_view_scan(cfg, &run->plan, run->output, run->quiet, err);
+    return run->view.cloud != NULL ? map_view_cloud(cfg, run->view.cloud, &run->plan, err)
+                                   : map_view_scan(cfg, &run->plan, err);
 }
 
 static int is_cloud(const char *path)
@@ -311,13 +311,15 @@ static int run_view(struct map_run *run)
         return app_usage(&app_map, "%s: allowed for a map from above, not with --perspective",
                          run->open_edges ? "--open-edges" : "--pixel-m");
     if (map_view_read(&run->view, &run->plan, &err) != SH_OK) return app_usage(&app_map, "%s", err.text);
+    run->plan.output = run->output;
+    run->plan.quiet = run->quiet;
     if (is_cloud(operand)) {
         if (run->view.cloud != NULL)
             return app_usage(&app_map, "%s and --cloud %s: one cloud is shown at a time", operand, run->view.cloud);
         if (run->in.sets.n > 0)
             return app_usage(&app_map, "--set: %s is not a configuration; allowed with a CONFIG", operand);
         if (app_check_files(&run->in, NULL, &err) != SH_OK) return app_fail(&err);
-        const int rc = map_view_cloud(NULL, operand, &run->plan, run->output, run->quiet, &err);
+        const int rc = map_view_cloud(NULL, operand, &run->plan, &err);
         return rc == SH_OK ? APP_OK : app_fail(&err);
     }
     if (run->view.cloud == NULL) status = set_scene_crs(&run->in.sets);
