@@ -75,6 +75,16 @@ static int parse_number(const struct app_command *command, const struct app_opti
                      whole ? "whole number" : "number", row->min, row->max);
 }
 
+int app_find_word(const char *option, const char *word, const char *const *words, size_t n, struct sh_err *err)
+{
+    char allowed[160] = "";
+    for (size_t i = 0; i < n; i++) {
+        if (strcmp(word, words[i]) == 0) return (int)i;
+        snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s", i > 0 ? ", " : "", words[i]);
+    }
+    return sh_fail(err, SH_EINPUT, "--%s %s: allowed are %s", option, word, allowed);
+}
+
 int app_read_numbers(const char *text, char between, double *out, int n)
 {
     for (int i = 0; i < n; i++) {

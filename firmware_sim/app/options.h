@@ -10,6 +10,8 @@
 #include <stdint.h>
 #include <stdio.h>
 
+struct sh_err;
+
 /* The name of the program, as messages, help and manual pages have it: scanhead; main sets another. */
 extern const char *app_program;
 
@@ -143,6 +145,10 @@ int app_add_set(struct app_sets *sets, const char *set);
  * APP_PASS, with the struct app_words at `at`. `rows` has APP_MAX_OPTIONS + 1 rows; those that are not used are
  * OPTION_END, which is zeros. A table that has such rows already stays as it is. */
 void app_pass_options(struct app_option *rows, const struct app_command *other, const char *const *names, size_t at);
+
+/* Returns the number of a word among n. Negative: it is none of them, and err names those that are allowed. option: the
+ * name of the word's option, without the dashes. */
+int app_find_word(const char *option, const char *word, const char *const *words, size_t n, struct sh_err *err);
 
 /* Reads n finite numbers with `between` between them, and nothing else. 0: the text is not that. */
 int app_read_numbers(const char *text, char between, double *out, int n);

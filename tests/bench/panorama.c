@@ -264,7 +264,7 @@ static int run(const struct options *o, struct bench_target *t, struct alone *a,
     if (rc == SH_OK) rc = prepare_files(o, t, err);
     if (rc == SH_OK) rc = alone_create(o, t, a, err);
     if (rc == SH_OK) rc = config_load(config_path, o->set, o->n_sets, cfg, err);
-    if (rc == SH_OK) rc = offline_open(cfg, 0.0, NULL, off, err);
+    if (rc == SH_OK) rc = offline_open(cfg, NULL, 0.0, NULL, off, err);
     static struct figures figures;
     if (rc == SH_OK) rc = offline_prepare(off, 1, NULL, err);
     if (rc == SH_OK) rc = measure(o, a, off, &figures, err);

@@ -37,6 +37,8 @@ static void plan_it(const char *colour, const char *limits)
     options.point_px = 8;
     options.shade = 0;
     if (map_view_read(&options, &plan, &err) != SH_OK) fail_msg("%s", err.text);
+    plan.output = path;
+    plan.quiet = 1;
 }
 
 /* Draws a wall of 2 x 2 m in the plane y = 0, all of whose points have these figures. Returns the code. */
@@ -46,7 +48,7 @@ static int draw(const struct picturing_figures *f, double top_m, uint8_t middle[
     struct picturing_bounds b = {{-1, 0, -1}, {1, 0, top_m}};
     uint8_t *rgb = malloc(3 * SIDE_PX * SIDE_PX);
     assert_non_null(rgb);
-    int rc = picturing_begin(&plan, path, 1, &p, &err);
+    int rc = picturing_begin(&plan, &p, &err);
     assert_int_equal(rc, SH_OK);
     rc = picturing_look(p, &b, &err);
     for (int x = -40; x <= 40 && rc == SH_OK; x++)
@@ -142,7 +144,7 @@ static void what_is_not_known_is_an_error(void **state)
     plan_it("height", NULL);
     options.above_m = 0; /* half of them, and the row at 0 is kept */
     struct picturing *p;
-    assert_int_equal(picturing_begin(&plan, path, 1, &p, &err), SH_OK);
+    assert_int_equal(picturing_begin(&plan, &p, &err), SH_OK);
     assert_int_equal(picturing_look(p, &(struct picturing_bounds){{-1, 0, -1}, {1, 0, 1}}, &err), SH_OK);
     picturing_add(p, (const double[3]){0, 0, 0}, &none);
     picturing_add(p, (const double[3]){0, 0, -1e-9}, &none);
@@ -183,7 +185,7 @@ static uint8_t *drawn_rows(const struct site *site)
     png_image image = {.version = PNG_IMAGE_VERSION};
     uint8_t *rgb = malloc(3 * SIDE_PX * SIDE_PX);
     assert_non_null(rgb);
-    assert_int_equal(picturing_begin(&plan, path, 1, &p, &err), SH_OK);
+    assert_int_equal(picturing_begin(&plan, &p, &err), SH_OK);
     p->site = site;
     assert_int_equal(picturing_look(p, &(struct picturing_bounds){{-1, 0, -1}, {1, 0, 1}}, &err), SH_OK);
     for (int r = 0; r < N_ROWS; r++)

@@ -108,11 +108,14 @@ static int open_it(const char *what, int k, double scan_s, struct offline *off, 
     return call(err, "%s:%d", what, k);
 }
 
-int offline_open(struct config *of, double scan_s, const struct sh_report *report, struct offline *off,
-                 struct sh_err *err)
+int offline_open(struct config *of, const struct site *beside, double scan_s, const struct sh_report *report,
+                 struct offline *off, struct sh_err *err)
 {
-    assert_ptr_equal(report, heads->report);
-    return open_it("open", of_cfg(of), scan_s, off, err);
+    if (beside == NULL)
+        assert_ptr_equal(report, heads->report);
+    else
+        assert_true(beside == &site_of[0] && report->progress != NULL);
+    return open_it(beside == NULL ? "open" : "beside", of_cfg(of), scan_s, off, err);
 }
 
 int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *off,
@@ -120,14 +123,6 @@ int offline_open_at(struct site *site, double scan_s, const struct sh_report *re
 {
     assert_ptr_equal(report, heads->report);
     return open_it("open_at", (int)(site - site_of), scan_s, off, err);
-}
-
-int offline_open_beside(struct config *of, const struct offline *other, double scan_s, const struct sh_report *report,
-                        struct offline *off, struct sh_err *err)
-{
-    assert_ptr_equal(other, &heads->one[0].offline);
-    assert_non_null(report->progress);
-    return open_it("beside", of_cfg(of), scan_s, off, err);
 }
 
 int offline_prepare(struct offline *off, uint32_t station, const struct sh_report *report, struct sh_err *err)

@@ -206,7 +206,7 @@ static void close_all(int keep, int rc)
     assert_int_equal(record_files_close(&files, keep, &err), rc);
     for (int i = 0; i < files.n; i++)
         assert_true(files.file[i].now == NULL && files.file[i].rec == NULL);
-    assert_true(files.spool == NULL && files.n_spools == 0 && files.spooling == 0);
+    assert_true(files.spool == NULL && files.n_spools == 0);
 }
 
 static void a_list_of_files(void **state)

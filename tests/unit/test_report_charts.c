@@ -289,10 +289,10 @@ static void draw_figures(FILE *out)
     static const uint64_t counts[] = {0, 999, 1000, 1234567};
     static const double numbers[] = {NAN, 0.12346, 999.9, 1000.4, 12345.6, 1e15};
     for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++, fputc(';', out))
-        page_length(out, lengths[i]);
-    page_signed_length(out, 0.25);
+        page_length(out, lengths[i], 0);
+    page_length(out, 0.25, 1);
     fputc(';', out);
-    page_signed_length(out, -2e-6);
+    page_length(out, -2e-6, 1);
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
         fputc(';', out), page_count(out, counts[i]);
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)

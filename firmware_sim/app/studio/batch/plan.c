@@ -8,7 +8,6 @@
 
 #include "core/bvh.h"
 #include "core/grow.h"
-#include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
 #include "firmware_sim/site/site.h"

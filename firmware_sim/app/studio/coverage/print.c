@@ -42,12 +42,11 @@ static void print_stations(const struct coverage_result *r)
 
 /* ---- by label, the largest unseen area first */
 
-static const struct coverage_of_label *sorted; /* for compare, which qsort gives no context */
-
-static int print_compare(const void *a, const void *b)
+static int print_compare(const void *a, const void *b, void *ctx)
 {
+    const struct coverage_of_label *label = ctx;
     const uint32_t i = *(const uint32_t *)a, k = *(const uint32_t *)b;
-    const double x = sorted[i].area_m2 - sorted[i].seen_m2, y = sorted[k].area_m2 - sorted[k].seen_m2;
+    const double x = label[i].area_m2 - label[i].seen_m2, y = label[k].area_m2 - label[k].seen_m2;
     return x != y ? (x < y) - (x > y) : (i > k) - (i < k);
 }
 
@@ -58,8 +57,7 @@ static void print_labels(const struct coverage_result *r)
     if (order == NULL) return;
     for (uint32_t i = 0; i < n; i++)
         order[i] = i;
-    sorted = r->label;
-    qsort(order, n, sizeof *order, print_compare);
+    qsort_r(order, n, sizeof *order, print_compare, r->label);
     printf("\n%12s %12s %8s %12s  %s\n", "area m2", "unseen m2", "seen %", "points/m2", "object | material");
     for (uint32_t i = 0; i < n; i++) {
         const struct coverage_of_label *l = &r->label[order[i]];

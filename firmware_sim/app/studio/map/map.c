@@ -26,6 +26,7 @@ struct map_run {
     int quiet, perspective, open_edges;
     struct map_view_options view;
     struct map_view_plan plan;
+    struct map_spec spec;
     struct map *map;
     const struct config *cfg; /* with the monitored fields */
     struct heads heads;
@@ -64,8 +65,12 @@ static int add_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame
     return SH_OK;
 }
 
-static void include(struct map_spec *spec, const double p[3])
+/* Widens the area of the map by a place in prcs. */
+static void include(struct map_run *run, const double p_prcs[3])
 {
+    struct map_spec *spec = &run->spec;
+    double p[3];
+    to_map(run, p_prcs, p);
     for (int i = 0; i < 2; i++) {
         spec->min_m[i] = fmin(spec->min_m[i], p[i]);
         spec->max_m[i] = fmax(spec->max_m[i], p[i]);
@@ -130,10 +135,10 @@ static int add_field_line(void *ctx, const double a[3], const double b[3], struc
 }
 
 /* Fields belong to links, and so to the scanner of head.station alone. */
-static int each_field_line(const struct map_run *run, uint32_t station, const struct placement *at, field_line *take,
-                           void *ctx, struct sh_err *err)
+static int each_field_line(struct map_run *run, uint32_t station, const struct placement *at, field_line *take,
+                           struct sh_err *err)
 {
-    return config_serves(run->cfg, station) ? field_lines_each(run->cfg, at, take, ctx, err) : SH_OK;
+    return config_serves(run->cfg, station) ? field_lines_each(run->cfg, at, take, run, err) : SH_OK;
 }
 
 /* Stations are marked here, one by one, since only the site of a station's own scanner has the height of the head. */
@@ -144,69 +149,57 @@ static int prepare(void *ctx, uint32_t station, struct sh_err *err)
     for (; rc == SH_OK && run->marked < station; run->marked++) {
         const struct site_station *at = &heads_site(&run->heads)->station[run->marked];
         rc = add_station(run, at, err);
-        if (rc == SH_OK) rc = each_field_line(run, run->marked, &at->at, add_field_line, run, err);
+        if (rc == SH_OK) rc = each_field_line(run, run->marked, &at->at, add_field_line, err);
     }
     return rc;
 }
 
 /* Includes the corners of their bounding boxes, which are a little larger than the copies. */
-static void include_copies(const struct map_run *run, const struct scene_copied *of, struct map_spec *spec)
+static void include_copies(struct map_run *run, const struct scene_copied *of)
 {
     for (uint32_t k = 0; k < of->n; k++)
         for (int corner = 0; corner < 8; corner++) {
-            double v[3], p[3];
+            double v[3];
             for (int i = 0; i < 3; i++)
                 v[i] = corner >> i & 1 ? of->copy[k].max_m[i] : of->copy[k].min_m[i];
-            to_map(run, v, p);
-            include(spec, p);
+            include(run, v);
         }
 }
 
-struct map_fields {
-    const struct map_run *run;
-    struct map_spec *spec;
-};
-
 static int include_line(void *ctx, const double a[3], const double b[3], struct sh_err *err)
 {
-    const struct map_fields *fields = ctx;
-    double p[3];
     (void)b;
     (void)err;
-    to_map(fields->run, a, p);
-    include(fields->spec, p);
+    include(ctx, a);
     return SH_OK;
 }
 
 static int create_map(struct map_run *run, const struct site *site, struct sh_err *err)
 {
     const struct scene *scene = site->scene;
-    struct map_spec spec = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, run->pixel_m};
-    double p[3], mark[3];
+    struct map_spec *spec = &run->spec;
+    *spec = (struct map_spec){{INFINITY, INFINITY}, {-INFINITY, -INFINITY}, run->pixel_m};
     int rc = choose_view(run, site, err);
     if (rc != SH_OK) return rc;
-    for (uint32_t v = 0; v < scene->n_vertices && run->turned; v++) {
-        to_map(run, scene->vertex_m[v], p);
-        include(&spec, p);
-    }
+    for (uint32_t v = 0; v < scene->n_vertices && run->turned; v++)
+        include(run, scene->vertex_m[v]);
     for (uint32_t i = 0; i < scene->n_copied && run->turned; i++)
-        include_copies(run, &scene->copied[i], &spec);
+        include_copies(run, &scene->copied[i]);
     if (!run->turned) {
-        include(&spec, scene->min_m);
-        include(&spec, scene->max_m);
+        include(run, scene->min_m);
+        include(run, scene->max_m);
     }
     for (uint32_t s = 0; s < site->n_stations; s++) {
-        to_map(run, site->station[s].at.position_m, mark);
-        include(&spec, mark);
-        rc = each_field_line(run, s, &site->station[s].at, include_line, &(struct map_fields){run, &spec}, err);
+        include(run, site->station[s].at.position_m);
+        rc = each_field_line(run, s, &site->station[s].at, include_line, err);
         if (rc != SH_OK) return rc;
     }
-    double span_m = fmax(spec.max_m[0] - spec.min_m[0], spec.max_m[1] - spec.min_m[1]);
+    double span_m = fmax(spec->max_m[0] - spec->min_m[0], spec->max_m[1] - spec->min_m[1]);
     for (int i = 0; i < 2; i++) { /* a margin, so that nothing sticks to the border */
-        spec.min_m[i] -= 0.03 * span_m;
-        spec.max_m[i] += 0.03 * span_m;
+        spec->min_m[i] -= 0.03 * span_m;
+        spec->max_m[i] += 0.03 * span_m;
     }
-    return map_create(&spec, &run->map, err);
+    return map_create(spec, &run->map, err);
 }
 
 static int add_edge(void *ctx, const double a[3], const double b[3], struct sh_err *err)
@@ -297,8 +290,8 @@ static int set_scene_crs(struct app_sets *sets)
 static int draw_view(struct config *cfg, void *ctx, struct sh_err *err)
 {
     const struct map_run *run = ctx;
-    return run->view.cloud != NULL ? map_view_cloud(cfg, run->view.cloud, &run->plan, run->output, run->quiet, err)
-                                   : map_view_scan(cfg, &run->plan, run->output, run->quiet, err);
+    return run->view.cloud != NULL ? map_view_cloud(cfg, run->view.cloud, &run->plan, err)
+                                   : map_view_scan(cfg, &run->plan, err);
 }
 
 static int is_cloud(const char *path)
@@ -318,13 +311,15 @@ static int run_view(struct map_run *run)
         return app_usage(&app_map, "%s: allowed for a map from above, not with --perspective",
                          run->open_edges ? "--open-edges" : "--pixel-m");
     if (map_view_read(&run->view, &run->plan, &err) != SH_OK) return app_usage(&app_map, "%s", err.text);
+    run->plan.output = run->output;
+    run->plan.quiet = run->quiet;
     if (is_cloud(operand)) {
         if (run->view.cloud != NULL)
             return app_usage(&app_map, "%s and --cloud %s: one cloud is shown at a time", operand, run->view.cloud);
         if (run->in.sets.n > 0)
             return app_usage(&app_map, "--set: %s is not a configuration; allowed with a CONFIG", operand);
         if (app_check_files(&run->in, NULL, &err) != SH_OK) return app_fail(&err);
-        const int rc = map_view_cloud(NULL, operand, &run->plan, run->output, run->quiet, &err);
+        const int rc = map_view_cloud(NULL, operand, &run->plan, &err);
         return rc == SH_OK ? APP_OK : app_fail(&err);
     }
     if (run->view.cloud == NULL) status = set_scene_crs(&run->in.sets);

@@ -10,7 +10,6 @@
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
 #include "firmware_sim/app/studio/record/heads.h"
-#include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
 
 /* ---- a scan */
@@ -96,7 +95,7 @@ static int scan(struct scanning *s, struct config *cfg, struct sh_err *err)
     struct recording_result result;
     struct recording_options options = {.first_station = 1,
                                         .frames = 1,
-                                        .progress = !s->p->quiet,
+                                        .progress = !s->p->plan->quiet,
                                         .report = &app_report_stderr,
                                         .prepare = prepare,
                                         .frame = add_frame,
@@ -121,12 +120,11 @@ static int scan(struct scanning *s, struct config *cfg, struct sh_err *err)
     return rc == SH_OK ? picturing_finish(s->p, err) : rc;
 }
 
-int map_view_scan(struct config *cfg, const struct map_view_plan *plan, const char *output, int quiet,
-                  struct sh_err *err)
+int map_view_scan(struct config *cfg, const struct map_view_plan *plan, struct sh_err *err)
 {
     struct scanning *s = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scan");
-    int rc = picturing_begin(plan, output, quiet, &s->p, err);
+    int rc = picturing_begin(plan, &s->p, err);
     if (rc == SH_OK && plan->colour == MAP_VIEW_RGB && cfg->output.colour == COLOUR_NONE)
         rc = sh_fail(err, SH_EINPUT,
                      "--colour rgb: the scan has no colours; set output.colour, as with --set output.colour=texture");
@@ -216,11 +214,10 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
     return rc == SH_OK ? picturing_finish(s->p, err) : rc;
 }
 
-int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, const char *output,
-                   int quiet, struct sh_err *err)
+int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, struct sh_err *err)
 {
     struct showing s = {.path = cloud};
-    int rc = picturing_begin(plan, output, quiet, &s.p, err);
+    int rc = picturing_begin(plan, &s.p, err);
     if (rc != SH_OK) return rc;
     rc = show(&s, cfg, err);
     picturing_end(s.p);

@@ -36,15 +36,15 @@ struct map_view_plan {
     int has_eye, has_look_at, has_limits;
     double azimuth_rad, elevation_rad, limit[2];
     const struct map_view_options *given; /* heights, widths of points and shade are used as given */
+    const char *output;                   /* the file to write; the caller's, as is quiet */
+    int quiet;
 };
-/* SH_EINPUT with what is wrong with which option. */
+/* SH_EINPUT with what is wrong with which option. output and quiet become 0. */
 int map_view_read(const struct map_view_options *options, struct map_view_plan *plan, struct sh_err *err);
 
 /* Scans the stations. */
-int map_view_scan(struct config *cfg, const struct map_view_plan *plan, const char *output, int quiet,
-                  struct sh_err *err);
+int map_view_scan(struct config *cfg, const struct map_view_plan *plan, struct sh_err *err);
 /* Shows a recording. cfg NULL: its coordinates are shown as they are. */
-int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, const char *output,
-                   int quiet, struct sh_err *err);
+int map_view_cloud(struct config *cfg, const char *cloud, const struct map_view_plan *plan, struct sh_err *err);
 
 #endif

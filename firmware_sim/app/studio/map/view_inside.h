@@ -10,8 +10,6 @@ enum { MAP_VIEW_BATCH = 1024, MAP_VIEW_NUMBERS = 65536 };
 
 struct picturing {
     const struct map_view_plan *plan;
-    const char *output;
-    int quiet;
     const struct site *site; /* NULL: no configuration */
     struct view *view;
     uint64_t cut;                      /* points that --below and --above leave out */
@@ -24,8 +22,7 @@ struct picturing {
     uint8_t rgb[MAP_VIEW_BATCH][3];
 };
 
-int picturing_begin(const struct map_view_plan *plan, const char *output, int quiet, struct picturing **out,
-                    struct sh_err *err);
+int picturing_begin(const struct map_view_plan *plan, struct picturing **out, struct sh_err *err);
 void picturing_end(struct picturing *p);
 
 struct picturing_bounds {

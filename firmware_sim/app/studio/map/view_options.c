@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Turns the options of map --perspective into a plan. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "core/angle.h"
@@ -21,23 +20,13 @@ const char *const map_view_colours[6] = {"height", "range", "reflectance", "labe
 const char *const map_view_winds[8] = {"north", "north-east", "east", "south-east",
                                        "south", "south-west", "west", "north-west"};
 
-static int find_word(const char *option, const char *word, const char *const *words, size_t n, struct sh_err *err)
-{
-    char allowed[160] = "";
-    for (size_t i = 0; i < n; i++) {
-        if (strcmp(word, words[i]) == 0) return (int)i;
-        snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s", i > 0 ? ", " : "", words[i]);
-    }
-    return sh_fail(err, SH_EINPUT, "--%s %s: allowed are %s", option, word, allowed);
-}
-
 /* A point of the compass, or degrees clockwise from north. */
 static int read_direction(const char *text, double *azimuth_rad, struct sh_err *err)
 {
     double azimuth_deg;
     if (text == NULL) text = "south-west";
     if (!app_read_numbers(text, ',', &azimuth_deg, 1) || fabs(azimuth_deg) > 360) {
-        const int wind = find_word("from", text, map_view_winds, 8, err);
+        const int wind = app_find_word("from", text, map_view_winds, 8, err);
         if (wind < 0)
             return sh_fail(err, SH_EINPUT, "%s, and degrees clockwise from north, -360 to 360", strdupa(err->text));
         azimuth_deg = 45.0 * wind;
@@ -89,7 +78,7 @@ static int read_limits(const struct map_view_options *o, struct map_view_plan *p
 int map_view_read(const struct map_view_options *o, struct map_view_plan *plan, struct sh_err *err)
 {
     memset(plan, 0, sizeof *plan);
-    int colour = find_word("colour", o->colour != NULL ? o->colour : "height", map_view_colours, 6, err);
+    int colour = app_find_word("colour", o->colour != NULL ? o->colour : "height", map_view_colours, 6, err);
     if (colour < 0) return colour;
     plan->colour = (enum map_view_colour)colour;
     plan->elevation_rad = angle_rad(o->elevation_deg);

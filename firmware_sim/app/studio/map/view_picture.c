@@ -177,7 +177,8 @@ static int check_figures(struct picturing *p, struct sh_err *err)
             err, SH_EINPUT,
             "%s: no point is in the picture: %llu are outside of it or behind the eye, --below and --above leave out "
             "%llu, and %llu shots have no echo",
-            p->output, (unsigned long long)counts.beyond, (unsigned long long)p->cut, (unsigned long long)counts.empty);
+            p->plan->output, (unsigned long long)counts.beyond, (unsigned long long)p->cut,
+            (unsigned long long)counts.empty);
     if (p->plan->colour == MAP_VIEW_RGB) return SH_OK;
     const int known = view_range(p->view, &p->limit[0], &p->limit[1]);
     if (!known && p->plan->colour == MAP_VIEW_REFLECTANCE)
@@ -203,9 +204,9 @@ static int draw_stations(const struct picturing *p, struct picture *picture, str
     }
     const uint32_t left_out = view_draw_stations(p->view, picture, station, site->n_stations);
     free(station);
-    if (left_out > 0 && !p->quiet)
+    if (left_out > 0 && !p->plan->quiet)
         fprintf(stderr, "scanhead: %s: %u names of stations would cover other names or marks, and are left out\n",
-                p->output, left_out);
+                p->plan->output, left_out);
     return SH_OK;
 }
 
@@ -218,13 +219,13 @@ int picturing_finish(struct picturing *p, struct sh_err *err)
     if (rc == SH_OK) rc = view_draw(p->view, &colours, &picture, err);
     if (rc == SH_OK && p->site != NULL && !p->site->moving) rc = draw_stations(p, &picture, err);
     if (rc == SH_OK) rc = draw_legend(p, &colours, &picture, err);
-    if (rc == SH_OK) rc = picture_write_png(&picture, "map", p->output, err);
+    if (rc == SH_OK) rc = picture_write_png(&picture, "map", p->plan->output, err);
     picture_free(&picture);
     if (rc == SH_ESTOPPED) return sh_fail(err, rc, "interrupted; nothing written");
-    if (rc != SH_OK || p->quiet) return rc;
+    if (rc != SH_OK || p->plan->quiet) return rc;
     struct view_counts counts;
     view_get_counts(p->view, &counts);
-    fprintf(stderr, "scanhead: %s: %llu points in the picture, %llu outside of it", p->output,
+    fprintf(stderr, "scanhead: %s: %llu points in the picture, %llu outside of it", p->plan->output,
             (unsigned long long)counts.drawn, (unsigned long long)counts.beyond);
     if (p->cut > 0) fprintf(stderr, ", %llu left out by height", (unsigned long long)p->cut);
     fputc('\n', stderr);
@@ -237,16 +238,13 @@ void picturing_end(struct picturing *p)
     free(p);
 }
 
-int picturing_begin(const struct map_view_plan *plan, const char *output, int quiet, struct picturing **out,
-                    struct sh_err *err)
+int picturing_begin(const struct map_view_plan *plan, struct picturing **out, struct sh_err *err)
 {
-    const int rc = newfile_check(output, err);
+    const int rc = newfile_check(plan->output, err);
     if (rc != SH_OK) return rc;
     struct picturing *p = calloc(1, sizeof *p);
     if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a picture");
     p->plan = plan;
-    p->output = output;
-    p->quiet = quiet;
     *out = p;
     return SH_OK;
 }

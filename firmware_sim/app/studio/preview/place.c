@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/angle.h"
 #include "core/bytes.h"
 #include "core/grow.h"
 #include "firmware_sim/app/studio/coverage/coverage.h"

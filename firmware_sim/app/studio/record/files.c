@@ -149,7 +149,6 @@ static void close_spools(struct record_files *files)
     free(files->spool);
     files->spool = NULL;
     files->n_spools = 0;
-    files->spooling = 0;
 }
 
 /* The path of the file at hand: with --split it has the scan's number. To be freed; NULL: no memory. */
@@ -253,11 +252,7 @@ int record_files_open(struct record_files *files, struct sh_err *err)
     files->has_points = 0;
     for (int i = 0; i < files->n && rc == SH_OK; i++)
         rc = open_file(files, &files->file[i], err);
-    if (rc == SH_OK && files->own_limits && record_files_have_colours(files)) {
-        files->spooling = 1;
-        rc = add_spool(files, err);
-    }
-    return rc;
+    return rc == SH_OK && files->own_limits && record_files_have_colours(files) ? add_spool(files, err) : rc;
 }
 
 static int to_coloured(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -288,7 +283,7 @@ static int colour_files(struct record_files *files, struct sh_err *err)
 
 int record_files_close(struct record_files *files, int keep, struct sh_err *err)
 {
-    int rc = files->spooling && keep ? colour_files(files, err) : SH_OK;
+    int rc = files->n_spools > 0 && keep ? colour_files(files, err) : SH_OK;
     const int is_coloured = rc == SH_OK;
     for (int i = 0; i < files->n; i++) {
         struct sh_err why = {0};
@@ -331,12 +326,12 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
     if (files->split && files->has_points && (begins_scan(frame) || is_other)) {
         rc = record_files_close(files, 1, err);
         if (rc == SH_OK) rc = record_files_open(files, err);
-    } else if (files->spooling && is_other) {
+    } else if (files->n_spools > 0 && is_other) {
         rc = add_spool(files, err);
     }
-    if (rc == SH_OK && files->spooling) rc = colour_spool_frame(files->spool[files->n_spools - 1], sh, frame, err);
+    if (rc == SH_OK && files->n_spools > 0) rc = colour_spool_frame(files->spool[files->n_spools - 1], sh, frame, err);
     for (int i = 0; i < files->n && rc == SH_OK; i++)
-        if (!files->spooling || !files->file[i].ops->track.wants_colours)
+        if (files->n_spools == 0 || !files->file[i].ops->track.wants_colours)
             rc = recorder_frame(files->file[i].rec, sh, frame, err);
     if (rc == SH_OK && frame->type == SCANHEAD_POINTS) files->has_points = 1;
     return rc;

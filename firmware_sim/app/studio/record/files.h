@@ -30,10 +30,9 @@ struct record_files {
     int n;
     unsigned part;               /* number of the scan in split files, from 1 */
     int has_points;              /* a frame of points came for the present files */
-    int spooling;                /* the frames of the present files wait for the limits */
-    struct colour_spool **spool; /* one for each head that comes, in their order */
-    uint32_t n_spools;
-    const struct scanhead *sh; /* the head from which the last frame came */
+    struct colour_spool **spool; /* one for each head that comes, in their order; frames wait there for the limits */
+    uint32_t n_spools;           /* 0: no frame has to wait */
+    const struct scanhead *sh;   /* the head from which the last frame came */
 };
 
 /* SH_EINPUT: more than RECORD_MAX_FILES, a path twice, an ending without a recorder. path must live on. */

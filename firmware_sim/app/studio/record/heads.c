@@ -73,7 +73,7 @@ static int open_one(struct heads *heads, struct heads_one *one, struct sh_err *e
     if (one->is_open) return SH_OK;
     one->is_open = 1;
     scanner_report_set_up(&one->report, heads->report, one->cfg->head.settings.station, &heads->warnings);
-    return offline_open_beside(one->cfg, heads->first, heads->scan_s, &one->report.report, &one->offline, err);
+    return offline_open(one->cfg, heads->first->site, heads->scan_s, &one->report.report, &one->offline, err);
 }
 
 int heads_open(struct heads *heads, struct site *site, double scan_s, const struct sh_report *report,
@@ -86,7 +86,7 @@ int heads_open(struct heads *heads, struct site *site, double scan_s, const stru
     heads->first = &one->offline;
     one->is_open = 1;
     return site != NULL ? offline_open_at(site, scan_s, report, &one->offline, err)
-                        : offline_open(one->cfg, scan_s, report, &one->offline, err);
+                        : offline_open(one->cfg, NULL, scan_s, report, &one->offline, err);
 }
 
 const struct site *heads_site(const struct heads *heads)

@@ -111,17 +111,10 @@ int offline_open_at(struct site *site, double scan_s, const struct sh_report *re
     return power_up(off, scan_s, report, err);
 }
 
-int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *off,
-                 struct sh_err *err)
+int offline_open(struct config *cfg, const struct site *beside, double scan_s, const struct sh_report *report,
+                 struct offline *off, struct sh_err *err)
 {
-    int rc = offline_load(cfg, NULL, report, &off->site, err);
-    return rc == SH_OK ? power_up(off, scan_s, report, err) : rc;
-}
-
-int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
-                        struct offline *off, struct sh_err *err)
-{
-    int rc = offline_load(cfg, other->site, report, &off->site, err);
+    int rc = offline_load(cfg, beside, report, &off->site, err);
     return rc == SH_OK ? power_up(off, scan_s, report, err) : rc;
 }
 

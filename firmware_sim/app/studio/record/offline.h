@@ -27,20 +27,16 @@ struct offline {
 
 /* Loads the scene and starts the head. The head's own links stay closed. scan_s > 0: the head ends each scan after this
  * device time, to the pulse. cfg is changed (pace, links) and must live on. `offline` begins as zeros but for truth,
- * and is to be closed, also after an error. */
-int offline_open(struct config *cfg, double scan_s, const struct sh_report *report, struct offline *offline,
-                 struct sh_err *err);
+ * and is to be closed, also after an error. beside: a site to share a scene with, as for site_load_for, where cfg is
+ * another scanner of its configuration; NULL: none. */
+int offline_open(struct config *cfg, const struct site *beside, double scan_s, const struct sh_report *report,
+                 struct offline *offline, struct sh_err *err);
 /* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
- * gives the site, which site_free frees; offline_open_at uses it. beside: a site to share a scene with, as for
- * site_load_for; NULL: none. */
+ * gives the site, which site_free frees; offline_open_at uses it. */
 int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
                  struct sh_err *err);
 int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *offline,
                     struct sh_err *err);
-/* Like offline_open, for another scanner of the configuration, beside the open head `other`. The scene that both have
- * is loaded once. */
-int offline_open_beside(struct config *cfg, const struct offline *other, double scan_s, const struct sh_report *report,
-                        struct offline *offline, struct sh_err *err);
 /* Ends the head, and frees its threads and its site. A site given to offline_open_at stays. The client's handle
  * keeps what it knows. */
 void offline_stop(struct offline *offline);

@@ -39,15 +39,11 @@ static int take_repair(void *values, const char *text)
 }
 
 /* The index of a word; APP_USAGE with the reason printed. */
-static int take_word(const char *option, const char *const *words, int n, const char *text, int *index)
+static int take_word(const char *option, const char *const *words, size_t n, const char *text, int *index)
 {
-    char allowed[96] = "";
-    for (*index = 0; *index < n; ++*index) {
-        if (strcmp(text, words[*index]) == 0) return APP_OK;
-        snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s", *index > 0 ? ", " : "",
-                 words[*index]);
-    }
-    return app_usage(&app_record, "--%s %s: allowed are %s", option, text, allowed);
+    struct sh_err err;
+    *index = app_find_word(option, text, words, n, &err);
+    return *index >= 0 ? APP_OK : app_usage(&app_record, "%s", err.text);
 }
 
 static int take_colour(void *values, const char *text)

@@ -67,13 +67,6 @@ void recording_put(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
-/* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not before the
- * first frame and after the last. */
-static uint64_t count_lost(const struct scanhead_stats *s)
-{
-    return s->seq_lost + s->bad_unseen + s->dropped;
-}
-
 /* Adds ", N what" where there were any. */
 static void add_count(char *text, size_t len, uint64_t n, const char *what)
 {
@@ -94,7 +87,9 @@ int recording_describe_order(const struct recording_result *result, char *text, 
 int recording_check_complete(const struct recording_result *result, struct sh_err *err)
 {
     const struct scanhead_stats *s = &result->stream;
-    const unsigned long long lost = count_lost(s);
+    /* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not before
+     * the first frame and after the last. */
+    const unsigned long long lost = s->seq_lost + s->bad_unseen + s->dropped;
     const uint64_t pulses = s->pulses_lost > result->counts.lost ? s->pulses_lost : result->counts.lost;
     if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
     if (result->broken_scans != 0)

@@ -86,10 +86,7 @@ static void begin_card(FILE *out, const char *what)
 static void put_length_card(FILE *out, const char *what, double m, int is_signed)
 {
     begin_card(out, what);
-    if (is_signed)
-        page_signed_length(out, m);
-    else
-        page_length(out, m);
+    page_length(out, m, is_signed);
     fputs("</b></div>\n", out);
 }
 

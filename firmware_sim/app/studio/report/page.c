@@ -92,7 +92,7 @@ static void put_digits(FILE *out, double v, int is_signed)
     fprintf(out, is_signed ? "%+.*f" : "%.*f", v == 0.0 ? 0 : decimals, v);
 }
 
-static void put_length(FILE *out, double m, int is_signed)
+void page_length(FILE *out, double m, int is_signed)
 {
     double per_m;
     if (!isfinite(m)) {
@@ -102,16 +102,6 @@ static void put_length(FILE *out, double m, int is_signed)
     const char *unit = page_unit(m, &per_m);
     put_digits(out, m * per_m, is_signed);
     fprintf(out, "&nbsp;%s", unit);
-}
-
-void page_length(FILE *out, double m)
-{
-    put_length(out, m, 0);
-}
-
-void page_signed_length(FILE *out, double m)
-{
-    put_length(out, m, 1);
 }
 
 void page_count(FILE *out, uint64_t n)

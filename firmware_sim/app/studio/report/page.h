@@ -13,10 +13,9 @@
 void page_begin(FILE *out, const char *title);
 void page_end(FILE *out);
 
-/* A length in the unit that suits it, nm to m: four digits, with three decimals at most; NaN: a dash. */
-void page_length(FILE *out, double m);
-/* The same with its sign. */
-void page_signed_length(FILE *out, double m);
+/* A length in the unit that suits it, nm to m: four digits, with three decimals at most; NaN: a dash.
+ * is_signed: with a sign also where it is positive. */
+void page_length(FILE *out, double m, int is_signed);
 /* A number with commas between thousands. */
 void page_count(FILE *out, uint64_t n);
 /* A number of up to four significant digits, without zeros at its end; from 1000 on a whole number as page_count writes

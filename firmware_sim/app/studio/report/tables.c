@@ -36,33 +36,6 @@ static void begin_table(FILE *out, const char *caption, const char *first, int d
         density ? "<th>5 %</th><th>median</th><th>95 %</th>" : "");
 }
 
-/* Leaves the row open. */
-static void begin_row(FILE *out, const char *name, const struct figures *f)
-{
-    const double length[] = {f->mean_m, f->rms_m, f->p95_m, f->max_m};
-    fputs("<tr><td>", out);
-    picture_put_escaped(out, name);
-    fputs("</td><td>", out);
-    page_count(out, f->points);
-    for (int k = 0; k < 4; k++) {
-        fputs("</td><td>", out);
-        page_length(out, length[k]);
-    }
-    fputs("</td><td>", out);
-    page_count(out, f->along);
-    fputs("</td><td>", out);
-    page_signed_length(out, f->along_mean_m);
-    fputs("</td><td>", out);
-    page_length(out, f->along_rms_m);
-    fputs("</td><td>", out);
-    page_count(out, f->judged);
-    fputs("</td><td>", out);
-    page_length(out, f->judged_rms_m);
-    fputs("</td><td>", out);
-    page_length(out, f->expected_rms_m);
-    fputs("</td>", out);
-}
-
 static void put_density_cells(FILE *out, const struct figures_density_row *d)
 {
     const double v[] = {d->p5, d->p50, d->p95};
@@ -71,6 +44,36 @@ static void put_density_cells(FILE *out, const struct figures_density_row *d)
         page_number(out, v[k]);
         fputs("</td>", out);
     }
+}
+
+/* Writes nothing where there are no points. d: NULL in a table without density. */
+static void put_row(FILE *out, const char *name, const struct figures *f, const struct figures_density_row *d)
+{
+    if (f->points == 0) return;
+    const double length[] = {f->mean_m, f->rms_m, f->p95_m, f->max_m};
+    fputs("<tr><td>", out);
+    picture_put_escaped(out, name);
+    fputs("</td><td>", out);
+    page_count(out, f->points);
+    for (int k = 0; k < 4; k++) {
+        fputs("</td><td>", out);
+        page_length(out, length[k], 0);
+    }
+    fputs("</td><td>", out);
+    page_count(out, f->along);
+    fputs("</td><td>", out);
+    page_length(out, f->along_mean_m, 1);
+    fputs("</td><td>", out);
+    page_length(out, f->along_rms_m, 0);
+    fputs("</td><td>", out);
+    page_count(out, f->judged);
+    fputs("</td><td>", out);
+    page_length(out, f->judged_rms_m, 0);
+    fputs("</td><td>", out);
+    page_length(out, f->expected_rms_m, 0);
+    fputs("</td>", out);
+    if (d != NULL) put_density_cells(out, d);
+    fputs("</tr>\n", out);
 }
 
 static void end_table(FILE *out)
@@ -84,11 +87,8 @@ void report_put_stations(FILE *out, const struct report *r)
     fputs("<h2>Stations</h2>\n", out);
     begin_table(out, "Each station by itself.", "station", 1);
     for (uint32_t s = 0; s < r->site->n_stations; s++) {
-        if (r->f.station[s].figures.points == 0) continue;
         snprintf(name, sizeof name, "%" PRIu32 " %s", s + 1, r->site->station[s].station->name);
-        begin_row(out, name, &r->f.station[s].figures);
-        put_density_cells(out, &r->f.station[s].density);
-        fputs("</tr>\n", out);
+        put_row(out, name, &r->f.station[s].figures, &r->f.station[s].density);
     }
     end_table(out);
     for (uint32_t s = 0; s < r->site->n_stations; s++) {
@@ -114,20 +114,13 @@ void report_put_bins(FILE *out, const struct report *r)
         "By the distance from the station, m, up to the farthest point that is near the scene. Density is that of one "
         "station's points.",
         "range, m", 1);
-    for (uint32_t k = 0; k < r->f.n_ranges; k++) {
-        if (r->f.range[k].points == 0) continue;
-        begin_row(out, ranges[k], &r->f.range[k]);
-        put_density_cells(out, &r->f.density_range[k]);
-        fputs("</tr>\n", out);
-    }
+    for (uint32_t k = 0; k < r->f.n_ranges; k++)
+        put_row(out, ranges[k], &r->f.range[k], &r->f.density_range[k]);
     end_table(out);
     if (r->site->moving) return;
     begin_table(out, "By the angle between the beam and the surface's normal.", "incidence", 0);
-    for (int k = 0; k < REPORT_INCIDENCES; k++) {
-        if (r->f.incidence[k].points == 0) continue;
-        begin_row(out, incidences[k], &r->f.incidence[k]);
-        fputs("</tr>\n", out);
-    }
+    for (int k = 0; k < REPORT_INCIDENCES; k++)
+        put_row(out, incidences[k], &r->f.incidence[k], NULL);
     end_table(out);
 }
 
@@ -157,8 +150,7 @@ int report_put_surfaces(FILE *out, const struct report *r, struct sh_err *err)
         char name[REPORT_SURFACE_LEN] = "surface not known";
         const uint32_t i = ranked[k].label;
         if (i < r->site->n_surfaces) report_name_surface(site_surface(r->site, i), name);
-        begin_row(out, name, &r->f.label[i]);
-        fputs("</tr>\n", out);
+        put_row(out, name, &r->f.label[i], NULL);
     }
     end_table(out);
     if (n > MOST_LABELS)

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
  * numbers, which are the same on all links. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "drivers/host/scanhead.h"

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/vec3.h"
 #include "firmware_sim/app/studio/verdict/match_index.h"
 
 /* A cell is twice as wide as a coordinate may differ. So all points that agree lie in the same cell or next to it. */
@@ -28,24 +29,13 @@ static int compare_entries(const void *left, const void *right)
     return by_cell;
 }
 
-static void widen(struct match_index *index, const double p[3])
-{
-    for (int k = 0; k < 3; k++) {
-        index->least[k] = fmin(index->least[k], p[k]);
-        index->most[k] = fmax(index->most[k], p[k]);
-    }
-}
-
 void match_index_make(struct match_index *index)
 {
     size_t n = 0;
-    for (int k = 0; k < 3; k++) {
-        index->least[k] = INFINITY;
-        index->most[k] = -INFINITY;
-    }
+    vec3_bound_nothing(index->least, index->most);
     for (size_t i = 0; i < index->n; i++) {
         cell_of(index, index->entry[i].p, index->entry[i].cell);
-        widen(index, index->entry[i].p);
+        vec3_bound(index->least, index->most, index->entry[i].p);
     }
     qsort(index->entry, index->n, sizeof *index->entry, compare_entries);
     for (size_t i = 0; i < index->n; i++) {

@@ -9,7 +9,6 @@
 #include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/app/studio/record/line.h"
 #include "firmware_sim/app/studio/view/encode.h"
-#include "firmware_sim/app/studio/view/spread.h"
 
 enum { MAX_WORDS = 6 };
 
@@ -57,18 +56,16 @@ static int get_mesh(struct view_serve *s, const char *query, struct web_body *ou
 /* Spreads the points of a request. Where the last request asked for the same points, s->sparse still has them. */
 static int make_sparse(struct view_serve *s, const struct view_spread *wish, struct sh_err *err)
 {
-    if (s->made && s->per_m2 == wish->per_m2 && s->long_edge == wish->long_edge && s->seed == wish->seed &&
-        s->scan == wish->scan)
+    const struct view_spread *last = &s->wish;
+    if (s->made && last->per_m2 == wish->per_m2 && last->long_edge == wish->long_edge && last->seed == wish->seed &&
+        last->scan == wish->scan)
         return SH_OK;
     viewed_points_free(&s->sparse);
     s->made = 0;
     int rc = view_spread(s->viewed, wish, s->report, &s->sparse, err);
     if (rc != SH_OK) return rc;
     s->made = 1;
-    s->per_m2 = wish->per_m2;
-    s->long_edge = wish->long_edge;
-    s->seed = wish->seed;
-    s->scan = wish->scan;
+    s->wish = *wish;
     return SH_OK;
 }
 

@@ -5,6 +5,7 @@
 #define FIRMWARE_SIM_APP_STUDIO_VIEW_SERVE_H
 
 #include "drivers/link/web.h"
+#include "firmware_sim/app/studio/view/spread.h"
 #include "firmware_sim/app/studio/view/viewed.h"
 
 struct view_serve {
@@ -13,8 +14,7 @@ struct view_serve {
     /* the last sparse points that were made, and by which request */
     struct viewed_points sparse;
     int made;
-    double per_m2, long_edge;
-    uint64_t seed, scan;
+    struct view_spread wish;
 };
 
 /* As web_source's get; ctx is a struct view_serve, zeroed but for viewed and report. */

@@ -61,15 +61,10 @@ int viewed_can_show(int64_t epsg, const double p[3])
     return fabs(p[0]) <= (epsg == EPSG_GEODETIC ? 90.0 : most) && fabs(p[1]) <= most && fabs(p[2]) <= most;
 }
 
-static void degrees_to_ecef(double p[3])
-{
-    const struct georef_place at = {p[0], p[1], p[2]};
-    georef_geodetic_to_ecef(&at, p);
-}
-
 static void to_enu(const struct geoframe *frame, int is_geodetic, double p[3])
 {
-    if (is_geodetic) degrees_to_ecef(p);
+    const struct georef_place at = {p[0], p[1], p[2]};
+    if (is_geodetic) georef_geodetic_to_ecef(&at, p);
     const double d[3] = {p[0] - frame->ecef_m[0], p[1] - frame->ecef_m[1], p[2] - frame->ecef_m[2]};
     mat3_apply_transposed(frame->rotation, d, p);
 }

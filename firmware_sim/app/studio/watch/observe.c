@@ -5,8 +5,6 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "core/mat3.h"
-#include "core/vec3.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/app/studio/watch/inside.h"
 #include "firmware_sim/base/clock.h"
@@ -217,20 +215,15 @@ static int next_frame(const struct watch *w, struct scanhead_frame *frame)
     return scanhead_next(w->sh, frame, NEXT_MS);
 }
 
-/* Lowers the processor priority of this thread alone; where that fails, the priority stays as it is. An observer that
- * the head waits for keeps the head's priority: else, on a busy machine, the whole head would be as slow as the
- * observer. */
-static void be_last(void)
-{
-    setpriority(PRIO_PROCESS, (id_t)gettid(), WATCH_NICE);
-}
-
 void *watch_observe(void *watch)
 {
     struct watch *w = watch;
     struct scanhead_frame frame;
     int quiet = 0;
-    if (w->options.cpu_share > 0.0) be_last();
+    /* This lowers the processor priority of this thread alone; where that fails, the priority stays as it is. An
+     * observer that the head waits for keeps the head's priority: else, on a busy machine, the whole head would be as
+     * slow as the observer. */
+    if (w->options.cpu_share > 0.0) setpriority(PRIO_PROCESS, (id_t)gettid(), WATCH_NICE);
     while (!atomic_load(&w->ending)) {
         const int rc = next_frame(w, &frame);
         quiet = rc == SCANHEAD_ETIMEOUT ? quiet + 1 : 0;

@@ -48,18 +48,11 @@ static int watch_make_room(struct watch *w, struct sh_err *err)
     return sh_fail(err, SH_ENOMEM, "no memory for %u stations", n);
 }
 
-static void join(struct watch *w)
-{
-    if (!w->running) return;
-    pthread_join(w->thread, NULL);
-    w->running = 0;
-}
-
 static void close_watch(struct watch *w)
 {
     atomic_store(&w->ending, 1);
     if (w->fd >= 0) shutdown(w->fd, SHUT_RDWR);
-    join(w);
+    if (w->running) pthread_join(w->thread, NULL);
     preview_free(w->preview);
     scanhead_close(w->sh);
     if (w->link.fd >= 0 && !w->link_given) close(w->link.fd);
