@@ -130,7 +130,6 @@ static int write_sparse(struct mesh_recorder *m, struct sh_err *err)
     const struct recorder_options *o = &m->base.options;
     const struct mesh_sparse sparse = {o->sparse_per_m2, o->sparse_seed, o->report};
     struct mesh_points out = {.has_frame = m->points.has_frame};
-    struct sh_err why = {0};
     int rc = SH_OK;
     size_t face = 0;
     for (size_t i = 0; rc == SH_OK && i < m->n_parts; i++) {
@@ -138,7 +137,7 @@ static int write_sparse(struct mesh_recorder *m, struct sh_err *err)
         if (p->n_faces == 0) continue;
         const struct mesh_sparse_part part = {(const uint32_t(*)[3])m->face + face, p->n_faces, p->station,
                                               p->scan << 16 | p->sweep};
-        rc = fail_with_path(m, mesh_sparse_add(&sparse, &m->points, &part, &out, &m->area_m2, &why), &why, err);
+        rc = name_path(m, mesh_sparse_add(&sparse, &m->points, &part, &out, &m->area_m2, err), err);
         face += p->n_faces;
     }
     if (rc == SH_OK) rc = write_mesh(m, &out, 0, NULL, err);
