@@ -242,9 +242,7 @@ int ptx_repair(struct repair *r, struct sh_err *err)
         if (rc == SH_OK) rc = end_text(r, &place, err);
     }
     if (rc == SH_OK && grid.spool != NULL) unlink(grid.path);
-    r->n_kept = place.n_points;
-    r->unit = "points";
-    r->n_scans = place.n_grids;
+    repair_say_kept(r, "points", place.n_points, place.n_grids);
     if (grid.spool != NULL) fclose(grid.spool);
     free(grid.path);
     return rc;
