@@ -22,7 +22,6 @@ static int las_begin(void *rec, struct sh_err *err)
     las->base.track.no_empty = 1;
     las->base.track.spared = TRACK_RANGE;
     las->facts.minor = las->base.options.las_minor == 2 ? 2 : 4;
-    las->facts.has_colour = las->base.track.has_colours;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
@@ -73,7 +72,6 @@ static int las_scan(void *rec, struct sh_err *err)
     }
     if (las->begun) return 0;
     set_scale(las);
-    f->has_colour = t->has_colours;
     f->has_waves = t->has_waves && f->minor != 2;
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
     f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;
