@@ -4,6 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+int csv_put_title(struct outfile *file, const char *title, struct sh_err *err)
+{
+    return file->written + file->len > 0 ? SH_OK : outfile_write(file, title, strlen(title), err);
+}
+
 struct rows {
     const struct csv_format *format;
     int titled, n_columns;
