@@ -51,18 +51,10 @@ static void LIBUSB_CALL in_done(struct libusb_transfer *transfer)
 
 static int errno_of_status(enum libusb_transfer_status status)
 {
-    switch (status) {
-    case LIBUSB_TRANSFER_COMPLETED:
-        return 0;
-    case LIBUSB_TRANSFER_NO_DEVICE:
-        return ENODEV;
-    case LIBUSB_TRANSFER_CANCELLED:
-        return ECANCELED;
-    case LIBUSB_TRANSFER_TIMED_OUT:
-        return ETIMEDOUT;
-    default:
-        return EPROTO;
-    }
+    if (status == LIBUSB_TRANSFER_COMPLETED) return 0;
+    if (status == LIBUSB_TRANSFER_NO_DEVICE) return ENODEV;
+    if (status == LIBUSB_TRANSFER_CANCELLED) return ECANCELED;
+    return status == LIBUSB_TRANSFER_TIMED_OUT ? ETIMEDOUT : EPROTO;
 }
 
 static void LIBUSB_CALL out_done(struct libusb_transfer *transfer)
