@@ -91,12 +91,7 @@ static void capture_close(struct host_source *source)
     free(source->capture);
 }
 
-static int capture_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
-{
-    return host_fd_ops.wait(source, events, deadline_ns, revents); /* a file can always be read */
-}
-
-static const struct host_source_ops capture_ops = {.read = capture_read, .wait = capture_wait, .close = capture_close};
+static const struct host_source_ops capture_ops = {.read = capture_read, .wait = host_fd_wait, .close = capture_close};
 
 /* The first interface says what the packets are. */
 static int check_front(struct host_source *source, struct sh_err *err)

@@ -105,20 +105,21 @@ void host_hang_up(struct scanhead *sh)
     native_parser_lend(&sh->parser, NULL, 0);
 }
 
-static void free_nodes(struct host_node *node)
+static struct host_node *pop(struct scanhead *sh)
 {
-    while (node != NULL) {
-        struct host_node *next = node->next;
-        free(node);
-        node = next;
-    }
+    struct host_node *node = sh->kept.first;
+    sh->kept.first = node->next;
+    if (sh->kept.first == NULL) sh->kept.last = NULL;
+    sh->kept.bytes -= sizeof *node + node->len;
+    return node;
 }
 
 void scanhead_close(struct scanhead *sh)
 {
     if (sh == NULL) return;
     if (sh->source.ops != NULL) sh->source.ops->close(&sh->source);
-    free_nodes(sh->kept.first);
+    while (sh->kept.first != NULL)
+        free(pop(sh));
     free(sh->kept.current);
     for (uint32_t i = 0; i < sh->n_surfaces; i++) {
         free(sh->surface[i].object);
@@ -132,15 +133,6 @@ void scanhead_close(struct scanhead *sh)
 const char *scanhead_error(const struct scanhead *sh)
 {
     return sh->err.text;
-}
-
-static struct host_node *pop(struct scanhead *sh)
-{
-    struct host_node *node = sh->kept.first;
-    sh->kept.first = node->next;
-    if (sh->kept.first == NULL) sh->kept.last = NULL;
-    sh->kept.bytes -= sizeof *node + node->len;
-    return node;
 }
 
 /* Drops the oldest frame. The frame's facts about the stream are taken in first, and the frame stays in the hash. */

@@ -24,7 +24,7 @@ static ssize_t fd_write(struct host_source *source, const void *data, size_t len
     return source->is_socket ? send(source->fd, data, len, MSG_NOSIGNAL) : write(source->fd, data, len);
 }
 
-static int fd_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
+int host_fd_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
 {
     struct timespec left = {0}, *wait = NULL;
     if (deadline_ns != INT64_MAX) {
@@ -45,7 +45,8 @@ static void fd_close(struct host_source *source)
     close(source->fd);
 }
 
-const struct host_source_ops host_fd_ops = {.read = fd_read, .write = fd_write, .wait = fd_wait, .close = fd_close};
+const struct host_source_ops host_fd_ops = {
+    .read = fd_read, .write = fd_write, .wait = host_fd_wait, .close = fd_close};
 
 int host_wait(struct scanhead *sh, short events, int64_t deadline_ns, short *revents)
 {

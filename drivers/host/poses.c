@@ -40,19 +40,6 @@ int host_absorb_poses(struct scanhead *sh, const uint8_t *payload, size_t len)
     return 0;
 }
 
-/* Finds the latest two poses of one stream frame with t_ns between them; 0 where there are none. */
-static int poses_find(const struct host_poses *poses, int64_t t_ns, const struct native_pose **a,
-                      const struct native_pose **b)
-{
-    uint64_t n = poses != NULL ? poses->n : 0, first = n > KEEP ? n - KEEP : 0;
-    for (uint64_t i = n; i > first + 1; i--) {
-        *a = &poses->at[(i - 2) % KEEP].pose;
-        *b = &poses->at[(i - 1) % KEEP].pose;
-        if (!poses->at[(i - 1) % KEEP].begins && (*a)->t_ns <= t_ns && t_ns <= (*b)->t_ns) return 1;
-    }
-    return 0;
-}
-
 /* The motion from pose a to pose b: the rotation at a, and the axis (in SOCS, the head's frame) and angle of the turn
  * from there. */
 struct leg {
@@ -68,6 +55,19 @@ static void set_leg(struct leg *leg, const struct native_pose *a, const struct n
     quat_matrix(a->quat, leg->rotation);
 }
 
+/* Finds the latest two poses of one stream frame with t_ns between them; 0 where there are none. */
+static int find_leg(const struct host_poses *poses, int64_t t_ns, struct leg *leg)
+{
+    uint64_t n = poses != NULL ? poses->n : 0, first = n > KEEP ? n - KEEP : 0;
+    for (uint64_t i = n; i > first + 1; i--) {
+        const struct native_pose *a = &poses->at[(i - 2) % KEEP].pose, *b = &poses->at[(i - 1) % KEEP].pose;
+        if (poses->at[(i - 1) % KEEP].begins || t_ns < a->t_ns || t_ns > b->t_ns) continue;
+        set_leg(leg, a, b);
+        return 1;
+    }
+    return 0;
+}
+
 static double fraction(const struct leg *leg, int64_t t_ns)
 {
     /* without signs: poses of a broken stream may be further apart than 63 bits */
@@ -77,13 +77,12 @@ static double fraction(const struct leg *leg, int64_t t_ns)
 
 int scanhead_pose(struct scanhead *sh, int64_t t_ns, struct scanhead_pose *pose)
 {
-    const struct native_pose *a, *b;
     struct leg leg;
     memset(pose, 0, sizeof *pose);
-    if (!poses_find(sh->poses, t_ns, &a, &b))
+    if (!find_leg(sh->poses, t_ns, &leg))
         return sh_fail(&sh->err, SCANHEAD_ESTATE, "%s: there is no pose of the head at %.9f s of the scan",
                        sh->source.name, 1e-9 * (double)t_ns);
-    set_leg(&leg, a, b);
+    const struct native_pose *a = leg.a, *b = leg.b;
     double f = fraction(&leg, t_ns), s = sin(0.5 * f * leg.angle_rad);
     const double turn[4] = {cos(0.5 * f * leg.angle_rad), s * leg.axis[0], s * leg.axis[1], s * leg.axis[2]};
     quat_multiply(a->quat, turn, pose->quat);
@@ -142,12 +141,9 @@ static int to_scene_moving(struct scanhead *sh, struct scanhead_point *points, u
     int lost = 0;
     for (uint32_t i = 0; i < n; i++) {
         struct scanhead_point *p = &points[i];
-        const struct native_pose *a, *b;
-        if (leg.a == NULL || p->t_ns < leg.a->t_ns || p->t_ns >= leg.b->t_ns) {
+        const int is_on_leg = leg.a != NULL && p->t_ns >= leg.a->t_ns && p->t_ns < leg.b->t_ns;
+        if (!is_on_leg && !find_leg(sh->poses, p->t_ns, &leg)) {
             leg.a = NULL;
-            if (poses_find(sh->poses, p->t_ns, &a, &b)) set_leg(&leg, a, b);
-        }
-        if (leg.a == NULL) {
             p->x = p->y = p->z = NAN;
             if (frame != NULL) frame[i] = NAN;
             lost++;

@@ -53,6 +53,8 @@ int host_source_is_usb(const char *source);
 /* usb_transfers.c: the same for "usb...". host_source_open() has set out's name, its fd to -1, and the rest to 0. */
 int host_usb_open(const char *source, struct host_source *out, struct sh_err *err);
 extern const struct host_source_ops host_fd_ops;
+/* io.c: waits as host_source_ops.wait does, on the source's descriptor. */
+int host_fd_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents);
 /* capture.c: source is an open .pcapng file. Where it fails, the descriptor is still the caller's. */
 int host_capture_open(struct host_source *source, struct sh_err *err);
 

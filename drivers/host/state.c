@@ -121,6 +121,12 @@ static int absorb_waves(struct scanhead *sh, const struct native_header *header,
     return native_decode_waves(payload, header->length, &waves) != 0 ? bad(sh, "wrong waveforms") : 0;
 }
 
+static int absorb_poses(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
+{
+    if (host_absorb_poses(sh, payload, header->length) == SH_EFORMAT) return bad(sh, "wrong poses");
+    return sh->poses != NULL ? 0 : sh_fail(&sh->err, SH_ENOMEM, "no memory for poses");
+}
+
 /* Notes the head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
 static void set_gps(struct scanhead *sh, uint64_t at_ns, uint64_t gps_ns)
 {
@@ -210,6 +216,13 @@ static void absorb_hash(struct scanhead *sh, const struct native_header *header,
     sha256_update(&sh->sha256, header->length, payload);
 }
 
+static int (*const absorbers[])(struct scanhead *sh, const struct native_header *header, const uint8_t *payload) = {
+    [NATIVE_DESCRIPTOR] = absorb_descriptor, [NATIVE_EMITTER] = absorb_emitter,       [NATIVE_ANCHOR] = absorb_anchor,
+    [NATIVE_POINTS] = absorb_points,         [NATIVE_ATTRIBUTES] = absorb_attributes, [NATIVE_COLOURS] = absorb_colours,
+    [NATIVE_WAVES] = absorb_waves,           [NATIVE_POSES] = absorb_poses,           [NATIVE_EVENT] = absorb_event,
+    [NATIVE_SURFACES] = absorb_surfaces,
+};
+
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     absorb_hash(sh, header, payload);
@@ -217,31 +230,9 @@ int host_absorb(struct scanhead *sh, const struct native_header *header, const u
         return sh_fail(&sh->err, SH_EFORMAT, "%s: the head speaks version %u of the protocol; this library reads %d",
                        sh->source.name, header->version, NATIVE_VERSION);
     follow_sequence(sh, header);
-    switch (header->type) {
-    case NATIVE_DESCRIPTOR:
-        return absorb_descriptor(sh, header, payload);
-    case NATIVE_EMITTER:
-        return absorb_emitter(sh, header, payload);
-    case NATIVE_ANCHOR:
-        return absorb_anchor(sh, header, payload);
-    case NATIVE_POINTS:
-        return absorb_points(sh, header, payload);
-    case NATIVE_ATTRIBUTES:
-        return absorb_attributes(sh, header, payload);
-    case NATIVE_COLOURS:
-        return absorb_colours(sh, header, payload);
-    case NATIVE_WAVES:
-        return absorb_waves(sh, header, payload);
-    case NATIVE_POSES:
-        if (host_absorb_poses(sh, payload, header->length) == SH_EFORMAT) return bad(sh, "wrong poses");
-        return sh->poses != NULL ? 0 : sh_fail(&sh->err, SH_ENOMEM, "no memory for poses");
-    case NATIVE_EVENT:
-        return absorb_event(sh, header, payload);
-    case NATIVE_SURFACES:
-        return absorb_surfaces(sh, header, payload);
-    default: /* line end and telemetry change nothing; unknown types are for later readers */
-        return 0;
-    }
+    /* line end and telemetry change nothing; unknown types are for later readers */
+    if (header->type >= sizeof absorbers / sizeof absorbers[0] || absorbers[header->type] == NULL) return 0;
+    return absorbers[header->type](sh, header, payload);
 }
 
 int scanhead_get_info(const struct scanhead *sh, struct scanhead_info *info)

@@ -51,18 +51,10 @@ static void LIBUSB_CALL in_done(struct libusb_transfer *transfer)
 
 static int errno_of_status(enum libusb_transfer_status status)
 {
-    switch (status) {
-    case LIBUSB_TRANSFER_COMPLETED:
-        return 0;
-    case LIBUSB_TRANSFER_NO_DEVICE:
-        return ENODEV;
-    case LIBUSB_TRANSFER_CANCELLED:
-        return ECANCELED;
-    case LIBUSB_TRANSFER_TIMED_OUT:
-        return ETIMEDOUT;
-    default:
-        return EPROTO;
-    }
+    if (status == LIBUSB_TRANSFER_COMPLETED) return 0;
+    if (status == LIBUSB_TRANSFER_NO_DEVICE) return ENODEV;
+    if (status == LIBUSB_TRANSFER_CANCELLED) return ECANCELED;
+    return status == LIBUSB_TRANSFER_TIMED_OUT ? ETIMEDOUT : EPROTO;
 }
 
 static void LIBUSB_CALL out_done(struct libusb_transfer *transfer)
@@ -97,21 +89,15 @@ static int count_reads(const struct host_usb *usb)
     return n;
 }
 
-/* Takes back the reads that are under way. Bytes that came in until then can still be read. */
-static void cancel_reads(struct host_usb *usb)
+/* Takes back the reads that are under way and, with_write, the write. Bytes that came in until then can still be
+ * read. */
+static void cancel(struct host_usb *usb, int with_write)
 {
     for (int i = 0; i < usb->n_in; i++)
         if (usb->in[i].flying) libusb_cancel_transfer(usb->in[i].transfer);
-    int64_t deadline_ns = host_deadline_ns(CANCEL_MS);
-    while (count_reads(usb) > 0 && host_deadline_ns(0) < deadline_ns)
-        handle_events(usb, 10000000);
-}
-
-static void cancel_write(struct host_usb *usb)
-{
-    if (usb->out_flying) libusb_cancel_transfer(usb->out);
-    int64_t deadline_ns = host_deadline_ns(CANCEL_MS);
-    while (usb->out_flying && host_deadline_ns(0) < deadline_ns)
+    if (with_write && usb->out_flying) libusb_cancel_transfer(usb->out);
+    const int64_t deadline_ns = host_deadline_ns(CANCEL_MS);
+    while ((count_reads(usb) > 0 || (with_write && usb->out_flying)) && host_deadline_ns(0) < deadline_ns)
         handle_events(usb, 10000000);
 }
 
@@ -148,7 +134,7 @@ static int recover(struct host_usb *usb, struct failing *failing, uint8_t endpoi
  * they don't start the endpoint again. */
 static int recover_reads(struct host_usb *usb)
 {
-    cancel_reads(usb);
+    cancel(usb, 0);
     for (int i = 0; i < usb->n_in; i++) {
         struct in_transfer *in = &usb->in[i];
         if (!in->flying && errno_of_status(in->transfer->status) == EPROTO)
@@ -288,8 +274,7 @@ static void usb_free(struct host_usb *usb)
 static void usb_end(struct host_usb *usb)
 {
     session(usb, 0);
-    cancel_write(usb);
-    cancel_reads(usb);
+    cancel(usb, 1);
     libusb_release_interface(usb->head.handle, usb->head.interface.number);
 }
 

@@ -27,11 +27,6 @@ static double float_of(uint32_t bits)
     return (double)le_get_float(wire);
 }
 
-static double turn_part(uint32_t count, double counts_per_turn)
-{
-    return TWO_PI * (count / counts_per_turn);
-}
-
 static void set_direction(const struct scanhead *sh, const struct native_wave *w, double direction[3])
 {
     const struct native_descriptor *d = &sh->descriptor;
@@ -41,8 +36,8 @@ static void set_direction(const struct scanhead *sh, const struct native_wave *w
             direction[i] = float_of(bits[i]);
         return;
     }
-    const double mirror_rad = turn_part(w->b, d->mirror_counts_per_turn);
-    const double pan_rad = turn_part(w->c, d->pan_counts_per_turn);
+    const double mirror_rad = TWO_PI * (w->b / d->mirror_counts_per_turn);
+    const double pan_rad = TWO_PI * (w->c / d->pan_counts_per_turn);
     direction[0] = sin(pan_rad) * cos(mirror_rad);
     direction[1] = cos(pan_rad) * cos(mirror_rad);
     direction[2] = sin(mirror_rad);

@@ -4,6 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+int csv_put_title(struct outfile *file, const char *title, struct sh_err *err)
+{
+    return file->written + file->len > 0 ? SH_OK : outfile_write(file, title, strlen(title), err);
+}
+
 struct rows {
     const struct csv_format *format;
     int titled, n_columns;
@@ -50,8 +55,6 @@ int csv_repair(struct repair *r, const struct csv_format *format, struct sh_err 
     if (rc == SH_OK && !rows.titled) rc = repair_fail_none(r, format->what, err);
     if (rc == SH_OK) rc = repair_check_rest(r, end, format->line_most, err);
     if (rc != SH_OK) return rc;
-    r->unit = format->unit;
-    r->n_kept = rows.n;
-    r->n_scans = rows.n_scans;
+    repair_say_kept(r, format->unit, rows.n, rows.n_scans);
     return repair_end_text(r, end, rows.is_marked, 1, err);
 }

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* This is the repair (repair.h) of CSV files whose first column is the scan's number. Rows are kept up to the last
- * whole one. Lines of comment begin with #. */
+/* CSV files whose first column is the scan's number: their title, and their repair (repair.h). Rows are kept up to the
+ * last whole one. Lines of comment begin with #. */
 #ifndef DRIVERS_RECORD_CSV_REPAIR_H
 #define DRIVERS_RECORD_CSV_REPAIR_H
 
+#include "drivers/record/outfile.h"
 #include "drivers/record/repair.h"
 
 struct csv_format {
@@ -12,6 +13,9 @@ struct csv_format {
     const char *unit, *what;  /* "poses", "file of poses" */
     size_t line_most;         /* bytes of a row */
 };
+
+/* Writes the title, which the file begins with, unless it is there. */
+int csv_put_title(struct outfile *file, const char *title, struct sh_err *err);
 
 int csv_repair(struct repair *repair, const struct csv_format *format, struct sh_err *err);
 

@@ -35,16 +35,8 @@ int e57_page_is_right(const uint8_t page[E57_PAGE])
     return memcmp(crc, page + E57_PAGE_CONTENT, sizeof crc) == 0;
 }
 
-static int put_page(struct e57_pages *pages, struct sh_err *err)
-{
-    put_crc(pages->page);
-    pages->used = 0;
-    pages->n_full++;
-    return outfile_write(pages->file, pages->page, E57_PAGE, err);
-}
-
-/* A page of content goes straight into the file's buffer. */
-static int put_whole_page(struct e57_pages *pages, const uint8_t *content, struct sh_err *err)
+/* Puts a page of content into the file's buffer. */
+static int put_page(struct e57_pages *pages, const uint8_t *content, struct sh_err *err)
 {
     uint8_t *to = outfile_room(pages->file, E57_PAGE, err);
     if (to == NULL) return SH_EIO;
@@ -62,11 +54,11 @@ int e57_put(struct e57_pages *pages, const void *data, size_t len, struct sh_err
     while (rc == 0 && len > 0) {
         const size_t room = E57_PAGE_CONTENT - pages->used, n = room < len ? room : len;
         if (n == E57_PAGE_CONTENT) {
-            rc = put_whole_page(pages, p, err);
+            rc = put_page(pages, p, err);
         } else {
             memcpy(pages->page + pages->used, p, n);
-            pages->used += n;
-            rc = n == room ? put_page(pages, err) : 0;
+            pages->used = n < room ? pages->used + n : 0;
+            rc = n < room ? 0 : put_page(pages, pages->page, err);
         }
         p += n;
         len -= n;
@@ -77,7 +69,8 @@ int e57_put(struct e57_pages *pages, const void *data, size_t len, struct sh_err
 int e57_finish(struct e57_pages *pages, struct sh_err *err)
 {
     memset(pages->page + pages->used, 0, E57_PAGE_CONTENT - pages->used);
-    int rc = pages->used > 0 ? put_page(pages, err) : 0;
+    int rc = pages->used > 0 ? put_page(pages, pages->page, err) : 0;
+    pages->used = 0;
     return rc != 0 ? rc : outfile_flush(pages->file, err);
 }
 

@@ -233,10 +233,10 @@ static int repair_left(struct left *l, struct sh_err *err)
     if (l->facts.n_scans == 0 && !r->was_whole)
         return sh_fail(err, SH_EFORMAT, "%s: is not an E57 file of scanhead, or is too short: no scan begins in it",
                        r->path);
+    uint64_t n = 0;
     for (uint32_t i = 0; i < l->facts.n_scans; i++)
-        r->n_kept += l->facts.scan[i].n_records;
-    r->unit = l->facts.empty_shots ? "points and empty shots" : "points";
-    r->n_scans = l->facts.n_scans;
+        n += l->facts.scan[i].n_records;
+    repair_say_kept(r, l->facts.empty_shots ? "points and empty shots" : "points", n, l->facts.n_scans);
     if (r->was_whole) return check_ours(l, err);
     rc = look_behind(l, err);
     return rc == SH_OK ? write_end(l, err) : rc;

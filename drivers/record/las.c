@@ -22,30 +22,30 @@ static int las_begin(void *rec, struct sh_err *err)
     las->base.track.no_empty = 1;
     las->base.track.spared = TRACK_RANGE;
     las->facts.minor = las->base.options.las_minor == 2 ? 2 : 4;
-    las->facts.has_colour = las->base.track.has_colours;
     for (int i = 0; i < 3; i++)
         las->facts.scale[i] = 1;
     strcpy(las->facts.profile, "OTHER"); /* until points have come */
     return las->base.options.las_wdp ? las_waves_check(las->base.file.path, err) : 0;
 }
 
+int las_write_front(struct las *las, struct sh_err *err)
+{
+    struct outfile *file = &las->base.file;
+    uint8_t front[LAS_FRONT_MAX];
+    int rc = las_waves_flush(&las->waves, err);
+    if (rc == 0) rc = outfile_flush(file, err);
+    if (rc != 0) return rc;
+    const size_t len = las_front(&las->facts, front);
+    return file->written == 0 ? outfile_write(file, front, len, err) : outfile_patch(file, 0, front, len, err);
+}
+
 /* Writes the header and the records before the points. Until the header is written again at the end, with the counts,
  * it marks the file as incomplete, for a repair (las_repair.c). */
 static int put_front(struct las *las, struct sh_err *err)
 {
-    uint8_t front[LAS_FRONT_MAX];
     las->begun = 1;
     las->facts.incomplete = las->facts.is_growing = 1;
-    las->front_len = las_front(&las->facts, front);
-    return outfile_write(&las->base.file, front, las->front_len, err);
-}
-
-int las_write_front(struct las *las, struct sh_err *err)
-{
-    uint8_t front[LAS_FRONT_MAX];
-    int rc = las_waves_flush(&las->waves, err);
-    if (rc == 0) rc = outfile_flush(&las->base.file, err);
-    return rc != 0 ? rc : outfile_patch(&las->base.file, 0, front, las_front(&las->facts, front), err);
+    return las_write_front(las, err);
 }
 
 /* Sets the offset to the first anchor, and the scale to the stream's own, or to a coarser one for a head that moves. */
@@ -72,7 +72,6 @@ static int las_scan(void *rec, struct sh_err *err)
     }
     if (las->begun) return 0;
     set_scale(las);
-    f->has_colour = t->has_colours;
     f->has_waves = t->has_waves && f->minor != 2;
     snprintf(f->profile, sizeof f->profile, "%s", t->info.profile);
     f->gps_time = scanhead_gps_time(t->sh, t->t0_ns, &f->created_gps_s) == 0;

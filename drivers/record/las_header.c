@@ -161,8 +161,8 @@ static void put_date(uint8_t *to, const struct las_facts *f)
 
 static uint8_t format_of(const struct las_facts *f)
 {
-    if (f->minor == 2) return f->has_colour ? 3 : 1;
-    return (uint8_t)((f->has_waves ? 9 : 6) + (f->has_colour != 0));
+    if (f->minor == 2) return f->track->has_colours ? 3 : 1;
+    return (uint8_t)((f->has_waves ? 9 : 6) + (f->track->has_colours != 0));
 }
 
 /* The places of the counts differ by version; LAS 1.4 leaves the counts of 32 bits 0. */

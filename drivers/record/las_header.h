@@ -42,9 +42,8 @@ enum {
 #define LAS_SOFTWARE_INCOMPLETE "scanhead, its end is missing" /* of a file that has not been completed */
 
 struct las_facts {
-    int minor; /* 4, or 2 */
-    int has_colour;
-    const struct track *track; /* whose CRS, movement and attributes are the file's */
+    int minor;                 /* 4, or 2 */
+    const struct track *track; /* whose CRS, movement, attributes and colours are the file's */
     int incomplete;            /* the recording goes on: the header says so */
     int is_growing;            /* more points may come: the header has no counts yet */
     int gps_time;              /* times are adjusted standard GPS time */

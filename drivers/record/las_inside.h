@@ -11,7 +11,6 @@ struct las {
     struct recorder base;
     struct las_facts facts;
     int begun, time_came_late;
-    size_t front_len;
     uint64_t n_no_angle;
     uint64_t n_beyond_returns, n_returns_cut, n_waves_left_out; /* LAS 1.2 */
     struct las_waves waves;
@@ -32,7 +31,7 @@ static inline void las_swap(double v[3])
     v[1] = x;
 }
 
-/* Writes the bytes before the points again, with the present facts. */
+/* Writes the bytes before the points, or writes them again, with the present facts. */
 int las_write_front(struct las *las, struct sh_err *err);
 /* Takes the n points of the batch (las_points.c). */
 int las_points(void *rec, int n, struct sh_err *err);

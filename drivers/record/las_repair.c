@@ -106,8 +106,6 @@ int las_repair(struct repair *repair, struct sh_err *err)
     struct records r = {0};
     const int rc = las_repair_all(repair, header, &r, err);
     if (r.has_waves) las_packets_free(&r.packets);
-    repair->unit = "points";
-    repair->n_kept = r.facts.n_points;
-    repair->n_scans = r.scans.n;
+    repair_say_kept(repair, "points", r.facts.n_points, r.scans.n);
     return rc;
 }

@@ -56,7 +56,7 @@ void las_put_rows(const struct las_facts *f, const struct las_columns *c, int n,
 {
     uint8_t *extra = to + las_own_len(f);
     put_common(f, c, n, to);
-    if (f->has_colour) put_colours(f, n, to + las_time_at(f) + 8);
+    if (f->track->has_colours) put_colours(f, n, to + las_time_at(f) + 8);
     if (f->minor == 2) return;
     if (f->has_waves) put_waves(f, c, n, extra - LAS_WAVE_LEN);
     put_extra(f, f->track->points.label, n, extra);

@@ -130,18 +130,13 @@ static int finish_grid(struct mesh_recorder *m, struct scan_faces *faces, struct
     scan_normals((const double(*)[3])m->points.xyz_m + g->first, g->n, (const uint32_t(*)[3])faces->face,
                  faces->n_faces, m->points.normal + g->first);
     int rc = mesh_add_part(m, &part, err);
-    if (rc == SH_OK && is_textured(m)) {
-        struct sh_err why = {0};
-        rc = fail_with_path(m, mesh_texture_draw(g, &m->points, &part->image, &every, &why), &why, err);
-    }
+    if (rc == SH_OK && is_textured(m))
+        rc = name_path(m, mesh_texture_draw(g, &m->points, &part->image, &every, err), err);
     if (every > m->every) m->every = every;
     if (rc == SH_OK) rc = drop_loose(m, faces, err);
     if (rc == SH_OK) rc = add_faces(m, faces, err);
-    if (rc == SH_OK && is_textured(m) && faces->n_faces > 0) {
-        struct sh_err why = {0};
-        rc = fail_with_path(m, mesh_texture_unwrap(g, &m->points, m->face + first_face, faces->n_faces, &why), &why,
-                            err);
-    }
+    if (rc == SH_OK && is_textured(m) && faces->n_faces > 0)
+        rc = name_path(m, mesh_texture_unwrap(g, &m->points, m->face + first_face, faces->n_faces, err), err);
     if (rc != SH_OK) return rc;
     part->n_points = m->points.n - g->first;
     part->n_faces = faces->n_faces;
@@ -151,11 +146,10 @@ static int finish_grid(struct mesh_recorder *m, struct scan_faces *faces, struct
 static int end_grid(struct mesh_recorder *m, struct sh_err *err)
 {
     struct scan_faces faces = {0};
-    struct sh_err why = {0};
     if (m->grid.n == 0) return SH_OK;
     const struct scan_grid grid =
         mesh_grid_of(&m->grid, (const double(*)[3])m->points.xyz_m, m->base.options.long_edge);
-    int rc = fail_with_path(m, scan_faces_make(&grid, &faces, m->base.options.report, &why), &why, err);
+    int rc = name_path(m, scan_faces_make(&grid, &faces, m->base.options.report, err), err);
     if (rc == SH_OK) {
         m->n_long += faces.n_long;
         m->n_flat += faces.n_flat;
@@ -238,7 +232,6 @@ static int take_point(struct mesh_recorder *m, int i, struct sh_err *err)
 {
     struct track *t = &m->base.track;
     const struct track_points *p = &t->points;
-    struct sh_err why = {0};
     struct mesh_point point = {.xyz_m = {p->x[i], p->y[i], p->z[i]},
                                .range_m = p->range_m[i],
                                .reflectance_db = (float)p->reflectance_db[i],
@@ -251,7 +244,7 @@ static int take_point(struct mesh_recorder *m, int i, struct sh_err *err)
     int is_in = mesh_grid_add(&m->grid, t, i, point.xyz_m, err);
     if (is_in < 0) return is_in;
     m->n_lost += is_in == 0;
-    return is_in ? fail_with_path(m, mesh_points_add(&m->points, &point, &why), &why, err) : SH_OK;
+    return is_in ? name_path(m, mesh_points_add(&m->points, &point, err), err) : SH_OK;
 }
 
 static int mesh_take_points(void *rec, int n, struct sh_err *err)

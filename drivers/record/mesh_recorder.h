@@ -47,9 +47,12 @@ static inline int is_textured(const struct mesh_recorder *m)
     return !is_ply(m) && !(c->given && c->scale.mode == COLOUR_NONE);
 }
 
-static inline int fail_with_path(const struct mesh_recorder *m, int rc, const struct sh_err *why, struct sh_err *err)
+/* Puts the path before the text of an error, if rc is one. Returns rc. */
+static inline int name_path(const struct mesh_recorder *m, int rc, struct sh_err *err)
 {
-    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %s", m->base.track.path, why->text);
+    if (rc == SH_OK || err == NULL) return rc;
+    const struct sh_err why = *err;
+    return sh_fail(err, rc, "%s: %s", m->base.track.path, why.text);
 }
 
 /* Writes the mesh with its textures, or the points spread over it, under the recording's path. */

@@ -88,17 +88,15 @@ static uint32_t set_scalars(const struct mesh_recorder *m, const struct mesh_poi
     return n;
 }
 
-static int write_mesh(const struct mesh_recorder *m, const struct mesh_points *points, int has_faces,
-                      const struct mesh_part *part, struct sh_err *err)
+/* part NULL: the points alone, without triangles. */
+static int write_mesh(const struct mesh_recorder *m, const struct mesh_points *points, const struct mesh_part *part,
+                      struct sh_err *err)
 {
     static const uint32_t none[1][3] = {{0, 0, 0}};
     const unsigned columns = m->base.options.columns != 0 ? m->base.options.columns : PLY_ALL;
     struct mesh_scalar scalar[MAX_SCALARS];
-    struct mesh mesh = {.n_vertices = points->n,
-                        .xyz_m = (const double(*)[3])points->xyz_m,
-                        .ascii = m->base.options.ascii,
-                        .part = part,
-                        .n_parts = part != NULL ? (uint32_t)m->n_parts : 0};
+    struct mesh mesh = {
+        .n_vertices = points->n, .xyz_m = (const double(*)[3])points->xyz_m, .ascii = m->base.options.ascii};
     char *text = NULL;
     size_t len;
     FILE *out = open_memstream(&text, &len);
@@ -108,7 +106,9 @@ static int write_mesh(const struct mesh_recorder *m, const struct mesh_points *p
         free(text);
         return sh_fail(err, SH_ENOMEM, "%s: no memory for its header", m->base.track.path);
     }
-    if (has_faces) {
+    if (part != NULL) {
+        mesh.part = part;
+        mesh.n_parts = (uint32_t)m->n_parts;
         mesh.normal = (const float(*)[3])points->normal;
         mesh.n_faces = (uint32_t)m->n_faces;
         /* with NULL here a mesh without triangles would be written as points alone */
@@ -130,7 +130,6 @@ static int write_sparse(struct mesh_recorder *m, struct sh_err *err)
     const struct recorder_options *o = &m->base.options;
     const struct mesh_sparse sparse = {o->sparse_per_m2, o->sparse_seed, o->report};
     struct mesh_points out = {.has_frame = m->points.has_frame};
-    struct sh_err why = {0};
     int rc = SH_OK;
     size_t face = 0;
     for (size_t i = 0; rc == SH_OK && i < m->n_parts; i++) {
@@ -138,10 +137,10 @@ static int write_sparse(struct mesh_recorder *m, struct sh_err *err)
         if (p->n_faces == 0) continue;
         const struct mesh_sparse_part part = {(const uint32_t(*)[3])m->face + face, p->n_faces, p->station,
                                               p->scan << 16 | p->sweep};
-        rc = fail_with_path(m, mesh_sparse_add(&sparse, &m->points, &part, &out, &m->area_m2, &why), &why, err);
+        rc = name_path(m, mesh_sparse_add(&sparse, &m->points, &part, &out, &m->area_m2, err), err);
         face += p->n_faces;
     }
-    if (rc == SH_OK) rc = write_mesh(m, &out, 0, NULL, err);
+    if (rc == SH_OK) rc = write_mesh(m, &out, NULL, err);
     mesh_points_free(&out);
     return rc;
 }
@@ -154,7 +153,7 @@ static int write_parts(struct mesh_recorder *m, struct sh_err *err)
         part[i] =
             (struct mesh_part){m->part[i].name, m->part[i].n_points, m->part[i].n_faces,
                                is_textured(m) ? m->part[i].texture : NULL, is_textured(m) ? &m->part[i].image : NULL};
-    const int rc = write_mesh(m, &m->points, 1, part, err);
+    const int rc = write_mesh(m, &m->points, part, err);
     free(part);
     return rc;
 }

@@ -65,8 +65,6 @@ int obj_repair(struct repair *r, struct sh_err *err)
     if (rc == SH_OK && o.n_vertices == 0) rc = repair_fail_none(r, "mesh of the OBJ format", err);
     if (rc == SH_OK) rc = repair_check_rest(r, end, LINE_MOST, err);
     if (rc != SH_OK) return rc;
-    r->unit = "points";
-    r->n_kept = o.n_vertices;
-    r->n_scans = o.n_objects;
+    repair_say_kept(r, "points", o.n_vertices, o.n_objects);
     return repair_end_text(r, end, o.is_marked, o.is_ours, err);
 }

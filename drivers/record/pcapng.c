@@ -147,9 +147,7 @@ static int pcapng_repair(struct repair *r, struct sh_err *err)
     if (rc == SH_OK && p->reader.n_interfaces == 0) rc = repair_fail_none(r, "capture (pcapng)", err);
     if (rc == SH_OK) rc = check_behind(r, p, err);
     if (rc == SH_OK) {
-        r->unit = "packets";
-        r->n_kept = p->n;
-        r->n_scans = p->scans.n_scans;
+        repair_say_kept(r, "packets", p->n, p->scans.n_scans);
         r->was_whole = end == r->len && (p->is_noted || !repair_is_part(r));
         rc = r->was_whole || p->is_ours ? repair_cut(r, end, err) : repair_fail_foreign(r, err);
     }

@@ -24,8 +24,7 @@ enum { TEXT_LEN = 512, TEXT_ROOM = 9 * DECIMAL_FIXED_ROOM + 9 * DECIMAL_GENERAL_
 struct ply {
     struct recorder base;
     struct ply_facts facts;
-    int begun;                                      /* room for the header is made */
-    size_t header_len;                              /* bytes of that room */
+    size_t header_len;                              /* bytes of the room for the header; 0: it is not made yet */
     struct ply_head last;                           /* of the present scan */
     uint64_t n_heads_beyond;                        /* that the facts have no room for */
     double time_s[TRACK_BATCH], frame[TRACK_BATCH]; /* of the batch, where they are columns */
@@ -45,43 +44,31 @@ static int ply_begin(void *rec, struct sh_err *err)
     return 0;
 }
 
-/* Makes the header from the facts known by now, in the length of its room. */
-static int make_header(struct ply *ply, int incomplete, char **text, size_t *len, struct sh_err *err)
+/* Writes the header from the facts known by now, in the length of its room. */
+static int write_header(struct ply *ply, int incomplete, struct sh_err *err)
 {
+    struct outfile *file = &ply->base.file;
+    char *text;
+    size_t len;
     uint64_t n_left_out;
+    int rc = outfile_flush(file, err);
     ply->facts.incomplete = incomplete;
-    const int rc = ply_header_make(&ply->facts, ply->header_len, text, len, &n_left_out, err);
-    if (rc == 0 && !incomplete)
+    if (rc == 0) rc = ply_header_make(&ply->facts, ply->header_len, &text, &len, &n_left_out, err);
+    if (rc != 0) return rc;
+    if (!incomplete)
         recorder_report(&ply->base, n_left_out + ply->n_heads_beyond,
                         "names of surfaces and heads left out; the header has no room for them");
+    rc = file->written == 0 ? outfile_write(file, text, len, err) : outfile_patch(file, 0, text, len, err);
+    free(text);
     return rc;
 }
 
 /* Makes room for the header with what is known of the names. */
 static int ply_make_room(struct ply *ply, uint32_t n_surfaces, struct sh_err *err)
 {
-    char *text;
-    size_t len;
     ply->header_len = ply_header_reserve(&ply->facts, n_surfaces);
     if (ply->header_len == 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for the header", ply->base.file.path);
-    ply->begun = 1;
-    int rc = make_header(ply, 1, &text, &len, err);
-    if (rc != 0) return rc;
-    rc = outfile_write(&ply->base.file, text, len, err);
-    free(text);
-    return rc;
-}
-
-static int write_header(struct ply *ply, int incomplete, struct sh_err *err)
-{
-    char *text;
-    size_t len;
-    int rc = outfile_flush(&ply->base.file, err);
-    if (rc == 0) rc = make_header(ply, incomplete, &text, &len, err);
-    if (rc != 0) return rc;
-    rc = outfile_patch(&ply->base.file, 0, text, len, err);
-    free(text);
-    return rc;
+    return write_header(ply, 1, err);
 }
 
 /* ---- binary rows, a column at a time */
@@ -346,7 +333,7 @@ static int ply_scan(void *rec, struct sh_err *err)
     int rc = check_float(ply->base.file.path, facts->columns, ply->base.track.crs == NATIVE_CRS_GEODETIC,
                          ply->base.track.pose.shift_m, err);
     set_gps(ply);
-    if (rc == 0 && !ply->begun) return ply_make_room(ply, info->n_surfaces, err);
+    if (rc == 0 && ply->header_len == 0) return ply_make_room(ply, info->n_surfaces, err);
     return rc == 0 && is_new ? write_header(ply, 1, err) : rc;
 }
 

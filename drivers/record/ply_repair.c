@@ -286,8 +286,7 @@ static int check_mesh(struct repair *r, const struct ply_header *h, struct sh_er
                        "%s: is a mesh of %" PRIu64 " points and %" PRIu64
                        " triangles, but some are missing; it is written in one piece, so nothing can be kept",
                        r->path, h->n_vertices, h->n_faces);
-    r->unit = "points";
-    r->n_kept = h->n_vertices;
+    repair_say_kept(r, "points", h->n_vertices, 0);
     r->was_whole = 1;
     return SH_OK;
 }
@@ -303,9 +302,7 @@ int ply_repair(struct repair *r, struct sh_err *err)
         rc = check_mesh(r, &h, err);
     } else if (rc == SH_OK) {
         rc = read_points(r, &h, &p, &end, err);
-        r->unit = "points";
-        r->n_kept = p.n;
-        r->n_scans = p.scans.n;
+        repair_say_kept(r, "points", p.n, p.scans.n);
         if (rc == SH_OK) rc = make_whole(r, &h, &p, end, err);
     }
     free(h.text);

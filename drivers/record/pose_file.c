@@ -23,7 +23,6 @@ enum { BATCH = 64, LINE = 512 };
 
 struct pose_file {
     struct recorder base;
-    int titled;
     /* of a head that moves */
     uint32_t n_scans;
     int is_due;                /* the event SCAN_START came, and no pose after it */
@@ -39,13 +38,6 @@ static const char *const title[] = {[STATIONS] = "scan,station,epsg,x_m,y_m,z_m,
                                         "scan,station,epsg,x_m,y_m,z_m,qw,qx,qy,qz,lat_deg,lon_deg,height_m,frame\n",
                                     [MOVING] = "scan,t_s,x_m,y_m,z_m,qw,qx,qy,qz,frame,flags\n",
                                     NULL};
-
-static int put_title(struct pose_file *file, enum title which, struct sh_err *err)
-{
-    if (file->titled) return SH_OK;
-    file->titled = 1;
-    return outfile_write(&file->base.file, title[which], strlen(title[which]), err);
-}
 
 static int put_station(void *rec, struct sh_err *err)
 {
@@ -64,7 +56,7 @@ static int put_station(void *rec, struct sh_err *err)
                      t->info.lon_deg, t->info.height_m);
     if (t->info.stop) n += snprintf(row + n, sizeof row - (size_t)n, ",%.9g", t->info.frame);
     row[n++] = '\n';
-    rc = put_title(file, t->info.stop ? STOPS : STATIONS, err);
+    rc = csv_put_title(&file->base.file, title[t->info.stop ? STOPS : STATIONS], err);
     return rc != SH_OK ? rc : outfile_write(&file->base.file, row, (size_t)n, err);
 }
 
@@ -115,7 +107,7 @@ static int put_poses(struct pose_file *file, struct scanhead *sh, const struct s
 {
     struct scanhead_pose pose[BATCH];
     struct scanhead_info info;
-    int n, rc = put_title(file, MOVING, err);
+    int n, rc = csv_put_title(&file->base.file, title[MOVING], err);
     if (rc != SH_OK || scanhead_get_info(sh, &info) != SCANHEAD_OK) return rc; /* the poses' scan is not known yet */
     if (file->n_scans == 0) rc = put_scene_in_crs(file, &info, err);
     if (is_new_scan(file, sh, &info)) {
@@ -150,7 +142,7 @@ static int pose_file_frame(void *rec, struct scanhead *sh, const struct scanhead
 
 static int pose_file_finish(void *rec, struct sh_err *err)
 {
-    return put_title(rec, STATIONS, err);
+    return csv_put_title(&((struct pose_file *)rec)->base.file, title[STATIONS], err);
 }
 
 /* ---- repair */

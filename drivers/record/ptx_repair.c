@@ -153,9 +153,11 @@ static int check_ours(const struct repair *r, const struct place *p, struct sh_e
 
 static int end_text(struct repair *r, struct place *p, struct sh_err *err)
 {
+    int rc = read_text(r, r->len, p, err);
+    if (rc != SH_OK) return rc;
     if (p->n_grids == 0 && p->n_lines == 0) return repair_fail_none(r, "PTX grid", err);
     if (r->len > p->at || p->header > 0) {
-        const int rc = check_ours(r, p, err);
+        rc = check_ours(r, p, err);
         if (rc != SH_OK) return rc;
     }
     if (p->header < HEADER_LINES || p->n_lines == 0) { /* no point of this grid is there */
@@ -165,7 +167,7 @@ static int end_text(struct repair *r, struct place *p, struct sh_err *err)
     }
     const uint64_t columns = (p->n_lines + p->rows - 1) / p->rows;
     r->cut_bytes = r->len - p->at;
-    int rc = fill_column(r, p, columns * p->rows - p->n_lines, err);
+    rc = fill_column(r, p, columns * p->rows - p->n_lines, err);
     if (rc == SH_OK) rc = set_columns(r, p, columns, err);
     p->n_grids++;
     return rc;
@@ -193,27 +195,18 @@ static int put_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_he
         r->path, grid->path);
 }
 
-static int end_grid(struct repair *r, struct ptx_grid *grid, struct place *p, struct sh_err *err)
+static int end_grid(struct repair *r, struct ptx_grid *grid, const struct ptx_head *head, struct place *p,
+                    struct sh_err *err)
 {
-    struct ptx_head head;
-    uint64_t cut;
-    int rc = ptx_grid_find(grid, &head, &cut, err);
-    if (rc < 0) return rc;
-    if (rc == 0) { /* FILE.grid holds no grid, so the text is all that is left */
-        rc = read_text(r, r->len, p, err);
-        return rc == SH_OK ? end_text(r, p, err) : rc;
-    }
-    rc = head.text_at <= r->len ? read_text(r, head.text_at, p, err) : SH_OK;
+    const int rc = head->text_at <= r->len ? read_text(r, head->text_at, p, err) : SH_OK;
     if (rc != SH_OK) return rc;
-    if (head.text_at > r->len || p->at != head.text_at || p->header != 0)
+    if (head->text_at > r->len || p->at != head->text_at || p->header != 0)
         return sh_fail(err, SH_EFORMAT, "%s: continues a PTX file from byte %" PRIu64 ", but in %s no grid ends there",
-                       grid->path, head.text_at, r->path);
+                       grid->path, head->text_at, r->path);
     if (grid->row_max - grid->row_min >= PTX_ROWS_MAX)
         return sh_fail(err, SH_EFORMAT, "%s: has rows %u to %u; allowed are up to %d rows", grid->path, grid->row_min,
                        grid->row_max, PTX_ROWS_MAX);
-    rc = put_grid(r, grid, &head, p, err);
-    r->cut_bytes = cut;
-    return rc;
+    return put_grid(r, grid, head, p, err);
 }
 
 /* Opens FILE.grid. SH_OK also where there is none: spool is NULL then. */
@@ -235,16 +228,18 @@ int ptx_repair(struct repair *r, struct sh_err *err)
 {
     struct ptx_grid grid;
     struct place place = {0};
+    struct ptx_head head;
+    uint64_t cut = 0;
     int rc = open_grid(r, &grid, err);
-    if (rc == SH_OK && grid.spool != NULL) rc = end_grid(r, &grid, &place, err);
-    if (rc == SH_OK && grid.spool == NULL) {
-        rc = read_text(r, r->len, &place, err);
-        if (rc == SH_OK) rc = end_text(r, &place, err);
+    if (rc == SH_OK && grid.spool != NULL) rc = ptx_grid_find(&grid, &head, &cut, err);
+    if (rc > 0) {
+        r->cut_bytes = cut;
+        rc = end_grid(r, &grid, &head, &place, err);
+    } else if (rc == SH_OK) {
+        rc = end_text(r, &place, err); /* there is no grid, so the text is all that is left */
     }
     if (rc == SH_OK && grid.spool != NULL) unlink(grid.path);
-    r->n_kept = place.n_points;
-    r->unit = "points";
-    r->n_scans = place.n_grids;
+    repair_say_kept(r, "points", place.n_points, place.n_grids);
     if (grid.spool != NULL) fclose(grid.spool);
     free(grid.path);
     return rc;

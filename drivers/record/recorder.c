@@ -64,8 +64,8 @@ int recorder_open(const struct recorder_ops *ops, const char *path, const struct
 
 void recorder_set_limits(struct recorder *rec, double low, double high)
 {
-    rec->track.colour.scale.low = rec->options.colour.scale.low = low;
-    rec->track.colour.scale.high = rec->options.colour.scale.high = high;
+    rec->track.colour.scale.low = low;
+    rec->track.colour.scale.high = high;
 }
 
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)

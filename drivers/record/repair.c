@@ -156,23 +156,18 @@ int repair_lines(const struct repair *r, uint64_t from, int (*fn)(void *ctx, con
     return rc;
 }
 
-struct rest {
-    uint64_t n, n_piece; /* bytes so far; those up to the last that is not 0 */
-};
-
-static void count_piece(void *ctx, const uint8_t *byte)
+static void note_data(void *has_data, const uint8_t *byte)
 {
-    struct rest *rest = ctx;
-    rest->n++;
-    if (*byte != 0) rest->n_piece = rest->n;
+    if (*byte != 0) *(int *)has_data = 1;
 }
 
 int repair_check_rest(const struct repair *r, uint64_t end, uint64_t most, struct sh_err *err)
 {
-    struct rest rest = {0};
+    int has_data = 0;
     if (r->len - end <= most) return SH_OK;
-    const int rc = repair_rows(r, &(struct repair_rows){end, r->len - end, 1}, count_piece, &rest, err);
-    return rc != SH_OK || rest.n_piece <= most ? rc : repair_fail_damaged(r, end, err);
+    const struct repair_rows behind = {end + most, r->len - end - most, 1};
+    const int rc = repair_rows(r, &behind, note_data, &has_data, err);
+    return rc != SH_OK || !has_data ? rc : repair_fail_damaged(r, end, err);
 }
 
 void repair_append_note(const struct repair *r, uint64_t end, const void *note, size_t len)

@@ -51,6 +51,13 @@ void repair_free(struct repaired *repaired);
 /* The words of a note at the end of a file that was not completed. */
 #define REPAIR_INCOMPLETE "incomplete: the recording was not completed; data may be missing after this"
 
+/* Says what is kept of the file. */
+static inline void repair_say_kept(struct repair *repair, const char *unit, uint64_t n, uint64_t n_scans)
+{
+    repair->unit = unit;
+    repair->n_kept = n;
+    repair->n_scans = n_scans;
+}
 /* Reads len bytes; SH_EIO where there are fewer. */
 int repair_read(const struct repair *repair, uint64_t at, void *to, size_t len, struct sh_err *err);
 /* SH_EIO also where the disk is full; overwriting bytes of the file needs no room. */

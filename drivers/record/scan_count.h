@@ -7,7 +7,6 @@
 
 struct scan_count { /* begins as zeros */
     uint64_t n_scans;
-    int within;      /* points of a scan have come, or its descriptor */
     uint32_t number; /* of the last descriptor's scan; 0: none yet */
     int64_t t_ns;    /* of the last descriptor */
 };

@@ -61,9 +61,7 @@ static int shs_repair(struct repair *r, struct sh_err *err)
         if (within != 0)
             sh_warn(r->report, "%s: %llu bytes between frames belong to no frame; they stay, and readers skip them",
                     r->path, (unsigned long long)within);
-        r->unit = "frames";
-        r->n_kept = f->n;
-        r->n_scans = f->scans.n_scans;
+        repair_say_kept(r, "frames", f->n, f->scans.n_scans);
         r->was_whole = f->end == r->len;
         rc = repair_cut(r, f->end, err);
     }

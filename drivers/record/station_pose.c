@@ -22,20 +22,12 @@ void station_pose_level(const struct station_pose *pose, double lat_deg, double 
     east_north_m[1] = (lat_deg - pose->shift_m[0]) * m_deg;
 }
 
-void station_pose_reverse(const struct station_pose *pose, double p[3])
-{
-    const double *s = pose->shift_m, from_station[3] = {p[0] - s[0], p[1] - s[1], p[2] - s[2]};
-    mat3_apply_transposed(pose->rotation, from_station, p);
-}
-
 VEC_CLONES void station_pose_reverse_all(const struct station_pose *restrict pose, int n, double *restrict x,
                                          double *restrict y, double *restrict z)
 {
-    const double *s = pose->shift_m;
     for (int i = 0; i < n; i++) {
-        const double from_station[3] = {x[i] - s[0], y[i] - s[1], z[i] - s[2]};
-        double p[3];
-        mat3_apply_transposed(pose->rotation, from_station, p);
+        double p[3] = {x[i], y[i], z[i]};
+        station_pose_reverse(pose, p);
         x[i] = p[0];
         y[i] = p[1];
         z[i] = p[2];
@@ -45,14 +37,12 @@ VEC_CLONES void station_pose_reverse_all(const struct station_pose *restrict pos
 VEC_CLONES void station_pose_forward_all(const struct station_pose *restrict pose, int n, double *restrict x,
                                          double *restrict y, double *restrict z)
 {
-    const double *s = pose->shift_m;
     for (int i = 0; i < n; i++) {
-        const double p[3] = {x[i], y[i], z[i]};
-        double turned[3];
-        mat3_apply(pose->rotation, p, turned);
-        x[i] = s[0] + turned[0];
-        y[i] = s[1] + turned[1];
-        z[i] = s[2] + turned[2];
+        double p[3] = {x[i], y[i], z[i]};
+        station_pose_forward(pose, p);
+        x[i] = p[0];
+        y[i] = p[1];
+        z[i] = p[2];
     }
 }
 

@@ -35,7 +35,11 @@ static inline void station_pose_forward(const struct station_pose *pose, double 
     for (int i = 0; i < 3; i++)
         p[i] = pose->shift_m[i] + turned[i];
 }
-void station_pose_reverse(const struct station_pose *pose, double p[3]);
+static inline void station_pose_reverse(const struct station_pose *pose, double p[3])
+{
+    const double *s = pose->shift_m, from_station[3] = {p[0] - s[0], p[1] - s[1], p[2] - s[2]};
+    mat3_apply_transposed(pose->rotation, from_station, p);
+}
 /* station_pose_reverse_all and station_pose_forward_all do the same for n points in columns; the results are equal bit
  * for bit. */
 void station_pose_reverse_all(const struct station_pose *restrict pose, int n, double *restrict x, double *restrict y,

@@ -6,8 +6,6 @@
  * threshold, is (count - baseline) * count_signal. dx, dy, dz lead along the beam: in the polar layout a vector of
  * length one in the head's frame, in the geo layout the change of the CRS's coordinates along a metre of range. The
  * last column has the counts, with blanks between. */
-#include <string.h>
-
 #include "core/bytes.h"
 #include "core/decimal.h"
 #include "drivers/record/csv_repair.h"
@@ -17,19 +15,12 @@ enum { WAVES_AT_ONCE = 64, FRONT_MOST = 1024, COUNT_MOST = 6, LINE_MOST = FRONT_
 
 struct waves_file {
     struct recorder base;
-    int is_titled, is_sent; /* is_sent: some head has waveforms */
+    int is_sent; /* some head has waveforms */
     uint64_t n_lost, n_samples_lost;
 };
 
 static const char *const title[] = {"scan,station,pulse,t_s,range_m,step_m,n,baseline,count_signal,dx,dy,dz,samples\n",
                                     NULL};
-
-static int put_title(struct waves_file *file, struct sh_err *err)
-{
-    if (file->is_titled) return SH_OK;
-    file->is_titled = 1;
-    return outfile_write(&file->base.file, title[0], strlen(title[0]), err);
-}
 
 /* Writes the columns before the samples. */
 static char *put_front(char *at, const struct track *t, const struct scanhead_wave *w)
@@ -71,7 +62,7 @@ static int put_waves(struct waves_file *file, struct scanhead *sh, const struct 
     struct scanhead_wave wave[WAVES_AT_ONCE];
     struct scanhead_info info;
     const int64_t lost = scanhead_waves_lost(sh, frame);
-    int rc = put_title(file, err);
+    int rc = csv_put_title(&file->base.file, title[0], err);
     if (lost > 0) file->n_samples_lost += (uint64_t)lost;
     if (scanhead_get_info(sh, &info) != SCANHEAD_OK) { /* the track still has the scan before */
         file->n_lost += frame->n_points;
@@ -102,13 +93,13 @@ static int waves_file_scan(void *rec, struct sh_err *err)
 {
     struct waves_file *file = rec;
     file->is_sent |= scanhead_has_waves(file->base.track.sh) == 1;
-    return put_title(file, err);
+    return csv_put_title(&file->base.file, title[0], err);
 }
 
 static int waves_file_finish(void *rec, struct sh_err *err)
 {
     struct waves_file *file = rec;
-    const int rc = put_title(file, err);
+    const int rc = csv_put_title(&file->base.file, title[0], err);
     if (rc != SH_OK) return rc;
     if (!file->is_sent && file->base.track.n_scans > 0)
         sh_warn(file->base.options.report, "%s: there are no waveforms in it: the head sends none (waveform.send)",

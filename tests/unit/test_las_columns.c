@@ -188,9 +188,9 @@ static uint8_t *lay_out(const struct las_facts *f, int i, uint8_t *to)
     le_put16(to, (uint16_t)track.info.station);
     le_put_double(to + 2, columns.time_s[i]);
     to += 10;
-    for (int k = 0; k < 3 && f->has_colour; k++, to += 2)
+    for (int k = 0; k < 3 && f->track->has_colours; k++, to += 2)
         le_put16(to, (uint16_t)(track.rgb[i][k] * 65535 / 255));
-    if (f->has_colour && f->has_waves) le_put16(to, 0), to += 2; /* near infrared */
+    if (f->track->has_colours && f->has_waves) le_put16(to, 0), to += 2; /* near infrared */
     if (f->has_waves) {
         to[0] = columns.packet[i].kind;
         le_put64(to + 1, columns.packet[i].at);
@@ -236,7 +236,8 @@ static void rows_are_laid_out_as_specified(void **state)
     (void)state;
     uint64_t seed = 3;
     for (int kind = 0; kind < 2 * 2 * 2 * 3; kind++) {
-        struct las_facts facts = {.track = &track, .minor = kind & 1 ? 2 : 4, .has_colour = kind >> 1 & 1};
+        struct las_facts facts = {.track = &track, .minor = kind & 1 ? 2 : 4};
+        track.has_colours = kind >> 1 & 1;
         if (facts.minor == 4) facts.has_waves = kind >> 2 & 1;
         track.has_attributes = kind >> 3 > 0;
         track.has_deviations = kind >> 3 > 1;

@@ -118,7 +118,7 @@ static void test_all_of_1_4(void **state)
     begin(4);
     track.has_attributes = track.has_deviations = track.geoid_heights = 1;
     track.epsg = 32632;
-    facts.has_colour = facts.gps_time = 1;
+    track.has_colours = facts.gps_time = 1;
     facts.created_gps_s = 1709164800.0 - 315964800 - 1e9;
     facts.n_points = 5000000000;
     for (int i = 0; i < 15; i++)
@@ -176,7 +176,7 @@ static void test_waves(void **state)
     for (int inside = 0; inside < 2; inside++) {
         begin(4);
         facts.has_waves = 1;
-        facts.has_colour = inside;
+        track.has_colours = inside;
         facts.waves_at = inside ? 123456789012 : 0;
         waves.n_kinds = 2;
         waves.kind[0] = (struct las_kind){8, 40, 500, 0.25, -1};
@@ -223,7 +223,7 @@ static void test_keys_of_1_2(void **state)
         begin(2);
         track.epsg = cases[c].epsg;
         track.geoid_heights = cases[c].geoid;
-        facts.has_colour = c % 2;
+        track.has_colours = c % 2;
         facts.n_points = 4000000000;
         for (int i = 0; i < 15; i++)
             facts.n_by_return[i] = 3000000000 + (uint64_t)i;

@@ -829,7 +829,8 @@ class _Poses:
         self._frames = collections.deque()
         self._n = 0
 
-    def absorb(self, payload: bytes) -> None:
+    def absorb(self, frame: Frame) -> None:
+        payload = frame.payload
         n = struct.unpack_from("<I", payload)[0] if len(payload) >= 8 else 0
         if n < 2 or n > (len(payload) - 8) // _POSE.size:
             raise ScanheadError("a poses frame with a wrong number of poses")
@@ -1363,13 +1364,11 @@ class Head:
 
     def _keep_frames(self) -> None:
         """Takes what has come: frames are kept, and nobody waits for the lines any more."""
-        item = self.parser.next(self._ended)
-        while item is not None:
+        while (item := self.parser.next(self._ended)) is not None:
             if isinstance(item, Frame):
                 self._keep(item)
             else:
                 self._stray(item)
-            item = self.parser.next(self._ended)
 
     def _keep(self, frame: Frame) -> None:
         self._queue.append(frame)
@@ -1387,10 +1386,7 @@ class Head:
 
     def frames(self, timeout_s: Optional[float] = None) -> Iterator[Frame]:
         """Frames in order, up to a recording's end. Closed: the head is gone; Timeout: none in timeout_s."""
-        while True:
-            frame = self.next_frame(timeout_s)
-            if frame is None:
-                return
+        while (frame := self.next_frame(timeout_s)) is not None:
             yield frame
 
     def next_frame(self, timeout_s: Optional[float] = None) -> Optional[Frame]:
@@ -1423,7 +1419,7 @@ class Head:
             frame = frame._replace(fields=_decode(frame.type, frame.payload))
         act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
                POINTS: self._absorb_points, EVENT: self._absorb_event, SURFACES: self._absorb_surfaces,
-               POSES: self._absorb_poses, ATTRIBUTES: self._absorb_attributes, COLOURS: self._absorb_colours,
+               POSES: self._poses.absorb, ATTRIBUTES: self._absorb_attributes, COLOURS: self._absorb_colours,
                WAVES: self._absorb_waves, EMITTER: self._absorb_emitter}.get(frame.type)
         if act is not None:
             act(frame)
@@ -1512,9 +1508,6 @@ class Head:
         self._scan_t0_ns = frame.t_ns - p["t0_ns"]
         self._points_key = (frame.seq + 1) % 2**32, p["pulse0"], p["line"], p["n_points"]
         self._points_time = frame.t_ns, p["t0_ns"]
-
-    def _absorb_poses(self, frame: Frame) -> None:
-        self._poses.absorb(frame.payload)
 
     def _absorb_attributes(self, frame: Frame) -> None:
         if frame.fields["n_points"] > (len(frame.payload) - 16) // 4:
