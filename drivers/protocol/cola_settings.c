@@ -147,11 +147,9 @@ enum cola_error cola_read_scale(struct cola *self, struct cola_args *args, struc
 
 enum cola_error cola_write_scale(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const uint32_t bits = cola_arg_u(args, 4);
+    const float scale = cola_arg_float(args);
     const enum cola_error error = cola_args_end(args);
-    float scale;
     (void)out;
-    memcpy(&scale, &bits, sizeof scale);
     if (error != COLA_OK) return error;
     if (!cola_head(self)->known) return COLA_CONDITION;
     /* with 1, ranges over 65.535 m that the head reaches would have no number */

@@ -84,6 +84,14 @@ int32_t cola_arg_i(struct cola_args *args, unsigned bytes)
     return sign == '-' ? (int32_t)(0 - (int64_t)v) : extend(v, bytes);
 }
 
+float cola_arg_float(struct cola_args *args)
+{
+    const uint32_t bits = cola_arg_u(args, 4);
+    float v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
+}
+
 void cola_arg_text(struct cola_args *args, char *dst, size_t cap)
 {
     const size_t len = cola_arg_u(args, 2);
