@@ -7,7 +7,7 @@
 
 void cola_settings_reset(struct cola *self)
 {
-    const char *name = self->identity->name;
+    const char *name = self->spec.identity->name;
     self->set = (struct cola_settings){.channels = {1, 0},
                                        .rssi = self->model->rssi,
                                        .rssi_16bit = self->model->rssi_16bit,
