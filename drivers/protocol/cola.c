@@ -15,7 +15,7 @@ int cola_power_up(struct cola *self, struct sh_err *err)
     self->measures = 1;
     self->streams = self->started = self->wants_scan = self->reboots = self->next.is_due = 0;
     self->n_waiting = self->since_sent = 0;
-    self->telegrams = (uint16_t)(0U - self->near_wrap);
+    self->telegrams = (uint16_t)(0U - self->spec.near_wrap);
     const int rc = cola_restore(self, err);
     self->power_framing = self->set.framing;
     return rc;
@@ -23,23 +23,16 @@ int cola_power_up(struct cola *self, struct sh_err *err)
 
 uint32_t cola_time_us(const struct cola *self, int64_t t_ns)
 {
-    return (uint32_t)((uint64_t)(t_ns - self->power_ns) / 1000U) - self->near_wrap;
+    return (uint32_t)((uint64_t)(t_ns - self->spec.power_ns) / 1000U) - self->spec.near_wrap;
 }
 
 static int cola_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
 {
     struct cola *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol cola: no memory for %zu bytes", sizeof *self);
-    self->host = spec->host;
-    self->identity = spec->identity;
-    self->power_ns = spec->power_ns;
-    self->power_ons = spec->power_ons;
-    self->near_wrap = spec->near_wrap;
+    self->spec = *spec;
     self->model = cola_model_find(spec->identity->model);
-    self->keeps = spec->keeps && spec->host.store != NULL;
     if (spec->stored != NULL) snprintf(self->stored, sizeof self->stored, "%s", spec->stored);
-    self->dialect = spec->dialect;
-    self->shared = spec->shared;
     planar_scan_init(&self->scan);
     const int rc = cola_power_up(self, err);
     if (rc != SH_OK)
@@ -63,10 +56,10 @@ static void send_scan(struct cola *self, const char *head, enum cola_form form)
     cola_put_scan(self, &out);
     const size_t len = cola_end(&out);
     if (len == 0) {
-        self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, 1);
+        self->spec.host.count(self->spec.host.ctx, PROTOCOL_UNITS_LOST, 1);
         return;
     }
-    if (self->host.send(self->host.ctx, self->unit, len) == 0) self->telegrams++;
+    if (self->spec.host.send(self->spec.host.ctx, self->unit, len) == 0) self->telegrams++;
 }
 
 static void deliver_scan(struct cola *self)
@@ -107,7 +100,7 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
     if (news.whole) self->pending = 1;
     if (self->scan.whole == NULL) self->pending = 0;
     if (news.broken != 0 && self->streams && self->measures)
-        self->host.count(self->host.ctx, PROTOCOL_UNITS_LOST, news.broken);
+        self->spec.host.count(self->spec.host.ctx, PROTOCOL_UNITS_LOST, news.broken);
 }
 
 static void pass_time(void *protocol, int64_t t_ns)
@@ -174,7 +167,7 @@ static void take_input(void *protocol, const uint8_t *bytes, size_t len)
             else
                 cola_carry_out(self, &request);
     }
-    if (lost != 0) self->host.count(self->host.ctx, PROTOCOL_INPUT_LOST, lost);
+    if (lost != 0) self->spec.host.count(self->spec.host.ctx, PROTOCOL_INPUT_LOST, lost);
 }
 
 /* Telegrams have the angle of a step as u16, 1/10000 degree. */

@@ -36,14 +36,11 @@ struct cola_settings {
 };
 
 struct cola {
-    struct protocol_host host;
-    const struct protocol_identity *identity;
+    struct protocol_spec spec; /* its `stored` is valid in create only */
     const struct cola_model *model;
     struct cola_settings set;
     char stored[PROTOCOL_STORED]; /* what mEEwriteall has kept */
-    int keeps, dialect;           /* of the spec */
     uint8_t power_framing;        /* EIHstCola at power-up, as configured or stored */
-    _Atomic uint32_t *shared;
     enum cola_level level;
     int measures;            /* 0 after LMCstopmeas: no output, of this session alone */
     int started;             /* LMCstartmeas was called after the last LMCstopmeas */
@@ -70,9 +67,6 @@ struct cola {
     int wants_scan; /* a scan was asked for, and none has come yet; try_ns: when to look at the head next */
     int64_t try_ns;
     int64_t now_ns;
-    int64_t power_ns; /* device time of power-up: its clock begins there */
-    uint32_t power_ons;
-    uint32_t near_wrap;                      /* counters begin this far below their wrap; 0: they begin at 0 */
     int streams;                             /* sEN LMDscandata 1 */
     enum cola_form stream_form;              /* of telegrams without a request */
     int pending;                             /* a scan is done and not yet looked at */

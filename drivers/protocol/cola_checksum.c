@@ -104,9 +104,5 @@ void cola_content(const uint8_t *unit, size_t len, uint8_t *mask)
 
 void cola_reseal(uint8_t *unit, size_t len)
 {
-    uint8_t check = 0;
-    if (!is_b(unit, len)) return;
-    for (size_t i = B_HEAD; i < len - 1; i++)
-        check ^= unit[i];
-    unit[len - 1] = check;
+    if (is_b(unit, len)) unit[len - 1] = protocol_xor(unit + B_HEAD, len - 1 - B_HEAD);
 }

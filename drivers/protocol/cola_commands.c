@@ -106,8 +106,8 @@ void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error)
     struct cola_out out = {.buf = unit, .cap = sizeof unit};
     cola_begin(&out, form, "sFA");
     cola_put_u(&out, 2, (uint32_t)error);
-    self->host.count(self->host.ctx, PROTOCOL_WRONG, 1);
-    self->host.send(self->host.ctx, unit, cola_end(&out));
+    self->spec.host.count(self->spec.host.ctx, PROTOCOL_WRONG, 1);
+    self->spec.host.send(self->spec.host.ctx, unit, cola_end(&out));
 }
 
 /* A request cut into its parts. */
@@ -178,10 +178,10 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
  * anew. */
 static void reboot(struct cola *self)
 {
-    const int refused = self->host.command(self->host.ctx, "HEAD:REBoot", NULL, 0) != 0;
+    const int refused = self->spec.host.command(self->spec.host.ctx, "HEAD:REBoot", NULL, 0) != 0;
     /* There can be no error: cola_keep wrote what is stored, or the session read it when it began. */
     cola_power_up(self, NULL);
-    if (refused) self->host.hang_up(self->host.ctx);
+    if (refused) self->spec.host.hang_up(self->spec.host.ctx);
 }
 
 void cola_carry_out(struct cola *self, const struct cola_request *request)
@@ -195,7 +195,7 @@ void cola_carry_out(struct cola *self, const struct cola_request *request)
     if (error == COLA_LATER) return;
     if (error != COLA_OK)
         cola_refuse(self, request->form, error);
-    else if (self->host.send(self->host.ctx, self->unit, cola_end(&out)) != 0)
+    else if (self->spec.host.send(self->spec.host.ctx, self->unit, cola_end(&out)) != 0)
         self->telegrams = telegrams;
     if (self->outputs_due) cola_send_outputs(self, request->form);
     if (self->reboots) reboot(self);

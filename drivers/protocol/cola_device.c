@@ -12,19 +12,19 @@ enum { MOST_LOCATION = 16 };
 
 static const char *version(const struct cola *self)
 {
-    return self->identity->firmware[0] != 0 ? self->identity->firmware : self->model->version;
+    return self->spec.identity->firmware[0] != 0 ? self->spec.identity->firmware : self->model->version;
 }
 
 enum cola_error cola_read_ident(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    cola_put_text(out, self->identity->model);
+    cola_put_text(out, self->spec.identity->model);
     cola_put_text(out, version(self));
     return cola_args_end(args);
 }
 
 enum cola_error cola_read_serial(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    cola_put_text(out, self->identity->serial);
+    cola_put_text(out, self->spec.identity->serial);
     return cola_args_end(args);
 }
 
@@ -59,7 +59,7 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
 enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     enum { BUSY, READY, ERROR };
-    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    const enum protocol_head_state head = protocol_ask_state(&self->spec.host);
     if (head == PROTOCOL_HEAD_FAULT)
         cola_put_u(out, 1, ERROR);
     else
@@ -73,7 +73,7 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
     enum { UNDEFINED, INITIALISATION, CONFIGURATION, REST, ROTATES, PREPARATION, READY, MEASURES };
     static const uint8_t states[] = {INITIALISATION, INITIALISATION, REST, PREPARATION, MEASURES, ROTATES, UNDEFINED};
     const struct cola_date d = cola_date_of(cola_clock_ns(self, self->now_ns));
-    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    const enum protocol_head_state head = protocol_ask_state(&self->spec.host);
     uint32_t state = head == PROTOCOL_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
     char text[40];
     if (state == MEASURES && !self->measures) state = READY;
@@ -92,7 +92,8 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
 enum cola_error cola_read_contamination(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     static const double levels_db[] = {1.0, 3.0, 10.0};
-    const double loss_db = self->host.window_loss_db != NULL ? self->host.window_loss_db(self->host.ctx) : 0.0;
+    const double loss_db =
+        self->spec.host.window_loss_db != NULL ? self->spec.host.window_loss_db(self->spec.host.ctx) : 0.0;
     uint32_t level = 0;
     while (level < 3 && loss_db >= levels_db[level])
         level++;
@@ -103,13 +104,13 @@ enum cola_error cola_read_contamination(struct cola *self, struct cola_args *arg
 enum cola_error cola_read_hours(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
     const int64_t tenth_ns = INT64_C(360000000000);
-    cola_put_u(out, 4, (uint32_t)((self->now_ns - self->power_ns) / tenth_ns));
+    cola_put_u(out, 4, (uint32_t)((self->now_ns - self->spec.power_ns) / tenth_ns));
     return cola_args_end(args);
 }
 
 enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    cola_put_u(out, 4, self->power_ons);
+    cola_put_u(out, 4, self->spec.power_ons);
     return cola_args_end(args);
 }
 
@@ -159,9 +160,9 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 
 int cola_start_scan(struct cola *self)
 {
-    const enum protocol_head_state head = protocol_ask_state(&self->host);
+    const enum protocol_head_state head = protocol_ask_state(&self->spec.host);
     int refused = head == PROTOCOL_HEAD_FAULT || head == PROTOCOL_HEAD_UNKNOWN;
-    if (head == PROTOCOL_HEAD_IDLE) refused = self->host.command(self->host.ctx, "SCAN:START", NULL, 0) != 0;
+    if (head == PROTOCOL_HEAD_IDLE) refused = self->spec.host.command(self->spec.host.ctx, "SCAN:START", NULL, 0) != 0;
     /* Until a scan has come, a head that is idle is started again, since somebody may have stopped it. */
     self->wants_scan = !refused;
     if (!refused) return 0;

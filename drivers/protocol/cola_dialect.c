@@ -10,23 +10,23 @@
  * before the last power-up does not count. */
 static uint32_t cola_dialect_word_of(const struct cola *self, uint32_t form)
 {
-    return self->power_ons << 2 | (form + 1);
+    return self->spec.power_ons << 2 | (form + 1);
 }
 
 static int is_strict(const struct cola *self)
 {
-    return self->dialect != PROTOCOL_DIALECT_ANY && self->shared != NULL;
+    return self->spec.dialect != PROTOCOL_DIALECT_ANY && self->spec.shared != NULL;
 }
 
 uint32_t cola_configured_framing(const struct cola *self)
 {
-    return self->dialect == PROTOCOL_COLA_B ? COLA_B : COLA_A;
+    return self->spec.dialect == PROTOCOL_COLA_B ? COLA_B : COLA_A;
 }
 
 uint32_t cola_framing(const struct cola *self)
 {
     if (!is_strict(self)) return self->set.framing;
-    const uint32_t word = atomic_load(self->shared);
+    const uint32_t word = atomic_load(self->spec.shared);
     if (word == cola_dialect_word_of(self, COLA_A)) return COLA_A;
     if (word == cola_dialect_word_of(self, COLA_B)) return COLA_B;
     return self->power_framing;
@@ -58,6 +58,6 @@ enum cola_error cola_write_framing(struct cola *self, struct cola_args *args, st
     if (form > COLA_B) return COLA_INVALID_DATA;
     self->set.framing = (uint8_t)form;
     self->stream_form = (enum cola_form)form;
-    if (is_strict(self)) atomic_store(self->shared, cola_dialect_word_of(self, form));
+    if (is_strict(self)) atomic_store(self->spec.shared, cola_dialect_word_of(self, form));
     return COLA_OK;
 }

@@ -32,14 +32,6 @@ static int take_flag(struct cola_args *args)
     return flag == 1;
 }
 
-static float take_float(struct cola_args *args)
-{
-    const uint32_t bits = cola_arg_u(args, 4);
-    float v;
-    memcpy(&v, &bits, sizeof v);
-    return v;
-}
-
 static void take_points(struct cola_args *args, struct cola_record *r)
 {
     const uint32_t n = cola_arg_u(args, 2);
@@ -77,8 +69,8 @@ static int has_part_of_type(const struct cola_record *r)
 enum cola_error cola_record_take(struct cola_args *args, struct cola_record *r)
 {
     memset(r, 0, sizeof *r);
-    r->scale = take_float(args);
-    r->offset = take_float(args);
+    r->scale = cola_arg_float(args);
+    r->offset = cola_arg_float(args);
     r->step_e4 = cola_arg_u(args, 4);
     r->first_e4 = cola_arg_i(args, 4);
     r->type = (uint8_t)cola_arg_u(args, 1);

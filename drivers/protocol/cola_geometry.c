@@ -13,7 +13,7 @@ enum { OK, FREQUENCY_ERROR, RESOLUTION_ERROR, RESOLUTION_AND_AREA_ERROR, AREA_ER
 
 const struct planar_head *cola_head(const struct cola *self)
 {
-    return self->identity->n_geometries != 0 ? &self->head : &self->scan.head;
+    return self->spec.identity->n_geometries != 0 ? &self->head : &self->scan.head;
 }
 
 /* Gives a head another line rate and step at the same angles: one number of steps divides the other, so ends stay. */
@@ -33,15 +33,15 @@ static void take_geometry(struct planar_head *h, int64_t lines_uhz, uint32_t ste
 static double ask(struct cola *self, const char *query)
 {
     char reply[PROTOCOL_REPLY];
-    return self->host.command(self->host.ctx, query, reply, sizeof reply) == 0 ? strtod(reply, NULL) : 0.0;
+    return self->spec.host.command(self->spec.host.ctx, query, reply, sizeof reply) == 0 ? strtod(reply, NULL) : 0.0;
 }
 
 /* A head that scans reports its settings in the stream. A head at rest does not, so it is asked for them. */
 void cola_look_at_head(struct cola *self)
 {
-    if (self->identity->n_geometries == 0) return;
+    if (self->spec.identity->n_geometries == 0) return;
     self->head = self->scan.head;
-    if (!self->head.known || protocol_ask_state(&self->host) == PROTOCOL_HEAD_SCANNING) return;
+    if (!self->head.known || protocol_ask_state(&self->spec.host) == PROTOCOL_HEAD_SCANNING) return;
     const double lines_hz = ask(self, "HEAD:LINes?"), step_deg = ask(self, "SCAN:STEP?");
     if (lines_hz > 0.0 && step_deg > 0.0)
         take_geometry(&self->head, (int64_t)(lines_hz * 1e6 + 0.5), (uint32_t)(360.0 / step_deg + 0.5));
@@ -82,7 +82,7 @@ static int area_fits(const struct planar_head *head, const struct scan_cfg *aske
 static uint32_t cola_geometry_find(const struct cola *self, const struct scan_cfg *asked, struct planar_head *found)
 {
     const struct planar_head *head = cola_head(self);
-    const struct protocol_identity *id = self->identity;
+    const struct protocol_identity *id = self->spec.identity;
     int rate_fits = 0, fits = 0;
     for (uint32_t i = 0; i == 0 || i < id->n_geometries; i++) {
         struct planar_head h = *head;
@@ -103,7 +103,7 @@ static int set_lines(struct cola *self)
 {
     char line[48];
     snprintf(line, sizeof line, "HEAD:LINes %.6f", (double)self->next.lines_uhz / 1e6);
-    return self->host.command(self->host.ctx, line, NULL, 0);
+    return self->spec.host.command(self->spec.host.ctx, line, NULL, 0);
 }
 
 /* The order of the two commands depends on the geometry before: each step must lead to a geometry that the head has. */
@@ -112,7 +112,7 @@ static enum cola_error set_head(struct cola *self)
     char line[48];
     const int lines = set_lines(self);
     snprintf(line, sizeof line, "SCAN:STEP %.9f", 360.0 / self->next.steps);
-    if (self->host.command(self->host.ctx, line, NULL, 0) != 0) return COLA_CONDITION;
+    if (self->spec.host.command(self->spec.host.ctx, line, NULL, 0) != 0) return COLA_CONDITION;
     if (lines != 0 && set_lines(self) != 0) return COLA_CONDITION;
     cola_look_at_head(self);
     return COLA_OK;
@@ -120,7 +120,7 @@ static enum cola_error set_head(struct cola *self)
 
 static int is_turning(const struct cola *self)
 {
-    const enum protocol_head_state state = protocol_ask_state(&self->host);
+    const enum protocol_head_state state = protocol_ask_state(&self->spec.host);
     return state == PROTOCOL_HEAD_SPIN_UP || state == PROTOCOL_HEAD_SCANNING;
 }
 
@@ -151,7 +151,7 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
         self->next.steps = wanted.steps;
         self->next.form = out->form;
         if (is_turning(self)) {
-            if (self->host.command(self->host.ctx, "SCAN:STOP", NULL, 0) != 0) return COLA_CONDITION;
+            if (self->spec.host.command(self->spec.host.ctx, "SCAN:STOP", NULL, 0) != 0) return COLA_CONDITION;
             self->next.is_due = 1;
             return COLA_LATER;
         }
@@ -175,5 +175,5 @@ void cola_geometry_time(struct cola *self)
     cola_begin(&out, self->next.form, "sAN mLMPsetscancfg");
     cola_put_u(&out, 1, OK);
     put_scan_cfg(cola_head(self), &out);
-    self->host.send(self->host.ctx, self->unit, cola_end(&out));
+    self->spec.host.send(self->spec.host.ctx, self->unit, cola_end(&out));
 }

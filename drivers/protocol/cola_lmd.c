@@ -19,11 +19,11 @@ static void put_head(const struct cola *self, struct cola_out *out)
     const struct planar_turn *turn = self->scan.whole;
     cola_put_u(out, 2, VERSION);
     cola_put_u(out, 2, DEVICE);
-    cola_put_u(out, 4, serial_number(self->identity->serial));
+    cola_put_u(out, 4, serial_number(self->spec.identity->serial));
     cola_put_u(out, 1, 0); /* device status: no error */
     cola_put_u(out, 1, 0);
     cola_put_u(out, 2, self->telegrams);
-    cola_put_u(out, 2, (uint16_t)(turn->number - self->near_wrap));
+    cola_put_u(out, 2, (uint16_t)(turn->number - self->spec.near_wrap));
     cola_put_u(out, 4, cola_time_us(self, turn->t0_ns));
     cola_put_u(out, 4, cola_time_us(self, self->now_ns));
     cola_put_u(out, 1, 0); /* two bytes of inputs, two of outputs */
@@ -81,7 +81,7 @@ static void put_distances(const struct cola *self, unsigned k, struct cola_out *
         if (distance == 0 && v != 0.0) lost++;
         cola_put_u(out, 2, distance);
     }
-    if (lost != 0) self->host.count(self->host.ctx, PROTOCOL_POINTS_LOST, lost);
+    if (lost != 0) self->spec.host.count(self->spec.host.ctx, PROTOCOL_POINTS_LOST, lost);
 }
 
 static void put_signals(const struct cola *self, unsigned k, struct cola_out *out)

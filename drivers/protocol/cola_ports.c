@@ -37,8 +37,8 @@ void cola_ports_select(struct cola *self)
 
 void cola_fields_load(struct cola *self)
 {
-    if (self->identity->fields != NULL)
-        self->fields = *self->identity->fields;
+    if (self->spec.identity->fields != NULL)
+        self->fields = *self->spec.identity->fields;
     else
         memset(&self->fields, 0, sizeof self->fields);
     self->ports.by_telegram = 0;
@@ -265,7 +265,7 @@ static void send_event(struct cola *self, enum cola_form form, const char *head,
     struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
     cola_begin(&out, form, head);
     put(self, &out);
-    self->host.send(self->host.ctx, self->unit, cola_end(&out));
+    self->spec.host.send(self->spec.host.ctx, self->unit, cola_end(&out));
 }
 
 void cola_send_outputs(struct cola *self, enum cola_form form)

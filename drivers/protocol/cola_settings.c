@@ -7,7 +7,7 @@
 
 void cola_settings_reset(struct cola *self)
 {
-    const char *name = self->identity->name;
+    const char *name = self->spec.identity->name;
     self->set = (struct cola_settings){.channels = {1, 0},
                                        .rssi = self->model->rssi,
                                        .rssi_16bit = self->model->rssi_16bit,
@@ -147,11 +147,9 @@ enum cola_error cola_read_scale(struct cola *self, struct cola_args *args, struc
 
 enum cola_error cola_write_scale(struct cola *self, struct cola_args *args, struct cola_out *out)
 {
-    const uint32_t bits = cola_arg_u(args, 4);
+    const float scale = cola_arg_float(args);
     const enum cola_error error = cola_args_end(args);
-    float scale;
     (void)out;
-    memcpy(&scale, &bits, sizeof scale);
     if (error != COLA_OK) return error;
     if (!cola_head(self)->known) return COLA_CONDITION;
     /* with 1, ranges over 65.535 m that the head reaches would have no number */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "core/bytes.h"
+#include "drivers/protocol/protocol.h"
 
 enum { STX = 2, ETX = 3, B_HEAD = 8, B_MARKS = 4 };
 
@@ -82,6 +83,14 @@ int32_t cola_arg_i(struct cola_args *args, unsigned bytes)
     if (v > (sign == '+' ? half - 1 : sign == '-' ? half : most(bytes)))
         return (int32_t)cola_telegram_fail(args, COLA_OVERFLOW);
     return sign == '-' ? (int32_t)(0 - (int64_t)v) : extend(v, bytes);
+}
+
+float cola_arg_float(struct cola_args *args)
+{
+    const uint32_t bits = cola_arg_u(args, 4);
+    float v;
+    memcpy(&v, &bits, sizeof v);
+    return v;
 }
 
 void cola_arg_text(struct cola_args *args, char *dst, size_t cap)
@@ -182,13 +191,10 @@ void cola_put_text(struct cola_out *out, const char *text)
 
 size_t cola_end(struct cola_out *out)
 {
-    uint8_t check = 0;
-    if (out->form == COLA_A) {
-        check = ETX;
-    } else {
+    uint8_t check = ETX;
+    if (out->form == COLA_B) {
         be_put32(out->buf + B_MARKS, (uint32_t)(out->len - B_HEAD));
-        for (size_t i = B_HEAD; i < out->len; i++)
-            check ^= out->buf[i];
+        check = protocol_xor(out->buf + B_HEAD, out->len - B_HEAD);
     }
     cola_telegram_put(out, &check, 1);
     return out->full ? 0 : out->len;
@@ -222,14 +228,11 @@ enum found { FOUND, NEED_MORE, NOT_HERE, OVERLONG };
 
 static enum found find_b(struct cola_input *in, struct cola_request *out)
 {
-    uint8_t check = 0;
     if (in->len < B_HEAD) return NEED_MORE;
     const uint32_t len = be_get32(in->buf + B_MARKS);
     if (len == 0 || len > COLA_MAX_REQUEST) return NOT_HERE;
     if (in->len < B_HEAD + len + 1) return NEED_MORE;
-    for (size_t i = 0; i <= len; i++)
-        check ^= in->buf[B_HEAD + i];
-    if (check != 0) return NOT_HERE;
+    if (protocol_xor(in->buf + B_HEAD, len + 1) != 0) return NOT_HERE; /* the check byte is among them */
     *out = (struct cola_request){COLA_B, in->buf + B_HEAD, len};
     in->used = B_HEAD + len + 1;
     return FOUND;

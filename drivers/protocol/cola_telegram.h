@@ -42,6 +42,7 @@ struct cola_args {
 /* bytes: 1, 2 or 4, the value's width in CoLa-B and its limit in CoLa-A. */
 uint32_t cola_arg_u(struct cola_args *args, unsigned bytes);
 int32_t cola_arg_i(struct cola_args *args, unsigned bytes);
+float cola_arg_float(struct cola_args *args);
 /* Length (CoLa-B: u16) and characters; dst gets them with a NUL. COLA_OVERFLOW where cap is too small,
  * COLA_INVALID_DATA where there is a NUL among them. */
 void cola_arg_text(struct cola_args *args, char *dst, size_t cap);

@@ -14,7 +14,7 @@ enum { N_ROLES = 3, N_INTERFACES = 2, ZONE_0 = 12, N_ZONES = 25 };
 
 int64_t cola_clock_ns(const struct cola *self, int64_t t_ns)
 {
-    return self->host.date_ns(self->host.ctx, t_ns);
+    return self->spec.host.date_ns(self->spec.host.ctx, t_ns);
 }
 
 void cola_put_time(const struct cola *self, int64_t t_ns, struct cola_out *out)
@@ -34,13 +34,13 @@ static int set_clock(struct cola *self, int64_t ns)
 {
     char line[48], reply[PROTOCOL_REPLY];
     int64_t shift_ns;
-    if (self->host.command(self->host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
+    if (self->spec.host.command(self->spec.host.ctx, "TIME:SHIFt?", reply, sizeof reply) != 0 ||
         sscanf(reply, "%" SCNd64, &shift_ns) != 1)
         return 0;
     /* In this order no difference overflows. The one in brackets is the clock's time without a shift. */
     shift_ns = ns - (cola_clock_ns(self, self->now_ns) - shift_ns);
     snprintf(line, sizeof line, "TIME:SHIFt %" PRId64, shift_ns);
-    return self->host.command(self->host.ctx, line, NULL, 0) == 0;
+    return self->spec.host.command(self->spec.host.ctx, line, NULL, 0) == 0;
 }
 
 /* ---- the time server */
@@ -66,7 +66,7 @@ static enum cola_error get_server(struct cola *self, struct cola_server *s)
     char reply[PROTOCOL_REPLY], role[8], interface[4];
     uint32_t *const a = s->address;
     int zone_h;
-    if (self->host.command(self->host.ctx, "TIME:SERVer?", reply, sizeof reply) != 0 ||
+    if (self->spec.host.command(self->spec.host.ctx, "TIME:SERVer?", reply, sizeof reply) != 0 ||
         sscanf(reply, "%7[A-Z],%3u.%3u.%3u.%3u,%6u,%3d,%3[A-Z]", role, &a[0], &a[1], &a[2], &a[3], &s->update_s,
                &zone_h, interface) != 8)
         return COLA_CONDITION;
@@ -83,7 +83,7 @@ static enum cola_error put_server(struct cola *self, const struct cola_server *s
     if (s->role >= N_ROLES || s->interface >= N_INTERFACES || s->zone >= N_ZONES) return COLA_INVALID_DATA;
     snprintf(line, sizeof line, "TIME:SERVer %s,%u.%u.%u.%u,%u,%d,%s", roles[s->role], a[0], a[1], a[2], a[3],
              s->update_s, (int)s->zone - ZONE_0, interfaces[s->interface]);
-    const int error = self->host.command(self->host.ctx, line, NULL, 0);
+    const int error = self->spec.host.command(self->spec.host.ctx, line, NULL, 0);
     return error == 0 ? COLA_OK : error == -221 ? COLA_CONDITION : COLA_INVALID_DATA;
 }
 
@@ -136,7 +136,7 @@ static enum cola_error put_answered(struct cola *self, int which, struct cola_ar
     int64_t ns[3];
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
-    if (self->host.command(self->host.ctx, "TIME:SERVer? STATe", reply, sizeof reply) != 0 ||
+    if (self->spec.host.command(self->spec.host.ctx, "TIME:SERVer? STATe", reply, sizeof reply) != 0 ||
         sscanf(reply, "%*[A-Z],%" SCNd64 ",%" SCNd64 ",%" SCNd64, &ns[0], &ns[1], &ns[2]) != 3)
         return COLA_CONDITION;
     cola_put_float(out, (float)(1e-9 * (double)ns[which]));

@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/ethernet.h"
 
+#include <linux/if_ether.h>
+#include <netinet/in.h>
 #include <string.h>
 
 #include "core/bytes.h"
 
 enum {
-    TYPE_IPV4 = 0x0800,
-    TYPE_IPV6 = 0x86dd,
-    PROTOCOL_TCP = 6,
-    PROTOCOL_UDP = 17,
     LINK_LEN = 14,
     IPV4_LEN = 20,
     IPV6_LEN = 40,
@@ -107,7 +105,7 @@ static uint8_t *put_front(uint8_t *to, const struct ethernet_end *from, const st
 {
     put_hardware(to, dest);
     put_hardware(to + 6, from);
-    be_put16(to + 12, from->is_v6 ? TYPE_IPV6 : TYPE_IPV4);
+    be_put16(to + 12, from->is_v6 ? ETH_P_IPV6 : ETH_P_IP);
     (from->is_v6 ? put_ipv6 : put_ipv4)(to + LINK_LEN, from, dest, protocol, len);
     return to + LINK_LEN + (from->is_v6 ? IPV6_LEN : IPV4_LEN);
 }
@@ -127,13 +125,13 @@ size_t ethernet_put_udp(uint8_t *to, const struct ethernet_end *from, const stru
                         size_t data_len)
 {
     const size_t len = UDP_LEN + data_len;
-    uint8_t *udp = put_front(to, from, dest, PROTOCOL_UDP, len);
+    uint8_t *udp = put_front(to, from, dest, IPPROTO_UDP, len);
     be_put16(udp, from->port);
     be_put16(udp + 2, dest->port);
     be_put16(udp + 4, len);
     be_put16(udp + 6, 0);
     memcpy(udp + UDP_LEN, data, data_len);
-    const uint16_t sum = checksum(udp, len, from, dest, PROTOCOL_UDP);
+    const uint16_t sum = checksum(udp, len, from, dest, IPPROTO_UDP);
     be_put16(udp + 6, sum != 0 ? sum : 0xffff); /* 0 means that there is none */
     return (size_t)(udp - to) + len;
 }
@@ -154,7 +152,7 @@ static size_t put_segment(struct tcp_talk *talk, int side, unsigned flags, const
     const struct ethernet_end *from = &talk->end[side], *dest = &talk->end[!side];
     const uint32_t ack = (flags & TCP_ACK) != 0 ? talk->next[!side] : 0;
     const size_t head = TCP_LEN + ((flags & TCP_SYN) != 0 ? SYN_OPTIONS_LEN : 0);
-    uint8_t *tcp = put_front(to, from, dest, PROTOCOL_TCP, head + len);
+    uint8_t *tcp = put_front(to, from, dest, IPPROTO_TCP, head + len);
     be_put16(tcp, from->port);
     be_put16(tcp + 2, dest->port);
     be_put32(tcp + 4, talk->next[side]);
@@ -165,7 +163,7 @@ static size_t put_segment(struct tcp_talk *talk, int side, unsigned flags, const
     be_put32(tcp + 16, 0);
     if ((flags & TCP_SYN) != 0) put_syn_options(tcp + TCP_LEN);
     if (len > 0) memcpy(tcp + head, data, len);
-    be_put16(tcp + 16, checksum(tcp, head + len, from, dest, PROTOCOL_TCP));
+    be_put16(tcp + 16, checksum(tcp, head + len, from, dest, IPPROTO_TCP));
     talk->next[side] += (uint32_t)len + ((flags & (TCP_SYN | TCP_FIN)) != 0);
     if ((flags & TCP_ACK) != 0) talk->acked[side] = ack;
     return (size_t)(tcp - to) + head + len;

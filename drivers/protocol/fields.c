@@ -15,9 +15,9 @@
 #define UNIT_FIELD_FLOAT 4
 #define UNIT_FIELD_REAL  8
 #define UNIT_FIELD_TEXT  1
-#define ROW(type, member, kind)                                                               \
-    {                                                                                         \
-        offsetof(struct type, member), kind, sizeof(((struct type *)0)->member) / UNIT_##kind \
+#define ROW(type, member, kind)                                                                            \
+    {                                                                                                      \
+        offsetof(struct type, member), kind, sizeof(((struct type *)0)->member) / UNIT_##kind, UNIT_##kind \
     }
 #define TABLE(rows, type, wire, frame) PART(rows, 0, type, wire, frame)
 /* A table without its last `less` rows. */
@@ -157,11 +157,6 @@ const struct field_table fields_telemetry_ptp = TABLE(telemetry, native_telemetr
 const struct field_table fields_event = TABLE(event, native_event, 128, NATIVE_EVENT);
 const struct field_table fields_pose = TABLE(pose, native_pose, NATIVE_POSE_LEN, NATIVE_POSES);
 
-static const uint8_t unit_of[] = {
-    [FIELD_8] = UNIT_FIELD_8,      [FIELD_16] = UNIT_FIELD_16,       [FIELD_32] = UNIT_FIELD_32,
-    [FIELD_64] = UNIT_FIELD_64,    [FIELD_FLOAT] = UNIT_FIELD_FLOAT, [FIELD_REAL] = UNIT_FIELD_REAL,
-    [FIELD_TEXT] = UNIT_FIELD_TEXT};
-
 /* Turns a number of 1, 2, 4 or 8 bytes between the machine's order and the wire's; both ways are the same. */
 static void fields_turn(void *to, const void *from, size_t unit)
 {
@@ -188,7 +183,7 @@ static size_t encode_field(const struct field *field, const char *from, uint8_t 
         memset(wire + len, 0, field->count - len);
         return field->count;
     }
-    const size_t unit = unit_of[field->kind];
+    const size_t unit = field->unit;
     for (size_t i = 0; i < field->count; i++)
         fields_turn(wire + i * unit, from + i * unit, unit);
     return unit * field->count;
@@ -211,7 +206,7 @@ static int decode_field(const struct field *field, const uint8_t *wire, char *to
         memcpy(to, wire, len);
         return field->count;
     }
-    const size_t unit = unit_of[field->kind];
+    const size_t unit = field->unit;
     for (size_t i = 0; i < field->count; i++) {
         fields_turn(to + i * unit, wire + i * unit, unit);
         if (!is_finite(field, to + i * unit)) return SH_EFORMAT;

@@ -20,8 +20,8 @@ enum field_kind {
 };
 
 struct field {
-    uint16_t offset; /* in the struct */
-    uint8_t kind, count;
+    uint16_t offset;           /* in the struct */
+    uint8_t kind, count, unit; /* unit: bytes of each */
 };
 
 struct field_table {

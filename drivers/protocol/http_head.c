@@ -126,6 +126,50 @@ int http_read_length(struct http_text text, size_t *out)
     return text.len > 0 ? 0 : 400;
 }
 
+static int take_field(struct http_fields *all, const struct http_field *f)
+{
+    if (http_text_is(f->name, "host")) {
+        all->host = f->value;
+        all->n_host++;
+    } else if (http_text_is(f->name, "origin")) {
+        all->origin = f->value;
+        all->n_origin++;
+    } else if (http_text_is(f->name, "sec-fetch-site")) {
+        all->site = f->value;
+    } else if (http_text_is(f->name, "sec-websocket-key")) {
+        all->key = f->value;
+    } else if (http_text_is(f->name, "sec-websocket-version")) {
+        all->version = f->value;
+    } else if (http_text_is(f->name, "sec-websocket-protocol")) {
+        all->protocol = f->value;
+    } else if (http_text_is(f->name, "upgrade")) {
+        all->upgrade = f->value;
+    } else if (http_text_is(f->name, "connection")) {
+        all->closes |= http_list_has(f->value, "close");
+        all->keeps_alive |= http_list_has(f->value, "keep-alive");
+        all->is_upgrade |= http_list_has(f->value, "upgrade");
+    } else if (http_text_is(f->name, "transfer-encoding")) {
+        all->has_coding = 1;
+    } else if (http_text_is(f->name, "expect")) {
+        all->expects = http_text_is(f->value, "100-continue");
+        all->expects_other |= !all->expects;
+    } else if (http_text_is(f->name, "content-length")) {
+        return all->n_length++ != 0 ? 400 : http_read_length(f->value, &all->length);
+    }
+    return 0;
+}
+
+int http_read_fields(const char *head, size_t len, size_t at, struct http_fields *out)
+{
+    struct http_text line;
+    struct http_field field;
+    int status = 0;
+    memset(out, 0, sizeof *out);
+    while (status == 0 && (line = http_next_line(head, len, &at)).len != 0)
+        status = http_read_field(line, &field) != 0 ? 400 : take_field(out, &field);
+    return status;
+}
+
 int http_read_place(struct http_text text, struct http_place *out)
 {
     const char *end = text.len > 0 && *text.s == '[' ? memchr(text.s, ']', text.len) : NULL;
@@ -141,9 +185,10 @@ int http_read_place(struct http_text text, struct http_place *out)
     return 0;
 }
 
+static const char scheme[] = "http://";
+
 void http_split_target(struct http_text target, struct http_target *out)
 {
-    static const char scheme[] = "http://";
     const size_t n = sizeof scheme - 1;
     struct http_text path = target;
     *out = (struct http_target){.place = {NULL, 0}};
@@ -156,4 +201,19 @@ void http_split_target(struct http_text target, struct http_target *out)
     }
     if (!cut(path, '?', &out->path, &out->query)) out->path = path;
     if (out->place.s != NULL && out->path.len == 0) out->path = (struct http_text){"/", 1};
+}
+
+int http_find_place(struct http_fields *fields, int minor, struct http_text target_place, struct http_place *out)
+{
+    if (fields->n_host > 1 || fields->n_origin > 1 || (fields->n_host == 0 && minor > 0)) return 400;
+    if (target_place.s != NULL) fields->host = target_place;
+    return http_read_place(fields->host, out);
+}
+
+int http_is_own_origin(const struct http_fields *fields)
+{
+    const struct http_text host = fields->host, origin = fields->origin;
+    const size_t n = sizeof scheme - 1;
+    return host.len != 0 && origin.len == n + host.len && strncasecmp(origin.s, scheme, n) == 0 &&
+           strncasecmp(origin.s + n, host.s, host.len) == 0;
 }

@@ -55,6 +55,18 @@ struct http_field {
 /* "Host: localhost": 0 or 400. */
 int http_read_field(struct http_text line, struct http_field *out);
 
+/* The fields that a server here looks at. Texts of fields that are missing have no bytes, and s is NULL. */
+struct http_fields {
+    struct http_text host, origin, site, key, version, protocol, upgrade; /* the last of each name */
+    int n_host, n_origin, n_length;                                       /* how often these came */
+    int has_coding;
+    int expects, expects_other;          /* Expect: 100-continue, and anything else */
+    int closes, keeps_alive, is_upgrade; /* words of Connection */
+    size_t length;
+};
+/* Reads the fields of a whole head from the line at `at` on. 0 or 400. */
+int http_read_fields(const char *head, size_t len, size_t at, struct http_fields *out);
+
 /* Reads decimal digits. A number of ten million or more comes out as its first seven digits. 0 or 400. */
 int http_read_length(struct http_text text, size_t *out);
 
@@ -71,5 +83,11 @@ struct http_target {
     struct http_text place, path, query;
 };
 void http_split_target(struct http_text target, struct http_target *out);
+
+/* Finds the place that a request of HTTP/1.minor is for. A target with a place (target_place.s is not NULL) takes
+ * precedence over Host, and is then in fields->host (RFC 9112 3.2.2). 0; or 400, as where Host or Origin came twice. */
+int http_find_place(struct http_fields *fields, int minor, struct http_text target_place, struct http_place *out);
+/* Whether Origin is http:// and the place of fields->host. */
+int http_is_own_origin(const struct http_fields *fields);
 
 #endif

@@ -2,7 +2,6 @@
 #include "drivers/protocol/http_request.h"
 
 #include <string.h>
-#include <strings.h>
 
 size_t http_reader_add(struct http_reader *r, const uint8_t *bytes, size_t len)
 {
@@ -28,13 +27,6 @@ void http_reader_drop(struct http_reader *r)
     forget(r, r->head_len + r->request.body_len);
 }
 
-/* read_head needs this of the request line and of the fields: values, how often each field came, and flags. */
-struct head {
-    struct http_text host, origin, target_place; /* without one, s is NULL */
-    int n_host, n_origin, n_length, n_coding, expects, expects_other, close, keep_alive;
-    size_t length;
-};
-
 static void set_text(char *to, size_t room, struct http_text text)
 {
     const size_t len = text.len < room ? text.len : room - 1;
@@ -43,43 +35,16 @@ static void set_text(char *to, size_t room, struct http_text text)
 }
 
 /* 0, or a status. */
-static int read_request_line(struct http_request *q, struct head *h, struct http_text text)
+static int read_request_line(struct http_request *q, struct http_target *target, struct http_text text)
 {
     struct http_line line;
-    struct http_target target;
     const int status = http_read_line(text, &line);
     if (status != 0) return status;
     if (line.method.len >= sizeof q->method) return 501;
-    http_split_target(line.target, &target);
+    http_split_target(line.target, target);
     set_text(q->method, sizeof q->method, line.method);
-    set_text(q->path, sizeof q->path, target.path);
-    h->target_place = target.place;
+    set_text(q->path, sizeof q->path, target->path);
     q->minor = line.minor;
-    return 0;
-}
-
-static int read_field(struct head *h, struct http_text line)
-{
-    struct http_field f;
-    if (http_read_field(line, &f) != 0) return 400;
-    if (http_text_is(f.name, "host")) {
-        h->n_host++;
-        h->host = f.value;
-    } else if (http_text_is(f.name, "origin")) {
-        h->n_origin++;
-        h->origin = f.value;
-    } else if (http_text_is(f.name, "transfer-encoding")) {
-        h->n_coding++;
-    } else if (http_text_is(f.name, "connection")) {
-        h->close |= http_list_has(f.value, "close");
-        h->keep_alive |= http_list_has(f.value, "keep-alive");
-    } else if (http_text_is(f.name, "expect")) {
-        h->expects = http_text_is(f.value, "100-continue");
-        h->expects_other |= !h->expects;
-    } else if (http_text_is(f.name, "content-length")) {
-        if (h->n_length++ != 0) return 400;
-        return http_read_length(f.value, &h->length);
-    }
     return 0;
 }
 
@@ -93,38 +58,29 @@ static int may_be_rebound(struct http_text host)
     return i < host.len && host.s[0] != '[' && memchr(host.s, '.', host.len) != NULL;
 }
 
-static int is_foreign(const struct head *h, struct http_text host)
+static int is_foreign(const struct http_fields *f, struct http_text host)
 {
-    static const char http[] = "http://";
-    const size_t n = sizeof http - 1;
-    if (h->origin.s == NULL) return 0;
-    if (host.len == 0 || may_be_rebound(host)) return 1;
-    return h->origin.len != n + h->host.len || strncasecmp(h->origin.s, http, n) != 0 ||
-           strncasecmp(h->origin.s + n, h->host.s, h->host.len) != 0;
+    return f->n_origin != 0 && (host.len == 0 || may_be_rebound(host) || !http_is_own_origin(f));
 }
 
 /* 0, or the status of a head that is broken. */
-static int read_head(struct http_reader *r, struct head *h)
+static int read_head(struct http_reader *r, struct http_fields *f)
 {
     struct http_request *q = &r->request;
+    struct http_target target;
     struct http_place place;
     size_t at = 0;
     memset(q, 0, sizeof *q);
-    memset(h, 0, sizeof *h);
-    struct http_text line = http_next_line(r->bytes, r->head_len, &at);
-    int status = read_request_line(q, h, line);
-    while (status == 0 && (line = http_next_line(r->bytes, r->head_len, &at)).len != 0)
-        status = read_field(h, line);
+    int status = read_request_line(q, &target, http_next_line(r->bytes, r->head_len, &at));
+    if (status == 0) status = http_read_fields(r->bytes, r->head_len, at, f);
+    if (status == 0) status = http_find_place(f, q->minor, target.place, &place);
     if (status != 0) return status;
-    if (h->n_host > 1 || h->n_origin > 1 || (h->n_host == 0 && q->minor > 0)) return 400;
-    if (h->target_place.s != NULL) h->host = h->target_place;
-    if (http_read_place(h->host, &place) != 0) return 400;
-    if (h->n_coding != 0 || (h->n_length == 0 && strcmp(q->method, "POST") == 0)) return 411;
-    if (h->length > HTTP_MAX_BODY) return 413;
-    if (h->expects_other) return 417;
-    q->keep_alive = !h->close && (q->minor > 0 || h->keep_alive);
-    q->foreign = is_foreign(h, place.host);
-    q->body_len = h->length;
+    if (f->has_coding || (f->n_length == 0 && strcmp(q->method, "POST") == 0)) return 411;
+    if (f->length > HTTP_MAX_BODY) return 413;
+    if (f->expects_other) return 417;
+    q->keep_alive = !f->closes && (q->minor > 0 || f->keeps_alive);
+    q->foreign = is_foreign(f, place.host);
+    q->body_len = f->length;
     return 0;
 }
 
@@ -149,14 +105,14 @@ static int find_head(struct http_reader *r)
 
 int http_reader_next(struct http_reader *r)
 {
-    struct head h;
+    struct http_fields fields;
     int status = r->head_len == 0 ? find_head(r) : 0;
     if (status != 0) return status;
     if (r->head_len == 0) return HTTP_MORE;
-    status = read_head(r, &h);
+    status = read_head(r, &fields);
     if (status != 0) return status;
     if (r->len - r->head_len < r->request.body_len) {
-        if (!h.expects || r->continued || r->request.minor == 0) return HTTP_MORE;
+        if (!fields.expects || r->continued || r->request.minor == 0) return HTTP_MORE;
         r->continued = 1;
         return HTTP_CONTINUE;
     }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/ip_packet.h"
 
+#include <linux/if_ether.h>
+#include <netinet/in.h>
 #include <string.h>
 
 #include "core/bytes.h"
@@ -15,8 +17,6 @@ static const struct {
     {113, 16}, {276, 20},                     /* Linux' SLL, SLL2 */
 };
 enum { LINK_ETHERNET = 1 };
-enum { TYPE_IPV4 = 0x0800, TYPE_IPV6 = 0x86dd, TYPE_VLAN = 0x8100, TYPE_QINQ = 0x88a8 };
-enum { PROTOCOL_HOP = 0, PROTOCOL_TCP = 6, PROTOCOL_UDP = 17, PROTOCOL_FRAGMENT = 44, PROTOCOL_OPTIONS = 60 };
 enum { IPV4_LEN = 20, IPV6_LEN = 40, UDP_LEN = 8, TCP_LEN = 20 };
 
 struct rest {
@@ -29,11 +29,11 @@ struct rest {
 static int skip_ethernet(const uint8_t *data, size_t len)
 {
     size_t at = 12;
-    while (len >= at + 4 && (be_get16(data + at) == TYPE_VLAN || be_get16(data + at) == TYPE_QINQ))
+    while (len >= at + 4 && (be_get16(data + at) == ETH_P_8021Q || be_get16(data + at) == ETH_P_8021AD))
         at += 4;
     if (len < at + 2) return -1;
     const uint16_t type = be_get16(data + at);
-    return type == TYPE_IPV4 || type == TYPE_IPV6 ? (int)at + 2 : -1;
+    return type == ETH_P_IP || type == ETH_P_IPV6 ? (int)at + 2 : -1;
 }
 
 /* Bytes before the IP packet; -1: it has none; -2: another link type. */
@@ -74,7 +74,7 @@ static enum ip_packet_found read_ipv6(struct rest *r, struct ip_packet *out, uns
     memcpy(out->to.address, r->p + 24, 16);
     r->p += IPV6_LEN;
     r->len -= IPV6_LEN;
-    while (*protocol == PROTOCOL_HOP || *protocol == PROTOCOL_OPTIONS) {
+    while (*protocol == IPPROTO_HOPOPTS || *protocol == IPPROTO_DSTOPTS) {
         const size_t head = r->len >= 8 ? 8 * ((size_t)r->p[1] + 1) : SIZE_MAX;
         if (head > r->len || head > r->claimed) return IP_PACKET_DAMAGED;
         *protocol = r->p[0];
@@ -82,7 +82,7 @@ static enum ip_packet_found read_ipv6(struct rest *r, struct ip_packet *out, uns
         r->len -= head;
         r->claimed -= head;
     }
-    return *protocol == PROTOCOL_FRAGMENT ? IP_PACKET_FRAGMENT : IP_PACKET_FOUND;
+    return *protocol == IPPROTO_FRAGMENT ? IP_PACKET_FRAGMENT : IP_PACKET_FOUND;
 }
 
 static enum ip_packet_found read_transport(const struct rest *r, struct ip_packet *out)
@@ -121,7 +121,7 @@ enum ip_packet_found ip_packet_read(uint16_t link, const uint8_t *data, size_t l
     if (version != 4 && version != 6) return IP_PACKET_OTHER;
     const enum ip_packet_found found = (version == 4 ? read_ipv4 : read_ipv6)(&r, out, &protocol);
     if (found != IP_PACKET_FOUND) return found;
-    if (protocol != PROTOCOL_TCP && protocol != PROTOCOL_UDP) return IP_PACKET_OTHER;
-    out->is_tcp = protocol == PROTOCOL_TCP;
+    if (protocol != IPPROTO_TCP && protocol != IPPROTO_UDP) return IP_PACKET_OTHER;
+    out->is_tcp = protocol == IPPROTO_TCP;
     return read_transport(&r, out);
 }

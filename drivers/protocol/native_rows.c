@@ -25,10 +25,10 @@ uint32_t native_put_rows_plain(uint8_t *restrict dst, const struct line_block *b
     return bits >> 24;
 }
 
+enum { LANES = 16 };
+
 #if defined(__x86_64__) && !defined(VEC_ONE) /* VEC_ONE: for measuring one instruction set (core/vecmath.h) */
 #include <immintrin.h>
-
-enum { LANES = 16 };
 
 /* Sixteen rows are 80 words, in five vectors. Word l of vector v belongs to row ROW, and is its word WORD. */
 #define ROW(v, l)  ((16 * (v) + (l)) / 5)
@@ -91,8 +91,6 @@ static int has_wide(void)
 }
 
 #else
-
-enum { LANES = 16 };
 
 static uint32_t put_wide(uint8_t *dst, const struct line_block *block, uint32_t first, uint32_t n, uint32_t dt0_ns)
 {

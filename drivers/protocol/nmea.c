@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "drivers/protocol/protocol.h"
+
 static const double KNOT_M_S = 1852.0 / 3600.0;
 
 /* A sentence being written. Text without room is left out, but the length counts it. */
@@ -25,14 +27,6 @@ static void nmea_put(struct sentence *s, const char *fmt, ...)
     s->len += (size_t)n;
 }
 
-uint8_t nmea_checksum(const char *text, size_t len)
-{
-    uint8_t sum = 0;
-    for (size_t i = 0; i < len; i++)
-        sum ^= (uint8_t)text[i];
-    return sum;
-}
-
 static struct sentence nmea_begin(char *dst, size_t cap, const struct nmea_fix *fix, const char *type)
 {
     struct sentence s = {dst, cap, 0, fix->is_spoilt ? 0xff : 0};
@@ -42,7 +36,7 @@ static struct sentence nmea_begin(char *dst, size_t cap, const struct nmea_fix *
 
 static size_t nmea_end(struct sentence *s)
 {
-    unsigned sum = s->len < s->cap ? nmea_checksum(s->dst + 1, s->len - 1) ^ s->spoil : 0;
+    unsigned sum = s->len < s->cap ? protocol_xor(s->dst + 1, s->len - 1) ^ s->spoil : 0;
     nmea_put(s, "*%02X\r\n", sum);
     return s->len < s->cap ? s->len : 0;
 }

@@ -40,9 +40,6 @@ size_t nmea_encode_zda(char *dst, size_t cap, const struct nmea_fix *fix);
 /* All of them: RMC GGA GSA GST ZDA. */
 size_t nmea_encode_all(char *dst, size_t cap, const struct nmea_fix *fix);
 
-/* XOR of len characters. */
-uint8_t nmea_checksum(const char *text, size_t len);
-
 /* The members `content` and `reseal` of protocol_ops: nmea_content marks the bits that an injected fault may change in
  * decimals after a point. A changed decimal is still a digit, so each field stays a number. nmea_reseal corrects the
  * checksums of the sentences. */

@@ -37,7 +37,7 @@ void nmea_reseal(uint8_t *bytes, size_t len)
 {
     static const char hex[] = "0123456789ABCDEF";
     for (size_t at = 0, star; next_sentence(bytes, len, &at, &star); at = star) {
-        const uint8_t sum = nmea_checksum((const char *)bytes + at + 1, star - at - 1);
+        const uint8_t sum = protocol_xor(bytes + at + 1, star - at - 1);
         bytes[star + 1] = (uint8_t)hex[sum >> 4];
         bytes[star + 2] = (uint8_t)hex[sum & 15];
     }

@@ -18,7 +18,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { NTP_LEN = 48, NTP_PORT = 123 };
+enum { NTP_LEN = 48 };
 
 enum ntp_kind {
     NTP_GOOD,

@@ -5,14 +5,8 @@
 
 /* The one list of protocols. A new one is a file of this folder that defines its protocol_ops, an id in protocol.h, and
  * two rows here. */
-extern const struct protocol_ops protocol_native;
-extern const struct protocol_ops protocol_nmea;
-extern const struct protocol_ops protocol_scip;
-extern const struct protocol_ops protocol_cola;
-extern const struct protocol_ops protocol_velodyne;
-extern const struct protocol_ops protocol_velodyne_position;
-extern const struct protocol_ops protocol_velodyne_http;
-extern const struct protocol_ops protocol_capture;
+extern const struct protocol_ops protocol_native, protocol_nmea, protocol_scip, protocol_cola, protocol_velodyne,
+    protocol_velodyne_position, protocol_velodyne_http, protocol_capture;
 
 static const struct protocol_ops *const protocols[PROTOCOL_N] = {
     [PROTOCOL_NATIVE] = &protocol_native,

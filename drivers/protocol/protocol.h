@@ -227,6 +227,15 @@ void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len);
  * digit, of 0 to 9 if it was. */
 uint8_t protocol_digit_bits(uint8_t c);
 
+/* The XOR of n bytes, with which sentences of NMEA 0183 and telegrams of CoLa-B end. */
+static inline uint8_t protocol_xor(const void *bytes, size_t n)
+{
+    uint8_t sum = 0;
+    for (size_t i = 0; i < n; i++)
+        sum ^= ((const uint8_t *)bytes)[i];
+    return sum;
+}
+
 /* From the one list, in protocol.c. NULL for an unknown id. */
 const struct protocol_ops *protocol_ops_get(enum protocol_id id);
 

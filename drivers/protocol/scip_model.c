@@ -11,8 +11,11 @@
 
 /* Sources: SCIP.md. If no source has a text of a model, the model gets the text of the most similar one. */
 #define SPEED_IN_WORDS .speed_before = "Initial(", .speed_after = "[rpm])", .at_default = "<-Default setting by user"
+#define RANGES_OF_LX   .no_object = 1, .too_near = 4, .no_step = 5
 #define SPEED_ALONE    .speed_before = "", .speed_after = "", .at_default = ""
-#define STATES_IN_WORDS .mode_booting = "BOOTING", .mode_fault = "ERROR", \
+#define STATES_IN_WORDS \
+    .mode_idle = "IDLE", .mode_single = "CLASSIC", .mode_streaming = "CLASSIC", \
+    .mode_booting = "BOOTING", .mode_fault = "ERROR", \
     .works = "Sensor works well.", .boots = "Sensor is booting.", .has_failed = "Self test failed."
 #define STATES_IN_NUMBERS \
     .mode_idle = "000 Idle", .mode_single = "003 Single_scan", .mode_streaming = "004 Multi_scan", \
@@ -27,7 +30,7 @@ enum { LX = SCIP_INTENSITY | SCIP_REBOOT | SCIP_SLEEP };
      .mode_idle = "Measuring by Sensitive Mode", .mode_single = "Measuring by Sensitive Mode", \
      .mode_streaming = "Measuring by Sensitive Mode", .mode_booting = "Booting", .mode_fault = "Error", \
      .works = "sensor is working normally", .boots = "sensor is booting", .has_failed = "sensor failed its self test", \
-     .no_object = 1, .too_near = 4, .no_step = 5}
+     RANGES_OF_LX}
 
 static const struct scip_model models[] = {
     {.name = "URG-04LX",
@@ -38,9 +41,6 @@ static const struct scip_model models[] = {
      .features = SCIP_MOTOR_SPEED | SCIP_BIT_RATE | SCIP_SIMULATION | SCIP_TIME_ALONE | SCIP_TIME_HEX,
      .bit_rate = 19200,
      SPEED_IN_WORDS,
-     .mode_idle = "IDLE",
-     .mode_single = "CLASSIC",
-     .mode_streaming = "CLASSIC",
      STATES_IN_WORDS,
      .no_object = 0,
      .too_near = 6,
@@ -54,13 +54,8 @@ static const struct scip_model models[] = {
      .bit_rate = 115200,
      .link = "USB Full Speed",
      SPEED_IN_WORDS,
-     .mode_idle = "IDLE",
-     .mode_single = "CLASSIC",
-     .mode_streaming = "CLASSIC",
      STATES_IN_WORDS,
-     .no_object = 1,
-     .too_near = 4,
-     .no_step = 5},
+     RANGES_OF_LX},
     {.name = "UTM-30LX-EW",
      .vendor = HOKUYO_NEW,
      .product = "UTM-30LX-EW",
@@ -71,9 +66,7 @@ static const struct scip_model models[] = {
      .link = "Ethernet 100 [Mbps]",
      SPEED_ALONE,
      STATES_IN_NUMBERS,
-     .no_object = 1,
-     .too_near = 4,
-     .no_step = 5},
+     RANGES_OF_LX},
     UST("UST-10LX"),
     UST("UST-20LX"),
     {.name = NULL,
@@ -83,9 +76,7 @@ static const struct scip_model models[] = {
      .bit_rate = 115200,
      SPEED_ALONE,
      STATES_IN_NUMBERS,
-     .no_object = 1,
-     .too_near = 4,
-     .no_step = 5},
+     RANGES_OF_LX},
 };
 /* clang-format on */
 

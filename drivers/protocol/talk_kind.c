@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/bytes.h"
+#include "drivers/protocol/protocol.h"
 #include "drivers/protocol/talk.h"
 
 /* ---- SICK CoLa: 02 ... 03, or 02 02 02 02, u32 length, the telegram and its check byte (COLA.md) */
@@ -117,8 +118,7 @@ static size_t cola_error(const uint8_t *request, size_t len, uint8_t *to)
     static const uint8_t head[COLA_B_HEAD] = {STX, STX, STX, STX, 0, 0, 0, 5};
     memcpy(to, head, sizeof head);
     memcpy(to + COLA_B_HEAD, (const uint8_t[]){'s', 'F', 'A', 0, code, 0}, 6);
-    for (int i = 0; i < 5; i++)
-        to[COLA_B_HEAD + 5] ^= to[COLA_B_HEAD + i];
+    to[COLA_B_HEAD + 5] = protocol_xor(to + COLA_B_HEAD, 5);
     return COLA_B_HEAD + 6;
 }
 

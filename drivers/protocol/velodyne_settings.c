@@ -11,8 +11,9 @@
 
 struct posted {
     const struct protocol_spec *spec;
-    char *text; /* of an error */
-    int apply;  /* 0: the form is only checked */
+    char *text;      /* of an error */
+    int apply;       /* 0: the form is only checked */
+    const char *key; /* whose value is at hand */
 };
 
 static int refuse(const struct posted *p, int status, const char *why)
@@ -98,22 +99,15 @@ static int set_rpm(const struct posted *p, const char *value)
     return command(p, line);
 }
 
-static int set_fov(const struct posted *p, const char *value, long whole, const char *why)
+static int set_fov(const struct posted *p, const char *value)
 {
+    const long whole = strcmp(p->key, "end") == 0 ? 359 : 0;
     long deg;
     if (!read_number(value, &deg) || deg > 359)
         return refuse(p, 400, "start, end: allowed are whole numbers from 0 to 359 degrees");
-    return deg == whole ? 200 : refuse(p, 409, why);
-}
-
-static int set_fov_start(const struct posted *p, const char *value)
-{
-    return set_fov(p, value, 0, "start: allowed is 0; this head sends the whole turn");
-}
-
-static int set_fov_end(const struct posted *p, const char *value)
-{
-    return set_fov(p, value, 359, "end: allowed is 359; this head sends the whole turn");
+    if (deg == whole) return 200;
+    snprintf(p->text, VELODYNE_TEXT, "%s: allowed is %ld; this head sends the whole turn", p->key, whole);
+    return 409;
 }
 
 static int set_address(const struct posted *p, const char *value)
@@ -122,23 +116,14 @@ static int set_address(const struct posted *p, const char *value)
     return refuse(p, 409, "addr: can't be changed here; the head's configuration sets it (links)");
 }
 
-static int set_port(const struct posted *p, const char *value, int present)
+static int set_port(const struct posted *p, const char *value)
 {
+    const long present = strcmp(p->key, "dport") == 0 ? velodyne_host_port(p->spec) : VELODYNE_POSITION_PORT;
     long port;
     if (!read_number(value, &port) || port < 1 || port > 65535)
         return refuse(p, 400, "dport, tport: allowed are 1 to 65535");
     if (port == present) return 200;
     return refuse(p, 409, "dport, tport: can't be changed here; the head's configuration sets them (links)");
-}
-
-static int set_data_port(const struct posted *p, const char *value)
-{
-    return set_port(p, value, velodyne_host_port(p->spec));
-}
-
-static int set_position_port(const struct posted *p, const char *value)
-{
-    return set_port(p, value, VELODYNE_POSITION_PORT);
 }
 
 static int set_network(const struct posted *p, const char *value)
@@ -209,11 +194,11 @@ static const struct setting {
     {"/cgi/setting", "laser", set_laser},
     {"/cgi/setting", "returns", set_returns},
     {"/cgi/setting", "rpm", set_rpm},
-    {"/cgi/setting/fov", "start", set_fov_start},
-    {"/cgi/setting/fov", "end", set_fov_end},
+    {"/cgi/setting/fov", "start", set_fov},
+    {"/cgi/setting/fov", "end", set_fov},
     {"/cgi/setting/host", "addr", set_address},
-    {"/cgi/setting/host", "dport", set_data_port},
-    {"/cgi/setting/host", "tport", set_position_port},
+    {"/cgi/setting/host", "dport", set_port},
+    {"/cgi/setting/host", "tport", set_port},
     {"/cgi/setting/net", "addr", set_network},
     {"/cgi/setting/net", "mask", set_network},
     {"/cgi/setting/net", "gateway", set_network},
@@ -294,7 +279,7 @@ static int read_form(const struct posted *p, const char *path, char *form, size_
 int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text)
 {
     struct pair pairs[N_SETTINGS + 1];
-    struct posted posted = {spec, text, 0};
+    struct posted posted = {.spec = spec, .text = text};
     char copy[HTTP_MAX_BODY + 1];
     memcpy(copy, form, len);
     if (len == 0 && strcmp(path, "/cgi/save") == 0) /* a published client posts no body to it */
@@ -302,8 +287,10 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
     const int n = read_form(&posted, path, copy, len, pairs);
     int status = n < 0 ? -n : 200;
     for (; posted.apply < 2; posted.apply++)
-        for (int i = 0; i < n && status == 200; i++)
+        for (int i = 0; i < n && status == 200; i++) {
+            posted.key = pairs[i].setting->key;
             status = pairs[i].setting->set(&posted, pairs[i].value);
+        }
     return status;
 }
 

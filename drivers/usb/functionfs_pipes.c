@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Endpoints of FunctionFS. write(2) on them blocks until the host has taken the data, so they are driven by
- * the kernel's asynchronous I/O, whose completions an eventfd counts. */
+ * the kernel's asynchronous I/O, whose completions an eventfd counts. glibc has no wrappers for these calls. */
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/usb/functionfs.h>
@@ -13,17 +13,6 @@
 #include <unistd.h>
 
 #include "drivers/usb/functionfs_private.h"
-
-/* glibc has no wrappers for these. */
-static long io_setup(unsigned n, aio_context_t *aio)
-{
-    return syscall(SYS_io_setup, n, aio);
-}
-
-static long io_submit(aio_context_t aio, struct iocb *io)
-{
-    return syscall(SYS_io_submit, aio, 1L, &io);
-}
 
 static int is_in(const struct ffs_pipe *pipe)
 {
@@ -53,7 +42,7 @@ int ffs_pipes_open(struct ffs_pipes *pipes, struct usb_device *device, const str
     pipes->event_fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     if (pipes->event_fd < 0) return sh_fail(err, SH_EIO, "functionfs: eventfd: %s", strerror(errno));
     int rc = SH_OK;
-    if (io_setup(2 * FFS_SLOTS * FFS_MAX_PIPES, &pipes->aio) != 0)
+    if (syscall(SYS_io_setup, 2 * FFS_SLOTS * FFS_MAX_PIPES, &pipes->aio) != 0)
         rc = sh_fail(err, SH_EIO, "functionfs: asynchronous I/O: %s%s", strerror(errno),
                      errno == EAGAIN ? "; see /proc/sys/fs/aio-max-nr" : "");
     for (unsigned i = 0; i < gadget->part.n_interfaces && rc == SH_OK; i++)
@@ -78,7 +67,8 @@ static int submit(struct ffs_pipes *pipes, struct ffs_pipe *pipe, struct ffs_slo
                         .aio_nbytes = len,
                         .aio_flags = IOCB_FLAG_RESFD,
                         .aio_resfd = (uint32_t)pipes->event_fd};
-    if (io_submit(pipes->aio, io) != 1) return 0; /* the endpoint has gone down; it will come up again */
+    if (syscall(SYS_io_submit, pipes->aio, 1L, &io) != 1)
+        return 0; /* the endpoint has gone down; it will come up again */
     slot->n_io++;
     return 1;
 }

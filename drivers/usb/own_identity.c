@@ -9,6 +9,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "core/bytes.h"
 #include "drivers/usb/sysfile.h"
 
 static void digest_text(const char *text, size_t len, uint8_t digest[SHA256_DIGEST_SIZE])
@@ -30,8 +31,7 @@ static void put_serial(struct usb_identity *id, const char *whose, unsigned plac
     const int len = snprintf(text, sizeof text, "scanhead %s %u %.299s", machine, place, whose);
     digest_text(text, (size_t)len, digest);
     const size_t used = strnlen(id->serial, sizeof id->serial - 10);
-    snprintf(id->serial + used, sizeof id->serial - used, "-%02x%02x%02x%02x", digest[0], digest[1], digest[2],
-             digest[3]);
+    snprintf(id->serial + used, sizeof id->serial - used, "-%08x", be_get32(digest));
 }
 
 /* A socket name outside the file system: the kernel gives it to one process, and takes the name back when that process
@@ -66,8 +66,7 @@ int usb_own_identity(struct usb_identity *id, const char *whose, struct usb_clai
     char name[24];
     unsigned place;
     digest_text(whose, strlen(whose), digest);
-    snprintf(name, sizeof name, "%02x%02x%02x%02x%02x%02x%02x%02x-", digest[0], digest[1], digest[2], digest[3],
-             digest[4], digest[5], digest[6], digest[7]);
+    snprintf(name, sizeof name, "%08x%08x-", be_get32(digest), be_get32(digest + 4));
     int error = claim_lowest("", &id->number, &claims->number);
     if (error == 0) error = claim_lowest(name, &place, &claims->place);
     if (error == EADDRINUSE)

@@ -2,10 +2,10 @@
 #include "drivers/usb/vhci.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
+
+#include "drivers/usb/sysfile.h"
 
 static const char DIR_DEFAULT[] = "/sys/devices/platform/vhci_hcd.0";
 enum { PORT_FREE = 4 }; /* VDEV_ST_NULL */
@@ -40,34 +40,20 @@ static int find_port(const char *dir, enum usb_rate rate, unsigned *port, struct
     return found ? SH_OK : sh_fail(err, SH_EIO, "usbip: no free port on vhci_hcd.0; detach one (usbip detach -p N)");
 }
 
-static int write_attach(const char *dir, const char *text, struct sh_err *err)
-{
-    char path[320];
-    snprintf(path, sizeof path, "%s/attach", dir);
-    int file = open(path, O_WRONLY | O_CLOEXEC);
-    if (file < 0) return vhci_fail(dir, "attach", err);
-    const ssize_t len = (ssize_t)strlen(text);
-    int rc = write(file, text, (size_t)len) == len ? SH_OK : vhci_fail(dir, "attach", err);
-    const int error = errno;
-    close(file);
-    errno = error;
-    return rc;
-}
-
 int vhci_attach(const char *dir, int fd, uint32_t devid, enum usb_rate rate, unsigned *port, struct sh_err *err)
 {
     static const int speed[] = {
         [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
     enum { TRIES = 8 }; /* somebody else may have taken the port meanwhile */
-    char text[64];
     int rc = SH_OK;
     if (dir == NULL) dir = DIR_DEFAULT;
     for (int i = 0; i < TRIES; i++) {
         rc = find_port(dir, rate, port, err);
         if (rc != SH_OK) return rc;
-        snprintf(text, sizeof text, "%u %d %u %d", *port, fd, devid, speed[rate]);
-        rc = write_attach(dir, text, err);
-        if (rc == SH_OK || errno != EBUSY) return rc;
+        if (sysfile_write(dir, "attach", "%u %d %u %d", *port, fd, devid, speed[rate]) == 0) return SH_OK;
+        const int is_taken = errno == EBUSY;
+        rc = vhci_fail(dir, "attach", err);
+        if (!is_taken) return rc;
     }
     return rc;
 }

@@ -10,7 +10,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "drivers/protocol/nmea.h"
+#include "drivers/protocol/protocol.h"
 #include "tests/common/nmea_reader.h"
 
 static struct nmea_fix fix;
@@ -59,7 +59,7 @@ static void published_checksums(void **state)
     };
     for (size_t i = 0; i < sizeof lines / sizeof *lines; i++) {
         const char *star = strchr(lines[i], '*');
-        assert_int_equal(nmea_checksum(lines[i] + 1, (size_t)(star - lines[i] - 1)), strtol(star + 1, NULL, 16));
+        assert_int_equal(protocol_xor(lines[i] + 1, (size_t)(star - lines[i] - 1)), strtol(star + 1, NULL, 16));
     }
 }
 
