@@ -76,6 +76,34 @@ static inline double le_get_double(const void *src)
     return d;
 }
 
+/* Types of numbers, in the order that PLY and glTF give them. */
+enum number_type { NUMBER_I8, NUMBER_U8, NUMBER_I16, NUMBER_U16, NUMBER_I32, NUMBER_U32, NUMBER_FLOAT, NUMBER_DOUBLE };
+/* Bytes, by number_type. */
+static const uint8_t number_size[] = {1, 1, 2, 2, 4, 4, 4, 8};
+
+static inline double le_get_number(const uint8_t *src, enum number_type type)
+{
+    switch (type) {
+    case NUMBER_I8:
+        return (int8_t)*src;
+    case NUMBER_U8:
+        return *src;
+    case NUMBER_I16:
+        return (int16_t)le_get16(src);
+    case NUMBER_U16:
+        return le_get16(src);
+    case NUMBER_I32:
+        return (int32_t)le_get32(src);
+    case NUMBER_U32:
+        return le_get32(src);
+    case NUMBER_FLOAT:
+        return (double)le_get_float(src);
+    case NUMBER_DOUBLE:
+        break;
+    }
+    return le_get_double(src);
+}
+
 /* Stores the low 16 bits. */
 static inline void be_put16(void *dst, size_t v)
 {
