@@ -4,8 +4,6 @@
 #ifndef CORE_BVH_LEAVES_H
 #define CORE_BVH_LEAVES_H
 
-#include <string.h>
-
 #include "core/bvh/bvh_inside.h"
 #include "core/bytes.h"
 

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Finds pulses near outlines, by the cells of their directions. */
 #include <math.h>
-#include <string.h>
 
 #include "core/bytes.h"
 #include "core/footprint/outlines.h"
