@@ -7,6 +7,20 @@
 #include <stdint.h>
 #include <string.h>
 
+static inline uint32_t float_bits(float f)
+{
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    return bits;
+}
+
+static inline float bits_float(uint32_t bits)
+{
+    float f;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+
 static inline void le_put16(void *dst, uint16_t v)
 {
     v = htole16(v);
@@ -34,9 +48,7 @@ static inline void le_put_double(void *dst, double d)
 
 static inline void le_put_float(void *dst, float f)
 {
-    uint32_t v;
-    memcpy(&v, &f, sizeof v);
-    le_put32(dst, v);
+    le_put32(dst, float_bits(f));
 }
 
 static inline uint16_t le_get16(const void *src)
@@ -62,10 +74,7 @@ static inline uint64_t le_get64(const void *src)
 
 static inline float le_get_float(const void *src)
 {
-    const uint32_t v = le_get32(src);
-    float f;
-    memcpy(&f, &v, sizeof f);
-    return f;
+    return bits_float(le_get32(src));
 }
 
 static inline double le_get_double(const void *src)
@@ -74,6 +83,34 @@ static inline double le_get_double(const void *src)
     double d;
     memcpy(&d, &v, sizeof d);
     return d;
+}
+
+/* Types of numbers, in the order that PLY and glTF give them. */
+enum number_type { NUMBER_I8, NUMBER_U8, NUMBER_I16, NUMBER_U16, NUMBER_I32, NUMBER_U32, NUMBER_FLOAT, NUMBER_DOUBLE };
+/* Bytes, by number_type. */
+static const uint8_t number_size[] = {1, 1, 2, 2, 4, 4, 4, 8};
+
+static inline double le_get_number(const uint8_t *src, enum number_type type)
+{
+    switch (type) {
+    case NUMBER_I8:
+        return (int8_t)*src;
+    case NUMBER_U8:
+        return *src;
+    case NUMBER_I16:
+        return (int16_t)le_get16(src);
+    case NUMBER_U16:
+        return le_get16(src);
+    case NUMBER_I32:
+        return (int32_t)le_get32(src);
+    case NUMBER_U32:
+        return le_get32(src);
+    case NUMBER_FLOAT:
+        return (double)le_get_float(src);
+    case NUMBER_DOUBLE:
+        break;
+    }
+    return le_get_double(src);
 }
 
 /* Stores the low 16 bits. */

@@ -19,6 +19,15 @@ static inline bool resize(void *array, size_t n, size_t size)
     return true;
 }
 
+/* Returns the size of a hash table for `least` slots or more: a power of two. */
+static inline size_t grow_table(uint64_t least)
+{
+    size_t size = 64;
+    while (size < least)
+        size *= 2;
+    return size;
+}
+
 /* Makes room for `need` elements, and some to spare. *room is the number of elements that there is room for. */
 static inline bool grow(void *array, size_t *room, size_t need, size_t size)
 {

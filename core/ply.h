@@ -7,13 +7,12 @@
 #ifndef CORE_PLY_H
 #define CORE_PLY_H
 
+#include "core/bytes.h"
 #include "core/text.h"
 
 enum { PLY_MAX_ELEMENTS = 16, PLY_MAX_PROPERTIES = 512, PLY_MAX_TEXTURES = 256 };
 
 enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
-
-enum ply_type { PLY_INT8, PLY_UINT8, PLY_INT16, PLY_UINT16, PLY_INT32, PLY_UINT32, PLY_FLOAT, PLY_DOUBLE };
 
 /* The use of a property. */
 enum ply_use {
@@ -41,7 +40,7 @@ enum ply_use {
 };
 
 struct ply_property {
-    enum ply_type type, count_type;
+    enum number_type type, count_type;
     bool is_list;
     enum ply_use use;
 };
@@ -72,7 +71,6 @@ struct ply_list {
     size_t n, cap;
 };
 
-extern const uint8_t ply_type_size[8];                 /* bytes, by ply_type */
 extern const char *const ply_scalar_name[PLY_SCALARS]; /* in the file, by ply_use from PLY_X on */
 
 /* Called by ply_open alone. Leaves t at the first byte of data. Fails where vertices lack x, y or z; faces may lack

@@ -141,20 +141,14 @@ static void cast_further(struct bvh_work *w, const struct bvh *bvh, const struct
 {
     const struct bvh_rays *rays = batch->rays;
     const double dir[3] = VEC3_AT(rays->dir, i);
-    struct bvh_rays one = {.n = 1,
-                           .from = rays->from,
-                           .dir = VEC3_IN(rays->dir, i),
-                           .scattered = 1,
-                           .range_m = rays->range_m + i,
-                           .triangle = rays->triangle + i};
+    struct bvh_rays one = bvh_rays_chunk(rays, i);
     float at[3];
     double o[3], start_m = batch->start_m != NULL ? batch->start_m[i] : 0.0;
     struct bvh_batch next = *batch;
     bvh_origin_of(&batch->local, i, o);
-    if (rays->from.own.x != NULL) {
-        one.from.own = VEC3_IN(rays->from.own, i);
-        next.local.own = VEC3_IN(batch->local.own, i);
-    }
+    if (rays->from.own.x != NULL) next.local.own = VEC3_IN(batch->local.own, i);
+    one.n = 1;
+    one.scattered = 1;
     next.rays = &one;
     next.dir = (struct vec3_floats){batch->dir.x + i, batch->dir.y + i, batch->dir.z + i};
     next.org = (struct vec3_floats){&at[0], &at[1], &at[2]};
@@ -174,14 +168,14 @@ static void cast_chunk(struct bvh_work *w, const struct bvh *bvh, const struct b
                               .dir = bvh_work_directions(w),
                               .t_max = (float)(in_stretches ? bvh->stretch_m : rays->range_max_m * 1.001),
                               .most_m = in_stretches ? bvh->stretch_m : INFINITY};
-    bvh_to_float(&rays->dir, rays->n, w->dir.x, w->dir.y, w->dir.z);
+    bvh_work_set_directions(w, &rays->dir, rays->n);
     set_origins(w, bvh, rays, &batch);
     bvh_stage_ends(w->profile, BVH_STAGE_PREPARE);
     bvh_intersect(bvh, &w->query, &batch);
     for (uint32_t i = 0; in_stretches && i < rays->n; i++)
         if (rays->triangle[i] == BVH_NO_TRIANGLE) cast_further(w, bvh, &batch, i);
     bvh_stage_ends(w->profile, BVH_STAGE_EMBREE);
-    if (rays->label != NULL || rays->steep != NULL) bvh_refine(bvh, rays);
+    bvh_refine(bvh, rays);
     bvh_stage_ends(w->profile, BVH_STAGE_REFINE);
 }
 

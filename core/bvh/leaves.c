@@ -40,7 +40,7 @@ static float above(double x)
 /* Returns the length, rounded up, in the bits that bvh_leaf_size_m reads. */
 static uint32_t length_bits(double length_m)
 {
-    return (bvh_float_bits(above(length_m)) + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
+    return (float_bits(above(length_m)) + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
 }
 
 /* Sets v to the corners, counted from the BVH's origin. Returns how far triangle 1 follows triangle 0 in the scene's
@@ -62,8 +62,7 @@ static void set_base(struct bvh_leaf *leaf, const double corner0_m[3], uint32_t 
 {
     const uint32_t mask = (1U << BVH_LEAF_BITS) - 1;
     for (int j = 0; j < 3; j++)
-        leaf->base_m[j] =
-            bvh_bits_float((bvh_float_bits((float)corner0_m[j]) & ~mask) | (rest >> j * BVH_LEAF_BITS & mask));
+        leaf->base_m[j] = bits_float((float_bits((float)corner0_m[j]) & ~mask) | (rest >> j * BVH_LEAF_BITS & mask));
 }
 
 /* Setting the base's lowest bits moves it by up to 2^-17 of its distance. The size includes that. */

@@ -4,9 +4,8 @@
 #ifndef CORE_BVH_LEAVES_H
 #define CORE_BVH_LEAVES_H
 
-#include <string.h>
-
 #include "core/bvh/bvh_inside.h"
+#include "core/bytes.h"
 
 /* Triangle 0 has the corners 0, 1, 2, and triangle 1 the corners 1, 3, 2. A leaf of one triangle has corner 0 in place
  * of corner 3.
@@ -32,28 +31,16 @@ enum {
     BVH_LEAF_AHEAD = 1 << BVH_LEAF_AHEAD_BITS,
     BVH_LENGTH_BITS = 17, /* a length is a float without its sign and this many lowest bits, rounded up */
 };
-static inline uint32_t bvh_float_bits(float f)
-{
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    return bits;
-}
-static inline float bvh_bits_float(uint32_t bits)
-{
-    float f;
-    memcpy(&f, &bits, sizeof f);
-    return f;
-}
 static inline uint32_t bvh_leaf_rest(const struct bvh_leaf *leaf)
 {
     const uint32_t mask = (1U << BVH_LEAF_BITS) - 1;
-    return (bvh_float_bits(leaf->base_m[0]) & mask) | (bvh_float_bits(leaf->base_m[1]) & mask) << BVH_LEAF_BITS |
-           (bvh_float_bits(leaf->base_m[2]) & mask) << 2 * BVH_LEAF_BITS;
+    return (float_bits(leaf->base_m[0]) & mask) | (float_bits(leaf->base_m[1]) & mask) << BVH_LEAF_BITS |
+           (float_bits(leaf->base_m[2]) & mask) << 2 * BVH_LEAF_BITS;
 }
 /* Returns an upper bound of the edges' lengths, and of the corners' distances from base_m. */
 static inline float bvh_leaf_size_m(uint32_t rest)
 {
-    return bvh_bits_float(rest >> BVH_LEAF_AHEAD_BITS << BVH_LENGTH_BITS);
+    return bits_float(rest >> BVH_LEAF_AHEAD_BITS << BVH_LENGTH_BITS);
 }
 static inline uint32_t bvh_leaf_ahead(uint32_t rest)
 {

@@ -4,7 +4,6 @@
 #include "core/bvh/meet.h"
 
 #include "core/bvh/nearest.h"
-#include "core/vec3.h"
 
 /* Packets here have up to eight rays; those of 16 are in meet_wide.c. */
 enum { LANES = 8 };

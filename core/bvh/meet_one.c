@@ -6,7 +6,6 @@
 #include "core/bvh/edges.h"
 #include "core/bvh/meet.h"
 #include "core/bvh/nearest.h"
-#include "core/bvh/packet.h"
 #include "core/vec3.h"
 
 /* Sets v to the corners, from the ray's origin. */

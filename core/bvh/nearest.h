@@ -4,18 +4,14 @@
 #define CORE_BVH_NEAREST_H
 
 #include "core/bvh/packet.h"
+#include "core/bytes.h"
 #include "core/vecmath.h"
 
 /* The next float above a number that is not negative. */
 VEC_INLINE float float_above(double x)
 {
     const float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    bits += (double)f <= x;
-    float above;
-    memcpy(&above, &bits, sizeof above);
-    return above;
+    return bits_float(float_bits(f) + ((double)f <= x));
 }
 
 /* Ties have to be found, too. So tfar lies beyond the nearest hit and all that count as equally near. */

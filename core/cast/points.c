@@ -2,7 +2,6 @@
 /* Echoes -> points, as entries of the block. Single rays and pulses of several echoes share this one writer. */
 #include "core/cast/points.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "core/cast/aim.h"

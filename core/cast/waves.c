@@ -12,6 +12,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/cast/caster.h"
 #include "core/cast/kernels_points.h"
 #include "core/cast/tripod.h"
@@ -214,14 +215,6 @@ static void keep_windows(struct caster *c, const struct chunk *k, uint32_t pulse
 
 /* ---- the beams of windows */
 
-static uint32_t float_bits(double x)
-{
-    const float f = (float)x;
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    return bits;
-}
-
 enum { BEAMS = 128 }; /* windows at a time */
 
 /* Computes directions in a CRS that is no rotation of the scene, from two positions a metre apart. */
@@ -242,9 +235,9 @@ static void bend_beams(const struct caster *c, const struct chunk *k, struct lin
     }
     georef_forward(s->georef, 2 * n, (struct vec3_in){at[0], at[1], at[2]}, (struct vec3_out){at[0], at[1], at[2]});
     for (uint32_t i = 0; i < n; i++) {
-        wave[i].a = float_bits(at[0][n + i] - at[0][i]);
-        wave[i].b = float_bits(at[1][n + i] - at[1][i]);
-        wave[i].c = float_bits(at[2][n + i] - at[2][i]);
+        wave[i].a = float_bits((float)(at[0][n + i] - at[0][i]));
+        wave[i].b = float_bits((float)(at[1][n + i] - at[1][i]));
+        wave[i].c = float_bits((float)(at[2][n + i] - at[2][i]));
     }
 }
 
@@ -264,9 +257,9 @@ static void set_beams(const struct caster *c, const struct chunk *k, uint32_t fi
         struct line_wave *wave = &waves->wave[i];
         const uint32_t pulse = wave->pulse - k->first;
         if (s->layout == LINE_GEO) {
-            wave->a = float_bits(l->e.x[pulse]);
-            wave->b = float_bits(l->e.y[pulse]);
-            wave->c = float_bits(l->e.z[pulse]);
+            wave->a = float_bits((float)l->e.x[pulse]);
+            wave->b = float_bits((float)l->e.y[pulse]);
+            wave->c = float_bits((float)l->e.z[pulse]);
         } else {
             wave->b = instrument_encoder_count(l->mirror_turn[pulse], s->mirror_counts);
             wave->c = instrument_encoder_count(l->pan_turn[pulse], s->pan_counts);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Finds pulses near outlines, by the cells of their directions. */
 #include <math.h>
-#include <string.h>
 
+#include "core/bytes.h"
 #include "core/footprint/outlines.h"
 #include "core/vecmath.h"
 
@@ -16,13 +16,10 @@ static float longest_step2(const struct vec3_floats *dir, uint32_t n)
     uint32_t most = 0;
     for (uint32_t i = 0; i + 1 < n; i++) {
         float x = dx[i + 1] - dx[i], y = dy[i + 1] - dy[i], z = dz[i + 1] - dz[i], step2 = x * x + y * y + z * z;
-        uint32_t bits; /* they have the order of the floats, since none is negative */
-        memcpy(&bits, &step2, sizeof bits);
+        const uint32_t bits = float_bits(step2); /* they have the order of the floats, since none is negative */
         most = bits > most ? bits : most;
     }
-    float longest;
-    memcpy(&longest, &most, sizeof longest);
-    return longest;
+    return bits_float(most);
 }
 
 VEC_CLONES

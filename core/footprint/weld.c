@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "core/footprint/outlines.h"
+#include "core/grow.h"
 #include "core/rng.h"
 #include "core/vec3.h"
 
@@ -29,14 +30,6 @@ struct weld {
     uint16_t *of; /* of a slot: kind of its first triangle that is not seen edge-on; NULL: not asked for */
     uint64_t mask;
 };
-
-static uint64_t power_of_two(uint64_t least)
-{
-    uint64_t n = 64;
-    while (n < least)
-        n *= 2;
-    return n;
-}
 
 static uint64_t find_edge(struct weld *w, uint32_t low, uint32_t high)
 {
@@ -113,7 +106,7 @@ int outline_find(const struct beam_outlines_spec *spec, struct beam_outlines *o,
     const struct scene *scene = spec->scene;
     const uint16_t *kind = spec->kind;
     struct weld w = {.scene = scene, .station_m = spec->station_m, .report = spec->report, .kind = kind};
-    uint64_t size = power_of_two(4 * (uint64_t)scene->n_triangles);
+    const size_t size = grow_table(4 * (uint64_t)scene->n_triangles);
     w.mask = size - 1;
     w.slot = malloc(size * sizeof *w.slot);
     w.sides = calloc(size, 1);

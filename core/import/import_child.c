@@ -28,17 +28,12 @@ _Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written i
 static int note_fd; /* the pipe, before and after it is moved to its place */
 
 /* Only the pipe reports errors. Where a write to it fails, the exit status still shows that reading failed. */
-static void send_note(const struct import_note *note)
-{
-    while (write(note_fd, note, sizeof *note) < 0 && errno == EINTR)
-        continue;
-}
-
 static void send_text(int kind, int code, double fraction, const char *text)
 {
     struct import_note note = {.kind = kind, .code = code, .fraction = fraction};
     snprintf(note.text, sizeof note.text, "%s", text);
-    send_note(&note);
+    while (write(note_fd, &note, sizeof note) < 0 && errno == EINTR)
+        continue;
 }
 
 static void send_warning(void *ctx, const char *text)

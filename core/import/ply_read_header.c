@@ -3,8 +3,6 @@
 
 #include <string.h>
 
-const uint8_t ply_type_size[8] = {1, 1, 2, 2, 4, 4, 4, 8};
-
 static int ply_read_header_fail(const struct text *t, struct sh_err *err, const char *what, struct text_span word)
 {
     return text_fail(t, t->line, SH_EINPUT, err, "%s '%.*s'", what, word.n < 40 ? (int)word.n : 40, word.p);
@@ -45,13 +43,13 @@ static int read_element(struct ply_header *h, struct text *t, struct sh_err *err
     return SH_OK;
 }
 
-static int read_type(struct text *t, enum ply_type *type, struct text_span word, struct sh_err *err)
+static int read_type(struct text *t, enum number_type *type, struct text_span word, struct sh_err *err)
 {
     static const char *const names[] = {"char", "uchar", "short", "ushort", "int",   "uint",   "float",   "double",
                                         "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"};
     for (unsigned i = 0; i < 16; i++) {
         if (!text_is(word, names[i])) continue;
-        *type = (enum ply_type)(i % 8);
+        *type = (enum number_type)(i % 8);
         return SH_OK;
     }
     return ply_read_header_fail(t, err, "unknown property type", word);
@@ -143,7 +141,7 @@ static int read_property(struct ply_header *h, struct text *t, struct sh_err *er
     if (p->is_list) {
         word = text_word(t);
         rc = read_type(t, &p->count_type, word, err);
-        if (rc == SH_OK && (p->count_type == PLY_FLOAT || p->count_type == PLY_DOUBLE))
+        if (rc == SH_OK && (p->count_type == NUMBER_FLOAT || p->count_type == NUMBER_DOUBLE))
             return ply_read_header_fail(t, err, "a list's count can't be of type", word);
         word = text_word(t);
     }

@@ -37,48 +37,24 @@ int ply_fail(const struct ply_rows *r, struct sh_err *err, const char *what)
                      (unsigned long long)r->row + 1, (unsigned long long)r->element->count, place, what);
 }
 
-static double load_binary(const unsigned char *p, enum ply_type type, bool big)
+static double load_binary(const uint8_t *p, enum number_type type, bool big)
 {
-    uint64_t bits = 0;
-    unsigned size = ply_type_size[type];
-    if (size == 8 && !big) /* the common case: read at once, in the machine's own order, which is little-endian */
-        memcpy(&bits, p, 8);
-    else
-        for (unsigned i = 0; i < size; i++)
-            bits = bits << 8 | p[big ? i : size - 1 - i];
-    switch (type) {
-    case PLY_INT8:
-        return (int8_t)bits;
-    case PLY_INT16:
-        return (int16_t)bits;
-    case PLY_INT32:
-        return (int32_t)bits;
-    case PLY_FLOAT: {
-        uint32_t low = (uint32_t)bits;
-        float f;
-        memcpy(&f, &low, sizeof f);
-        return (double)f;
-    }
-    case PLY_DOUBLE: {
-        double d;
-        memcpy(&d, &bits, sizeof d);
-        return d;
-    }
-    default:
-        return (double)bits;
-    }
+    uint8_t turned[8];
+    for (unsigned i = 0, size = number_size[type]; big && i < size; i++)
+        turned[i] = p[size - 1 - i];
+    return le_get_number(big ? turned : p, type);
 }
 
-static int read_scalar(struct ply_rows *r, enum ply_type type, double *value, struct sh_err *err)
+static int read_scalar(struct ply_rows *r, enum number_type type, double *value, struct sh_err *err)
 {
     if (r->h.format == PLY_ASCII) {
         text_skip_blanks(&r->t);
         if (text_number(&r->t, value)) return SH_OK;
         return ply_fail(r, err, text_at_line_end(&r->t) ? "a value is missing" : "a value is not a number");
     }
-    if ((size_t)(r->t.end - r->t.p) < ply_type_size[type]) return ply_fail(r, err, "the file ends in it");
-    *value = load_binary((const unsigned char *)r->t.p, type, r->h.format == PLY_BIG);
-    r->t.p += ply_type_size[type];
+    if ((size_t)(r->t.end - r->t.p) < number_size[type]) return ply_fail(r, err, "the file ends in it");
+    *value = load_binary((const uint8_t *)r->t.p, type, r->h.format == PLY_BIG);
+    r->t.p += number_size[type];
     return SH_OK;
 }
 
@@ -139,8 +115,8 @@ static int ply_read_rows_begin(struct ply_rows *r, int i, struct sh_err *err)
     uint64_t least = 0; /* bytes of a row; in a text, a digit and a separator for each value */
     for (int k = e->first; k < e->first + e->n_properties; k++) {
         const struct ply_property *p = &r->h.property[k];
-        least += ascii ? 2 : ply_type_size[p->is_list ? p->count_type : p->type];
-        r->is_single |= !ascii && p->use >= PLY_X && p->use <= PLY_Z && p->type == PLY_FLOAT;
+        least += ascii ? 2 : number_size[p->is_list ? p->count_type : p->type];
+        r->is_single |= !ascii && p->use >= PLY_X && p->use <= PLY_Z && p->type == NUMBER_FLOAT;
     }
     uint64_t rest = (uint64_t)(r->t.end - r->t.p) + ascii; /* the last line may lack its end */
     if (e->count == 0 || e->count <= rest / least) return SH_OK;

@@ -27,7 +27,7 @@ static bool has_rgb(const struct ply *y, enum ply_kind kind)
 /* The factor that brings colours of this type to 0..255. 0: the type is floating, which leaves the factor open. */
 static double scale_of(const struct ply_property *p)
 {
-    return p->type == PLY_FLOAT || p->type == PLY_DOUBLE ? 0.0 : p->type == PLY_UINT16 ? 255.0 / 65535.0 : 1.0;
+    return p->type == NUMBER_FLOAT || p->type == NUMBER_DOUBLE ? 0.0 : p->type == NUMBER_U16 ? 255.0 / 65535.0 : 1.0;
 }
 
 /* ---- textures */

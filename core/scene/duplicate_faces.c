@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/rng.h"
 #include "core/scene.h"
 
@@ -42,9 +43,7 @@ static int same_holes(const struct scene *scene, uint32_t a, uint32_t b)
 int scene_find_duplicate_faces(const struct scene *scene, const struct sh_report *report, uint64_t **duplicate,
                                struct sh_err *err)
 {
-    uint64_t size = 16;
-    while (size < 2 * (uint64_t)scene->n_triangles)
-        size *= 2;
+    const uint64_t size = grow_table(2 * (uint64_t)scene->n_triangles);
     uint32_t *table = malloc(size * sizeof *table);
     *duplicate = calloc((size_t)scene->n_triangles / 64 + 1, sizeof **duplicate);
     int rc = SH_OK;

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "core/body.h"
+#include "core/grow.h"
 #include "core/rng.h"
 #include "core/vec3.h"
 
@@ -89,9 +90,7 @@ static struct edge *find_edge(struct work *w, uint32_t low, uint32_t high)
 
 static int make_table(struct work *w, uint32_t n_triangles)
 {
-    uint64_t size = 64;
-    while (size < 4 * (uint64_t)n_triangles)
-        size *= 2;
+    const uint64_t size = grow_table(4 * (uint64_t)n_triangles);
     if (size > w->room) {
         free(w->edge);
         w->edge = malloc(size * sizeof *w->edge);

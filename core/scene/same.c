@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/rng.h"
 #include "core/scene.h"
 
@@ -10,9 +11,7 @@ enum { NONE = 0xffffffff };
 
 int scene_find_same(const struct scene *scene, const struct sh_report *report, uint32_t **same, struct sh_err *err)
 {
-    uint64_t size = 64;
-    while (size < 2 * (uint64_t)scene->n_vertices)
-        size *= 2;
+    const uint64_t size = grow_table(2 * (uint64_t)scene->n_vertices);
     uint32_t *table = malloc(size * sizeof *table);
     *same = malloc(((size_t)scene->n_vertices + 1) * sizeof **same);
     int rc = table != NULL && *same != NULL

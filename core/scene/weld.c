@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/grow.h"
 #include "core/huge_pages.h"
 #include "core/rng.h"
 #include "core/scene/build.h"
@@ -52,13 +53,10 @@ static int make_table(struct scene_build *b, struct build_weld *w, size_t size, 
  * most a third of the table is in use. */
 int build_weld_begin(struct scene_build *b, struct build_weld *w, uint64_t vertices, struct sh_err *err)
 {
-    size_t size = 64;
-    while (size < vertices / 2)
-        size *= 2;
     w->number = malloc((size_t)vertices * sizeof *w->number);
     if (w->number == NULL)
         return build_fail(b, SH_ENOMEM, err, "no memory for %llu vertices", (unsigned long long)vertices);
-    return make_table(b, w, size, err);
+    return make_table(b, w, grow_table(vertices / 2), err);
 }
 
 /* Returns the number of the scene's last vertex. Where one was at the same place before, the last one is removed. */
@@ -104,9 +102,7 @@ int build_weld_flush(struct scene_build *b, struct build_weld *w, struct sh_err 
     enum { NEAR = 8, FAR = 16 };
     const uint32_t n = w->waiting, first = b->scene->n_vertices - n;
     uint64_t key[BUILD_TOGETHER];
-    size_t size = w->size;
-    while (2 * (w->used + n) > size) /* it is at most half full, so that a free slot is near */
-        size *= 2;
+    const size_t size = grow_table(2 * (w->used + n)); /* at most half full, so that a free slot is near */
     int rc = size > w->size ? make_table(b, w, size, err) : SH_OK;
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < n; i++)

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* This file has the samples of one pulse: how far its returns reach, which part of that is kept, and which counts
  * the digitiser makes of it. */
-#include <math.h>
 #include <string.h>
 
 #include "core/rng.h"

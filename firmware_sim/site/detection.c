@@ -204,11 +204,9 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
                                    .ambiguity = cfg->head.ambiguity,
                                    .zones = cfg->head.mta_zones};
     if (cfg->signal.on || cfg->n_surfaces > 0) rc = set_up_surfaces(site, report, err);
-    if (rc == SH_OK && cfg->signal.on) rc = set_up_signals(site, err);
     if (rc != SH_OK) return rc;
     d->cast.depth = d->surfaces.has_optics ? cfg->optics.depth : 0;
     d->cast.surfaces = cfg->signal.on || d->cast.depth > 0 ? &d->surfaces : NULL;
-    d->cast.signal = signal_in_use(cfg, d);
     d->cast.ghost_label = site->n_surfaces;
     if (d->cast.surfaces != NULL && casts_footprints(site)) {
         d->kind = calloc(d->surfaces.n + 1, sizeof *d->kind);
@@ -216,9 +214,7 @@ int site_set_up_detect(struct site *site, const struct sh_report *report, struct
                              : surface_kinds(&d->surfaces, d->kind, err);
     }
     if (rc == SH_OK && d->cast.depth > 0 && d->surfaces.has_mirror) rc = name_ghosts(site, err);
-    set_up_noise(cfg, d);
-    site_set_depth(site, d->cast.depth);
-    return rc;
+    return rc == SH_OK ? site_vary_detect(site, err) : rc;
 }
 
 void site_set_depth(struct site *site, uint32_t depth)

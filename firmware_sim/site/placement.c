@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
 #include "core/angle.h"
 #include "core/cast.h"
@@ -11,6 +10,7 @@
 #include "core/ifc_site.h"
 #include "core/locate.h"
 #include "core/mat3.h"
+#include "core/text.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/site/steps.h"
@@ -26,19 +26,13 @@ double placement_apart_m(const struct georef_place *a, const struct georef_place
     return hypot(hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
 }
 
-static int is_ifc(const struct config_mesh *mesh)
-{
-    size_t len = strlen(mesh->file);
-    return len > 4 && strcasecmp(mesh->file + len - 4, ".ifc") == 0;
-}
-
 /* Finds the one IFC mesh. The mesh's coordinate frame must be the scene's except for a shift. */
 static int find_ifc(const struct config *cfg, const struct config_mesh **out, struct sh_err *err)
 {
     *out = NULL;
     for (uint32_t i = 0; i < cfg->scene.n_meshes; i++) {
         const struct config_mesh *mesh = &cfg->scene.mesh[i];
-        if (!is_ifc(mesh)) continue;
+        if (!text_has_ending(mesh->file, ".ifc")) continue;
         if (*out != NULL)
             return sh_fail(err, SH_EINPUT, "%s: scene.anchor: source ifc, but there are two IFC meshes; allowed one",
                            cfg->file);

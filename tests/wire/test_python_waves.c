@@ -37,13 +37,6 @@ static float some_float(void)
     return (float)(int32_t)random_u32() * 1e-9F;
 }
 
-static uint32_t float_bits(float f)
-{
-    uint32_t bits;
-    memcpy(&bits, &f, sizeof bits);
-    return bits;
-}
-
 static void add_window(struct line_waves *waves, uint32_t pulse, int geo)
 {
     struct line_wave *w = &waves->wave[waves->n++];

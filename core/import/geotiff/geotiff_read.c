@@ -8,6 +8,7 @@
 #include <tiffio.h>
 #include <unistd.h>
 
+#include "core/bytes.h"
 #include "core/geotiff.h"
 #include "core/late.h"
 #include "core/scene/build_surfaces.h"
@@ -209,26 +210,15 @@ static int set_up_blocks(struct raster *r, struct sh_err *err)
 
 /* ---- cells */
 
-#define LOAD(type)               \
-    do {                         \
-        type v;                  \
-        memcpy(&v, p, sizeof v); \
-        return (double)v;        \
-    } while (0)
-
+/* libtiff gives cells in the machine's own order, which is little-endian. */
 static double geotiff_read_load(const struct raster *r, const uint8_t *p)
 {
     const int is_signed = r->format == SAMPLEFORMAT_INT;
-    if (r->format == SAMPLEFORMAT_IEEEFP && r->bits == 32) LOAD(float);
-    if (r->format == SAMPLEFORMAT_IEEEFP) LOAD(double);
-    if (r->bits == 8 && is_signed) LOAD(int8_t);
-    if (r->bits == 8) LOAD(uint8_t);
-    if (r->bits == 16 && is_signed) LOAD(int16_t);
-    if (r->bits == 16) LOAD(uint16_t);
-    if (r->bits == 32 && is_signed) LOAD(int32_t);
-    if (r->bits == 32) LOAD(uint32_t);
-    if (is_signed) LOAD(int64_t);
-    LOAD(uint64_t);
+    if (r->format == SAMPLEFORMAT_IEEEFP) return le_get_number(p, r->bits == 32 ? NUMBER_FLOAT : NUMBER_DOUBLE);
+    if (r->bits == 8) return le_get_number(p, is_signed ? NUMBER_I8 : NUMBER_U8);
+    if (r->bits == 16) return le_get_number(p, is_signed ? NUMBER_I16 : NUMBER_U16);
+    if (r->bits == 32) return le_get_number(p, is_signed ? NUMBER_I32 : NUMBER_U32);
+    return is_signed ? (double)(int64_t)le_get64(p) : (double)le_get64(p);
 }
 
 static double height_of(const struct raster *r, const uint8_t *p)

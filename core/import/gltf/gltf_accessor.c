@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/import/gltf/gltf.h"
 #include "core/import/gltf/gltf_at.h"
 #include "core/import/gltf/gltf_extensions.h"
@@ -31,10 +32,8 @@ static uint32_t components_of(const char *type)
 /* 0: there is no such component. */
 static uint32_t size_of(uint64_t component)
 {
-    return component == GLTF_I8 || component == GLTF_U8     ? 1
-           : component == GLTF_I16 || component == GLTF_U16 ? 2
-           : component == GLTF_U32 || component == GLTF_F32 ? 4
-                                                            : 0;
+    const uint64_t type = component - GLTF_I8;
+    return type <= NUMBER_FLOAT && type != NUMBER_I32 ? number_size[type] : 0;
 }
 
 /* ---- buffer views */
@@ -189,44 +188,19 @@ int gltf_view_open(struct gltf *g, uint32_t accessor, const char *type, struct g
     return open_accessor(g, accessor, object, out);
 }
 
+/* Largest whole numbers, by number_type. */
+static const double most[] = {127.0, 255.0, 32767.0, 65535.0, 0.0, 4294967295.0};
+
 double gltf_value(const struct gltf_view *v, uint32_t i, uint32_t k)
 {
-    int8_t i8;
-    int16_t i16;
-    uint16_t u16;
-    uint32_t u32;
-    float f32;
     if (v->data == NULL) return 0.0;
-    const uint8_t *p = v->data + i * v->stride + (size_t)k * size_of(v->component);
-    switch (v->component) {
-    case GLTF_I8:
-        memcpy(&i8, p, sizeof i8);
-        return v->is_normalized ? fmax(i8 / 127.0, -1.0) : i8;
-    case GLTF_U8:
-        return v->is_normalized ? *p / 255.0 : *p;
-    case GLTF_I16:
-        memcpy(&i16, p, sizeof i16);
-        return v->is_normalized ? fmax(i16 / 32767.0, -1.0) : i16;
-    case GLTF_U16:
-        memcpy(&u16, p, sizeof u16);
-        return v->is_normalized ? u16 / 65535.0 : u16;
-    case GLTF_U32:
-        memcpy(&u32, p, sizeof u32);
-        return v->is_normalized ? u32 / 4294967295.0 : u32;
-    case GLTF_F32:
-        memcpy(&f32, p, sizeof f32);
-        return (double)f32;
-    }
-    return 0.0;
+    const enum number_type type = (enum number_type)(v->component - GLTF_I8);
+    const double value = le_get_number(v->data + i * v->stride + (size_t)k * number_size[type], type);
+    return v->is_normalized && type != NUMBER_FLOAT ? fmax(value / most[type], -1.0) : value;
 }
 
 double gltf_step(const struct gltf_view *v)
 {
     if (v->component == GLTF_F32) return 0.0;
-    if (!v->is_normalized) return 1.0;
-    return v->component == GLTF_I8    ? 1.0 / 127.0
-           : v->component == GLTF_U8  ? 1.0 / 255.0
-           : v->component == GLTF_I16 ? 1.0 / 32767.0
-           : v->component == GLTF_U16 ? 1.0 / 65535.0
-                                      : 1.0 / 4294967295.0;
+    return v->is_normalized ? 1.0 / most[v->component - GLTF_I8] : 1.0;
 }

@@ -3,7 +3,6 @@
  * apply it to figures that they take from the records, such as those of an anchor. */
 #include "core/import/ifc/ifc_unit.h"
 
-#include <math.h>
 #include <string.h>
 
 enum { PROJECT_UNITS = 8, PROJECT_ARGS = 9, SI_ARGS = 4 };

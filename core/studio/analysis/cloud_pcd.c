@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* PCD 0.7 of the Point Cloud Library: as text, binary, and binary_compressed. In the last one the bytes are packed by
  * LZF, and one field of all points comes before the next field. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -93,7 +93,7 @@ static bool has_colours(const struct ply_header *h, const struct ply_element *e)
 {
     for (int use = PLY_RED; use <= PLY_BLUE; use++) {
         const struct ply_property *p = ply_find(h, e, (enum ply_use)use);
-        if (p == NULL || p->type != PLY_UINT8) return false;
+        if (p == NULL || p->type != NUMBER_U8) return false;
     }
     return true;
 }

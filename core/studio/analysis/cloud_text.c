@@ -2,7 +2,6 @@
 /* Points from text: a line each, with numbers between blanks, commas, semicolons or tabs. Between commas or semicolons
  * a cell may be empty, or text. The first three cells are x, y and z, unless a line of names says which ones are. */
 #include <stdbool.h>
-#include <stdio.h>
 #include <string.h>
 #include <strings.h>
 

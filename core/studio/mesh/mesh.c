@@ -3,9 +3,9 @@
 
 #include <math.h>
 #include <string.h>
-#include <strings.h>
 
 #include "core/studio/mesh/inside.h"
+#include "core/text.h"
 #include "core/vec3.h"
 
 static const struct mesh_format formats[] = {
@@ -22,11 +22,8 @@ static const double FLOAT_LEAST_M = 1e-6;
 
 static const struct mesh_format *mesh_find(const char *path)
 {
-    size_t len = strlen(path);
-    for (size_t i = 0; i < N_FORMATS; i++) {
-        size_t n = strlen(formats[i].ending);
-        if (len > n && strcasecmp(path + len - n, formats[i].ending) == 0) return &formats[i];
-    }
+    for (size_t i = 0; i < N_FORMATS; i++)
+        if (text_has_ending(path, formats[i].ending)) return &formats[i];
     return NULL;
 }
 

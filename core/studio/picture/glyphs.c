@@ -101,27 +101,26 @@ static const char *const ascii[] = {
 };
 /* clang-format on */
 
+/* Characters beyond ASCII. */
+static const struct {
+    uint32_t code;
+    const char *strokes;
+} others[] = {
+    {0xb0, "o0,20 8,20 8,28 0,28"}, /* degree */
+    {0xb1, "9,8 9,22|1,15 17,15|1,2 17,2"},
+    {0xb2, "~0,25 0,29 5,29 9,29 9,24 9,21 0,14|0,14 10,14"},
+    {0xb7, "0,12 0,11"},
+    {0xd7, "2,5 16,19|2,19 16,5"},
+    {0xdf, "~0,0 0,18 0,29 7,29 13,29 13,22 13,17 7,15|~7,15 16,14 16,7 16,0 8,0 6,0 5,1"}, /* sharp s */
+    {0x2013, "0,11 16,11"},
+};
+
 const char *glyph_strokes(uint32_t code)
 {
     if (code < sizeof ascii / sizeof ascii[0]) return ascii[code];
-    switch (code) {
-    case 0xb0:
-        return "o0,20 8,20 8,28 0,28"; /* degree */
-    case 0xb1:
-        return "9,8 9,22|1,15 17,15|1,2 17,2";
-    case 0xb2:
-        return "~0,25 0,29 5,29 9,29 9,24 9,21 0,14|0,14 10,14";
-    case 0xb7:
-        return "0,12 0,11";
-    case 0xd7:
-        return "2,5 16,19|2,19 16,5";
-    case 0xdf:
-        return "~0,0 0,18 0,29 7,29 13,29 13,22 13,17 7,15|~7,15 16,14 16,7 16,0 8,0 6,0 5,1"; /* sharp s */
-    case 0x2013:
-        return "0,11 16,11";
-    default:
-        return NULL;
-    }
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+        if (others[i].code == code) return others[i].strokes;
+    return NULL;
 }
 
 uint32_t glyph_base(uint32_t code, const char **accent)
@@ -129,32 +128,15 @@ uint32_t glyph_base(uint32_t code, const char **accent)
     /* The characters from 0xc0 on: base letters, and kinds of accents. A dot: the character has no accent. */
     static const char base[] = "AAAAAA.CEEEEIIII.NOOOOO.OUUUUY..aaaaaa.ceeeeiiii.nooooo.ouuuuy.y";
     static const char kind[] = "`'^~:o.,`'^:`'^:.~`'^~:./`'^:'..`'^~:o.,`'^:`'^:.~`'^~:./`'^:'.:";
+    static const char *const accents[] = {['`'] = "-3,30 2,25",
+                                          ['\''] = "3,30 -2,25",
+                                          ['^'] = "-4,25 0,30 4,25",
+                                          ['~'] = "~-5,26 -3,30 0,28 3,25 5,29",
+                                          [':'] = "-4,27 -4,26|4,27 4,26",
+                                          ['o'] = "o-3,24 3,24 3,30 -3,30",
+                                          [','] = "_~0,0 0,-4 3,-8 -3,-7",
+                                          ['/'] = "_-9,-2 9,22"};
     if (code < 0xc0 || code >= 0xc0 + sizeof base - 1 || base[code - 0xc0] == '.') return 0;
-    switch (kind[code - 0xc0]) {
-    case '`':
-        *accent = "-3,30 2,25";
-        break;
-    case '\'':
-        *accent = "3,30 -2,25";
-        break;
-    case '^':
-        *accent = "-4,25 0,30 4,25";
-        break;
-    case '~':
-        *accent = "~-5,26 -3,30 0,28 3,25 5,29";
-        break;
-    case ':':
-        *accent = "-4,27 -4,26|4,27 4,26";
-        break;
-    case 'o':
-        *accent = "o-3,24 3,24 3,30 -3,30";
-        break;
-    case ',':
-        *accent = "_~0,0 0,-4 3,-8 -3,-7";
-        break;
-    default:
-        *accent = "_-9,-2 9,22";
-        break;
-    }
+    *accent = accents[(unsigned char)kind[code - 0xc0]];
     return (uint32_t)base[code - 0xc0];
 }
