@@ -4,12 +4,9 @@
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/command/decimal.h"
 #include "firmware_sim/command/error_queue.h"
-#include "firmware_sim/command/fault_commands.h"
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
-#include "firmware_sim/command/scan_replay.h"
 #include "firmware_sim/command/setting.h"
-#include "firmware_sim/command/time_server.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -170,10 +167,7 @@ static int do_act(struct command_call *call)
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes no parameter", row->header);
     if (row->unit != NULL && call->param[0] == '\0')
         return command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
-                            row->unit == &command_unit_fault                      ? "fault or its number"
-                            : row->unit == &command_unit_server                   ? "role, address, s, h and interface"
-                            : row->unit == &command_unit_replay                   ? "time, speed or loop"
-                            : row->own                                            ? "station and its place"
+                            row->unit->takes != NULL                              ? row->unit->takes
                             : row->setting != NULL && row->setting->words != NULL ? "word"
                                                                                   : "number");
     if (row->unit != NULL && !row->own && parse_value(call) != 0) return -1;

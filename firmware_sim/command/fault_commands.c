@@ -11,8 +11,6 @@
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
 
-const struct command_unit command_unit_fault = {"", 0, "no unit", {{NULL, 0}}};
-
 static int fail_no_faults(struct command_call *call)
 {
     return command_fail(call, CMD_E_SETTINGS, "%s: this head has no faults", call->row->header);

@@ -14,6 +14,7 @@ struct command_unit {
         const char *suffix;
         int shift; /* power of ten to the unit */
     } suffix[4];
+    const char *takes; /* the parameters, as an error lists them; NULL: a number or a word */
 };
 
 struct command_row {

@@ -10,8 +10,6 @@
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
 
-const struct command_unit command_unit_replay = {"s", 0, "no unit", {{NULL, 0}}};
-
 static const double SLOWEST = 0.01, FASTEST = 1000.0;
 static const double LONGEST_S = 1e9; /* of a recording whose length is not known */
 

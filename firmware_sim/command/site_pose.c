@@ -14,8 +14,6 @@
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/site_pose.h"
 
-const struct command_unit command_unit_place = {"m, deg", 0, "M, DEG", {{NULL, 0}}};
-
 enum { PARTS = 6 };
 
 struct part {

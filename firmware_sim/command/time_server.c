@@ -10,8 +10,6 @@
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/setting.h"
 
-const struct command_unit command_unit_server = {"s, h", 0, "no unit", {{NULL, 0}}};
-
 static const char *const roles[] = {"NONE", "CLIENT", "SERVER"}, *const interfaces[] = {"ETH", "CAN"};
 enum { LONGEST_UPDATE_S = 86400, FARTHEST_H = 12 };
 
