@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Loading a site: take_steps near its end has the steps in their order. */
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 

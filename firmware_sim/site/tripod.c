@@ -14,7 +14,6 @@
 
 #include "core/angle.h"
 #include "core/mat3.h"
-#include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 
 /* Each leg is a prism with SIDES side faces and two ends. */
