@@ -18,17 +18,13 @@ void site_get_place(const struct site *site, uint32_t station, struct site_place
 
 const char *site_why_fixed(const struct site *site)
 {
-    switch (site->cfg->platform.kind) {
-    case PLATFORM_TRAJECTORY:
-        return "the head follows a trajectory (platform.kind)";
-    case PLATFORM_LIVE:
-        return "the head is on a live platform (platform.kind)";
-    case PLATFORM_STOPS:
-        return "the stations are the platform's stops (platform.kind)";
-    case PLATFORM_STATIC:
-        break;
-    }
-    return NULL;
+    static const char *const why[] = {
+        [PLATFORM_STATIC] = NULL,
+        [PLATFORM_TRAJECTORY] = "the head follows a trajectory (platform.kind)",
+        [PLATFORM_LIVE] = "the head is on a live platform (platform.kind)",
+        [PLATFORM_STOPS] = "the stations are the platform's stops (platform.kind)",
+    };
+    return why[site->cfg->platform.kind];
 }
 
 static int move_is_same(const struct site_place *a, const struct site_place *b)
