@@ -43,10 +43,10 @@ void command_refuse(struct command_device *dev, int number, const char *text, st
     command_fail(&call, number, "%s", text);
 }
 
-static const struct command_row *find_row(const struct command_request *req)
+const struct command_row *command_find_row(const char *header, size_t len)
 {
     for (const struct command_row *row = command_rows; row->header != NULL; row++)
-        if (command_header_matches(row->header, req->header, req->header_len)) return row;
+        if (command_header_matches(row->header, header, len)) return row;
     return NULL;
 }
 
@@ -194,7 +194,7 @@ void command_execute(struct command_device *dev, uint32_t session, const char *l
         return;
     }
     if (req.header_len == 0) return;
-    call.row = find_row(&req);
+    call.row = command_find_row(req.header, req.header_len);
     call.param = req.param;
     if (call.row == NULL) {
         char clip[COMMAND_CLIP_LEN];
