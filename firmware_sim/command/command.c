@@ -22,6 +22,12 @@ int command_reply(struct command_call *call, const char *fmt, ...)
     return 0;
 }
 
+int command_accept(struct command_call *call, enum command_effect effect)
+{
+    call->out->effect = effect;
+    return command_reply(call, "OK");
+}
+
 int command_fail(struct command_call *call, int number, const char *fmt, ...)
 {
     char text[COMMAND_TEXT_LEN], entry[COMMAND_TEXT_LEN];

@@ -201,8 +201,7 @@ static int query_session(struct command_call *call)
 
 static int act_take(struct command_call *call)
 {
-    call->out->effect = COMMAND_TAKE;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_TAKE);
 }
 
 static int act_release(struct command_call *call)
@@ -220,8 +219,7 @@ static int act_event(struct command_call *call, enum command_effect effect)
     if (head_next_state(call->dev->state, event) < 0)
         return command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s%s%s", call->row->header,
                             head_state_name(call->dev->state), why != NULL ? ": " : "", why != NULL ? why : "");
-    call->out->effect = effect;
-    return command_reply(call, "OK");
+    return command_accept(call, effect);
 }
 
 static int act_start(struct command_call *call)
@@ -230,17 +228,12 @@ static int act_start(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s waits for SITE:POSE: station %u is being moved",
                             call->row->header, call->dev->moving);
     if (call->dev->recorded == NULL) return act_event(call, COMMAND_START);
-    call->out->effect = COMMAND_START; /* the recording begins anew */
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_START); /* the recording begins anew */
 }
 
 static int act_stop(struct command_call *call)
 {
-    if (call->dev->is_played) {
-        call->out->effect = COMMAND_STOP;
-        return command_reply(call, "OK");
-    }
-    return act_event(call, COMMAND_STOP);
+    return call->dev->is_played ? command_accept(call, COMMAND_STOP) : act_event(call, COMMAND_STOP);
 }
 
 static int act_reset(struct command_call *call)
@@ -272,8 +265,7 @@ static int act_store(struct command_call *call)
     dev->defaults.station = station;
     dev->defaults.frames = frames;
     dev->server_default = dev->server;
-    call->out->effect = COMMAND_STORE;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_STORE);
 }
 
 static int act_step(struct command_call *call)

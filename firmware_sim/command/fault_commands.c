@@ -60,8 +60,7 @@ int command_fault_clear(struct command_call *call)
     if (fault_commands_take_number(call, &number) != 0) return -1;
     if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0)
         return fail_no_such_fault(call, number);
-    call->out->effect = COMMAND_FAULTS;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_FAULTS);
 }
 
 int command_fault_injected(struct command_call *call)

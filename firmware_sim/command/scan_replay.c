@@ -89,6 +89,5 @@ int command_replay_change(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s needs a recording that is replayed", call->row->header);
     if (check_speed(call, to.speed) != 0) return -1;
     call->out->replay = to;
-    call->out->effect = COMMAND_REPLAY;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_REPLAY);
 }
