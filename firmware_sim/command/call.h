@@ -43,6 +43,9 @@ int command_fail(struct command_call *call, int number, const char *fmt, ...) __
 /* Returns 0. */
 int command_reply(struct command_call *call, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 
+/* Sets the effect, and replies OK. Returns 0. */
+int command_accept(struct command_call *call, enum command_effect effect);
+
 /* MIN, MAX or DEF; 0 when the parameter is none of them. */
 int command_parse_special(const char *param, enum command_value_kind *kind);
 

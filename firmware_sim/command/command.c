@@ -4,12 +4,9 @@
 #include "firmware_sim/command/command.h"
 #include "firmware_sim/command/decimal.h"
 #include "firmware_sim/command/error_queue.h"
-#include "firmware_sim/command/fault_commands.h"
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
-#include "firmware_sim/command/scan_replay.h"
 #include "firmware_sim/command/setting.h"
-#include "firmware_sim/command/time_server.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -23,6 +20,12 @@ int command_reply(struct command_call *call, const char *fmt, ...)
     vsnprintf(call->out->reply, sizeof call->out->reply, fmt, ap);
     va_end(ap);
     return 0;
+}
+
+int command_accept(struct command_call *call, enum command_effect effect)
+{
+    call->out->effect = effect;
+    return command_reply(call, "OK");
 }
 
 int command_fail(struct command_call *call, int number, const char *fmt, ...)
@@ -46,10 +49,10 @@ void command_refuse(struct command_device *dev, int number, const char *text, st
     command_fail(&call, number, "%s", text);
 }
 
-static const struct command_row *find_row(const struct command_request *req)
+const struct command_row *command_find_row(const char *header, size_t len)
 {
     for (const struct command_row *row = command_rows; row->header != NULL; row++)
-        if (command_header_matches(row->header, req->header, req->header_len)) return row;
+        if (command_header_matches(row->header, header, len)) return row;
     return NULL;
 }
 
@@ -170,10 +173,7 @@ static int do_act(struct command_call *call)
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s takes no parameter", row->header);
     if (row->unit != NULL && call->param[0] == '\0')
         return command_fail(call, CMD_E_MISSING, "%s takes a %s", row->header,
-                            row->unit == &command_unit_fault                      ? "fault or its number"
-                            : row->unit == &command_unit_server                   ? "role, address, s, h and interface"
-                            : row->unit == &command_unit_replay                   ? "time, speed or loop"
-                            : row->own                                            ? "station and its place"
+                            row->unit->takes != NULL                              ? row->unit->takes
                             : row->setting != NULL && row->setting->words != NULL ? "word"
                                                                                   : "number");
     if (row->unit != NULL && !row->own && parse_value(call) != 0) return -1;
@@ -200,7 +200,7 @@ void command_execute(struct command_device *dev, uint32_t session, const char *l
         return;
     }
     if (req.header_len == 0) return;
-    call.row = find_row(&req);
+    call.row = command_find_row(req.header, req.header_len);
     call.param = req.param;
     if (call.row == NULL) {
         char clip[COMMAND_CLIP_LEN];

@@ -23,13 +23,18 @@ enum { TURN_UDEG = 360000000 };
 #define TURN_NDEG INT64_C(360000000000)
 #define NM_PER_M  INT64_C(1000000000)
 
-static const struct command_unit unit_hz = {"Hz", 6, "HZ, KHZ or MHZ", {{"HZ", 0}, {"KHZ", 3}, {"MHZ", 6}}};
-static const struct command_unit unit_deg = {"deg", 6, "DEG", {{"DEG", 0}}};
-static const struct command_unit unit_deg_s = {"deg/s", 6, "DEG/S", {{"DEG/S", 0}}};
-static const struct command_unit unit_ns = {"ns", 0, "NS, US, MS or S", {{"NS", 0}, {"US", 3}, {"MS", 6}, {"S", 9}}};
-static const struct command_unit unit_fine_deg = {"deg", 9, "DEG", {{"DEG", 0}}};
-static const struct command_unit unit_m = {"m", 9, "M, MM or KM", {{"M", 0}, {"MM", -3}, {"KM", 3}}};
-static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}};
+static const struct command_unit unit_hz = {"Hz", 6, "HZ, KHZ or MHZ", {{"HZ", 0}, {"KHZ", 3}, {"MHZ", 6}}, NULL};
+static const struct command_unit unit_deg = {"deg", 6, "DEG", {{"DEG", 0}}, NULL};
+static const struct command_unit unit_deg_s = {"deg/s", 6, "DEG/S", {{"DEG/S", 0}}, NULL};
+static const struct command_unit unit_ns = {"ns", 0, "NS, US, MS or S",
+                                            {{"NS", 0}, {"US", 3}, {"MS", 6}, {"S", 9}}, NULL};
+static const struct command_unit unit_fine_deg = {"deg", 9, "DEG", {{"DEG", 0}}, NULL};
+static const struct command_unit unit_m = {"m", 9, "M, MM or KM", {{"M", 0}, {"MM", -3}, {"KM", 3}}, NULL};
+static const struct command_unit unit_count = {"", 0, "no unit", {{NULL, 0}}, NULL};
+static const struct command_unit unit_fault = {"", 0, "no unit", {{NULL, 0}}, "fault or its number"};
+static const struct command_unit unit_server = {"s, h", 0, "no unit", {{NULL, 0}}, "role, address, s, h and interface"};
+static const struct command_unit unit_replay = {"s", 0, "no unit", {{NULL, 0}}, "time, speed or loop"};
+static const struct command_unit unit_place = {"m, deg", 0, "M, DEG", {{NULL, 0}}, "station and its place"};
 
 enum { PRR, LINES, PAN, STATION, LINE_START, LINE_STOP, PAN_START, PAN_STOP, FRAMES, ECHOES, RANGE_MIN, RANGE_MAX,
        NOISE, ANGLE, SIGMA, BALL, PHASE, PHASE_LOCK, STEP, STEP_LINE, STEP_PAN, WAVES };
@@ -196,8 +201,7 @@ static int query_session(struct command_call *call)
 
 static int act_take(struct command_call *call)
 {
-    call->out->effect = COMMAND_TAKE;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_TAKE);
 }
 
 static int act_release(struct command_call *call)
@@ -215,8 +219,7 @@ static int act_event(struct command_call *call, enum command_effect effect)
     if (head_next_state(call->dev->state, event) < 0)
         return command_fail(call, CMD_E_SETTINGS, "%s is not possible in state %s%s%s", call->row->header,
                             head_state_name(call->dev->state), why != NULL ? ": " : "", why != NULL ? why : "");
-    call->out->effect = effect;
-    return command_reply(call, "OK");
+    return command_accept(call, effect);
 }
 
 static int act_start(struct command_call *call)
@@ -225,17 +228,12 @@ static int act_start(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s waits for SITE:POSE: station %u is being moved",
                             call->row->header, call->dev->moving);
     if (call->dev->recorded == NULL) return act_event(call, COMMAND_START);
-    call->out->effect = COMMAND_START; /* the recording begins anew */
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_START); /* the recording begins anew */
 }
 
 static int act_stop(struct command_call *call)
 {
-    if (call->dev->is_played) {
-        call->out->effect = COMMAND_STOP;
-        return command_reply(call, "OK");
-    }
-    return act_event(call, COMMAND_STOP);
+    return call->dev->is_played ? command_accept(call, COMMAND_STOP) : act_event(call, COMMAND_STOP);
 }
 
 static int act_reset(struct command_call *call)
@@ -267,8 +265,7 @@ static int act_store(struct command_call *call)
     dev->defaults.station = station;
     dev->defaults.frames = frames;
     dev->server_default = dev->server;
-    call->out->effect = COMMAND_STORE;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_STORE);
 }
 
 static int act_step(struct command_call *call)
@@ -338,11 +335,11 @@ const struct command_row command_rows[] = {
     CHANGE("SCAN:STARt", act_start, HEAD_EV_START),
     CHANGE("SCAN:STOP", act_stop, HEAD_EV_STOP),
     QUERY("SCAN:COUNt", query_count),
-    {"SCAN:REPLay", command_replay_query, command_replay_change, &command_unit_replay, NULL, 0, 0, 1, 0, 0},
-    {"SITE:POSE", command_place_query, command_place_change, &command_unit_place, NULL, 0, 0, 1, 0,
+    {"SCAN:REPLay", command_replay_query, command_replay_change, &unit_replay, NULL, 0, 0, 1, 0, 0},
+    {"SITE:POSE", command_place_query, command_place_change, &unit_place, NULL, 0, 0, 1, 0,
      HEAD_EV_START + 1},
-    {"FAULt:ADD", NULL, command_fault_add, &command_unit_fault, NULL, 0, 0, 1, 0, 0},
-    {"FAULt:CLEar", NULL, command_fault_clear, &command_unit_fault, NULL, 0, 0, 1, 0, 0},
+    {"FAULt:ADD", NULL, command_fault_add, &unit_fault, NULL, 0, 0, 1, 0, 0},
+    {"FAULt:CLEar", NULL, command_fault_clear, &unit_fault, NULL, 0, 0, 1, 0, 0},
     {"FAULt:INJected", command_fault_injected, NULL, NULL, NULL, 0, 0, 1, 0, 0},
     QUERY("FAULt:LIST", command_fault_list),
     {"HELP", command_help, NULL, NULL, NULL, 0, 0, 0, 1, 0},
@@ -354,7 +351,7 @@ const struct command_row command_rows[] = {
     {"TIME:STEP", NULL, act_step, &unit_ns, NULL, 0, 1, 0, 0, 0},
     /* Open to sessions without control, as HEAD:REBoot is. */
     {"TIME:SHIFt", command_shift_query, command_shift_change, &unit_ns, NULL, 1, 0, 0, 0, 0},
-    {"TIME:SERVer", command_server_query, command_server_change, &command_unit_server, NULL, 1, 0, 1, 0, 0},
+    {"TIME:SERVer", command_server_query, command_server_change, &unit_server, NULL, 1, 0, 1, 0, 0},
     {.header = NULL},
 };
 /* clang-format on */

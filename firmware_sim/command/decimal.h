@@ -3,7 +3,6 @@
 #ifndef FIRMWARE_SIM_COMMAND_DECIMAL_H
 #define FIRMWARE_SIM_COMMAND_DECIMAL_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "firmware_sim/command/command.h"

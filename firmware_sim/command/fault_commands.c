@@ -11,8 +11,6 @@
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
 
-const struct command_unit command_unit_fault = {"", 0, "no unit", {{NULL, 0}}};
-
 static int fail_no_faults(struct command_call *call)
 {
     return command_fail(call, CMD_E_SETTINGS, "%s: this head has no faults", call->row->header);
@@ -62,8 +60,7 @@ int command_fault_clear(struct command_call *call)
     if (fault_commands_take_number(call, &number) != 0) return -1;
     if (dev->faults->remove(dev->faults_owner, (uint32_t)number) == 0 && number != 0)
         return fail_no_such_fault(call, number);
-    call->out->effect = COMMAND_FAULTS;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_FAULTS);
 }
 
 int command_fault_injected(struct command_call *call)

@@ -4,9 +4,7 @@
 #define FIRMWARE_SIM_COMMAND_FAULT_COMMANDS_H
 
 struct command_call;
-struct command_unit;
 
-extern const struct command_unit command_unit_fault;
 int command_fault_add(struct command_call *call);
 int command_fault_clear(struct command_call *call);
 int command_fault_injected(struct command_call *call);

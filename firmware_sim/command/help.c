@@ -130,8 +130,8 @@ int command_help(struct command_call *call)
     size_t len = strlen(header);
     len -= len > 0 && header[len - 1] == '?'; /* HELP? itself lists headers with '?' */
     if (len == 0) return list_others(call);
-    for (const struct command_row *row = command_rows; row->header != NULL; row++) {
-        if (!command_header_matches(row->header, header, len)) continue;
+    const struct command_row *row = command_find_row(header, len);
+    if (row != NULL) {
         call->row = row;
         return help_describe(call);
     }

@@ -3,6 +3,8 @@
 #ifndef FIRMWARE_SIM_COMMAND_ROW_H
 #define FIRMWARE_SIM_COMMAND_ROW_H
 
+#include <stddef.h>
+
 struct command_call;
 struct command_setting;
 
@@ -14,6 +16,7 @@ struct command_unit {
         const char *suffix;
         int shift; /* power of ten to the unit */
     } suffix[4];
+    const char *takes; /* the parameters, as an error lists them; NULL: a number or a word */
 };
 
 struct command_row {
@@ -31,5 +34,7 @@ struct command_row {
 };
 
 extern const struct command_row command_rows[]; /* up to one without a header */
+/* Returns the row of a header in its short or long form; NULL: there is none. */
+const struct command_row *command_find_row(const char *header, size_t len);
 
 #endif

@@ -10,8 +10,6 @@
 #include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
 
-const struct command_unit command_unit_replay = {"s", 0, "no unit", {{NULL, 0}}};
-
 static const double SLOWEST = 0.01, FASTEST = 1000.0;
 static const double LONGEST_S = 1e9; /* of a recording whose length is not known */
 
@@ -91,6 +89,5 @@ int command_replay_change(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s needs a recording that is replayed", call->row->header);
     if (check_speed(call, to.speed) != 0) return -1;
     call->out->replay = to;
-    call->out->effect = COMMAND_REPLAY;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_REPLAY);
 }

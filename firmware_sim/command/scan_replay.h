@@ -4,9 +4,7 @@
 #define FIRMWARE_SIM_COMMAND_SCAN_REPLAY_H
 
 struct command_call;
-struct command_unit;
 
-extern const struct command_unit command_unit_replay;
 int command_replay_query(struct command_call *call);
 int command_replay_change(struct command_call *call);
 

@@ -14,8 +14,6 @@
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/site_pose.h"
 
-const struct command_unit command_unit_place = {"m, deg", 0, "M, DEG", {{NULL, 0}}};
-
 enum { PARTS = 6 };
 
 struct part {
@@ -161,8 +159,7 @@ int command_place_change(struct command_call *call)
                             head_state_name(dev->state));
     if (dev->moving != 0)
         return command_fail(call, CMD_E_SETTINGS, "%s: station %u is being moved", header, dev->moving);
-    call->out->effect = COMMAND_MOVE;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_MOVE);
 }
 
 int command_take_pose(struct command_call *call)

@@ -4,12 +4,10 @@
 #define FIRMWARE_SIM_COMMAND_SITE_POSE_H
 
 struct command_call;
-struct command_unit;
 
 /* Reads the six numbers of the text call->pose into call->out. Returns -1 when it failed. */
 int command_take_pose(struct command_call *call);
 
-extern const struct command_unit command_unit_place;
 int command_place_query(struct command_call *call);
 int command_place_change(struct command_call *call);
 

@@ -5,7 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "firmware_sim/command/parse.h"
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/setting.h"
 #include "firmware_sim/command/step.h"
@@ -60,14 +59,6 @@ struct lines {
     int n;
 };
 
-static const struct command_row *row_of(const char *line)
-{
-    const size_t len = strcspn(line, " ");
-    for (const struct command_row *row = command_rows; row->header != NULL; row++)
-        if (command_header_matches(row->header, line, len)) return row;
-    return NULL;
-}
-
 static int cut_lines(const struct command_device *dev, const char *text, struct lines *lines, char *why, size_t len)
 {
     for (size_t n; *text != '\0'; text += n + (text[n] == '\n')) {
@@ -78,7 +69,7 @@ static int cut_lines(const struct command_device *dev, const char *text, struct 
         }
         char *line = lines->line[lines->n++]; /* all zeros */
         memcpy(line, text, n);
-        const struct command_row *row = row_of(line);
+        const struct command_row *row = command_find_row(line, strcspn(line, " "));
         if (row == NULL || !is_stored(dev, row)) {
             snprintf(why, len, "'%.80s' is no setting that this head stores", line);
             return -1;

@@ -10,8 +10,6 @@
 #include "firmware_sim/command/row.h"
 #include "firmware_sim/command/setting.h"
 
-const struct command_unit command_unit_server = {"s, h", 0, "no unit", {{NULL, 0}}};
-
 static const char *const roles[] = {"NONE", "CLIENT", "SERVER"}, *const interfaces[] = {"ETH", "CAN"};
 enum { LONGEST_UPDATE_S = 86400, FARTHEST_H = 12 };
 
@@ -32,8 +30,7 @@ int command_shift_change(struct command_call *call)
     if (call->dev->recorded != NULL) return fail_recorded(call);
     if (command_value_in_range(call, -most_ns, most_ns, &shift_ns) != 0) return -1;
     call->dev->shift_ns = shift_ns;
-    call->out->effect = COMMAND_CLOCK;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_CLOCK);
 }
 
 static int reply_state(struct command_call *call)
@@ -101,6 +98,5 @@ int command_server_change(struct command_call *call)
     s.update_s = update_s;
     s.zone_h = zone_h;
     command_server_set(call->dev, &s);
-    call->out->effect = COMMAND_SERVER;
-    return command_reply(call, "OK");
+    return command_accept(call, COMMAND_SERVER);
 }

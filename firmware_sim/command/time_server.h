@@ -13,9 +13,7 @@
 #define FIRMWARE_SIM_COMMAND_TIME_SERVER_H
 
 struct command_call;
-struct command_unit;
 
-extern const struct command_unit command_unit_server;
 int command_shift_query(struct command_call *call);
 int command_shift_change(struct command_call *call);
 int command_server_query(struct command_call *call);

@@ -10,9 +10,7 @@
 #include "firmware_sim/config/table/value.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 static const double PRR_MOST_HZ = 1e7;
 

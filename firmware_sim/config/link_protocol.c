@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Checks what a link's protocol needs from the link, the stream, the head and the time. */
 #include <stdio.h>
-#include <string.h>
 
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/velodyne.h"

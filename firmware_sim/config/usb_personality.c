@@ -10,16 +10,12 @@
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"
 
+/* Protocols other than these two and native are refused (link_protocol.c). */
 static enum usb_personality_id personality_of(int protocol)
 {
-    switch (protocol) {
-    case PROTOCOL_SCIP:
-        return USB_PERSONALITY_HOKUYO;
-    case PROTOCOL_COLA:
-        return USB_PERSONALITY_SICK;
-    default: /* native; other protocols are refused (link_protocol.c) */
-        return USB_PERSONALITY_NATIVE;
-    }
+    return protocol == PROTOCOL_SCIP   ? USB_PERSONALITY_HOKUYO
+           : protocol == PROTOCOL_COLA ? USB_PERSONALITY_SICK
+                                       : USB_PERSONALITY_NATIVE;
 }
 
 void cfg_set_usb_identity(struct cfg_reader *rd, const struct config *cfg, struct link_spec *link, uint32_t item)

@@ -9,7 +9,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "core/angle.h"
 #include "firmware_sim/config/profile.h"
 #include "firmware_sim/device/beam_faults.h"
 #include "firmware_sim/device/head_faults.h"

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/rng.h"
 #include "firmware_sim/device/events.h"
@@ -17,23 +16,10 @@ static const int64_t PPT = 1000000000000, MS_NS = 1000000;
 /* Until a master is selected pmc shows these. */
 enum { CLASS_OF_NONE = 255, ACCURACY_OF_NONE = 0xfe };
 
-static const char *port_name(enum native_ptp_port port)
-{
-    switch (port) {
-    case NATIVE_PTP_INITIALIZING:
-        return "INITIALIZING";
-    case NATIVE_PTP_FAULTY:
-        return "FAULTY";
-    case NATIVE_PTP_LISTENING:
-        return "LISTENING";
-    case NATIVE_PTP_UNCALIBRATED:
-        return "UNCALIBRATED";
-    case NATIVE_PTP_SLAVE:
-        return "SLAVE";
-    default:
-        return "NONE";
-    }
-}
+static const char *const port_names[] = {
+    [NATIVE_PTP_NONE] = "NONE",           [NATIVE_PTP_INITIALIZING] = "INITIALIZING", [NATIVE_PTP_FAULTY] = "FAULTY",
+    [NATIVE_PTP_LISTENING] = "LISTENING", [NATIVE_PTP_UNCALIBRATED] = "UNCALIBRATED", [NATIVE_PTP_SLAVE] = "SLAVE",
+};
 
 void ptp_init(struct ptp *ptp, const struct config_ptp *cfg, uint64_t seed)
 {
@@ -70,7 +56,7 @@ static void set_state(struct ptp *ptp, int64_t t_ns, enum native_ptp_port port, 
     ptp->now.servo = servo;
     ptp_keep(ptp, t_ns);
     if (port != was.port)
-        len = snprintf(text, sizeof text, "%s to %s on %s", port_name(was.port), port_name(port), why);
+        len = snprintf(text, sizeof text, "%s to %s on %s", port_names[was.port], port_names[port], why);
     if (servo != was.servo)
         len += snprintf(text + len, sizeof text - (size_t)len, "%sservo s%d to s%d", len != 0 ? ", " : "",
                         (int)was.servo, (int)servo);
@@ -89,7 +75,7 @@ const struct ptp_status *ptp_at(const struct ptp *ptp, int64_t t_ns)
 void ptp_text(const struct ptp_status *status, char text[PTP_TEXT_LEN])
 {
     const uint64_t id = status->grandmaster;
-    snprintf(text, PTP_TEXT_LEN, "%s,s%d,%" PRId64 ",%" PRId64 ",%06x.%04x.%06x,%u,0x%02x,%d", port_name(status->port),
+    snprintf(text, PTP_TEXT_LEN, "%s,s%d,%" PRId64 ",%" PRId64 ",%06x.%04x.%06x,%u,0x%02x,%d", port_names[status->port],
              (int)status->servo, status->offset_ns, status->delay_ns, (unsigned)(id >> 40),
              (unsigned)(id >> 24 & 0xffff), (unsigned)(id & 0xffffff), status->clock_class, status->clock_accuracy,
              status->utc_valid);

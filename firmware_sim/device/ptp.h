@@ -33,7 +33,6 @@
 #ifndef FIRMWARE_SIM_DEVICE_PTP_H
 #define FIRMWARE_SIM_DEVICE_PTP_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "drivers/protocol/native.h"

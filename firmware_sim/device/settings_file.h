@@ -14,8 +14,6 @@
 #ifndef FIRMWARE_SIM_DEVICE_SETTINGS_FILE_H
 #define FIRMWARE_SIM_DEVICE_SETTINGS_FILE_H
 
-#include <stddef.h>
-
 #include "core/err.h"
 
 struct settings_file;

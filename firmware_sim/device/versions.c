@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The present site and earlier ones: users hold them, and unused ones are freed. Also the stations' present places. */
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "firmware_sim/config/places.h"
 #include "firmware_sim/device/variant.h"

@@ -15,67 +15,9 @@
 enum { FAULT_MAX = 32 };
 
 enum fault_kind {
-    /* on the wire: of a frame of the native protocol, or a unit of another (a datagram, a packet, a telegram) */
-    FAULT_DROP,
-    FAULT_DUPLICATE, /* n copies more */
-    FAULT_REORDER,   /* comes after up to n later ones */
-    FAULT_DELAY,     /* it comes for_ms later; none overtakes it */
-    FAULT_JITTER,    /* the same, by a random time of up to for_ms */
-    FAULT_TRUNCATE,  /* its last n bytes are missing; n = 0: a random number */
-    FAULT_FLIP,      /* n bits change, at `byte` or anywhere; reseal: its checksums are made right again */
-    FAULT_STALL,     /* nothing is written for for_ms before it */
-    FAULT_SPLIT,     /* it goes out in n writes */
-    FAULT_MERGE,     /* it and the next n - 1 go out in one write */
-    FAULT_GARBAGE,   /* n random bytes before it */
-    /* on the wire: of a reply to a client */
-    FAULT_NO_REPLY,
-    FAULT_LATE_REPLY,  /* by for_ms; frames overtake it */
-    FAULT_WRONG_REPLY, /* the reply before it comes instead */
-    FAULT_ECHO,        /* the client's line comes back before its reply */
-    /* of the link, at a frame: for all its sessions where not said otherwise */
-    FAULT_DISCONNECT,     /* the session at hand ends before the frame */
-    FAULT_UNPLUG,         /* the link is not there for for_ms */
-    FAULT_CABLE,          /* nothing comes or goes for for_ms; reset: what was connected is reset after that */
-    FAULT_USB_RESET,      /* the bus is reset */
-    FAULT_ENDPOINT_STALL, /* the endpoint of the stream is halted, until the host clears it */
-    FAULT_SHORT_PACKETS,  /* each of the next n transfers ends early, and goes on in the next */
-    /* of the link, at a connection (USB: at an enumeration) */
-    FAULT_REFUSE,            /* a client is turned away */
-    FAULT_SLOW_ENUMERATION,  /* each control request takes for_ms */
-    FAULT_DESCRIPTOR_LENGTH, /* the configuration says that it is n bytes longer than it is */
-    /* in the head: these change what is measured, or what the head says of the time and of its state */
-    FAULT_SLOW_BOOT,     /* takes for_ms longer */
-    FAULT_POWER_CYCLE,   /* everything is off for for_ms, and boots again */
-    FAULT_SELF_TEST,     /* fails at the end of boot */
-    FAULT_MIRROR_SLOW,   /* turns at `factor` of its speed */
-    FAULT_MIRROR_STUCK,  /* stands where it is */
-    FAULT_MIRROR_WOBBLE, /* swings about its even turn by deg, hz times a second; the encoder shows it */
-    FAULT_PAN_SLIP,      /* the head looks deg farther than the pan's encoder says */
-    FAULT_LASER_OFF,
-    FAULT_WINDOW_SOILED, /* loss_db on the way there and back; noise grows as the signal fades */
-    FAULT_CLOCK_JUMP,    /* the time of day, by jump_s */
-    FAULT_CLOCK_DRIFT,   /* gains ppm */
-    FAULT_CLOCK_STOP,
-    FAULT_PPS_LOST,
-    FAULT_PPS_JITTER,      /* the first pulse and every second one after it are late by for_ms */
-    FAULT_NMEA_LOST,       /* the receiver sends no sentence */
-    FAULT_NMEA_LATE,       /* by for_ms */
-    FAULT_NMEA_VOID,       /* it has no fix */
-    FAULT_NMEA_CHECKSUM,   /* its sentences have wrong checksums */
-    FAULT_PTP_LOST,        /* nothing comes from the master; the clock gains ppm meanwhile */
-    FAULT_PTP_NO_SYNC,     /* the same, but its Announce messages come */
-    FAULT_PTP_FAULTY,      /* the port is faulty; the clock gains ppm meanwhile */
-    FAULT_PTP_GRANDMASTER, /* another one is better; its time is ahead by ns */
-    FAULT_PTP_STEP,        /* the master's time is ahead by ns */
-    FAULT_PTP_ASYMMETRY,   /* the way from the master is longer than the mean by ns */
-    FAULT_PTP_JITTER,      /* of each measurement, up to ns to either side */
-    FAULT_LEAP_SECOND,     /* at the end of the minute at hand; no table has it */
-    FAULT_COUNTERS_HIGH,   /* counters begin n below their wrap at power-up */
-    /* the answer of a SICK scanner's time server is: */
-    FAULT_NTP_SILENT, /* nothing */
-    FAULT_NTP_KISS,   /* DENY */
-    FAULT_NTP_UNSYNC, /* that it is not synchronised */
-    FAULT_NTP_STEP,   /* a time that is ahead by jump_s */
+#define KIND(kind, name) kind,
+#include "firmware_sim/fault/kinds.h"
+#undef KIND
     FAULT_N_KINDS
 };
 

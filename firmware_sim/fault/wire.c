@@ -169,14 +169,6 @@ static int emit(struct wire *wire, const struct wire_making *making, int is_firs
     return rc;
 }
 
-static int emit_all(struct wire *wire, const struct wire_making *making)
-{
-    int rc = SH_OK;
-    for (uint32_t i = 0; i < making->copies && rc == SH_OK; i++)
-        rc = emit(wire, making, i == 0);
-    return rc;
-}
-
 static int is_merging(const struct wire *wire)
 {
     return wire->count[FAULT_OF_STREAM] < wire->merge_until[FAULT_OF_STREAM] ||
@@ -257,7 +249,8 @@ int wire_put(struct wire *wire, const struct wire_item *given, int64_t now_ns)
         lose(wire, &making);
         return rc;
     }
-    if (!making.is_dropped) rc = emit_all(wire, &making);
+    for (uint32_t i = 0; i < making.copies && rc == SH_OK && !making.is_dropped; i++)
+        rc = emit(wire, &making, i == 0);
     const int end = wire_finish(wire, &making);
     return rc != SH_OK ? rc : end;
 }

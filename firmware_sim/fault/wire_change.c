@@ -56,21 +56,28 @@ static int reorder(struct change *c)
     return 1;
 }
 
-static int delay(struct change *c, double ms)
+/* Moves *not_before_ns to ms after now, unless it is later already. */
+static int put_off(struct change *c, double ms, int64_t *not_before_ns)
 {
     const int64_t due_ns = c->making->now_ns + llround(ms * 1e6);
-    if (due_ns > c->making->not_before_ns) c->making->not_before_ns = due_ns;
+    if (due_ns > *not_before_ns) *not_before_ns = due_ns;
     c->note.for_ms = ms;
     return 1;
 }
 
+static int delay(struct change *c)
+{
+    return put_off(c, c->fault->entry.fault.for_ms, &c->making->not_before_ns);
+}
+
+static int jitter(struct change *c)
+{
+    return put_off(c, c->fault->entry.fault.for_ms * 0x1p-64 * (double)draw(c, DRAW_MS), &c->making->not_before_ns);
+}
+
 static int late_reply(struct change *c)
 {
-    const double ms = c->fault->entry.fault.for_ms;
-    const int64_t due_ns = c->making->now_ns + llround(ms * 1e6);
-    if (due_ns > c->making->hold_ns) c->making->hold_ns = due_ns;
-    c->note.for_ms = ms;
-    return 1;
+    return put_off(c, c->fault->entry.fault.for_ms, &c->making->hold_ns);
 }
 
 static int split(struct change *c)
@@ -295,43 +302,24 @@ static int is_before(enum fault_kind kind)
     return kind == FAULT_GARBAGE || kind == FAULT_STALL || kind == FAULT_ECHO || kind >= FAULT_DISCONNECT;
 }
 
-static int change_item(struct change *c)
-{
-    const struct fault *f = &c->fault->entry.fault;
-    switch (f->kind) {
-    case FAULT_DROP:
-    case FAULT_NO_REPLY:
-        return drop(c);
-    case FAULT_DUPLICATE:
-        return duplicate(c);
-    case FAULT_REORDER:
-        return reorder(c);
-    case FAULT_DELAY:
-        return delay(c, f->for_ms);
-    case FAULT_JITTER:
-        return delay(c, f->for_ms * 0x1p-64 * (double)draw(c, DRAW_MS));
-    case FAULT_TRUNCATE:
-        return cut(c);
-    case FAULT_FLIP:
-        return flip(c);
-    case FAULT_STALL:
-        return stall(c);
-    case FAULT_SPLIT:
-        return split(c);
-    case FAULT_MERGE:
-        return merge(c);
-    case FAULT_GARBAGE:
-        return garbage(c);
-    case FAULT_LATE_REPLY:
-        return late_reply(c);
-    case FAULT_WRONG_REPLY:
-        return wrong_reply(c);
-    case FAULT_ECHO:
-        return echo(c);
-    default:
-        return act(c);
-    }
-}
+/* Other kinds are acts. */
+static int (*const changes[FAULT_N_KINDS])(struct change *c) = {
+    [FAULT_DROP] = drop,
+    [FAULT_DUPLICATE] = duplicate,
+    [FAULT_REORDER] = reorder,
+    [FAULT_DELAY] = delay,
+    [FAULT_JITTER] = jitter,
+    [FAULT_TRUNCATE] = cut,
+    [FAULT_FLIP] = flip,
+    [FAULT_STALL] = stall,
+    [FAULT_SPLIT] = split,
+    [FAULT_MERGE] = merge,
+    [FAULT_GARBAGE] = garbage,
+    [FAULT_NO_REPLY] = drop,
+    [FAULT_LATE_REPLY] = late_reply,
+    [FAULT_WRONG_REPLY] = wrong_reply,
+    [FAULT_ECHO] = echo,
+};
 
 static void wire_change_describe(struct change *c)
 {
@@ -360,7 +348,8 @@ int wire_change(struct wire *wire, const struct wire_fault *fault, uint64_t numb
     struct change c = {.wire = wire, .fault = fault, .number = number, .making = making};
     if (making->is_dropped && !is_before(fault->entry.fault.kind)) return 0;
     wire_change_describe(&c);
-    const int done = change_item(&c);
-    if (done > 0 && !fault_is_act(fault->entry.fault.kind)) fault_board_note(wire->spec.board, &c.note);
+    const enum fault_kind kind = fault->entry.fault.kind;
+    const int done = changes[kind] != NULL ? changes[kind](&c) : act(&c);
+    if (done > 0 && !fault_is_act(kind)) fault_board_note(wire->spec.board, &c.note);
     return done;
 }

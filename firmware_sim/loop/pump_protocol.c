@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "drivers/protocol/crc32c.h"
-#include "firmware_sim/base/clock.h"
 #include "firmware_sim/loop/pump_inside.h"
 
 enum { PIECE_BYTES = 64 }; /* input is given to the protocol in pieces so small that answers find room */

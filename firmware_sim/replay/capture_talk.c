@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Makes talks of flows: each message of a device goes to the request that it answers, or whose stream it belongs to. */
 #include <arpa/inet.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 

@@ -2,7 +2,6 @@
 /* A recording as a device of another protocol than the native one: whether it can be that device, its time of day and
  * the fixes of its receiver. */
 #include <math.h>
-#include <string.h>
 
 #include "core/utc.h"
 #include "drivers/protocol/protocol.h"

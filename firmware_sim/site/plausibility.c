@@ -3,7 +3,6 @@
  * to look at. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/angle.h"
 #include "core/distance.h"

@@ -104,10 +104,6 @@ static void read_numbers(struct walk *w, const struct cfg_key *key, uint32_t ite
 static void read_vec3(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     char allowed[CFG_ALLOWED_MAX];
-    if (node->type != YAML_SEQUENCE_NODE) {
-        wrong_kind(w, key, item, node);
-        return;
-    }
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
     if (top - first != cfg_axes(key))
         cfg_fail_value(w->rd, key, item, line_of(w, node), "has %td numbers instead of %d; %s", top - first,
@@ -120,10 +116,6 @@ static void read_points(struct walk *w, const struct cfg_key *key, uint32_t item
 {
     struct config_points *points = cfg_address(w->rd, key, item);
     char allowed[CFG_ALLOWED_MAX];
-    if (node->type != YAML_SEQUENCE_NODE) {
-        wrong_kind(w, key, item, node);
-        return;
-    }
     const yaml_node_item_t *first = node->data.sequence.items.start, *top = node->data.sequence.items.top;
     if (top - first > CONFIG_MAX_POINTS) {
         cfg_fail_value(w->rd, key, item, line_of(w, node), "has %td points; allowed up to %d", top - first,
@@ -230,10 +222,6 @@ static void read_map(struct walk *w, const yaml_node_t *node, const char *path, 
 static void read_list(struct walk *w, const struct cfg_key *key, const yaml_node_t *node)
 {
     char allowed[CFG_ALLOWED_MAX];
-    if (node->type != YAML_SEQUENCE_NODE) {
-        wrong_kind(w, key, 0, node);
-        return;
-    }
     const yaml_node_item_t *first = node->data.sequence.items.start;
     ptrdiff_t n = node->data.sequence.items.top - first;
     if ((double)n > key->max) {
@@ -294,6 +282,12 @@ static void keep_scanner(struct walk *w, const struct cfg_key *key, uint32_t ite
     w->main->scanner_of[item] = w->of;
 }
 
+/* Whether a value of the type is a sequence in YAML. */
+static int wants_sequence(enum cfg_type type)
+{
+    return type == CFG_LIST || type == CFG_POINTS || type == CFG_VEC3 || type == CFG_PAIR;
+}
+
 static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item, const yaml_node_t *node)
 {
     if (node->type != YAML_SCALAR_NODE && has_tag(node)) {
@@ -307,6 +301,8 @@ static void read_value(struct walk *w, const struct cfg_key *key, uint32_t item,
     } else if (key->type == CFG_MAP && node->type == YAML_MAPPING_NODE) {
         read_map(w, node, key->path, item);
     } else if (key->type == CFG_MAP) {
+        wrong_kind(w, key, item, node);
+    } else if (wants_sequence(key->type) && node->type != YAML_SEQUENCE_NODE) {
         wrong_kind(w, key, item, node);
     } else if (key->type == CFG_LIST) {
         read_list(w, key, node);
