@@ -12,6 +12,7 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/socket.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/sysmacros.h>
@@ -24,18 +25,6 @@
 
 static char dir[] = "/tmp/test_newfile_XXXXXX", path[64], part[64], other[64];
 static struct sh_err err;
-
-/* The system's name of this process, which is that of an emulator where one runs it. */
-static const char *own_name(void)
-{
-    static char name[64];
-    FILE *in = fopen("/proc/self/comm", "r");
-    assert_non_null(in);
-    assert_non_null(fgets(name, sizeof name, in));
-    fclose(in);
-    name[strcspn(name, "\n")] = '\0';
-    return name;
-}
 
 /* ---- two steps of a writer, before which another one acts */
 
@@ -280,9 +269,10 @@ static void test_begin_before_rename(void **state)
 static void test_one_writer_in_place(void **state)
 {
     (void)state;
-    char pid[96];
+    char pid[96], name[16]; /* that of an emulator where one runs this program */
     int fd, again;
-    snprintf(pid, sizeof pid, "process %ld (%s)", (long)getpid(), own_name());
+    prctl(PR_GET_NAME, name);
+    snprintf(pid, sizeof pid, "process %ld (%s)", (long)getpid(), name);
     assert_int_equal(newfile_open(path, &fd, &err), 0);
     assert_int_equal(write(fd, "one", 3), 3);
     expect_error(newfile_open(path, &again, &err), SH_EINPUT, path, pid);
