@@ -36,7 +36,8 @@ static int claim_tick(struct loop_caster *caster, uint32_t i)
     struct loop *loop = caster->loop;
     struct casters *casters = &loop->casters;
     struct device_work *work = &caster->work[i];
-    if (atomic_load(&loop->stopping)) return -1;
+    /* Once another caster has found the end, nobody wakes this one when there is more room. */
+    if (atomic_load(&loop->stopping) || atomic_load(&loop->final_tick) != UINT64_MAX) return -1;
     if (!may_claim(loop) || (i == 0 && !has_room(caster))) return 0;
     if (device_claim(loop->device, work) != 0) {
         /* A tick that is still being computed may be lost. Its events then need one more tick to go out with. So the
