@@ -46,25 +46,24 @@ static uint32_t tile_of(const struct schedule_run *run, uint32_t n_runs)
     return line_turn > 2.0 * pulse_turn ? 2 * AHEAD_STEP : AHEAD_STEP;
 }
 
-uint32_t ahead_begin(struct cast_ahead *a, const struct schedule_run *run, uint32_t n_runs)
+void ahead_begin(struct cast_ahead *a, const struct schedule_run *run, uint32_t n_runs)
 {
-    uint64_t column = UINT64_MAX;
     uint32_t at = 0;
+    a->column = UINT64_MAX;
+    a->end = 0;
     for (a->n_runs = 0; a->n_runs < n_runs && run[a->n_runs].n <= a->room - at; a->n_runs++) {
         const struct schedule_run *r = &run[a->n_runs];
         a->run[a->n_runs] = (struct ahead_run){.pulse0 = r->pulse0, .column = r->in_line, .n = r->n, .at = at};
         at += r->n;
-        column = r->in_line < column ? r->in_line : column;
+        a->column = r->in_line < a->column ? r->in_line : a->column;
+        a->end = (uint64_t)r->in_line + r->n > a->end ? (uint64_t)r->in_line + r->n : a->end;
     }
-    a->column = column;
     if (a->n_runs != 0) a->tile = tile_of(run, a->n_runs);
-    return a->n_runs;
 }
 
 uint32_t ahead_open_window(struct cast_ahead *a)
 {
     uint32_t pulses = 0;
-    int more = 0;
     for (uint32_t q = 0; q < a->n_runs; q++) {
         struct ahead_run *run = &a->run[q];
         const uint64_t begin = run->column, end = begin + run->n, from = a->column > begin ? a->column : begin,
@@ -72,10 +71,9 @@ uint32_t ahead_open_window(struct cast_ahead *a)
         run->first = from < to ? (uint32_t)(from - begin) : 0;
         run->in_window = from < to ? (uint32_t)(to - from) : 0;
         pulses += run->in_window;
-        more |= a->column < end;
     }
     a->column += AHEAD_WINDOW;
-    return pulses == 0 && more ? ahead_open_window(a) : pulses;
+    return pulses;
 }
 
 void ahead_aimed(struct cast_ahead *a, uint32_t q, const struct vec3_in *d)

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Private to core/cast: first hits that are found before their pulses are cast, for several lines at once.
  *
- * ahead_begin takes the lines. While ahead_open_window returns pulses, caster.c aims those of each line
- * (ahead_aimed), and ahead_cast finds their hits. Later ahead_take gives them to the chunks that are cast. */
+ * ahead_begin takes the lines. caster.c opens window after window (ahead_open_window), from `column` to `end`. It aims
+ * the window's pulses of each line (ahead_aimed), and ahead_cast finds their hits. Later ahead_take gives them to the
+ * chunks that are cast. */
 #ifndef CORE_CAST_AHEAD_H
 #define CORE_CAST_AHEAD_H
 
@@ -24,7 +25,7 @@ struct cast_ahead {
     } run[CAST_AHEAD_RUNS];
     uint32_t n_runs, room; /* pulses that the arrays have room for */
     uint32_t tile;         /* consecutive pulses of a line that go into a packet */
-    uint64_t column;       /* place in the line where the next window begins */
+    uint64_t column, end;  /* places in the lines: where the next window begins, and where the last line ends */
     double *range_m;
     uint32_t *triangle, *label;
     float *steep; /* only of beams with a footprint */
@@ -48,9 +49,9 @@ struct cast_ahead {
 /* Makes room for the hits of so many pulses. The caller frees *out, also after an error. */
 int ahead_create(uint32_t pulses, struct cast_ahead **out, struct sh_err *err);
 void ahead_free(struct cast_ahead *ahead);
-/* Takes the runs that there is room for. Returns their number. */
-uint32_t ahead_begin(struct cast_ahead *ahead, const struct schedule_run *run, uint32_t n_runs);
-/* Opens the next window: sets `first` and `in_window` of the runs. Returns its pulses; 0: there are no more. */
+/* Takes the runs that there is room for. */
+void ahead_begin(struct cast_ahead *ahead, const struct schedule_run *run, uint32_t n_runs);
+/* Opens the next window: sets `first` and `in_window` of the runs. Returns its pulses. */
 uint32_t ahead_open_window(struct cast_ahead *ahead);
 /* Takes the directions of run q's pulses in the window. */
 void ahead_aimed(struct cast_ahead *ahead, uint32_t q, const struct vec3_in *d);

@@ -233,7 +233,8 @@ void caster_look_ahead(struct caster *caster, const struct cast_setup *setup, co
     struct cast_setup s = *setup;
     s.layout = LINE_POLAR; /* what the encoders read is computed later */
     ahead_begin(caster->ahead, run, n_runs);
-    for (uint32_t pulses; (pulses = ahead_open_window(caster->ahead)) != 0;) {
+    while (caster->ahead->column < caster->ahead->end) {
+        const uint32_t pulses = ahead_open_window(caster->ahead);
         aim_window(caster, &s, run);
         ahead_cast(caster->ahead, &s, caster->nearest.bvh, pulses);
     }

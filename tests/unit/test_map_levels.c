@@ -143,7 +143,7 @@ static void heights_are_hues(void **state)
     map_free(map);
 }
 
-/* Of 401 pixels the two lowest and the two highest are beyond the scale's ends: a two-hundredth are 2.005. The scale
+/* The two lowest and the two highest of 401 pixels are beyond the scale's ends: a two-hundredth are 2.005. The scale
  * has 1024 steps, and its ends are those of steps. A pixel shows the lowest of its neighbours. */
 static void a_few_heights_are_beyond(void **state)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a site says while it is loaded, each line compared whole, with its numbers; and the setup that its casters get.
- */
+/* A site's messages while it is loaded are compared line by line, with their numbers; and so is the setup that its
+ * casters get. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>

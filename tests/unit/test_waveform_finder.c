@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What detectors know of a pulse (core/waveform/detect_inside.h), against closed forms of the pulse and numbers that
- * are integrated here. */
+/* The figures that detectors have of a pulse (core/waveform/detect_inside.h) agree with closed forms of the pulse, and
+ * with numbers that are integrated here. */
 #include <math.h>
 
 #include "core/light.h"
