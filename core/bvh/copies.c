@@ -170,8 +170,7 @@ static int enter(const struct bvh_query *query, const struct bvh_copy *copy, con
     else
         set_floats(in, nested, query->width);
     in->dir_float = bvh_field(&nested->rays, query->width, dir_x);
-    in->apart_m = 1.001 * query->apart_m / copy->at->scale; /* the turn rounds */
-    if (in->has_own) bvh_turn_origins(in);
+    if (in->has_own) bvh_find_apart(in);
     return 1;
 }
 

@@ -64,50 +64,44 @@ struct bvh_profile *bvh_work_profile(const struct bvh_work *work)
 
 enum { LANES = 16 };
 
-/* Takes n <= LANES origins of rays into the local frame, from ray `at` on. apart2[k] is the largest squared distance to
- * first_m, the first ray's origin, of all origins that lane k has had. */
-VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const double origin_m[3],
-                           const double first_m[3], uint32_t at, uint32_t n, double apart2[LANES])
+/* Takes n <= LANES origins of rays into the local frame, from ray `at` on. far2[k] is the largest squared distance to
+ * that frame's origin of all points that lane k has had. */
+VEC_INLINE void take_lanes(struct bvh_work *w, const struct vec3_in *p, const double origin_m[3], uint32_t at,
+                           uint32_t n, double far2[LANES])
 {
     const double *px = p->x + at, *py = p->y + at, *pz = p->z + at;
     double *x = w->own.x + at, *y = w->own.y + at, *z = w->own.z + at;
     float *fx = w->org.x + at, *fy = w->org.y + at, *fz = w->org.z + at;
     const double ox = origin_m[0], oy = origin_m[1], oz = origin_m[2];
-    const double ax = first_m[0], ay = first_m[1], az = first_m[2];
     VEC_LOOP
     for (uint32_t k = 0; k < n; k++) {
-        const double lx = px[k] - ox, ly = py[k] - oy, lz = pz[k] - oz, dx = lx - ax, dy = ly - ay, dz = lz - az;
-        const double d2 = dx * dx + dy * dy + dz * dz;
+        const double lx = px[k] - ox, ly = py[k] - oy, lz = pz[k] - oz, d2 = lx * lx + ly * ly + lz * lz;
         x[k] = lx;
         y[k] = ly;
         z[k] = lz;
         fx[k] = (float)lx;
         fy[k] = (float)ly;
         fz[k] = (float)lz;
-        apart2[k] = d2 > apart2[k] ? d2 : apart2[k];
+        far2[k] = d2 > far2[k] ? d2 : far2[k];
     }
 }
 
-/* Takes the rays' own origins into the local frame, in double, and in float for Embree. Returns a bound of their
- * distances from that frame's origin, and sets batch->apart_m, a bound of the distances between any two of them. Both
- * bounds follow from the largest distance from the first ray. */
+/* Takes the rays' own origins into the local frame, in double, and in float for Embree. Returns the largest of their
+ * distances from that frame's origin. */
 VEC_CLONES
 static double take_own(struct bvh_work *w, const struct bvh *bvh, const struct bvh_rays *rays, struct bvh_batch *batch)
 {
     const struct vec3_in p = rays->from.own;
-    const double at[3] = VEC3_AT(p, 0);
-    double first_m[3], apart2[LANES] = {0.0}, most2 = 0.0;
+    double far2[LANES] = {0.0}, most2 = 0.0;
     uint32_t i = 0;
-    vec3_sub(at, bvh->origin_m, first_m);
     for (; i + LANES <= rays->n; i += LANES)
-        take_lanes(w, &p, bvh->origin_m, first_m, i, LANES, apart2);
-    take_lanes(w, &p, bvh->origin_m, first_m, i, rays->n - i, apart2);
+        take_lanes(w, &p, bvh->origin_m, i, LANES, far2);
+    take_lanes(w, &p, bvh->origin_m, i, rays->n - i, far2);
     for (int k = 0; k < LANES; k++)
-        most2 = apart2[k] > most2 ? apart2[k] : most2;
+        most2 = far2[k] > most2 ? far2[k] : most2;
     batch->local.own = VEC3_IN(w->own, 0);
     batch->org = (struct vec3_floats){w->org.x, w->org.y, w->org.z};
-    batch->apart_m = 2.0 * sqrt(most2);
-    return vec3_length(first_m) + sqrt(most2);
+    return sqrt(most2);
 }
 
 /* A ray that begins outside of the sphere around the scene hits nothing before it has gone as far as that sphere is

@@ -33,22 +33,25 @@ VEC_INLINE int32_t judge(float a, float b, float c, float doubt)
     return in | (1 - (in | out)) << 1;
 }
 
-/* Judges all lanes of a packet; those without a ray may have any result. own: its rays begin at points of their own.
- * found: in, all bits of the rays that Embree asks for; out, how each passes. */
-VEC_INLINE void judge_packet(const struct bvh_query *query, const struct bvh_edges *edges, int own, struct lanes *found)
+/* Judges all lanes of a packet; those without a ray may have any result. own: rays begin at points of their own. both:
+ * with the second term of each side. asked: all bits of the rays that Embree asks for. found: how each passes. */
+VEC_INLINE void judge_packet(const struct bvh_query *query, const struct bvh_edges *edges, int own, int both,
+                             const struct lanes *asked, struct lanes *found)
 {
     const float *dx = query->dir_float, *dy = dx + query->width, *dz = dy + query->width;
     const float *ux = query->turned[0], *uy = query->turned[1], *uz = query->turned[2];
-    const float(*m)[8] = edges->m, (*e)[8] = edges->e, doubt = edges->doubt;
+    const float(*m)[8] = edges->m, (*e)[8] = edges->e, *apart_m = query->apart_m;
+    const float more_doubt = edges->size_m * (both ? BVH_BOTH_DOUBT : BVH_FIRST_DOUBT);
     int32_t wide[LANES];
     VEC_LOOP
     for (uint32_t i = 0; i < LANES; i++) {
+        const float doubt = own ? edges->doubt + more_doubt * apart_m[i] : edges->doubt;
         float s[BVH_EDGES], more[BVH_EDGES];
         for (int k = 0; k < BVH_EDGES; k++) {
             s[k] = m[0][k] * dx[i] + m[1][k] * dy[i] + m[2][k] * dz[i];
-            if (own && k != 2 && k != 4) more[k] = e[0][k] * ux[i] + e[1][k] * uy[i] + e[2][k] * uz[i];
+            if (both && k != 2 && k != 4) more[k] = e[0][k] * ux[i] + e[1][k] * uy[i] + e[2][k] * uz[i];
         }
-        if (own) {
+        if (both) {
             s[0] += more[0];
             s[1] += more[1];
             s[2] -= more[0] + more[1];
@@ -58,7 +61,7 @@ VEC_INLINE void judge_packet(const struct bvh_query *query, const struct bvh_edg
         wide[i] = judge(s[0], s[1], s[2], doubt) | judge(s[3], s[4], -s[1], doubt) << SECOND;
     }
     for (uint32_t i = 0; i < LANES; i++)
-        found->of[i] &= (uint8_t)wide[i];
+        found->of[i] = asked->of[i] & (uint8_t)wide[i];
 }
 
 /* The fate of a ray that is inside of a triangle for certain. */
@@ -132,18 +135,23 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
 }
 
 VEC_CLONES
-static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, struct lanes *found)
+static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const struct lanes *asked)
 {
     struct bvh_edges edges;
+    struct lanes found;
     query->counters.leaves++;
     bvh_find_edges(query, leaf, &edges);
     if (query->has_own)
-        judge_packet(query, &edges, 1, found);
+        judge_packet(query, &edges, 1, 0, asked, &found);
     else
-        judge_packet(query, &edges, 0, found);
-    if (any(found, EITHER)) meet_triangle(query, tfar, leaf, 0, found);
-    if (bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0 && any(found, EITHER << SECOND))
-        meet_triangle(query, tfar, leaf, 1, found);
+        judge_packet(query, &edges, 0, 0, asked, &found);
+    if (query->has_own && any(&found, DOUBT | DOUBT << SECOND)) {
+        if (!query->is_turned) bvh_turn_origins(query);
+        judge_packet(query, &edges, 1, 1, asked, &found);
+    }
+    if (any(&found, EITHER)) meet_triangle(query, tfar, leaf, 0, &found);
+    if (bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0 && any(&found, EITHER << SECOND))
+        meet_triangle(query, tfar, leaf, 1, &found);
 }
 
 /* Rays that meet a leaf mostly meet the leaves next to it. So this many more are fetched into the cache, since waiting
@@ -155,7 +163,7 @@ void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args)
     struct bvh_query *query = (struct bvh_query *)(void *)args->context;
     const struct bvh_leaf *leaf = &query->first_leaf[args->primID];
     float *tfar = bvh_field(args->rayhit, args->N, tfar);
-    struct lanes found = {{0}};
+    struct lanes asked = {{0}};
     for (int i = 0; i <= AHEAD; i++) {
         __builtin_prefetch(&leaf[i]);
         __builtin_prefetch(leaf[i].plane);
@@ -165,6 +173,6 @@ void bvh_meet_leaf(const struct RTCIntersectFunctionNArguments *args)
         return;
     }
     for (uint32_t i = 0; i < LANES && i < args->N; i++)
-        found.of[i] = args->valid[i] != 0 ? 0xff : 0;
-    meet(query, tfar, leaf, &found);
+        asked.of[i] = args->valid[i] != 0 ? 0xff : 0;
+    meet(query, tfar, leaf, &asked);
 }

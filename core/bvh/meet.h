@@ -45,19 +45,23 @@ void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t 
  * the dot product 5. |p| itself is no measure, since it may be far smaller than its summands.
  *
  * Rays of a packet may begin at different points o. Then p and q are relative to c, the origin of one of them, and the
- * side is (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term rounds like the first, with A = |o - c| in place
- * of F. The second term is computed for three edges. For the other two edges it is a sum or difference of these three
- * terms, since the edges of a triangle add up to zero. The second term's error is therefore at most 2 * 15 + 1 units of
- * A L. Adding it to the first term rounds by 1 unit of A L and 1 of F L. So F has 2 A in it. The doubt of double
- * precision (edges.h) is far less than the rest of the bound. */
+ * side is (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term is at most A L, with A = |o - c|. Where the first
+ * term is greater than the doubt by more than A L, the second one is not needed. Elsewhere it is computed for three
+ * edges, and rounds like the first, with A in place of F. For the other two edges it is a sum or difference of these
+ * three terms, since the edges of a triangle add up to zero. The second term's error is therefore at most 2 * 15 + 1
+ * units of A L. Adding it to the first term rounds by 1 unit of A L and 1 of F L. So F has 2 A in it. The doubt of
+ * double precision (edges.h) is far less than the rest of the bound. */
 #define BVH_SIDE_DOUBT (24.0F * 0x1p-24F)
+/* A L times this is added to the doubt of a ray from a point of its own: without the second term, and with it. */
+#define BVH_FIRST_DOUBT 1.002F
+#define BVH_BOTH_DOUBT  (2.002F * BVH_SIDE_DOUBT)
 
 /* The figures of a leaf by which rays are judged: edges e, and their moments m = p x (q - p). All rays from one point
  * share them. */
 enum { BVH_EDGES = 5 };
 struct bvh_edges {
     float m[3][8], e[3][8]; /* x, y, z of each edge; three more lanes to fill a vector */
-    float doubt;
+    float doubt, size_m;    /* the doubt of rays from at_local; L */
 } __attribute__((aligned(32)));
 
 VEC_INLINE void bvh_find_edges(const struct bvh_query *query, const struct bvh_leaf *leaf, struct bvh_edges *edges)
@@ -81,8 +85,9 @@ VEC_INLINE void bvh_find_edges(const struct bvh_query *query, const struct bvh_l
         memcpy(edges->m[j], &m, sizeof m);
         memcpy(edges->e[j], &e[j], sizeof e[j]);
     }
-    const float far_m = fabsf(base[0]) + fabsf(base[1]) + fabsf(base[2]) + size_m + 2.0F * (float)query->apart_m;
+    const float far_m = fabsf(base[0]) + fabsf(base[1]) + fabsf(base[2]) + size_m;
     edges->doubt = BVH_SIDE_DOUBT * 1.001F * far_m * size_m;
+    edges->size_m = size_m;
 }
 
 #endif

@@ -14,21 +14,15 @@ struct judged {
     unsigned in, doubt;
 };
 
-/* Rays that pass an edge on its positive side for certain, and on its negative side. */
-struct sides {
-    unsigned above, below;
-};
-
-WIDE struct sides sides_of(__m512 side, __m512 doubt)
+/* Judges the rays in `valid` by a, b and c, which say on which side of each of the triangle's edges they pass. With
+ * `same` greater than the doubt, all three certainly have the same sign: the ray is inside. With -same greater than the
+ * doubt, two certainly have different signs: it is outside. */
+WIDE struct judged judge(__m512 a, __m512 b, __m512 c, __m512 doubt, unsigned valid)
 {
-    return (struct sides){_mm512_cmp_ps_mask(side, doubt, _CMP_GT_OQ),
-                          _mm512_cmp_ps_mask(side, _mm512_sub_ps(_mm512_setzero_ps(), doubt), _CMP_LT_OQ)};
-}
-
-WIDE struct judged judge(struct sides a, struct sides b, struct sides c, unsigned valid)
-{
-    const unsigned in = (a.above & b.above & c.above) | (a.below & b.below & c.below),
-                   out = (a.above | b.above | c.above) & (a.below | b.below | c.below);
+    const __m512 zero = _mm512_setzero_ps(), least = _mm512_min_ps(_mm512_min_ps(a, b), c),
+                 most = _mm512_max_ps(_mm512_max_ps(a, b), c), same = _mm512_max_ps(least, _mm512_sub_ps(zero, most));
+    const unsigned in = _mm512_cmp_ps_mask(same, doubt, _CMP_GT_OQ),
+                   out = _mm512_cmp_ps_mask(same, _mm512_sub_ps(zero, doubt), _CMP_LT_OQ);
     return (struct judged){in & valid, ~(in | out) & valid};
 }
 
@@ -120,9 +114,10 @@ WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_l
 }
 
 /* Rays that begin at points of their own: adds the second term of each edge's side (meet.h). */
-WIDE void add_own(const struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES])
+WIDE void add_own(struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES])
 {
     __m512 turned[3], more[BVH_EDGES];
+    if (!query->is_turned) bvh_turn_origins(query);
     for (int j = 0; j < 3; j++)
         turned[j] = _mm512_loadu_ps(query->turned[j]);
     for (int k = 0; k < 4; k++)
@@ -134,31 +129,44 @@ WIDE void add_own(const struct bvh_query *query, const struct bvh_edges *edges, 
     side[4] = _mm512_add_ps(side[4], _mm512_sub_ps(more[1], more[3]));
 }
 
+/* Judges the rays in `valid` by the sides of both triangles' edges. */
+WIDE void judge_both(const __m512 side[BVH_EDGES], __m512 doubt, unsigned valid, struct judged judged[2])
+{
+    const __m512 reversed = _mm512_sub_ps(_mm512_setzero_ps(), side[1]);
+    judged[0] = judge(side[0], side[1], side[2], doubt, valid);
+    judged[1] = judge(side[3], side[4], reversed, doubt, valid);
+}
+
+/* Returns the doubt of rays from points of their own. more: BVH_FIRST_DOUBT or BVH_BOTH_DOUBT. */
+WIDE __m512 own_doubt(const struct bvh_query *query, const struct bvh_edges *edges, float more)
+{
+    const __m512 more_m = _mm512_mul_ps(_mm512_set1_ps(more * edges->size_m), _mm512_loadu_ps(query->apart_m));
+    return _mm512_add_ps(_mm512_set1_ps(edges->doubt), more_m);
+}
+
 WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid, int own)
 {
     const __m512i asked = _mm512_loadu_si512(valid);
     const unsigned all = _mm512_test_epi32_mask(asked, asked);
     struct bvh_edges edges;
-    struct sides sides[BVH_EDGES];
+    struct judged judged[2];
     __m512 dir[3], side[BVH_EDGES];
     bvh_find_edges(query, leaf, &edges);
     /* Each number of the edges fills a vector. Loads from memory cost less for this than shuffles. The next line makes
      * the compiler use loads. */
     __asm__ volatile("" ::: "memory");
-    const __m512 doubt = _mm512_set1_ps(edges.doubt);
     for (int j = 0; j < 3; j++)
         dir[j] = _mm512_loadu_ps(query->dir_float + j * BVH_PACKET);
     for (int k = 0; k < BVH_EDGES; k++)
         side[k] = dot(edges.m[0][k], edges.m[1][k], edges.m[2][k], dir);
-    if (own) add_own(query, &edges, side);
-    for (int k = 0; k < BVH_EDGES; k++)
-        sides[k] = sides_of(side[k], doubt);
-    const struct sides reversed = {sides[1].below, sides[1].above};
-    const struct judged first = judge(sides[0], sides[1], sides[2], all),
-                        second = judge(sides[3], sides[4], reversed, all);
-    if ((first.in | first.doubt) != 0) meet_triangle(query, tfar, leaf, 0, first, own);
-    if ((second.in | second.doubt) != 0 && bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0)
-        meet_triangle(query, tfar, leaf, 1, second, own);
+    judge_both(side, own ? own_doubt(query, &edges, BVH_FIRST_DOUBT) : _mm512_set1_ps(edges.doubt), all, judged);
+    if (own && (judged[0].doubt | judged[1].doubt) != 0) {
+        add_own(query, &edges, side);
+        judge_both(side, own_doubt(query, &edges, BVH_BOTH_DOUBT), all, judged);
+    }
+    if ((judged[0].in | judged[0].doubt) != 0) meet_triangle(query, tfar, leaf, 0, judged[0], own);
+    if ((judged[1].in | judged[1].doubt) != 0 && bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0)
+        meet_triangle(query, tfar, leaf, 1, judged[1], own);
 }
 
 __attribute__((target("avx512f,avx512vl"))) void bvh_meet_wide(struct bvh_query *query, float *tfar,

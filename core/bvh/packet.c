@@ -158,7 +158,7 @@ VEC_INLINE void cast_one(struct bvh_query *query, struct packet *packet, const s
     set_doubles(query, batch, first, n);
     query->width = width;
     query->dir_float = bvh_field(&packet->at, width, dir_x);
-    if (query->has_own) bvh_turn_origins(query);
+    if (query->has_own) bvh_find_apart(query);
     bvh_call_embree(query->bvh, query, packet->valid, &packet->at, width);
     if (query->unsure != 0) packet_settle(query, packet, width);
     if (query->counters.decided != decided) take_near(query, n);
@@ -187,7 +187,6 @@ void bvh_intersect(const struct bvh *bvh, struct bvh_query *query, struct bvh_ba
     query->at_origin_m = BVH_AT_ORIGIN_M;
     query->has_own = rays->from.own.x != NULL;
     query->most_m = batch->most_m;
-    query->apart_m = batch->apart_m;
     memcpy(query->at, rays->from.at_m, sizeof query->at);
     memcpy(query->at_local, batch->local.at_m, sizeof query->at_local);
     memset(query->start_m, 0, sizeof query->start_m);

@@ -42,8 +42,9 @@ struct bvh_query {
     const double *dir[3], *org[3], *local[3];
     const float *dir_float;        /* [3][width] dir for Embree; BVH_PACKET elements of each may be read */
     double room[9][BVH_PACKET];    /* for dir, org, local */
-    float turned[3][BVH_PACKET];   /* of own points: (local - at_local) x dir */
-    double apart_m;                /* no two rays begin further from each other */
+    float apart_m[BVH_PACKET];     /* of own points: no ray begins further from at_local than this */
+    int is_turned;                 /* `turned` is set */
+    float turned[3][BVH_PACKET];   /* of own points, where leaves need them: (local - at_local) x dir */
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
     double range_m[BVH_PACKET];    /* out: the nearest so far; before a hit, the greatest that counts */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
@@ -81,12 +82,26 @@ static inline void bvh_forget_near(struct bvh_query *query)
     }
 }
 
-/* Sets at_local and turned of a packet whose rays have points of their own. */
+/* Sets at_local and apart_m of a packet whose rays have points of their own. */
+VEC_INLINE void bvh_find_apart(struct bvh_query *query)
+{
+    const double *px = query->local[0], *py = query->local[1], *pz = query->local[2];
+    const double ax = px[0], ay = py[0], az = pz[0];
+    VEC_LOOP
+    for (uint32_t i = 0; i < BVH_PACKET; i++)
+        query->apart_m[i] = (float)(fabs(px[i] - ax) + fabs(py[i] - ay) + fabs(pz[i] - az));
+    query->at_local[0] = ax;
+    query->at_local[1] = ay;
+    query->at_local[2] = az;
+    query->is_turned = 0;
+}
+
+/* Sets `turned`. */
 VEC_INLINE void bvh_turn_origins(struct bvh_query *query)
 {
     const double *px = query->local[0], *py = query->local[1], *pz = query->local[2];
     const double *dx = query->dir[0], *dy = query->dir[1], *dz = query->dir[2];
-    const double ax = px[0], ay = py[0], az = pz[0];
+    const double ax = query->at_local[0], ay = query->at_local[1], az = query->at_local[2];
     VEC_LOOP
     for (uint32_t i = 0; i < BVH_PACKET; i++) {
         const double x = px[i] - ax, y = py[i] - ay, z = pz[i] - az;
@@ -94,9 +109,7 @@ VEC_INLINE void bvh_turn_origins(struct bvh_query *query)
         query->turned[1][i] = (float)(z * dx[i] - x * dz[i]);
         query->turned[2][i] = (float)(x * dy[i] - y * dx[i]);
     }
-    query->at_local[0] = ax;
-    query->at_local[1] = ay;
-    query->at_local[2] = az;
+    query->is_turned = 1;
 }
 
 /* Up to BVH_CHUNK rays for bvh_intersect, with their directions and origins in float. */
@@ -105,7 +118,6 @@ struct bvh_batch {
     struct vec3_floats dir, org; /* org.x NULL: all at local.at_m */
     const double *start_m;       /* NULL: 0 */
     struct bvh_origins local;    /* from the BVH's origin */
-    double apart_m;              /* no two rays begin further from each other; 0: all at one point */
     float t_max;
     double most_m; /* greatest length of a float ray; INFINITY: hits beyond t_max may be missed */
 };
