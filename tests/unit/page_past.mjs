@@ -6,6 +6,7 @@ import {crc32c, LOCAL, Parser, REPEAT} from '../../drivers/link/web/native.js';
 import {Cloud} from '../../drivers/link/web/cloud.js';
 import {Head} from '../../drivers/link/web/head.js';
 import {Losses} from '../../drivers/link/web/losses.js';
+import {fetchJson} from '../../drivers/link/web/page.js';
 import {Past} from '../../drivers/link/web/past.js';
 import {readSamples, same as equal} from './page_rig.mjs';
 import {runTests, test} from './page_tap.mjs';
@@ -157,6 +158,21 @@ test('the keeper may be later than anyone waits in patience, on a busy machine',
   }
 });
 
+test('a head that has no room for a request is asked again', async () => {
+  const stream = new Stream(), {get} = stream;
+  let refused = 0;
+  stream.places();
+  stream.shots(0, 20);
+  stream.get = async (url) => {
+    if (refused < 4 && url.endsWith(`=${refused}`)) throw new Error(`refused ${++refused}`);
+    return get(url);
+  };
+  const page = new Page(stream);
+  page.take(stream.telemetry());
+  await page.shows(0, 20, 'all');
+  equal(refused, 4, 'requests that were refused');
+});
+
 test('what /past had already does not count again when it comes live', async () => {
   const stream = new Stream();
   const places = stream.places();
@@ -255,6 +271,31 @@ test('of a head that has started again, the same number is another scan', () => 
   cloud.outdate(came);
   take(cloud, batch(4, 1, 1));
   equal(held(cloud), [[2, 2, 3], [1, 1, 8]], 'blocks');
+});
+
+// ---- a head without room
+
+test('a page asks a busy head for its description again, and takes a refusal for what it is', async () => {
+  const {fetch} = globalThis, asked = [];
+  const answers = (...list) => {
+    asked.length = 0;
+    globalThis.fetch = async (path) => {
+      asked.push(path);
+      const status = list.shift();
+      if (status === 0) throw new TypeError('fetch failed');
+      return {ok: status === 200, status, json: async () => ({run: 7})};
+    };
+  };
+  try {
+    answers(503, 0, 200);
+    equal(await fetchJson('/head'), {run: 7}, 'after a refusal and a broken connection');
+    equal(asked, ['/head', '/head', '/head'], 'requests');
+    answers(404, 200);
+    equal(await fetchJson('/plan'), null, 'a head without a plan');
+    equal(asked, ['/plan'], 'requests');
+  } finally {
+    globalThis.fetch = fetch;
+  }
 });
 
 // ---- the connection's end

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module connects the page's modules: a head and its points, or a recording.
-import {bodyOf, byId, fetchJson, kept, say} from './page.js';
+import {bodyOf, byId, fetchBytes, fetchJson, kept, say} from './page.js';
 import {Head} from './head.js';
 import {Cloud} from './cloud.js';
 import {Session, startTheme, why} from './session.js';
@@ -76,15 +76,6 @@ class Names {
   };
 }
 
-async function fetchScene() {
-  try {
-    const answer = await fetch('/scene');
-    return answer.ok ? await answer.arrayBuffer() : null;
-  } catch {
-    return null;
-  }
-}
-
 // Returns how many seconds a pan sweep takes, from a descriptor; 0 if the pan does not turn.
 const frameSeconds = ({pan_start_udeg: from, pan_stop_udeg: to, pan_udeg_s: rate}) =>
   (Number(rate) > 0 ? Math.abs(Number(to) - Number(from)) / Number(rate) : 0);
@@ -137,7 +128,7 @@ function startHead(cloud, view, names, keepsPast) {
     if (view) view.stations.fields = info.fields ?? [];
     stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true, info.run)).catch(() => {}); // the head is gone
     showPlan();
-    view?.setScene(await fetchScene());
+    view?.setScene(await fetchBytes('/scene'));
   };
   stations.addEventListener('tell', ({detail}) => {
     bar.notice(detail.text, 6000, detail.kind);

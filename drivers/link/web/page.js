@@ -140,12 +140,20 @@ export const kept = {
   },
 };
 
-// Returns the JSON of one of the link's resources; null if there is none or it does not come.
-export async function fetchJson(path) {
-  try {
-    const answer = await fetch(path, {cache: 'no-store'});
-    return answer.ok ? await answer.json() : null;
-  } catch {
-    return null;
+const AGAIN_MS = 100, AGAIN_MOST_MS = 3200; // a head that has no room for a request is asked again, ever less often
+
+// Returns what `read` makes of the answer for one of the link's resources; null if there is none or it does not come.
+async function fetchPatiently(path, cache, read) {
+  for (let wait_ms = AGAIN_MS; wait_ms <= AGAIN_MOST_MS; wait_ms *= 2) {
+    try {
+      const answer = await fetch(path, {cache});
+      if (answer.ok) return await read(answer);
+      if (answer.status !== 408 && answer.status !== 503) return null;
+    } catch { /* the connection broke */ }
+    await new Promise((done) => setTimeout(done, wait_ms));
   }
+  return null;
 }
+
+export const fetchJson = (path) => fetchPatiently(path, 'no-store', (answer) => answer.json());
+export const fetchBytes = (path) => fetchPatiently(path, 'default', (answer) => answer.arrayBuffer());

@@ -42,7 +42,7 @@ export class Past {
   #takesPast = true;
 
   /** give(batch) takes points of the past. hasRoom() is false while the owner is late. get(url) returns a promise of
-   * the bytes, or of null if there is nothing. */
+   * the bytes, or of null if the head has no /past. It fails where the head does not answer now. */
   constructor({give, hasRoom = () => true, get = getBytes}) {
     this.#give = give;
     this.#hasRoom = hasRoom;
@@ -124,18 +124,26 @@ export class Past {
     if (this.#isReading || this.#url === null) return;
     this.#isReading = true;
     const connection = this.#connection;
-    try {
-      await this.#readAll(() => connection === this.#connection);
-    } catch {
-      // The head is gone; the connection reports that.
-    }
+    await this.#readAll(() => connection === this.#connection);
     if (connection === this.#connection) this.#isReading = false;
+  }
+
+  // Asks for the piece at #at, again while the head has no room for a request. A head that is gone ends the connection.
+  async #piece(goesOn) {
+    for (let wait_ms = AGAIN_MS; goesOn(); wait_ms = Math.min(2 * wait_ms, SELDOM_MS)) {
+      try {
+        return await this.#get(`${this.#url}?from=${this.#at}`);
+      } catch {
+        await sleep(wait_ms);
+      }
+    }
+    return null;
   }
 
   async #readAll(goesOn) {
     let until_ms = performance.now() + PATIENCE_MS;
     for (;;) {
-      const bytes = await this.#get(`${this.#url}?from=${this.#at}`);
+      const bytes = await this.#piece(goesOn);
       if (!goesOn()) return;
       const head = bytes === null ? null : readHead(bytes);
       if (head === null) return this.#hasNone();
@@ -178,5 +186,7 @@ export class Past {
 
 async function getBytes(url) {
   const answer = await fetch(url);
-  return answer.ok ? answer.arrayBuffer() : null;
+  if (answer.status === 404) return null;
+  if (!answer.ok) throw new Error(`${url}: ${answer.status}`);
+  return answer.arrayBuffer();
 }
