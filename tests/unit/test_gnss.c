@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "core/rng.h"
 #include "drivers/protocol/nmea.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
@@ -234,6 +235,25 @@ static void noise_is_what_was_asked_for(void **state)
     close_receiver(&r);
 }
 
+/* The noise is keyed by seed and purpose, and position k has the numbers 3 k to 3 k + 2 of it, so that other builds send
+ * the same positions. */
+static void noise_has_its_key(void **state)
+{
+    (void)state;
+    static const char *const more[] = {"gnss.accuracy_m=0.5", "noise.seed=7", NULL};
+    const uint64_t key = rng_key(7, RNG_GNSS);
+    struct receiver r = open_receiver("48", "11", more);
+    start_receiver(&r);
+    for (uint64_t k = 0; k < 4; k++) {
+        struct fix fix = get_fix(&r, k, 0);
+        double d[3];
+        offset_enu(48, 11, 123.4567, &fix, d);
+        for (uint64_t i = 0; i < 3; i++)
+            assert_true(fabs(d[i] - 0.5 * rng_normal(key, 3 * k + i)) < STEP_M);
+    }
+    close_receiver(&r);
+}
+
 /* An error is independent of later ones, on its own axis and on others. The mean product of two errors of N positions
  * is within 5 sigma^2 / sqrt(N) but once in 1.7 million. There are 36 of them: once in 48,000. The seed is fixed. */
 static void noise_does_not_last(void **state)
@@ -305,10 +325,15 @@ static void without_a_place_no_fix_is_valid(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_antenna_is_where_the_arm_puts_it),  cmocka_unit_test(at_the_poles),
-        cmocka_unit_test(times_are_those_of_the_rate),           cmocka_unit_test(it_stands_where_the_head_stands),
-        cmocka_unit_test(noise_is_what_was_asked_for),           cmocka_unit_test(noise_does_not_last),
-        cmocka_unit_test(speed_and_course_are_those_of_the_way), cmocka_unit_test(without_a_place_no_fix_is_valid),
+        cmocka_unit_test(the_antenna_is_where_the_arm_puts_it),
+        cmocka_unit_test(at_the_poles),
+        cmocka_unit_test(times_are_those_of_the_rate),
+        cmocka_unit_test(it_stands_where_the_head_stands),
+        cmocka_unit_test(noise_is_what_was_asked_for),
+        cmocka_unit_test(noise_does_not_last),
+        cmocka_unit_test(noise_has_its_key),
+        cmocka_unit_test(speed_and_course_are_those_of_the_way),
+        cmocka_unit_test(without_a_place_no_fix_is_valid),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
