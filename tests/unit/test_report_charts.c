@@ -97,6 +97,34 @@ static void test_axis_of_bins(void **state)
     free(svg);
 }
 
+/* A line of the scale goes from side to side at its value. Its figure ends 6 units before the line. In letters of 12
+ * units digits are some 8.6 high, so that they are in the middle where they stand 4.3 below the line. */
+static void test_scale(void **state)
+{
+    static const char line[] = "<line class=\"axis\" x1=\"70\"";
+    (void)state;
+    char *svg = drawn(draw_histogram);
+    const char *bars = svg;
+    struct rect ten; /* the bar of 10 */
+    int n = 0;
+    assert_true(next_bar(&bars, "s0", &ten));
+    for (const char *at = svg; (at = strstr(at, line)) != NULL; n++, at++) {
+        double x2, y[2], text_x, text_y, value;
+        assert_int_equal(sscanf(at + strlen(line),
+                                " y1=\"%lf\" x2=\"%lf\" y2=\"%lf\"/><text x=\"%lf\" y=\"%lf\" "
+                                "text-anchor=\"end\">%lf",
+                                &y[0], &x2, &y[1], &text_x, &text_y, &value),
+                         6);
+        near("end", x2, RIGHT, 0.0);
+        near("level", y[1], y[0], 0.0);
+        near("value", (BOTTOM - y[0]) / ten.height, value / 10.0, 1e-3);
+        near("figure's end", text_x, LEFT - 6.0, 0.0);
+        near("figure's middle", text_y - 4.3, y[0], 0.5);
+    }
+    assert_true(n >= 3);
+    free(svg);
+}
+
 static void draw_bars(FILE *out)
 {
     static const char group[2][32] = {"0-10", "10-20"};
@@ -319,6 +347,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bars_stand_on_the_axis),
         cmocka_unit_test(test_axis_of_bins),
+        cmocka_unit_test(test_scale),
         cmocka_unit_test(test_groups),
         cmocka_unit_test(test_ends_and_curve),
         cmocka_unit_test(test_one_point),
