@@ -222,6 +222,26 @@ static void the_mirror_has_limits(void **state)
     rig_close(rig);
 }
 
+/* Losses of soiled windows add up while they last. Other faults lose nothing. */
+static void losses_of_the_window_add_up(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"head.frames=0", "signal.model=on"};
+    const char *const faults[] = {"{kind: window_soiled, loss_db: 1.5}", "{kind: mirror_slow, factor: 0.5}",
+                                  "{kind: window_soiled, loss_db: 0.25, from_pulse: 3000}"};
+    struct rig *rig = open_scan(sets, LEN(sets), faults, LEN(faults));
+    assert_true(device_window_loss_db(rig->device) == 1.5);
+    rig_go_to(rig, rig->next + 20); /* 300 pulses a tick */
+    assert_true(device_window_loss_db(rig->device) == 1.75);
+    rig_tell(rig, "FAUL:CLE 1", rig->next - 1);
+    rig_claim(rig);
+    assert_true(device_window_loss_db(rig->device) == 0.25);
+    rig_tell(rig, "SCAN:STOP", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_END, 100);
+    assert_true(device_window_loss_db(rig->device) == 0.0);
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -232,6 +252,7 @@ int main(void)
         cmocka_unit_test(an_added_fault_counts_from_its_command),
         cmocka_unit_test(another_fault_leaves_it_as_it_is),
         cmocka_unit_test(the_mirror_has_limits),
+        cmocka_unit_test(losses_of_the_window_add_up),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
