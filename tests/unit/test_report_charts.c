@@ -255,14 +255,14 @@ static void test_without_values(void **state)
     free(svg);
 }
 
-/* Names of 20 letters take 7 units a letter and 8 more, 148 in all; a group has 55.5. Each third name is there, and
- * where the picture is narrow, only each second one of these. */
+/* Names of 23 letters take 7 units a letter and 8 more, 169 in all; three groups have 166.5. Each fourth name is there,
+ * and where the picture is narrow, only each second one of these. */
 static void draw_many(FILE *out)
 {
     static char group[10][32];
     static double value_m[10][PAGE_SERIES];
     for (int g = 0; g < 10; g++) {
-        snprintf(group[g], sizeof group[g], "group-number-%07d", g);
+        snprintf(group[g], sizeof group[g], "group-number-%010d", g);
         value_m[g][0] = 1e-6 * (g + 1);
         value_m[g][1] = value_m[g][2] = value_m[g][3] = (double)NAN;
     }
@@ -280,9 +280,9 @@ static void test_names_of_groups(void **state)
     (void)state;
     char *svg = drawn(draw_many), text[128];
     for (int g = 0; g < 10; g++) {
-        snprintf(text, sizeof text, "<text%s x=\"%.1f\" y=\"262\" text-anchor=\"middle\">group-number-%07d</text>\n",
-                 g / 3 % 2 == 1 ? " class=\"odd\"" : "", LEFT + (g + 0.5) * (RIGHT - LEFT) / 10.0, g);
-        assert_int_equal(strstr(svg, text) != NULL, g % 3 == 0);
+        snprintf(text, sizeof text, "<text%s x=\"%.1f\" y=\"262\" text-anchor=\"middle\">group-number-%010d</text>\n",
+                 g / 4 % 2 == 1 ? " class=\"odd\"" : "", LEFT + (g + 0.5) * (RIGHT - LEFT) / 10.0, g);
+        assert_int_equal(strstr(svg, text) != NULL, g % 4 == 0);
     }
     const char *at = svg;
     struct rect bar;
