@@ -54,6 +54,7 @@ static void a_thread_plans(void **state)
     assert_int_equal(eventfd_read(b.wake_fd, &n), 0); /* the reply is there */
     assert_true(mover_take(&b.mover, &b.box, reply));
     assert_string_equal(reply, "OK");
+    assert_true(b.mover.running); /* the thread is there for the next one, and is waited for at the end */
     assert_false(mover_take(&b.mover, &b.box, reply));
     mover_join(&b.mover);
     close_bench(&b);

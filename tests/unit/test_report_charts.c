@@ -160,6 +160,11 @@ static void test_groups(void **state)
             near("height", bar.height / mm, height_of_mm, 2.0 * ROUNDED);
         }
     }
+    /* Steps of 1, 2 or 5 times a power of ten, of which not more than 6.5 fit: at least 2.6 do. Zero has a line, too. */
+    int lines = 0;
+    for (const char *at = svg; (at = strstr(at, "<line class=\"axis\" x1=\"70\"")) != NULL; at++)
+        lines++;
+    assert_true(lines >= 3 && lines <= 7);
     const char *mark = strstr(svg, "<line class=\"mark\"");
     assert_non_null(mark);
     near("expected", BOTTOM - atof(strstr(mark, "y1=\"") + 4), 3.0 * height_of_mm, 4.0 * ROUNDED);

@@ -156,6 +156,10 @@ static void one_point_in_a_mirror(void **state)
     write_text("g.ply", text);
     does(&app_report, "m.yaml g.ply", 2);
     assert_string_equal(on_err, "scanhead: g.ply: it has no points (1 shots without echo)\n");
+    snprintf(text, sizeof text, head, 2, "1 1 3 1\n1 1 -3 4\n"); /* two surfaces and their images have 0 to 3 */
+    write_text("g.ply", text);
+    does(&app_report, "m.yaml g.ply", 2);
+    assert_string_equal(on_err, "scanhead: g.ply: point 2 has label 4; the scene has 4 surfaces, from 0\n");
 }
 
 /* The top of a page names the files, the scanner with its noise, and the frame of the coordinates. UTM 33 north is EPSG

@@ -113,6 +113,7 @@ static void absences(void **state)
     assert_true(v.figures.breaks == 2 && v.figures.back_mean_s == 2.0 && v.figures.back_max_s == 3.0);
     assert_string_equal(v.broken[0].kind, "disconnect");
     assert_true(v.broken[0].link == 1 && v.broken[0].back_s == 1.0 && v.broken[1].link == 2);
+    assert_true(v.broken[2].kind == NULL && v.broken[2].link == 0);
     broken[1].back_ns = 27 * S; /* just the limit */
     judge(VERDICT_COMES_BACK, YES, "2 times, after 3.00 s on average and 5.00 s at most (unplug)");
     broken[1].back_ns = 28 * S;
