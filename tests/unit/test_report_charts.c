@@ -167,6 +167,8 @@ static void test_groups(void **state)
     assert_true(lines >= 3 && lines <= 7);
     const char *mark = strstr(svg, "<line class=\"mark\"");
     assert_non_null(mark);
+    near("mark's begin", atof(strstr(mark, "x1=\"") + 4), LEFT + 0.05 * (RIGHT - LEFT) / 2.0, ROUNDED);
+    near("mark's end", atof(strstr(mark, "x2=\"") + 4), LEFT + 0.95 * (RIGHT - LEFT) / 2.0, ROUNDED);
     near("expected", BOTTOM - atof(strstr(mark, "y1=\"") + 4), 3.0 * height_of_mm, 4.0 * ROUNDED);
     free(svg);
 }
