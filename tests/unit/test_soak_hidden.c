@@ -256,6 +256,16 @@ static void a_refused_frame_is_missing(void **state)
     assert_true(row->noticed == 1 && row->lost == 1);
     assert_int_equal(soak->link[0].refused_now, 0);
     soak_rig_end(soak);
+    soak = soak_rig_make(); /* one was refused, and two are not there: the other one has no reason */
+    see(soak, FIRST, 0, 0.0);
+    soak->link[0].refused_now = 1;
+    see(soak, FIRST + 3, 0, 0.0);
+    uint32_t gaps = 0;
+    for (uint32_t i = 0; i < SOAK_RING; i++)
+        gaps += soak->link[0].fact[i].gap != 0;
+    assert_int_equal(gaps, 1);
+    assert_int_equal(soak->link[0].refused_now, 0);
+    soak_rig_end(soak);
 }
 
 int main(void)
