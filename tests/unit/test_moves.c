@@ -265,7 +265,8 @@ static void a_move_that_fails_changes_nothing(void **state)
     static const char *const sets[] = {SHORT, TRIPOD};
     struct rig *rig = rig_idle(NULL, sets, 4);
     const struct site *was = rig->device->site;
-    expect_refused(rig, "SITE:POSE 1, 0,0,-1.9,0,0,0", CMD_E_SETTINGS, "tripod.head_above_m: 0.2 m, but the head is");
+    expect_refused(rig, "SITE:POSE 1, 0,0,-1.9,0,0,0", CMD_E_SETTINGS,
+                   "SITE:POSE: stations[0] (station-1): tripod.head_above_m: 0.2 m, but the head is");
     assert_ptr_equal(rig->device->site, was);
     assert_string_equal(rig_tell(rig, "SITE:POSE? 1", rig->next), "0,0,0,0,0,0");
     assert_string_equal(rig_tell(rig, "SYST:CONT?", rig->next), "0"); /* a refused command takes no control */
