@@ -408,43 +408,6 @@ static void a_journals_moves_are_planned_ahead(void **state)
     rig_close(rig);
 }
 
-/* A plane that touches the Earth leaves it by r^2 / 2R: 0.02 mm at 16 m, and 0.8 mm at 100 m. So georeferencing by a
- * plane is within 0.3 mm in the scene, whose corners are up to 15 m away, and is not from a place 90 m farther. The plan that
- * SYSTem:PLAN? reports is the one at the present place, and a change of it stands once in the journal, before its
- * command. */
-static void the_plan_is_that_of_the_present_place(void **state)
-{
-    (void)state;
-    static const char *const sets[] = {SHORT,
-                                       "output.crs=utm",
-                                       "output.layout=geo",
-                                       "output.tolerance_m=0.0003",
-                                       "scene.anchor.source=explicit",
-                                       "scene.anchor.lat_deg=47",
-                                       "scene.anchor.lon_deg=8",
-                                       "scene.anchor.height_m=400"};
-    static const char *const order[] = {"georef order1\n", "# plan: ", "georef order2\n", " SITE:POSE 1, 90,",
-                                        " SITE:POSE 1, 91,"};
-    char text[4096] = "";
-    struct rig *rig = rig_idle(&(struct device_options){.journal = journal_path}, sets, 9);
-    assert_non_null(strstr(rig_tell(rig, "SYSTem:PLAN?", rig->next), "georef order1"));
-    expect_moved(rig, "SITE:POSE 1, 90,0,0,0,0,0");
-    assert_non_null(strstr(rig_tell(rig, "SYSTem:PLAN?", rig->next), "georef order2"));
-    expect_moved(rig, "SITE:POSE 1, 91,0,0,0,0,0");
-    rig_close(rig);
-    FILE *in = fopen(journal_path, "r");
-    assert_non_null(in);
-    text[fread(text, 1, sizeof text - 1, in)] = '\0';
-    fclose(in);
-    const char *at = strstr(text, "# plan: ");
-    for (size_t i = 0; i < sizeof order / sizeof order[0]; i++) {
-        if (at == NULL || (at = strstr(at, order[i])) == NULL)
-            fail_msg("%s is not in its place in:\n%s", order[i], text);
-        at++;
-    }
-    assert_null(strstr(strstr(text, "order2"), "# plan: "));
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -461,7 +424,6 @@ int main(void)
         cmocka_unit_test(settings_hold_at_the_new_place),
         cmocka_unit_test(a_replayed_journal_moves_at_the_same_tick),
         cmocka_unit_test(a_journals_moves_are_planned_ahead),
-        cmocka_unit_test(the_plan_is_that_of_the_present_place),
     };
     return cmocka_run_group_tests_name("moves", tests, make_folder, remove_folder);
 }
