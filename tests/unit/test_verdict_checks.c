@@ -134,6 +134,9 @@ static void missing_clients(void **state)
     judge(VERDICT_COMES_BACK, FOUND, "it did not come back after unplug, for 18.0 s until the end; the limit is 5 s");
     expect(VERDICT_LETS_GO, YES, "each time");
     assert_true(isnan(v.broken[2].back_s) && v.figures.back_mean_s == 1.0);
+    watch.n_broken = 2; /* one absence without an end is enough */
+    judge(VERDICT_COMES_BACK, FOUND, "it did not come back after unplug, for 18.0 s until the end; the limit is 5 s");
+    watch.n_broken = 3;
     checks.holds = 1;
     judge(VERDICT_COMES_BACK, NO, "it still has the connection from before unplug");
     expect(VERDICT_LETS_GO, FOUND, "18.0 s after unplug it still had the connection from before");
