@@ -279,7 +279,7 @@ static void the_order_of_labels(void **state)
     result.label = label;
 }
 
-/* Of nothing, nothing is seen. */
+/* A scene without area has 0 percent. */
 static void parts_in_percent(void **state)
 {
     (void)state;

@@ -241,8 +241,8 @@ static void noise_is_what_was_asked_for(void **state)
     close_receiver(&r);
 }
 
-/* The noise is keyed by seed and purpose, and position k has the numbers 3 k to 3 k + 2 of it, so that other builds send
- * the same positions. */
+/* The noise is keyed by seed and purpose, and position k has the numbers 3 k to 3 k + 2. So other builds send the same
+ * positions. */
 static void noise_has_its_key(void **state)
 {
     (void)state;

@@ -160,7 +160,7 @@ static void test_groups(void **state)
             near("height", bar.height / mm, height_of_mm, 2.0 * ROUNDED);
         }
     }
-    /* Steps of 1, 2 or 5 times a power of ten, of which not more than 6.5 fit: at least 2.6 do. Zero has a line, too. */
+    /* A step is 1, 2 or 5 times a power of ten. At most 6.5 steps fit, and at least 2.6. Zero has a line, too. */
     int lines = 0;
     for (const char *at = svg; (at = strstr(at, "<line class=\"axis\" x1=\"70\"")) != NULL; at++)
         lines++;

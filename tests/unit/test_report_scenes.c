@@ -249,14 +249,14 @@ static void clouds_that_are_far_or_empty(void **state)
     assert_string_equal(on_err, "scanhead: none.ply: it has no points (2 shots without echo)\n");
 }
 
-/* The body goes north at 1 m/s. It stands for the scan at a stop, 2 s after the ride began: 2 m ahead of its place at
- * rest. Points on its other surface, which is the second one, and on the floor are there, too. A point at the place at
- * rest is 2 m away from it. Without stops the body moves during the scan. */
+/* The body goes north at 1 m/s, and the roof up at 0.25 m/s. At a stop both stand still for the scan. The stop is 2 s
+ * after the ride began, so the body is 2 m north of its place at rest, and the roof 0.5 m higher. A point at the body's
+ * place at rest is 2 m away from it. Without stops the body moves during the scan. */
 static void points_on_bodies(void **state)
 {
     static const char scene[] =
         "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: polar}\n"
-        "scene: {meshes: [{file: floor.obj, up: z, scale: 1}, {file: still.obj, up: z, scale: "
+        "scene: {meshes: [{file: floor.obj, up: z, scale: 1}, {file: roof.obj, up: z, scale: "
         "1, move_m_s: [0, 0, 0.25]}, {file: body.obj, up: z, scale: 1, move_m_s: [0, 1, 0]}]}\n";
     static const char cloud[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
                                 "property double z\nproperty ushort label\nend_header\n-3 -3 0 0\n0.5 3 0.5 2\n"
@@ -264,13 +264,13 @@ static void points_on_bodies(void **state)
     char text[800];
     (void)state;
     write_text("floor.obj", "o floor\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3 4\n");
-    write_text("still.obj", "o roof\nv 0 0 5\nv 1 0 5\nv 1 1 5\nv 0 1 5\nf 1 2 3 4\n");
+    write_text("roof.obj", "o roof\nv 0 0 5\nv 1 0 5\nv 1 1 5\nv 0 1 5\nf 1 2 3 4\n");
     write_text("body.obj", "o body\nv 0 1 0\nv 1 1 0\nv 1 1 1\nv 0 1 1\nf 1 2 3 4\n");
     write_text("ride.csv", "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\n0,2,-4,2,0,0,0\n4,2,-5,2,0,0,0\n");
-    snprintf(
-        text, sizeof text,
-        "%sstations: [{position_m: [2, -4, 2]}]\nplatform: {kind: stops, file: ride.csv, start_s: 2, end_s: 3, step_s: 1}\n",
-        scene);
+    snprintf(text, sizeof text,
+             "%sstations: [{position_m: [2, -4, 2]}]\n"
+             "platform: {kind: stops, file: ride.csv, start_s: 2, end_s: 3, step_s: 1}\n",
+             scene);
     write_text("stops.yaml", text);
     snprintf(text, sizeof text, "%sstations: [{position_m: [2, -4, 2]}]\n", scene);
     write_text("moves.yaml", text);
