@@ -265,9 +265,9 @@ struct command_lines {
     int overrun, last_cr;
 };
 enum command_line_kind { COMMAND_LINE_NONE, COMMAND_LINE_READY, COMMAND_LINE_OVERRUN };
-/* Takes one byte. READY: the line is in buf, NUL-terminated, until the next call. OVERRUN: a line that was
- * too long has ended. A tab becomes a blank. Any other byte that is not printable ASCII becomes '~', which is
- * in no command: the line is then a wrong command. */
+/* Takes one byte. READY: the line is in buf, NUL-terminated, until the next call. OVERRUN: a line that was too long has
+ * ended, and buf is empty. A tab becomes a blank. Any other byte that is not printable ASCII becomes '~', which is in
+ * no command: the line is then a wrong command. */
 enum command_line_kind command_lines_feed(struct command_lines *lines, unsigned char byte);
 
 #endif

@@ -165,7 +165,7 @@ void fault_board_note(struct fault_board *board, const struct fault_note *note)
     if (!note->ended) {
         pthread_mutex_lock(&board->lock);
         board->injected[0]++;
-        if (note->fault != 0 && note->fault <= board->last_number) board->injected[note->fault]++;
+        board->injected[note->fault]++;
         pthread_mutex_unlock(&board->lock);
     }
     truth_write(board->truth, note);

@@ -297,6 +297,8 @@ static void another_campaign_is_refused(void **state)
           "scanhead: warning: d: 2 files belong to no job of this campaign, the first: 0002_y\n"
           "scanhead: 4 jobs are complete: d/manifest.json\n");
     batch(SEEDS "-o none --merge", 2, "", "scanhead: -o none: no such folder; allowed is the folder of a campaign\n");
+    batch("-o c.yaml", 2, "", "scanhead: -o c.yaml: the folder cannot be made: Not a directory\n");
+    batch("-o nowhere/d", 2, "", "scanhead: -o nowhere/d: the folder cannot be made: No such file or directory\n");
     batch("-o c.yaml/d", 2, "", "scanhead: -o c.yaml/d: the folder cannot be made: Not a directory\n");
 }
 

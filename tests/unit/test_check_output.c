@@ -104,6 +104,16 @@ static void a_plain_scene(void **state)
     free(text);
 }
 
+/* A window has 28 bytes and two for each sample, of an even number: 84 bytes, 20,000 times in a second. */
+static void waveforms(void **state)
+{
+    (void)state;
+    write_scene(0, 0, 0);
+    char *text = checked(ONE, (const char *const[]){"waveform.send=on", "signal.model=on", NULL});
+    has(text, "waveforms 27 samples for a usual pulse, 1.68 MB/s");
+    free(text);
+}
+
 /* Each scanner has its stations, and the limits that the configuration sets. The second is without pulses between 0.5
  * and 1000 m that the profile has. */
 static void two_scanners(void **state)
@@ -357,6 +367,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plain_scene),
+        cmocka_unit_test(waveforms),
         cmocka_unit_test(two_scanners),
         cmocka_unit_test(scanners_with_other_counts),
         cmocka_unit_test(the_target_and_the_others),

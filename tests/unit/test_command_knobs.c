@@ -185,6 +185,8 @@ static void a_spheres_step_divides_half_a_turn(void **ctx)
     expect(&dev, "SCAN:STEP?", "1");
     expect(&dev, "SCAN:STEP? MIN", "0.1"); /* 3600 a ring, 100 rings/s */
     expect(&dev, "SCAN:STEP? MAX", "90");
+    dev.settings.step_udeg = 700000; /* as a configuration may have it: 514 steps are the nearest */
+    expect(&dev, "SCAN:STEP?", "0.700389105");
     expect(&dev, "SCAN:STEP 0.36", "0.36");
     expect(&dev, "HEAD:PRR?", "100000"); /* 1000 a ring */
     expect(&dev, "HEAD:LIN? MAX", "360");

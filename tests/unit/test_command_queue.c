@@ -144,7 +144,7 @@ static void feed(struct command_lines *lines, const char *bytes, size_t len, cha
         if (kind == COMMAND_LINE_READY)
             at += (size_t)snprintf(log + at, log_size - at, "<%s>", lines->buf);
         else if (kind == COMMAND_LINE_OVERRUN)
-            at += (size_t)snprintf(log + at, log_size - at, "!");
+            at += (size_t)snprintf(log + at, log_size - at, "!%s", lines->buf);
     }
 }
 

@@ -13,6 +13,7 @@
 
 #include <cmocka.h>
 
+#include "firmware_sim/app/studio/coverage/coverage.h"
 #include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/config/places.h"
@@ -278,12 +279,24 @@ static void the_order_of_labels(void **state)
     result.label = label;
 }
 
+/* A scene without area has 0 percent. */
+static void parts_in_percent(void **state)
+{
+    (void)state;
+    assert_true(coverage_percent(1.0, 4.0) == 25.0 && coverage_percent(0.0, 4.0) == 0.0);
+    assert_true(coverage_percent(0.0, 0.0) == 0.0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_order_of_labels),     cmocka_unit_test(each_key),
-        cmocka_unit_test(keys_that_are_not_there), cmocka_unit_test(each_line),
-        cmocka_unit_test(each_line_of_next),       cmocka_unit_test(nothing_left_to_gain),
+        cmocka_unit_test(parts_in_percent),
+        cmocka_unit_test(the_order_of_labels),
+        cmocka_unit_test(each_key),
+        cmocka_unit_test(keys_that_are_not_there),
+        cmocka_unit_test(each_line),
+        cmocka_unit_test(each_line_of_next),
+        cmocka_unit_test(nothing_left_to_gain),
     };
     return cmocka_run_group_tests(tests, name_them, NULL);
 }

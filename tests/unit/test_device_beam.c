@@ -114,6 +114,7 @@ static void faults_end_with_their_scan(void **state)
     assert_string_equal(notes[0].text, "scan 1, at 39.920000 deg"); /* 999 of 3000 pulses of 240 deg from -40 on */
     assert_string_equal(notes[1].text, "scan 1");
     rig_go_to(rig, rig->next + 100);
+    rig_tell(rig, "HEAD:LINES 200", rig->next - 1);
     rig_tell(rig, "SCAN:STAR", rig->next - 1);
     rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
     rig_go_to(rig, rig->next + 50);
@@ -125,7 +126,28 @@ static void faults_end_with_their_scan(void **state)
     assert_int_equal(rig->work.pulse0, cleared);
     assert_int_equal(n_notes, 4);
     assert_note(2, 1, 0, 999);
+    assert_string_equal(notes[2].text, "scan 2, at 119.840000 deg"); /* 999 of 1500 pulses */
     assert_note(3, 1, 1, cleared);
+    rig_close(rig);
+}
+
+/* Where the mirror stood in the scan before means nothing to the next one, also at its first pulse. */
+static void the_mirror_stands_anew_in_each_scan(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"head.frames=0"}, *const faults[] = {"{kind: mirror_stuck, from_pulse: 999}"};
+    struct rig *rig = open_scan(sets, LEN(sets), faults, LEN(faults));
+    rig_go_to(rig, rig->next + 20);
+    rig_tell(rig, "SCAN:STOP", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_END, 10);
+    rig_go_to(rig, rig->next + 100);
+    rig_tell(rig, "FAUL:ADD {kind: mirror_stuck}", rig->next - 1);
+    rig_tell(rig, "SCAN:STAR", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+    rig_go_to(rig, rig->next + 20);
+    assert_true(n_notes >= 3);
+    assert_string_equal(notes[0].text, "scan 1, at 39.920000 deg");
+    assert_string_equal(notes[2].text, "scan 2, at -40.000000 deg");
     rig_close(rig);
 }
 
@@ -222,16 +244,34 @@ static void the_mirror_has_limits(void **state)
     rig_close(rig);
 }
 
+/* Losses of soiled windows add up while they last. Other faults lose nothing. */
+static void losses_of_the_window_add_up(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"head.frames=0", "signal.model=on"};
+    const char *const faults[] = {"{kind: window_soiled, loss_db: 1.5}", "{kind: mirror_slow, factor: 0.5}",
+                                  "{kind: window_soiled, loss_db: 0.25, from_pulse: 3000}"};
+    struct rig *rig = open_scan(sets, LEN(sets), faults, LEN(faults));
+    assert_true(device_window_loss_db(rig->device) == 1.5);
+    rig_go_to(rig, rig->next + 20); /* 300 pulses a tick */
+    assert_true(device_window_loss_db(rig->device) == 1.75);
+    rig_tell(rig, "FAUL:CLE 1", rig->next - 1);
+    rig_claim(rig);
+    assert_true(device_window_loss_db(rig->device) == 0.25);
+    rig_tell(rig, "SCAN:STOP", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_END, 100);
+    assert_true(device_window_loss_db(rig->device) == 0.0);
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_tick_ends_where_a_fault_does),
-        cmocka_unit_test(settings_change_while_the_mirror_is_slow),
-        cmocka_unit_test(faults_end_with_their_scan),
-        cmocka_unit_test(what_stands_does_not_wobble),
-        cmocka_unit_test(an_added_fault_counts_from_its_command),
-        cmocka_unit_test(another_fault_leaves_it_as_it_is),
-        cmocka_unit_test(the_mirror_has_limits),
+        cmocka_unit_test(a_tick_ends_where_a_fault_does),   cmocka_unit_test(settings_change_while_the_mirror_is_slow),
+        cmocka_unit_test(faults_end_with_their_scan),       cmocka_unit_test(the_mirror_stands_anew_in_each_scan),
+        cmocka_unit_test(what_stands_does_not_wobble),      cmocka_unit_test(an_added_fault_counts_from_its_command),
+        cmocka_unit_test(another_fault_leaves_it_as_it_is), cmocka_unit_test(the_mirror_has_limits),
+        cmocka_unit_test(losses_of_the_window_add_up),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

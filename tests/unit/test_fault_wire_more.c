@@ -120,6 +120,25 @@ static void a_fault_counts_from_when_it_was_added(void **state)
     assert_int_equal(add(&f, 0), 3); /* and its number */
 }
 
+/* Each fault drops a frame of its own. The first 32 are taken out as of a later time, so they strike, too. */
+static void as_many_faults_as_are_kept_strike(void **state)
+{
+    (void)state;
+    f = fault_of_kind(FAULT_DROP);
+    rig_open(NULL, 0, 1);
+    for (int i = 1; i <= FAULT_KEPT; i++) {
+        f.at = (uint64_t)i;
+        assert_int_equal(add(&f, 0), i);
+        if (i == FAULT_MAX) assert_int_equal(fault_board_end(rig.board, 0, 1000 * MS), FAULT_MAX);
+    }
+    for (int i = 0; i <= FAULT_KEPT; i++)
+        rig_frame_at(RIG_STREAM, 40, MS, 0);
+    assert_int_equal(rig.n_notes, FAULT_KEPT);
+    for (uint32_t i = 0; i < rig.n_notes; i++)
+        assert_true(rig.note[i].fault == i + 1 && rig.note[i].number == i + 1);
+    rig_end(1);
+}
+
 static void what_is_held_when_its_fault_goes_still_comes(void **state)
 {
     (void)state;
@@ -320,6 +339,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_key_says_when),
         cmocka_unit_test_teardown(a_fault_counts_from_when_it_was_added, rig_teardown),
+        cmocka_unit_test_teardown(as_many_faults_as_are_kept_strike, rig_teardown),
         cmocka_unit_test_teardown(what_is_held_when_its_fault_goes_still_comes, rig_teardown),
         cmocka_unit_test_teardown(a_wire_is_full_by_what_only_time_keeps_back, rig_teardown),
         cmocka_unit_test_teardown(an_item_longer_than_usual_is_taken, rig_teardown),

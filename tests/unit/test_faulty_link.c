@@ -319,6 +319,30 @@ static void a_cable_is_pulled_once(void **state)
     close_it(f);
 }
 
+/* While the cable is out, an act that is due waits for the inner link, and the poll does not end early for it. */
+static void acts_wait_for_the_cable(void **state)
+{
+    (void)state;
+    struct link_event events[4];
+    struct fault fault[2] = {fault_of_kind(FAULT_CABLE), fault_of_kind(FAULT_DISCONNECT)};
+    fault[0].at = 1;
+    fault[0].for_ms = HOUR_MS;
+    fault[1].at = 2;
+    struct faulty_link *f = open_with(fault, 2);
+    write_it(f, 0, "a\n\n");
+    faulty_pass(f, 0, owner.now_ns);
+    write_it(f, 0, "b\n\n");
+    assert_int_equal(faulty_pass(f, 0, owner.now_ns), 0);
+    assert_true(inner.n_faults == 1 && faulty_is_pulled(f) && !f->session[0].is_gone && faulty_look(f, 0).waits);
+    poll_it(f, 3, MOST_MS, events);
+    assert_true(inner.want_write == 3 && inner.timeout_ms == MOST_MS);
+    assert_int_equal(faulty_fault(f, LINK_FAULT_PLUG, 0, 0, 0.0), SH_OK);
+    assert_int_equal(faulty_pass(f, 0, owner.now_ns), SH_ECLOSED);
+    assert_true(inner.n_faults == 3 && f->session[0].is_gone);
+    expect_fault(2, LINK_FAULT_DISCONNECT, 0, fault_n(&fault[1]), 0.0);
+    close_it(f);
+}
+
 /* A link that can't fall silent is unplugged instead, and one that can't do that either goes on. */
 static void a_cable_is_an_unplugging_where_need_be(void **state)
 {
@@ -417,6 +441,7 @@ int main(void)
         cmocka_unit_test(an_unplugged_link_comes_back),
         cmocka_unit_test(an_act_that_fails_is_told),
         cmocka_unit_test(a_cable_is_pulled_once),
+        cmocka_unit_test(acts_wait_for_the_cable),
         cmocka_unit_test(a_cable_is_an_unplugging_where_need_be),
         cmocka_unit_test(clients_are_turned_away),
         cmocka_unit_test(a_plugged_device_begins_anew),

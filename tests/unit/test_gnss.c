@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "core/rng.h"
 #include "drivers/protocol/nmea.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
@@ -20,13 +21,22 @@ struct receiver {
 
 enum { MAX_SETS = 24 };
 
+static struct receiver load_receiver(const char *const *sets, int n)
+{
+    struct receiver r = {.cfg = calloc(1, sizeof *r.cfg)};
+    char path[96];
+    struct sh_err err;
+    snprintf(path, sizeof path, "%s/run.yaml", folder);
+    need(config_load(path, sets, n, r.cfg, &err), &err);
+    need(site_load(r.cfg, NULL, &r.site, &err), &err);
+    return r;
+}
+
 /* sets: further ones, ends with NULL. */
 static struct receiver open_receiver(const char *lat, const char *lon, const char *const *more)
 {
-    struct receiver r = {.cfg = calloc(1, sizeof *r.cfg)};
-    char path[96], sets[8][64];
+    char sets[8][64];
     const char *list[MAX_SETS];
-    struct sh_err err;
     int n = 0;
     snprintf(sets[0], sizeof sets[0], "stations[0].lat_deg=%s", lat);
     snprintf(sets[1], sizeof sets[1], "stations[0].lon_deg=%s", lon);
@@ -41,10 +51,7 @@ static struct receiver open_receiver(const char *lat, const char *lon, const cha
     list[n++] = "time.epoch=2026-01-01T00:00:00.375Z";
     for (; more != NULL && *more != NULL; n++)
         list[n] = *more++;
-    snprintf(path, sizeof path, "%s/run.yaml", folder);
-    need(config_load(path, list, n, r.cfg, &err), &err);
-    need(site_load(r.cfg, NULL, &r.site, &err), &err);
-    return r;
+    return load_receiver(list, n);
 }
 
 /* The receiver keeps addresses of its members, so it can't start in open_receiver. */
@@ -234,6 +241,25 @@ static void noise_is_what_was_asked_for(void **state)
     close_receiver(&r);
 }
 
+/* The noise is keyed by seed and purpose, and position k has the numbers 3 k to 3 k + 2. So other builds send the same
+ * positions. */
+static void noise_has_its_key(void **state)
+{
+    (void)state;
+    static const char *const more[] = {"gnss.accuracy_m=0.5", "noise.seed=7", NULL};
+    const uint64_t key = rng_key(7, RNG_GNSS);
+    struct receiver r = open_receiver("48", "11", more);
+    start_receiver(&r);
+    for (uint64_t k = 0; k < 4; k++) {
+        struct fix fix = get_fix(&r, k, 0);
+        double d[3];
+        offset_enu(48, 11, 123.4567, &fix, d);
+        for (uint64_t i = 0; i < 3; i++)
+            assert_true(fabs(d[i] - 0.5 * rng_normal(key, 3 * k + i)) < STEP_M);
+    }
+    close_receiver(&r);
+}
+
 /* An error is independent of later ones, on its own axis and on others. The mean product of two errors of N positions
  * is within 5 sigma^2 / sqrt(N) but once in 1.7 million. There are 36 of them: once in 48,000. The seed is fixed. */
 static void noise_does_not_last(void **state)
@@ -283,6 +309,26 @@ static void speed_and_course_are_those_of_the_way(void **state)
     close_receiver(&r);
 }
 
+/* The scene's axes are east, north and up at its anchor. Station 2 is 0.5 m east of it, and the arm ahead of the head
+ * points north. */
+static void an_anchored_scene_has_places(void **state)
+{
+    static const char *const sets[] = {"scene.anchor.source=explicit", "scene.anchor.lat_deg=48",
+                                       "scene.anchor.lon_deg=11",      "scene.anchor.height_m=123.4567",
+                                       "links[0].type=null",           "links[0].protocol=nmea",
+                                       "gnss.lever_arm_m=[0, 2, 0]",   "time.epoch=2026-01-01T00:00:00Z"};
+    static const double enu[3] = {0.5, 2, 0};
+    double d[3];
+    (void)state;
+    struct receiver r = load_receiver(sets, sizeof sets / sizeof sets[0]);
+    start_receiver(&r);
+    const struct fix fix = get_fix(&r, 0, 1);
+    offset_enu(48, 11, 123.4567, &fix, d);
+    for (int i = 0; i < 3; i++)
+        assert_true(fabs(d[i] - enu[i]) < STEP_M);
+    close_receiver(&r);
+}
+
 /* Position packets of a VLP-16 and its settings need no place. The packets' sentence says V, and not 0 degrees north
  * and east. */
 static void without_a_place_no_fix_is_valid(void **state)
@@ -305,10 +351,16 @@ static void without_a_place_no_fix_is_valid(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_antenna_is_where_the_arm_puts_it),  cmocka_unit_test(at_the_poles),
-        cmocka_unit_test(times_are_those_of_the_rate),           cmocka_unit_test(it_stands_where_the_head_stands),
-        cmocka_unit_test(noise_is_what_was_asked_for),           cmocka_unit_test(noise_does_not_last),
-        cmocka_unit_test(speed_and_course_are_those_of_the_way), cmocka_unit_test(without_a_place_no_fix_is_valid),
+        cmocka_unit_test(the_antenna_is_where_the_arm_puts_it),
+        cmocka_unit_test(at_the_poles),
+        cmocka_unit_test(times_are_those_of_the_rate),
+        cmocka_unit_test(it_stands_where_the_head_stands),
+        cmocka_unit_test(noise_is_what_was_asked_for),
+        cmocka_unit_test(noise_does_not_last),
+        cmocka_unit_test(noise_has_its_key),
+        cmocka_unit_test(an_anchored_scene_has_places),
+        cmocka_unit_test(speed_and_course_are_those_of_the_way),
+        cmocka_unit_test(without_a_place_no_fix_is_valid),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

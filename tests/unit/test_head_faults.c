@@ -56,6 +56,10 @@ static void begins_and_ends_at_its_times(void **state)
     struct fault_list list = {.n = 2};
     list.fault[0] = make(FAULT_CLOCK_STOP, 0.0025, 0.0043);
     list.fault[1] = make(FAULT_LASER_OFF, 0.0025, 0.0043);
+    for (int i = 0; i < 2; i++) {
+        list.fault[i].for_ms = 12.5 + i;
+        list.fault[i].n = 3 + (uint32_t)i;
+    }
     struct rig rig;
     open_rig(&rig, &list);
     static const struct {
@@ -77,6 +81,8 @@ static void begins_and_ends_at_its_times(void **state)
         assert_int_equal(rig.note[i].t_ns, want[i].t_ns);
         assert_int_equal(rig.note[i].ended, want[i].ended);
         assert_false(rig.note[i].has_pulse);
+        assert_true(rig.note[i].for_ms == 11.5 + want[i].fault && rig.note[i].byte == -1);
+        if (!want[i].ended) assert_int_equal(rig.note[i].n, 2 + want[i].fault);
     }
     fault_board_free(rig.board);
 }

@@ -74,9 +74,10 @@ static void units_are_guessed(void **state)
     } rows[] = {{{10, 5, 3}, 1.0, none},           {{2000, 5, 3}, 1.0, none},
                 {{2001, 1500, 1500}, 0.001, none}, {{6000, 5000, 499}, 1.0, survey},
                 {{6000, 6000, 500}, 0.001, none},  {{5000, 2900, 290}, 0.001, none}, /* ten times as wide is not more */
-                {{5000, 2901, 290}, 1.0, survey},  {{50000, 50000, 100}, 1.0, survey},
+                {{5000, 2901, 290}, 1.0, survey},  {{2900, 5000, 290}, 0.001, none},
+                {{2901, 5000, 290}, 1.0, survey},  {{50000, 50000, 100}, 1.0, survey},
                 {{50001, 50000, 100}, 0.001, none}};
-    static const double low[3] = {0, 0, 0};
+    static const double low[3] = {70, -3000, 400};
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         const char *why = strstr(rows[i].from, ": ") + 2;
@@ -93,7 +94,12 @@ static void units_are_guessed(void **state)
                  rows[i].from == none ? "" : why, rows[i].scale * largest);
         assert_string_equal(said, want);
         for (int k = 0; k < 3; k++)
-            assert_true(fabs(scene->max_m[k] - rows[i].scale * rows[i].size[k]) < 1e-9 * rows[i].size[k]);
+            assert_true(fabs(scene->max_m[k] - rows[i].scale * (low[k] + rows[i].size[k])) < 1e-9 * largest);
+        scene_free(scene);
+        const double y_up[3] = {rows[i].size[0], rows[i].size[2], rows[i].size[1]}; /* the same mesh, with y up */
+        write_box(low, y_up);
+        scene = load("y", 0);
+        assert_true(as.scale == rows[i].scale);
         scene_free(scene);
     }
 }

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* `scanhead map` in this process: what is refused, what --quiet leaves out, and one picture from a scan and from its
  * recording. */
+#include "firmware_sim/app/studio/map/field_lines.h"
+#include "firmware_sim/config/config.h"
+#include "firmware_sim/site/placement.h"
 #include "tests/unit/commands_rig.h"
 
 #include <math.h>
@@ -208,9 +211,54 @@ static void quiet_is_quiet(void **state)
     free(again);
 }
 
+struct lines {
+    double a[4][3], b[4][3];
+    int n, stop_at;
+};
+
+static int keep_line(void *ctx, const double a[3], const double b[3], struct sh_err *error)
+{
+    struct lines *lines = ctx;
+    assert_true(lines->n < 4);
+    memcpy(lines->a[lines->n], a, sizeof lines->a[0]);
+    memcpy(lines->b[lines->n], b, sizeof lines->b[0]);
+    return ++lines->n == lines->stop_at ? sh_fail(error, SH_ENOMEM, "full") : SH_OK;
+}
+
+/* The head is at (10, 20, 3). Its x axis is the scene's y, and its y axis the scene's z. So a corner (x, y) is at
+ * (10, 20 + x, 3 + y). A triangle has three lines, each from a corner to the next one, and the last one back. */
+static void fields_are_lines_at_the_station(void **state)
+{
+    static const struct placement at = {.position_m = {10, 20, 3}, .rotation = {0, 0, 1, 1, 0, 0, 0, 1, 0}};
+    static const double corner_m[3][2] = {{1, 0.5}, {4, 0.5}, {1, 2.5}};
+    struct config *cfg = calloc(1, sizeof *cfg);
+    struct lines lines = {0};
+    struct sh_err err = {0};
+    (void)state;
+    assert_non_null(cfg);
+    cfg->n_fields = 2; /* the second one has no corner */
+    cfg->field[0].shape = cfg->field[1].shape = FIELD_POLYGON;
+    cfg->field[0].points_m.n = 3;
+    memcpy(cfg->field[0].points_m.at, corner_m, sizeof corner_m);
+    assert_int_equal(field_lines_each(cfg, &at, keep_line, &lines, &err), SH_OK);
+    assert_int_equal(lines.n, 3);
+    for (int i = 0; i < 3; i++) {
+        const double *a = corner_m[i], *b = corner_m[(i + 1) % 3];
+        assert_true(lines.a[i][0] == 10 && lines.b[i][0] == 10);
+        assert_true(fabs(lines.a[i][1] - 20 - a[0]) < 1e-9 && fabs(lines.a[i][2] - 3 - a[1]) < 1e-9);
+        assert_true(fabs(lines.b[i][1] - 20 - b[0]) < 1e-9 && fabs(lines.b[i][2] - 3 - b[1]) < 1e-9);
+    }
+    cfg->field[1] = cfg->field[0];
+    lines = (struct lines){.stop_at = 2};
+    assert_int_equal(field_lines_each(cfg, &at, keep_line, &lines, &err), SH_ENOMEM);
+    assert_int_equal(lines.n, 2);
+    free(cfg);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fields_are_lines_at_the_station),
         cmocka_unit_test(what_is_refused),
         cmocka_unit_test(nothing_is_seen),
         cmocka_unit_test(options_that_do_not_fit),

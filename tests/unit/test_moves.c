@@ -234,6 +234,29 @@ static void who_asks_holds_the_site_of_now(void **state)
     rig_close(rig);
 }
 
+/* The site of a scan is that of the last one alone, and stays as it is while it is held. */
+static void who_asks_holds_the_site_of_a_scan(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {SHORT};
+    struct device_held held;
+    struct rig *rig = rig_idle(NULL, sets, 2);
+    struct bytes b = scan(rig);
+    const uint32_t number = rig->device->scan.number;
+    assert_null(device_hold_scan(rig->device, number + 1, &held));
+    assert_true(held.variant == NULL && held.version == NULL);
+    const struct site *site = device_hold_scan(rig->device, number, &held);
+    assert_true(site != NULL && site->station[0].at.position_m[2] == 0.0);
+    assert_true((held.variant != NULL) != (held.version != NULL));
+    rig_go_to(rig, rig->next + 100);
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.5,0,0,0");
+    expect_moved(rig, "SITE:POSE 1, 0,0,0.25,0,0,0");
+    assert_true(site->station[0].at.position_m[2] == 0.0);
+    device_let_go(&held);
+    free(b.at);
+    rig_close(rig);
+}
+
 /* ---- failures */
 
 static void a_move_that_fails_changes_nothing(void **state)
@@ -242,10 +265,17 @@ static void a_move_that_fails_changes_nothing(void **state)
     static const char *const sets[] = {SHORT, TRIPOD};
     struct rig *rig = rig_idle(NULL, sets, 4);
     const struct site *was = rig->device->site;
-    expect_refused(rig, "SITE:POSE 1, 0,0,-1.9,0,0,0", CMD_E_SETTINGS, "tripod.head_above_m: 0.2 m, but the head is");
+    expect_refused(rig, "SITE:POSE 1, 0,0,-1.9,0,0,0", CMD_E_SETTINGS,
+                   "SITE:POSE: stations[0] (station-1): tripod.head_above_m: 0.2 m, but the head is");
     assert_ptr_equal(rig->device->site, was);
     assert_string_equal(rig_tell(rig, "SITE:POSE? 1", rig->next), "0,0,0,0,0,0");
     assert_string_equal(rig_tell(rig, "SYST:CONT?", rig->next), "0"); /* a refused command takes no control */
+    assert_true(rig_claim(rig));
+    const struct native_event *last = NULL;
+    for (uint32_t i = 0; i < rig->work.n_events; i++)
+        if (rig->work.event[i].code == NATIVE_EV_CONTROL) last = &rig->work.event[i];
+    assert_true(last != NULL && last->a == 0 && last->b == 0 && last->c == 0); /* nobody has it */
+    assert_string_equal(last->text, "released");
     assert_string_equal(rig_tell(rig, "SYST:ERR:COUN?", rig->next), "1");
     assert_string_equal(rig_tell(rig, "SCAN:STARt", rig->next), "OK");
     expect_refused(rig, "SITE:POSE 1, 0,0,0.5,0,0,0", CMD_E_SETTINGS, "state spin-up");
@@ -386,6 +416,7 @@ int main(void)
         cmocka_unit_test(the_bvh_and_the_maps_of_others_stay),
         cmocka_unit_test(what_nobody_uses_is_freed_once),
         cmocka_unit_test(who_asks_holds_the_site_of_now),
+        cmocka_unit_test(who_asks_holds_the_site_of_a_scan),
         cmocka_unit_test(a_move_that_fails_changes_nothing),
         cmocka_unit_test(nothing_starts_while_a_station_is_moved),
         cmocka_unit_test(the_end_of_the_run_ends_planning),

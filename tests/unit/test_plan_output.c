@@ -12,17 +12,19 @@
 #include "firmware_sim/site/site.h"
 
 static char config_file[96];
-/* A beam, and coordinates in UTM, may be had in several ways, most of which the plan leaves out. */
+/* A beam, and coordinates in UTM, may be had in several ways, most of which the plan leaves out. The second station has
+ * another scanner, of which the plan is not. */
 static const char *const SETS[] = {"beam.mode=auto", "output.crs=utm", "output.layout=geo",
                                    "scene.anchor={source: explicit, origin_m: [0, 0, 0], lat_deg: 52, lon_deg: 15, "
-                                   "height_m: 40}"};
+                                   "height_m: 40}",
+                                   "stations[1].scanner={head: {profile: full-sweep, prr_hz: 20000, lines_hz: 100}}"};
 enum { N_SETS = sizeof SETS / sizeof SETS[0] };
 
 static char *print_plan(const char *option)
 {
     char name[] = "plan", form[16], set[] = "--set", kept[N_SETS][160];
     char *argv[3 + 2 * N_SETS + 1] = {name, config_file};
-    struct output output;
+    struct output output, messages;
     int argc = 2;
     for (int i = 0; i < N_SETS; i++) {
         snprintf(kept[i], sizeof kept[i], "%s", SETS[i]);
@@ -32,8 +34,13 @@ static char *print_plan(const char *option)
     snprintf(form, sizeof form, "%s", option != NULL ? option : "");
     if (option != NULL) argv[argc++] = form;
     output_take(&output, stdout);
+    output_take(&messages, stderr);
     const int status = app_plan.run(argc, argv);
-    char *text = output_give(&output);
+    char *said = output_give_said(&messages), *text = output_give(&output);
+    if (strstr(said, "the plan of the scanner of station 1; others have other scanners: --set head.station=N\n") ==
+        NULL)
+        fail_msg("%s", said);
+    free(said);
     assert_int_equal(status, APP_OK);
     return text;
 }

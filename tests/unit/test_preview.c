@@ -92,6 +92,7 @@ static void test_cells(void **state)
     assert_memory_equal(cells.bytes, "SHCE", 4);
     assert_int_equal(le_get32(cells.bytes + 4), 1); /* versions */
     assert_int_equal(le_get32(leg.bytes + 4), 1);
+    assert_true(le_get_double(cells.bytes + 40) == 0.2);
     assert_int_equal(n, coverage_cells(r.coverage));
     assert_int_equal(points_of(&leg), 0);
     for (uint32_t i = 0; i < n; i++)

@@ -280,12 +280,33 @@ static void only_whole_turns_are_held(void **state)
     rig_close(rig);
 }
 
+/* Power comes a quarter after the full second, so pulses are due at 0.75 s, 1.75 s, ... A late one has
+ * its own second all the same. GPS time is 18 s ahead of UTC, and counts from 1980-01-06. */
+static void late_pulses_have_their_second(void **state)
+{
+    (void)state;
+    const char *const sets[] = {"time.epoch=2026-01-01T00:00:00.25Z", "faults[0].kind=pps_jitter",
+                                "faults[0].for_ms=50"};
+    struct rig *rig = open_with(sets, 3);
+    int late_ticks = 0;
+    for (uint64_t k = 1; k <= 4; k++) {
+        const struct native_event *pps = rig_wait(rig, NATIVE_EV_PPS, 1100);
+        const uint64_t due_ns = k * (uint64_t)SECOND_NS - 250000000;
+        assert_true(pps->a == 1767225600 + k && pps->c == 1767225600 - 315964800 + 18 + k);
+        assert_true(pps->b >= due_ns && pps->b <= due_ns + 50000000);
+        late_ticks += pps->b >= due_ns + 1000000;
+    }
+    assert_true(late_ticks >= 2); /* in ticks after the second's: of 1 ms, one in 50 is not */
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_what_comes),
         cmocka_unit_test(sentences_go_wrong),
         cmocka_unit_test(late_sentences_are_not_lost),
+        cmocka_unit_test(late_pulses_have_their_second),
         cmocka_unit_test(the_rotor_is_where_the_lock_wants_it),
         cmocka_unit_test(the_phase_is_lost_with_the_pulses),
         cmocka_unit_test(only_whole_turns_are_held),

@@ -194,7 +194,9 @@ static void a_command_seeks_paces_and_loops(void **state)
                 {7, "SCAN:REPL 0.019 , 0.5 , ON", "D "}, /* at half the speed each takes two ticks */
                 {8, "", "19 "},
                 {9, "SCAN:REPL ,1", "0 "}, /* anew, by the loop */
-                {10, "SCAN:REPL ,,OFF", "1 "}};
+                {10, "SCAN:REPL ,,OFF", "1 "},
+                {11, "SCAN:REPL 0", "0 "},
+                {12, "", "1 "}};
     struct config *cfg = config_new();
     event_recording_write(file_path, 20);
     const struct replay_options options = {.path = file_path, .speed = 1, .start = 1};
@@ -208,7 +210,7 @@ static void a_command_seeks_paces_and_loops(void **state)
     }
     assert_string_equal(said(r, "SCAN:REPL?"), "PLAYING,0.001000,0.019000,1,OFF");
     struct ring_tick last;
-    for (uint64_t tick = 11; replay_source.next(r, tick, 0, 0, &last) == LOOP_SOURCE_TICK; tick++) {
+    for (uint64_t tick = 13; replay_source.next(r, tick, 0, 0, &last) == LOOP_SOURCE_TICK; tick++) {
     } /* it was begun with --start, and ends with the recording */
     assert_string_equal(said(r, "SCAN:REPL?"), "IDLE,0.019000,0.019000,1,OFF");
     replay_free(r);

@@ -97,6 +97,34 @@ static void test_axis_of_bins(void **state)
     free(svg);
 }
 
+/* A line of the scale goes from side to side at its value. Its figure ends 6 units before the line. In letters of 12
+ * units digits are some 8.6 high, so that they are in the middle where they stand 4.3 below the line. */
+static void test_scale(void **state)
+{
+    static const char line[] = "<line class=\"axis\" x1=\"70\"";
+    (void)state;
+    char *svg = drawn(draw_histogram);
+    const char *bars = svg;
+    struct rect ten; /* the bar of 10 */
+    int n = 0;
+    assert_true(next_bar(&bars, "s0", &ten));
+    for (const char *at = svg; (at = strstr(at, line)) != NULL; n++, at++) {
+        double x2, y[2], text_x, text_y, value;
+        assert_int_equal(sscanf(at + strlen(line),
+                                " y1=\"%lf\" x2=\"%lf\" y2=\"%lf\"/><text x=\"%lf\" y=\"%lf\" "
+                                "text-anchor=\"end\">%lf",
+                                &y[0], &x2, &y[1], &text_x, &text_y, &value),
+                         6);
+        near("end", x2, RIGHT, 0.0);
+        near("level", y[1], y[0], 0.0);
+        near("value", (BOTTOM - y[0]) / ten.height, value / 10.0, 1e-3);
+        near("figure's end", text_x, LEFT - 6.0, 0.0);
+        near("figure's middle", text_y - 4.3, y[0], 0.5);
+    }
+    assert_true(n >= 3);
+    free(svg);
+}
+
 static void draw_bars(FILE *out)
 {
     static const char group[2][32] = {"0-10", "10-20"};
@@ -132,8 +160,15 @@ static void test_groups(void **state)
             near("height", bar.height / mm, height_of_mm, 2.0 * ROUNDED);
         }
     }
+    /* A step is 1, 2 or 5 times a power of ten. At most 6.5 steps fit, and at least 2.6. Zero has a line, too. */
+    int lines = 0;
+    for (const char *at = svg; (at = strstr(at, "<line class=\"axis\" x1=\"70\"")) != NULL; at++)
+        lines++;
+    assert_true(lines >= 3 && lines <= 7);
     const char *mark = strstr(svg, "<line class=\"mark\"");
     assert_non_null(mark);
+    near("mark's begin", atof(strstr(mark, "x1=\"") + 4), LEFT + 0.05 * (RIGHT - LEFT) / 2.0, ROUNDED);
+    near("mark's end", atof(strstr(mark, "x2=\"") + 4), LEFT + 0.95 * (RIGHT - LEFT) / 2.0, ROUNDED);
     near("expected", BOTTOM - atof(strstr(mark, "y1=\"") + 4), 3.0 * height_of_mm, 4.0 * ROUNDED);
     free(svg);
 }
@@ -227,14 +262,14 @@ static void test_without_values(void **state)
     free(svg);
 }
 
-/* Names of 20 letters take 7 units a letter and 8 more, 148 in all; a group has 55.5. Each third name is there, and
- * where the picture is narrow, only each second one of these. */
+/* Names of 23 letters take 7 units a letter and 8 more, 169 in all; three groups have 166.5. Each fourth name is there,
+ * and where the picture is narrow, only each second one of these. */
 static void draw_many(FILE *out)
 {
     static char group[10][32];
     static double value_m[10][PAGE_SERIES];
     for (int g = 0; g < 10; g++) {
-        snprintf(group[g], sizeof group[g], "group-number-%07d", g);
+        snprintf(group[g], sizeof group[g], "group-number-%010d", g);
         value_m[g][0] = 1e-6 * (g + 1);
         value_m[g][1] = value_m[g][2] = value_m[g][3] = (double)NAN;
     }
@@ -252,9 +287,9 @@ static void test_names_of_groups(void **state)
     (void)state;
     char *svg = drawn(draw_many), text[128];
     for (int g = 0; g < 10; g++) {
-        snprintf(text, sizeof text, "<text%s x=\"%.1f\" y=\"262\" text-anchor=\"middle\">group-number-%07d</text>\n",
-                 g / 3 % 2 == 1 ? " class=\"odd\"" : "", LEFT + (g + 0.5) * (RIGHT - LEFT) / 10.0, g);
-        assert_int_equal(strstr(svg, text) != NULL, g % 3 == 0);
+        snprintf(text, sizeof text, "<text%s x=\"%.1f\" y=\"262\" text-anchor=\"middle\">group-number-%010d</text>\n",
+                 g / 4 % 2 == 1 ? " class=\"odd\"" : "", LEFT + (g + 0.5) * (RIGHT - LEFT) / 10.0, g);
+        assert_int_equal(strstr(svg, text) != NULL, g % 4 == 0);
     }
     const char *at = svg;
     struct rect bar;
@@ -319,6 +354,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_bars_stand_on_the_axis),
         cmocka_unit_test(test_axis_of_bins),
+        cmocka_unit_test(test_scale),
         cmocka_unit_test(test_groups),
         cmocka_unit_test(test_ends_and_curve),
         cmocka_unit_test(test_one_point),

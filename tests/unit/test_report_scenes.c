@@ -156,6 +156,10 @@ static void one_point_in_a_mirror(void **state)
     write_text("g.ply", text);
     does(&app_report, "m.yaml g.ply", 2);
     assert_string_equal(on_err, "scanhead: g.ply: it has no points (1 shots without echo)\n");
+    snprintf(text, sizeof text, head, 2, "1 1 3 1\n1 1 -3 4\n"); /* two surfaces and their images have 0 to 3 */
+    write_text("g.ply", text);
+    does(&app_report, "m.yaml g.ply", 2);
+    assert_string_equal(on_err, "scanhead: g.ply: point 2 has label 4; the scene has 4 surfaces, from 0\n");
 }
 
 /* The top of a page names the files, the scanner with its noise, and the frame of the coordinates. UTM 33 north is EPSG
@@ -191,6 +195,7 @@ static void the_top_of_a_page(void **state)
         snprintf(fact, sizeof fact, "<dt>Scanner</dt><dd>scanhead sphere, %s</dd>\n", rows[i].scanner);
         has(page, fact);
         has(page, "<dt>Recording</dt><dd>g.ply</dd>\n");
+        has(page, "<h2>Pictures</h2>\n");
         has(page, "<dt>Configuration</dt><dd>g.yaml</dd>\n<dt>Scene</dt><dd>tiles.obj</dd>\n");
         for (int k = 0; k < 9; k++) { /* the chart of incidences has all groups */
             snprintf(fact, sizeof fact, ">%d\xe2\x80\x93%d\xc2\xb0</text>", 10 * k, 10 * k + 10);
@@ -244,12 +249,51 @@ static void clouds_that_are_far_or_empty(void **state)
     assert_string_equal(on_err, "scanhead: none.ply: it has no points (2 shots without echo)\n");
 }
 
+/* The body goes north at 1 m/s, and the roof up at 0.25 m/s. At a stop both stand still for the scan. The stop is 2 s
+ * after the ride began, so the body is 2 m north of its place at rest, and the roof 0.5 m higher. A point at the body's
+ * place at rest is 2 m away from it. Without stops the body moves during the scan. */
+static void points_on_bodies(void **state)
+{
+    static const char scene[] =
+        "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: polar}\n"
+        "scene: {meshes: [{file: floor.obj, up: z, scale: 1}, {file: roof.obj, up: z, scale: "
+        "1, move_m_s: [0, 0, 0.25]}, {file: body.obj, up: z, scale: 1, move_m_s: [0, 1, 0]}]}\n";
+    static const char cloud[] = "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
+                                "property double z\nproperty ushort label\nend_header\n-3 -3 0 0\n0.5 3 0.5 2\n"
+                                "0.5 0.5 5.5 1\n0.5 %d 0.25 2\n";
+    char text[800];
+    (void)state;
+    write_text("floor.obj", "o floor\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf 1 2 3 4\n");
+    write_text("roof.obj", "o roof\nv 0 0 5\nv 1 0 5\nv 1 1 5\nv 0 1 5\nf 1 2 3 4\n");
+    write_text("body.obj", "o body\nv 0 1 0\nv 1 1 0\nv 1 1 1\nv 0 1 1\nf 1 2 3 4\n");
+    write_text("ride.csv", "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\n0,2,-4,2,0,0,0\n4,2,-5,2,0,0,0\n");
+    snprintf(text, sizeof text,
+             "%sstations: [{position_m: [2, -4, 2]}]\n"
+             "platform: {kind: stops, file: ride.csv, start_s: 2, end_s: 3, step_s: 1}\n",
+             scene);
+    write_text("stops.yaml", text);
+    snprintf(text, sizeof text, "%sstations: [{position_m: [2, -4, 2]}]\n", scene);
+    write_text("moves.yaml", text);
+    snprintf(text, sizeof text, cloud, 3);
+    write_text("bodies.ply", text);
+    does(&app_report, "stops.yaml bodies.ply --tolerance-m 1e-9", 0);
+    has(on_out, "\nmax        0.000000 mm\n");
+    does(&app_report, "moves.yaml bodies.ply", 2);
+    has(on_err,
+        "bodies.ply: point 2 is on body, which moved during the scan; allowed are points on bodies that stand ");
+    snprintf(text, sizeof text, cloud, 1);
+    write_text("bodies.ply", text);
+    does(&app_report, "stops.yaml bodies.ply --tolerance-m 1e-9", 1);
+    has(on_out, "\nmax        2.000000 m\nworst      point 4 at 0.500000 1.000000 0.250000 on body\n");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(so_many_surfaces_are_shown), cmocka_unit_test(points_in_a_mirror_are_left_out),
         cmocka_unit_test(one_point_in_a_mirror),      cmocka_unit_test(the_top_of_a_page),
         cmocka_unit_test(names_are_one_line),         cmocka_unit_test(clouds_that_are_far_or_empty),
+        cmocka_unit_test(points_on_bodies),
     };
     return cmocka_run_group_tests_name("report scenes", tests, go_there, commands_end);
 }

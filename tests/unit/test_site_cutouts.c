@@ -135,6 +135,10 @@ static void single_rays_and_rings_pass_holes(void **state)
     if (load_site("beam: {mode: single}\n", "off", 1, &cfg, &site, &err) != SH_OK) fail_msg("%s", err.text);
     assert_null(site->mover[0].scene->cutout);
     site_free(site);
+    assert_int_equal(load_site("beam: {mode: single}\ncast: {sight: on}\n", "on", 0, &cfg, &site, &err), SH_EINPUT);
+    if (strstr(err.text, ": cast.sight: on, but textures cut holes into surfaces (scene.cutouts); allowed auto, off") ==
+        NULL)
+        fail_msg("%s", err.text);
 }
 
 #ifndef SH_SANITIZE /* the plan casts for seconds then */

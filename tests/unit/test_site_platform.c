@@ -159,6 +159,8 @@ static void stops_at_stations(void **state)
     expect_stop(1, "two frame 1", 1, 1, 3, 4);
     expect_stop(2, "one frame 2", 3, 2, 0, 0);
     expect_stop(3, "two frame 2", 3, 2, 3, 4);
+    const struct config_station *two = site->station[3].station; /* a stop is a station with a name of its own */
+    assert_true(two->has_position && two->position_m[0] == 3 && two->position_m[1] == 4);
     take(TWO, "kind: stops, frames_per_s: 10, first_frame: 5, last_frame: 25, frame_step: 10");
     assert_int_equal(site->n_stations, 6);
     expect_stop(1, "two frame 5", 0.5, 5, 3, 4);

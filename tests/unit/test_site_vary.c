@@ -38,10 +38,45 @@ static void the_legs_of_other_stations_keep_their_scale(void **state)
     site_free(site);
 }
 
+/* Ranges and noise are those of the new settings. Others stay those of power-up, since no plan depends on them. */
+static void the_plan_has_the_new_settings(void **state)
+{
+    (void)state;
+    struct site *site, *other;
+    write_in("room.obj", "v -50 -50 0\nv 50 -50 0\nv 50 50 0\nv -50 50 0\nf 1 2 3 4\n");
+    write_in("test.yaml", "head: {profile: riegl-vz400i, prr_hz: 300000}\n"
+                          "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\n"
+                          "stations: [{position_m: [0, 0, 2]}]\nbeam: {mode: single}\noutput: {crs: local}\n"
+                          "noise: {range: off, angle: off}\n");
+    if (config_load(config_path, NULL, 0, cfg, &err) != SH_OK || site_load(cfg, &report, &site, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    const struct head_settings own = cfg->head.settings;
+    struct head_settings new = own;
+    new.range_min_nm = 2000000000;
+    new.range_max_nm = 90000000000;
+    new.noise = 1;
+    new.angle_noise = 1;
+    new.sigma_nm = 7000000;
+    new.ball_nm = 3000000;
+    new.prr_uhz = own.prr_uhz / 2;
+    new.frames = own.frames + 3;
+    if (site_vary(site, &new, 0, &other, &err) != SH_OK) fail_msg("%s", err.text);
+    const struct config *c = other->cfg;
+    assert_true(fabs(c->profile.range_min_m - 2.0) < 1e-12 && fabs(c->profile.range_max_m - 90.0) < 1e-12);
+    assert_true(c->noise.range == RANGE_NOISE_ON && c->noise.angle == 1);
+    assert_true(fabs(c->noise.sigma_m - 0.007) < 1e-12 && fabs(c->noise.ball.radius_m - 0.003) < 1e-12);
+    assert_true(c->head.settings.prr_uhz == own.prr_uhz && c->head.settings.frames == own.frames);
+    assert_false(site_varies(&new, &c->head.settings));
+    assert_true(cfg->noise.angle == 0 && site->cfg == cfg);
+    site_vary_free(other);
+    site_free(site);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(the_legs_of_other_stations_keep_their_scale, site_rig_setup, site_rig_teardown),
+        cmocka_unit_test_setup_teardown(the_plan_has_the_new_settings, site_rig_setup, site_rig_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

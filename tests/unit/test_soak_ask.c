@@ -65,6 +65,8 @@ static void begin(int rc, const char *reply, int64_t after_ns)
     memset(&link, 0, sizeof link);
     pthread_mutex_init(&link.lock, NULL);
     link.sh = (struct scanhead *)&link;
+    link.ask.n = link.ask.echoes = 1; /* left from a question before */
+    link.ask.others = link.ask.bad_bytes = 1;
     clock_rig_ns = 1000 * 1000 * MS;
     script[0] = (struct answer_is){rc, reply, after_ns};
     n_notes = n_echoes = 0;

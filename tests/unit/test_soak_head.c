@@ -219,6 +219,12 @@ static void a_clock_that_stops_or_drifts(void **state)
         stop(rows[i].kind, 1.4, 0);
         time_is(1.5, 10);
         expect(rows[i].kind, 1, 0, "it was before the client had a time");
+        at->times = (struct soak_times){0};
+        begin(rows[i].kind, 1.2, 0); /* this one goes on after the first time */
+        time_is(1.5, 10);
+        assert_int_equal(at->n_moments, 1);
+        time_is(2, 10.5 + rows[i].by_s);
+        expect(rows[i].kind, 1, rows[i].noticed, NULL);
     }
 }
 

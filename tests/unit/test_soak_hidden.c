@@ -74,6 +74,27 @@ static void a_fault_without_a_place(void **state)
     soak_rig_end(soak);
 }
 
+/* Only the client's first frame shows that a power cycle came before it. */
+static void a_power_cycle_before_the_first_frame(void **state)
+{
+    (void)state;
+    struct soak *soak = soak_rig_make();
+    const struct soak_link *link = &soak->link[0];
+    struct fault_note note = note_of(FAULT_POWER_CYCLE, 0, 0, "");
+    note.has_seq = 0;
+    note.link = note.session = 0;
+    note.t_ns = 0;
+    send_clean(soak);
+    soak_heard(soak, &note);
+    assert_int_equal(link->row[FAULT_POWER_CYCLE].hidden, 0);
+    see(soak, FIRST, 0, 0.0);
+    expect_hidden(&link->row[FAULT_POWER_CYCLE], 1, "it was before the client had a frame");
+    soak_heard(soak, &note);
+    see(soak, FIRST + 1, 0, 0.0);
+    assert_int_equal(link->row[FAULT_POWER_CYCLE].hidden, 1);
+    soak_rig_end(soak);
+}
+
 /* A frame that is dropped shows nothing else. */
 static void faults_beside_a_drop(void **state)
 {
@@ -235,6 +256,16 @@ static void a_refused_frame_is_missing(void **state)
     assert_true(row->noticed == 1 && row->lost == 1);
     assert_int_equal(soak->link[0].refused_now, 0);
     soak_rig_end(soak);
+    soak = soak_rig_make(); /* one was refused, and two are not there: the other one has no reason */
+    see(soak, FIRST, 0, 0.0);
+    soak->link[0].refused_now = 1;
+    see(soak, FIRST + 3, 0, 0.0);
+    uint32_t gaps = 0;
+    for (uint32_t i = 0; i < SOAK_RING; i++)
+        gaps += soak->link[0].fact[i].gap != 0;
+    assert_int_equal(gaps, 1);
+    assert_int_equal(soak->link[0].refused_now, 0);
+    soak_rig_end(soak);
 }
 
 int main(void)
@@ -242,6 +273,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(faults_that_change_nothing),
         cmocka_unit_test(a_fault_without_a_place),
+        cmocka_unit_test(a_power_cycle_before_the_first_frame),
         cmocka_unit_test(faults_beside_a_drop),
         cmocka_unit_test(faults_beside_a_refused_frame),
         cmocka_unit_test(nothing_overtakes),

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Faults of enumerations in a soak: each one is judged once a client has opened the device, or hidden with the reason.
- * Only slow enumerations are tried here. The other faults show in the descriptors that a kernel keeps. */
+ * A slow enumeration shows by its time, and a wrong length in the descriptors that a kernel keeps. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <glob.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -54,6 +56,86 @@ static void slow_ones_are_noticed_by_their_time(void **state)
         if (row->hidden != 0) assert_string_equal(row->why, "shorter than 10 ms");
         soak_usb_opened(&plugs, rows, "usb:1:2:NONE", 1e6); /* each is judged once */
         assert_int_equal(row->noticed + row->missed + row->hidden, 1);
+    }
+}
+
+/* ---- descriptors that a kernel keeps, in one folder for each device. The folders are of the test's own. */
+
+static char *sys_device[3];
+
+int glob(const char *pattern, int flags, int (*failed)(const char *path, int number), glob_t *found)
+{
+    assert_string_equal(pattern, "/sys/bus/usb/devices/*");
+    assert_true(flags == 0 && failed == NULL);
+    if (sys_device[0] == NULL) return GLOB_NOMATCH;
+    *found = (glob_t){.gl_pathc = 3, .gl_pathv = sys_device};
+    return 0;
+}
+
+void globfree(glob_t *found)
+{
+    assert_ptr_equal(found->gl_pathv, sys_device);
+}
+
+static void put_file(const char *in, const char *name, const uint8_t *bytes, size_t len)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s", in, name);
+    FILE *out = fopen(path, "w");
+    assert_non_null(out);
+    assert_int_equal(fwrite(bytes, 1, len, out), len);
+    assert_int_equal(fclose(out), 0);
+}
+
+static void remove_device(const char *of)
+{
+    static const char *const names[] = {"serial", "descriptors"};
+    char path[256];
+    for (size_t i = 0; i < 2; i++) {
+        snprintf(path, sizeof path, "%s/%s", of, names[i]);
+        unlink(path);
+    }
+    assert_int_equal(rmdir(of), 0);
+}
+
+static uint64_t judged_noticed(const char *source, uint32_t announced)
+{
+    const struct fault_note note = {.kind = FAULT_DESCRIPTOR_LENGTH, .n = announced};
+    begin();
+    soak_usb_plugged(&plugs, rows, &note);
+    soak_usb_opened(&plugs, rows, source, 1e6);
+    assert_int_equal(rows[FAULT_DESCRIPTOR_LENGTH].noticed + rows[FAULT_DESCRIPTOR_LENGTH].missed, 1);
+    return rows[FAULT_DESCRIPTOR_LENGTH].noticed;
+}
+
+/* A device descriptor has 18 bytes, and bytes 2 and 3 of a configuration descriptor are its whole length (USB 2.0,
+ * tables 9-8 and 9-10). The second device announces 261 bytes, and 256 are there: 5 too many. The first one has another
+ * serial number, which begins with the same letters; the third one has no files, as a hub's interface. */
+static void bytes_that_are_not_there_are_noticed(void **state)
+{
+    char device[3][64];
+    uint8_t descriptors[18 + 256] = {18, 1, [18] = 9, 2, 261 & 0xff, 261 >> 8};
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        strcpy(device[i], "/tmp/scanhead-sys-XXXXXX");
+        sys_device[i] = mkdtemp(device[i]);
+        assert_non_null(sys_device[i]);
+    }
+    put_file(device[0], "serial", (const uint8_t *)"SN12\n", 5);
+    put_file(device[0], "descriptors", descriptors, 18 + 100);
+    put_file(device[1], "serial", (const uint8_t *)"SN1\n", 4);
+    put_file(device[1], "descriptors", descriptors, sizeof descriptors);
+    assert_int_equal(judged_noticed("usb:1:2:SN1", 5), 1);
+    assert_int_equal(judged_noticed("usb:1:2:SN1", 4), 0);
+    assert_int_equal(judged_noticed("usb:1:2:SN12", 161), 1);
+    assert_int_equal(judged_noticed("usb:1:2:SN", 5), 0);
+    put_file(device[1], "descriptors", descriptors, 18 + 4); /* all that is needed to know */
+    assert_int_equal(judged_noticed("usb:1:2:SN1", 257), 1);
+    put_file(device[1], "descriptors", descriptors, 18 + 3);
+    assert_int_equal(judged_noticed("usb:1:2:SN1", 258), 0);
+    for (int i = 0; i < 3; i++) {
+        remove_device(device[i]);
+        sys_device[i] = NULL;
     }
 }
 
@@ -125,6 +207,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(slow_ones_are_noticed_by_their_time),
+        cmocka_unit_test(bytes_that_are_not_there_are_noticed),
         cmocka_unit_test(a_device_that_is_not_here),
         cmocka_unit_test(another_enumeration),
         cmocka_unit_test(devices_have_names),

@@ -259,6 +259,7 @@ static void files_of_runs(void **state)
                 {"--client run --client-file - --json new/configuration.stdout", 2},
                 {"--client run --json new/configuration.points", 0},
                 {"--client {out} --json new/configuration.points", 2},
+                {"--client run>{out} --json new/configuration.points", 2},
                 {"--client run --client-file {out} --json new/configuration.points", 2},
                 {"--client {out} --client-file new/configuration.points", 0}};
     (void)state;

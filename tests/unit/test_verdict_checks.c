@@ -113,6 +113,7 @@ static void absences(void **state)
     assert_true(v.figures.breaks == 2 && v.figures.back_mean_s == 2.0 && v.figures.back_max_s == 3.0);
     assert_string_equal(v.broken[0].kind, "disconnect");
     assert_true(v.broken[0].link == 1 && v.broken[0].back_s == 1.0 && v.broken[1].link == 2);
+    assert_true(v.broken[2].kind == NULL && v.broken[2].link == 0);
     broken[1].back_ns = 27 * S; /* just the limit */
     judge(VERDICT_COMES_BACK, YES, "2 times, after 3.00 s on average and 5.00 s at most (unplug)");
     broken[1].back_ns = 28 * S;
@@ -133,6 +134,9 @@ static void missing_clients(void **state)
     judge(VERDICT_COMES_BACK, FOUND, "it did not come back after unplug, for 18.0 s until the end; the limit is 5 s");
     expect(VERDICT_LETS_GO, YES, "each time");
     assert_true(isnan(v.broken[2].back_s) && v.figures.back_mean_s == 1.0);
+    watch.n_broken = 2; /* one absence without an end is enough */
+    judge(VERDICT_COMES_BACK, FOUND, "it did not come back after unplug, for 18.0 s until the end; the limit is 5 s");
+    watch.n_broken = 3;
     checks.holds = 1;
     judge(VERDICT_COMES_BACK, NO, "it still has the connection from before unplug");
     expect(VERDICT_LETS_GO, FOUND, "18.0 s after unplug it still had the connection from before");

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The process of somebody else's client: placeholders of its command, its end, and what it leaves running. */
+#include <fcntl.h>
 #include <signal.h>
 #include <sys/wait.h>
 
@@ -118,6 +119,18 @@ static void test_what_leaves_the_group(void **state)
     assert_int_equal(kill(pid, 0), -1);
 }
 
+/* Without a log there is no client, and its end touches no descriptor of this process. */
+static void test_no_log(void **state)
+{
+    (void)state;
+    struct client client;
+    struct sh_err err;
+    assert_int_not_equal(client_start(&client, "exit 3", "/nowhere/log", NULL, &err), SH_OK);
+    assert_true(client.pid == 0 && client.in_fd == -1 && client_has_ended(&client));
+    client_end(&client, 0.0);
+    assert_int_not_equal(fcntl(1, F_GETFD), -1);
+}
+
 /* Some programs end with their input, or at a key. If its input ended, this client would end with status 5. */
 static void test_its_input_stays_open(void **state)
 {
@@ -134,7 +147,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_placeholders),          cmocka_unit_test(test_ends),
         cmocka_unit_test(test_what_the_shell_leaves), cmocka_unit_test(test_what_leaves_the_group),
-        cmocka_unit_test(test_its_input_stays_open),
+        cmocka_unit_test(test_its_input_stays_open),  cmocka_unit_test(test_no_log),
     };
     return cmocka_run_group_tests(tests, make_folder, drop);
 }

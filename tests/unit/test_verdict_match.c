@@ -105,9 +105,9 @@ static void test_repeated(void **state)
     assert_int_equal(try(&cloud, 1e-5).repeated, PER_FRAME);
     /* A fault took that frame away from it. */
     span[1].to_ns = INT64_MAX;
-    struct watch_spoiled spoiled[] = {{2, 30}, {2, 5}, {1, 9}};
+    struct watch_spoiled spoiled[] = {{2, 30}, {2, 40}, {2, 5}, {1, 9}, {2, 50}, {2, 12}, {2, 3}};
     watch.spoiled = spoiled;
-    watch.n_spoiled = 3;
+    watch.n_spoiled = sizeof spoiled / sizeof spoiled[0];
     assert_int_equal(try(&cloud, 1e-5).repeated, PER_FRAME);
 }
 

@@ -290,6 +290,32 @@ static void ecef_is_turned_to_metres(void **state)
     viewed_free(&shown);
 }
 
+static void surface_name(void *ctx, uint32_t i, const char **object, const char **material)
+{
+    static const char *const names[][2] = {{"wall", "brick"}, {"door", ""}};
+    (void)ctx;
+    *object = names[i - 7][0];
+    *material = names[i - 7][1];
+}
+
+static void surfaces_have_their_names(void **state)
+{
+    static uint8_t out[1024];
+    struct native_names names = {7, 2, surface_name, NULL};
+    (void)state;
+    begin_geo(NATIVE_CRS_LOCAL, 0, 3);
+    rig_put(out, native_encode_surfaces(out, sizeof out, sizeof out, &names, 0));
+    write_two_lines();
+    loads();
+    assert_int_equal(shown.n_surfaces, 2);
+    assert_true(shown.surface[0].label == 7 && shown.surface[1].label == 8);
+    assert_string_equal(shown.surface[0].object, "wall");
+    assert_string_equal(shown.surface[0].material, "brick");
+    assert_string_equal(shown.surface[1].object, "door");
+    assert_string_equal(shown.surface[1].material, "");
+    viewed_free(&shown);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -299,6 +325,7 @@ int main(void)
         cmocka_unit_test(without_a_grid_the_reason_is_there),
         cmocka_unit_test(degrees_are_turned_to_metres),
         cmocka_unit_test(ecef_is_turned_to_metres),
+        cmocka_unit_test(surfaces_have_their_names),
     };
     return cmocka_run_group_tests_name("view stream", tests, rig_set_up, rig_tear_down);
 }

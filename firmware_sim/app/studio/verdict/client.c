@@ -24,11 +24,11 @@ struct client_part {
     char value[PART_LEN];
 };
 
-/* "tcp:HOST:PORT", where HOST may be "[::1]"; "tty:PATH". */
+/* "tcp:HOST:PORT", where HOST may be "[::1]"; "tty:PATH". The parts are empty before, and those that an endpoint lacks
+ * stay so. */
 static void split_endpoint(const char *endpoint, char host[PART_LEN], char port[PART_LEN], char path[PART_LEN])
 {
     const char *at = strchr(endpoint, ':'), *last = strrchr(endpoint, ':');
-    host[0] = port[0] = path[0] = '\0';
     if (at == NULL) return;
     if (strncmp(endpoint, "tty:", 4) == 0) {
         snprintf(path, PART_LEN, "%s", at + 1);

@@ -16,7 +16,7 @@
 #include "firmware_sim/app/studio/verdict/match.h"
 #include "firmware_sim/app/studio/verdict/match_index.h"
 
-enum { TRIED_POINTS = 2000, MAX_WAYS = 4, LOOK_POINTS = 64 };
+enum { TRIED_POINTS = 2000, MAX_WAYS = 3, LOOK_POINTS = 64 };
 
 /* ---- coordinate frames */
 
@@ -130,7 +130,7 @@ static int index_stream(const struct match_input *in, struct match_index *index,
     const struct own_stream *stream = in->stream;
     struct watch *watch = in->watch;
     size_t n = 0;
-    index->entry = malloc((stream->n + 1) * sizeof *index->entry);
+    index->entry = malloc((stream->n > 0 ? stream->n : 1) * sizeof *index->entry);
     if (index->entry == NULL) return sh_fail(err, SH_ENOMEM, "no memory to compare %zu points", stream->n);
     if (watch->n_spoiled != 0) qsort(watch->spoiled, watch->n_spoiled, sizeof *watch->spoiled, compare_spoiled);
     for (size_t f = 0; f < stream->n_frames; f++) {

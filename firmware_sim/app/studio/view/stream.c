@@ -188,13 +188,12 @@ static void look_for_losses(struct viewed_stream *s, struct scanhead *sh)
                 c->within || c->scans == 0 ? "; it ends in the middle of a scan" : "");
 }
 
-static int take_names(struct viewed_stream *s, struct sh_err *err)
+static int take_names(struct viewed_stream *s, const struct scanhead *sh, struct sh_err *err)
 {
-    struct scanhead *named = s->track.named != NULL ? s->track.named : s->track.sh;
     const char *object, *material;
     int rc = SH_OK;
-    for (uint32_t label = 0; named != NULL && rc == SH_OK && label < SCANHEAD_NO_LABEL; label++)
-        if (scanhead_surface(named, label, &object, &material))
+    for (uint32_t label = 0; rc == SH_OK && label < SCANHEAD_NO_LABEL; label++)
+        if (scanhead_surface(sh, label, &object, &material))
             rc = viewed_add_surface(s->v, label, object, material, err);
     return rc;
 }
@@ -218,7 +217,7 @@ int viewed_load_stream(struct viewed *v, const struct sh_report *report, struct 
     if (rc == SH_OK) rc = read_frames(s, sh, err);
     if (rc == SH_OK) rc = track_flush(&s->track, err);
     if (rc == SH_OK) rc = viewed_end_grid(s, err);
-    if (rc == SH_OK) rc = take_names(s, err);
+    if (rc == SH_OK) rc = take_names(s, sh, err);
     if (rc == SH_OK && v->points.n > 0)
         rc = viewed_points_room(&v->points, v->points.n, s->has, err); /* frees the rest */
     if (rc == SH_OK) look_for_losses(s, sh);
