@@ -75,6 +75,7 @@ static void test_submit_fails_for_a_while(void **state)
     bus.submit_fails = 3;
     expect_events(sh, 1, 100);
     assert_int_equal(bus.submit_fails, 0);
+    assert_int_equal(bus.n_clear_halts, 1); /* the three are one failure */
     close_head(sh);
 }
 
