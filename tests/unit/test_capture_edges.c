@@ -403,6 +403,7 @@ static void test_long_answer(void **state)
     assert_int_equal(c.n_sent, 3);
     assert_true(c.sent[0] == TALK_MAX_MESSAGE && c.sent[1] == TALK_MAX_MESSAGE);
     assert_int_equal(c.sent[2], WHOLE - 2 * TALK_MAX_MESSAGE);
+    assert_int_equal(c.last, 3);
     client_close(&c);
 }
 
