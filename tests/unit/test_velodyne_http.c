@@ -284,6 +284,25 @@ static void test_documents(void **state)
         assert_non_null(strchr(http_rig.line[i], '?')); /* reading changes nothing */
 }
 
+/* The snapshot has the four other pages. */
+static void test_snapshot(void **state)
+{
+    (void)state;
+    static const char *const parts[][2] = {{"{\"info\":", "/cgi/info.json"},
+                                           {",\"config\":", "/cgi/settings.json"},
+                                           {",\"status\":", "/cgi/status.json"},
+                                           {",\"diag\":", "/cgi/diag.json"}};
+    char want[4096] = "";
+    for (int i = 0; i < 4; i++) {
+        const size_t n = strlen(want);
+        http_get(parts[i][1]);
+        snprintf(want + n, sizeof want - n, "%s%s", parts[i][0], http_body());
+    }
+    strcat(want, "}");
+    http_get("/cgi/snapshot.hdl");
+    assert_string_equal(http_body(), want);
+}
+
 /* A name from a profile stays a string of JSON, and no part of a page. */
 static void test_names_are_escaped(void **state)
 {
@@ -298,17 +317,10 @@ static void test_names_are_escaped(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_curl),
-        TEST(test_mrpt),
-        TEST(test_urllib),
-        TEST(test_settings),
-        TEST(test_save),
-        TEST(test_idle_clients),
-        TEST(test_head_at_rest),
-        TEST(test_reset),
-        TEST(test_refused_by_the_head),
-        TEST(test_documents),
-        TEST(test_names_are_escaped),
+        TEST(test_curl),         TEST(test_mrpt),     TEST(test_urllib),
+        TEST(test_settings),     TEST(test_save),     TEST(test_idle_clients),
+        TEST(test_head_at_rest), TEST(test_reset),    TEST(test_refused_by_the_head),
+        TEST(test_documents),    TEST(test_snapshot), TEST(test_names_are_escaped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
