@@ -246,6 +246,9 @@ static void test_documents(void **state)
     http_rig.fix.lon_deg = -179.9999;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "\"position\":\"89 59.99N 179 59.99W\"}"));
+    http_rig.fix.lat_deg = http_rig.fix.lon_deg = 0.0;
+    http_get("/cgi/status.json");
+    assert_non_null(strstr(http_body(), "\"position\":\"0 00.00N 0 00.00E\"}"));
     http_rig.pps = PROTOCOL_PPS_ERROR;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "{\"pps_state\":\"Error\","));
