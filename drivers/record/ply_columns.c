@@ -182,7 +182,6 @@ static const struct column {
 unsigned ply_columns_there(const struct track *track, unsigned asked)
 {
     if (asked == 0) asked = PLY_ALL;
-    asked &= ~(unsigned)PLY_XYZ;
     if (!track->moving && !track->stops) asked &= ~(unsigned)PLY_FRAME;
     if (!track->has_attributes) asked &= ~(unsigned)PLY_ATTRIBUTES;
     if ((asked & PLY_ATTRIBUTES) != 0 && track->has_deviations) asked |= PLY_DEVIATION;
