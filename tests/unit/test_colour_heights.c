@@ -80,6 +80,13 @@ static void test_scene_in_the_grid(void **state)
     t.points.z[0] = anchor[2] + 7;
     t.points.echo_count[0] = 1;
     assert_true(fabs(colour_figure(COLOUR_HEIGHT, &t, 0) - 107) < 1e-9);
+    /* Points of a moving head, and those in the scene's own frame, have their height as it is, whatever the axes. */
+    memcpy(t.info.axes, (const double[9]){1, 0, 0, 0, 0, -1, 0, 1, 0}, sizeof axes);
+    t.info.moving = 1;
+    assert_true(fabs(colour_figure(COLOUR_HEIGHT, &t, 0) - 107) < 1e-9);
+    t.info.moving = 0;
+    t.info.crs = NATIVE_CRS_LOCAL;
+    assert_true(fabs(colour_figure(COLOUR_HEIGHT, &t, 0) - 107) < 1e-9);
     t.points.echo_count[0] = 0; /* a shot without echo has none */
     assert_true(isnan(colour_figure(COLOUR_HEIGHT, &t, 0)));
 }
