@@ -213,6 +213,8 @@ static void test_room(void **state)
     for (size_t k = 0; k < sizeof n_heads / sizeof n_heads[0]; k++) {
         const uint32_t n = n_heads[k];
         begin();
+        track.moving = track.has_attributes = 1;
+        facts.columns = ply_columns_there(&track, 0);
         facts.more_heads = n - 1;
         for (uint32_t i = 0; i < n; i++) {
             facts.head[i].station = 65535 - i;
@@ -222,8 +224,9 @@ static void test_room(void **state)
         const size_t room = ply_header_reserve(&facts, 0);
         facts.n_heads = n;
         facts.stats.seq_lost = facts.stats.reader_lost = facts.stats.dropped = facts.stats.bad_payload = UINT64_MAX;
-        facts.stats.repeated = facts.stats.late = facts.stats.pulses_lost = facts.n_unplaced = UINT64_MAX;
-        facts.n_vertices = UINT64_MAX;
+        facts.stats.repeated = facts.stats.late = facts.stats.restarts = facts.stats.pulses_lost = facts.n_unplaced =
+            UINT64_MAX;
+        facts.n_vertices = facts.n_without_attributes = facts.n_without_pose = UINT64_MAX;
         facts.have_gps = 1;
         facts.gps_s = 604800.0 * 9999 + 604799.999999;
         assert_int_equal(ply_header_make(&facts, room, &text, &len, &n_left_out, &err), 0);
