@@ -145,6 +145,9 @@ static void test_cut(void **state)
     const size_t front = front_of(&left), n = 2 * N;
     assert_int_equal(left.len, front + n * POINT);
     assert_int_equal(left_wdp.len, EVLR + n * PACKET);
+    assert_int_equal(front_of(&whole), front); /* with the descriptors of all packets that are there */
+    assert_int_equal(rig_uint(left.data + 100, 4), rig_uint(whole.data + 100, 4));
+    assert_memory_equal(left.data + 375, whole.data + 375, front - 375);
     for (size_t cut = 0; cut < 40; cut++) {
         const size_t las_len = front + (cut * 977) % (n * POINT + 1), wdp_len = (cut * 613) % (left_wdp.len + 1);
         struct repaired again;
