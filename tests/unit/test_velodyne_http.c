@@ -266,6 +266,12 @@ static void test_documents(void **state)
     assert_non_null(strstr(http_body(), "\"phaselock\":{\"enabled\":\"On\",\"offset\":9001,\"offsetInput\":90.01},"));
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "\"rpm\":600,\"lock\":\"On\",\"phase\":9000}"));
+    http_replies[5].reply = "359.99"; /* the greatest offset; what rounds to a whole turn is 0 */
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "\"offset\":35999,\"offsetInput\":359.99},"));
+    http_replies[5].reply = "359.996";
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "\"offset\":0,\"offsetInput\":0},"));
     http_replies[2].reply = "FIRSt"; /* the device has no such mode */
     http_get("/cgi/settings.json");
     assert_non_null(strstr(http_body(), "{\"laser\":\"On\",\"returns\":\"\",\"rpm\":600,"));
