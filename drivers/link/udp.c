@@ -388,7 +388,6 @@ static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, 
     (void)session, (void)n, (void)for_ms;
     if (what == LINK_FAULT_UNPLUG && !udp->unplugged) {
         udp->unplugged = 1;
-        udp->is_silent = 0;
         udp->closing = udp->reported_opened;
         return SH_OK;
     }

@@ -79,7 +79,7 @@ void cola_deliver(struct cola *self)
     self->pending = self->wants_scan = 0;
     const unsigned news = self->watch.on && self->measures ? cola_ports_scan(self) : 0;
     deliver_scan(self);
-    if (news != 0) cola_ports_report(self, news);
+    cola_ports_report(self, news);
 }
 
 static void take_frame(void *protocol, const uint8_t *frame, size_t len)

@@ -70,7 +70,6 @@ static int read_head(struct http_reader *r, struct http_fields *f)
     struct http_target target;
     struct http_place place;
     size_t at = 0;
-    memset(q, 0, sizeof *q);
     int status = read_request_line(q, &target, http_next_line(r->bytes, r->head_len, &at));
     if (status == 0) status = http_read_fields(r->bytes, r->head_len, at, f);
     if (status == 0) status = http_find_place(f, q->minor, target.place, &place);

@@ -26,8 +26,8 @@ static size_t cola_len(const uint8_t *bytes, size_t len)
     }
     if (len < sizeof marks && memcmp(bytes, marks, len) == 0) return 0;
     if (memcmp(bytes, marks, sizeof marks) == 0) {
-        const uint32_t n = len >= COLA_B_HEAD ? be_get32(bytes + 4) : 0;
         if (len < COLA_B_HEAD) return 0;
+        const uint32_t n = be_get32(bytes + 4);
         if (n > COLA_MOST) return 1; /* this is no telegram */
         return len >= COLA_B_HEAD + (size_t)n + 1 ? COLA_B_HEAD + (size_t)n + 1 : 0;
     }

@@ -130,7 +130,6 @@ int outfile_write(struct outfile *file, const void *data, size_t len, struct sh_
 
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err)
 {
-    direct_set(file->fd, &file->is_direct, 0);
     return write_at(file, &at, data, len, err);
 }
 

@@ -182,7 +182,6 @@ static const struct column {
 unsigned ply_columns_there(const struct track *track, unsigned asked)
 {
     if (asked == 0) asked = PLY_ALL;
-    asked &= ~(unsigned)PLY_XYZ;
     if (!track->moving && !track->stops) asked &= ~(unsigned)PLY_FRAME;
     if (!track->has_attributes) asked &= ~(unsigned)PLY_ATTRIBUTES;
     if ((asked & PLY_ATTRIBUTES) != 0 && track->has_deviations) asked |= PLY_DEVIATION;
@@ -280,6 +279,14 @@ int ply_header_make(const struct ply_facts *facts, size_t size, char **text, siz
     return rc;
 }
 
+/* With several heads, each line of a head has its station in front, also a line of the first head. */
+static size_t heads_room(uint32_t more_heads)
+{
+    static const char station[] = "station 65535 ", lines[] = "comment idn \ncomment profile \n";
+    enum { STATIONS = 2 * (sizeof station - 1), NAMES = sizeof(struct ply_head) - sizeof(uint32_t) };
+    return more_heads == 0 ? 0 : STATIONS + more_heads * (STATIONS + sizeof lines + NAMES);
+}
+
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces)
 {
     const char *object, *material;
@@ -288,7 +295,7 @@ size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces)
     uint64_t none;
     if (ply_header_make(facts, 0, &text, &len, &none, NULL) != 0) return 0;
     free(text);
-    len += facts->more_heads * (sizeof(struct ply_head) + 48);
+    len += heads_room(facts->more_heads);
     if (facts->track->has_attributes) len += 20;
     for (uint32_t label = 0; label < n_surfaces; label++)
         if (!scanhead_surface(facts->track->sh, label, &object, &material)) len += NAME_ROOM;

@@ -7,7 +7,6 @@
 void usb_device_restart(struct usb_device *device)
 {
     const int configured = device->state == USB_CONFIGURED;
-    if (device->state == USB_DETACHED) return;
     usb_device_reset(device);
     usb_device_assume_address(device);
     if (configured) usb_enter(device, USB_CONFIGURED, USB_END_RESET);

@@ -36,13 +36,13 @@ static int answer(void *ctx, const char *line, char *reply, size_t cap)
     struct protocol_rig *rig = ctx;
     assert_true(rig->n_lines < RIG_LINES && (reply == NULL ? cap == 0 : cap >= PROTOCOL_REPLY));
     snprintf(rig->line[rig->n_lines++], sizeof rig->line[0], "%s", line);
-    if (sscanf(line, "TIME:SHIFt %" SCNd64, &rig->shift_ns) == 1) return snprintf(reply, cap, "OK"), 0;
-    if (strcmp(line, "TIME:SHIFt?") == 0) return snprintf(reply, cap, "%" PRId64, rig->shift_ns), 0;
     for (const struct protocol_rig_reply *r = rig->replies; r != NULL && r->prefix != NULL; r++)
         if (strncmp(line, r->prefix, strlen(r->prefix)) == 0) {
             snprintf(reply, cap, "%s", r->reply);
             return r->error;
         }
+    if (strcmp(line, "TIME:SHIFt?") == 0) return snprintf(reply, cap, "%" PRId64, rig->shift_ns), 0;
+    sscanf(line, "TIME:SHIFt %" SCNd64, &rig->shift_ns);
     snprintf(reply, cap, "OK");
     return 0;
 }

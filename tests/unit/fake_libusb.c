@@ -192,7 +192,7 @@ int libusb_control_transfer(libusb_device_handle *handle, uint8_t type, uint8_t 
 {
     (void)handle, (void)timeout;
     if (type == 0x80 && request == LIBUSB_REQUEST_GET_STATUS) { /* whether the device is still there */
-        assert_int_equal(length, 2);
+        assert_true(value == 0 && index == 0 && length == 2);   /* USB 2.0, 9.4.5; else a device may refuse it */
         if (bus.gone) return LIBUSB_ERROR_NO_DEVICE;
         memset(data, 0, 2);
         return 2;
@@ -200,7 +200,7 @@ int libusb_control_transfer(libusb_device_handle *handle, uint8_t type, uint8_t 
     assert_int_equal(request, 0x22);
     assert_int_equal(index, 2);
     if (type == 0xc1) { /* whether a session is open */
-        assert_int_equal(length, 1);
+        assert_true(value == 0 && length == 1);
         data[0] = !bus.was_reset;
         return bus.gone ? LIBUSB_ERROR_NO_DEVICE : bus.no_question ? LIBUSB_ERROR_PIPE : 1;
     }
@@ -262,6 +262,8 @@ int libusb_clear_halt(libusb_device_handle *handle, unsigned char endpoint)
 {
     (void)handle;
     assert_true(endpoint == FAKE_IN || endpoint == FAKE_OUT);
+    for (int i = 0; i < bus.n_flying; i++) /* libusb's documentation: cancel all transfers before */
+        assert_true(bus.flying[i]->endpoint != endpoint || bus.gone || bus.will_not_cancel);
     bus.n_clear_halts++;
     return bus.gone ? LIBUSB_ERROR_NO_DEVICE : bus.clear_halt_rc;
 }

@@ -69,6 +69,8 @@ static int client_send(void *ctx, const void *unit, size_t len)
 {
     struct client *c = ctx;
     const size_t n = strlen(c->got);
+    if (c->n_sent < 8) c->sent[c->n_sent++] = len;
+    c->last = ((const char *)unit)[len - 1];
     snprintf(c->got + n, sizeof c->got - n, "%d:%.*s|", (int)c->now_ms, (int)len, (const char *)unit);
     return 0;
 }

@@ -42,7 +42,9 @@ struct client {
     char got[4096]; /* "at 5: text|" for each unit */
     int64_t now_ms;
     int wrong, ended;
-    uint64_t lost; /* bytes of it */
+    uint64_t lost;    /* bytes of it */
+    size_t sent[8];   /* the lengths of the first units */
+    int n_sent, last; /* last: the last byte of the last unit */
     char told[120];
 };
 

@@ -384,6 +384,29 @@ static void test_endless_request(void **state)
     client_close(&c);
 }
 
+/* A message that is longer than a unit may be is sent in parts, which are all of its bytes. */
+static void test_long_answer(void **state)
+{
+    (void)state;
+    enum { PARTS = 94, PART = 1400, HEAD = 7, WHOLE = HEAD + PARTS * PART + 1 };
+    char part[PART + 1] = "";
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 10, 0, "\x02sRN A\x03");
+    made_say(&m, 10, 1, "\x02sRA A ");
+    memset(part, 'x', PART);
+    for (int i = 0; i < PARTS; i++)
+        made_say(&m, 10, 1, part);
+    made_say(&m, 10, 1, "\x03");
+    client_open(&c, &m, 0, NULL);
+    assert_int_equal(strncmp(client_ask(&c, "\x02sRN A\x03", 1), "0:\x02sRA A xxx", 12), 0);
+    assert_int_equal(c.n_sent, 3);
+    assert_true(c.sent[0] == TALK_MAX_MESSAGE && c.sent[1] == TALK_MAX_MESSAGE);
+    assert_int_equal(c.sent[2], WHOLE - 2 * TALK_MAX_MESSAGE);
+    assert_int_equal(c.last, 3);
+    client_close(&c);
+}
+
 /* Two datagrams are two requests, whatever their bytes are together. */
 static void test_datagrams_stay_apart(void **state)
 {
@@ -409,6 +432,7 @@ int main(void)
         cmocka_unit_test(test_kinds),
         cmocka_unit_test(test_http),
         cmocka_unit_test(test_equal_times),
+        cmocka_unit_test(test_long_answer),
         cmocka_unit_test(test_clock_steps),
         cmocka_unit_test(test_without_times),
         cmocka_unit_test(test_time_offsets),

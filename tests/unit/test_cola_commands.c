@@ -188,8 +188,12 @@ static void a_resting_head_is_started(void **state)
     assert_string_equal(cola.line[1], "SCAN:START");
     cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
     assert_string_equal(cola.line[1], "SCAN:START");
+    cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0"); /* who wants no scans starts none */
+    assert_int_equal(cola.n_lines, 0);
     cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0"); /* of this session alone */
     assert_int_equal(cola.n_lines, 0);
+    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+    assert_int_equal(cola.n_lines, 0); /* the session measures nothing */
     cola_head_state("fault");
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
     cola_head_state("scanning");

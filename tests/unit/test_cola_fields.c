@@ -358,9 +358,11 @@ static void telegrams_choose_the_set(void **state)
     fields_turn();
     fields_expect("200");
     cola_expect("sRN FieldSetSelectionMethod", "sRA FieldSetSelectionMethod 0");
+    EXPECT_B("sRN FieldSetSelectionMethod", "sRA FieldSetSelectionMethod \0");
     cola_expect("sRN ActiveFieldSet", "sRA ActiveFieldSet 1");
     cola_expect("sWN ActiveFieldSet 2", "sFA 4");
     cola_expect("sWN FieldSetSelectionMethod 1", "sWA FieldSetSelectionMethod");
+    cola_expect("sRN FieldSetSelectionMethod", "sRA FieldSetSelectionMethod 1");
     cola_expect("sWN ActiveFieldSet 0", "sFA 5");
     cola_expect("sWN ActiveFieldSet 17", "sFA 5");
     cola_expect("sWN ActiveFieldSet 02", "sWA ActiveFieldSet");

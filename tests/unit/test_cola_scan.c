@@ -328,6 +328,24 @@ static void a_way_ends_with_its_poses(void **state)
     expect_way(&way, 4, S, 13000, 13000);
 }
 
+/* Between these ends the speed is one: of all the frame's poses, and of the way since the frame before. */
+static void a_way_has_one_speed_a_frame(void **state)
+{
+    (void)state;
+    static const int64_t S = 1000000000;
+    const struct native_pose pose[3] = {{0, {0, 0, 0}, {1, 0, 0, 0}, 0, 0, 0},
+                                        {S, {13, 0, 0}, {1, 0, 0, 0}, 0, 0, 0},
+                                        {2 * S, {13, 40, 0}, {1, 0, 0, 0}, 0, 0, 0}},
+                             later[2] = {{4 * S, {13, 40, 50}, {1, 0, 0, 0}, 0, 0, 0},
+                                         {5 * S, {13, 40, 62}, {1, 0, 0, 0}, 0, 0, 0}};
+    struct cola_way way = {0};
+    add_way(&way, 1, pose, 3); /* 53 m in 2 s */
+    expect_way(&way, 1, 3 * S / 2, 39750, 26500);
+    add_way(&way, 1, later, 2); /* 62 m more, 3 s later */
+    expect_way(&way, 1, 7 * S / 2, 84000, 20667);
+    expect_way(&way, 1, 9 * S, 115000, 20667);
+}
+
 /* The longest telegram has all channels, 16 bits, hexadecimal, and everything in the tail. */
 static void the_longest_telegram_has_room(void **state)
 {
@@ -365,7 +383,7 @@ int main(void)
         CASE(far_heads_count_in_two_millimetres), CASE(echoes_go_to_their_channels),
         CASE(signals_end_where_their_scale_ends), CASE(name_and_time_where_asked_for),
         CASE(the_encoder_counts_the_way),         CASE(a_way_ends_with_its_poses),
-        CASE(the_longest_telegram_has_room),
+        CASE(a_way_has_one_speed_a_frame),        CASE(the_longest_telegram_has_room),
     };
     return cmocka_run_group_tests_name("cola scan", tests, NULL, NULL);
 }

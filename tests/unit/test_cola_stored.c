@@ -41,6 +41,9 @@ static void settings_are_kept(void **state)
     cola_expect("sMN mEEwriteall", "sAN mEEwriteall 1");
     assert_string_equal(cola.stored, lines);
     assert_string_equal(cola.line[cola.n_lines - 1], "HEAD:STORe"); /* rates and time server are the head's */
+    cola_expect("sWN FREchoFilter 0", "sWA FREchoFilter");
+    cola_expect("sMN mSCreboot", "sAN mSCreboot"); /* the same session has them after a power cycle, too */
+    cola_expect("sRN FREchoFilter", "sRA FREchoFilter 1");
 
     cola.spec.stored = lines;
     assert_int_equal(open_again(&err), 0);
@@ -74,8 +77,11 @@ static void what_is_refused_is_not_kept(void **state)
     assert_int_equal(open_again(&err), 0);
     cola.replies = refuses;
     cola_authorise();
+    cola_expect("sWN FREchoFilter 1", "sWA FREchoFilter");
     cola_expect("sMN mEEwriteall", "sAN mEEwriteall 0");
     assert_string_equal(cola.stored, "");
+    cola_expect("sMN mSCreboot", "sAN mSCreboot");
+    cola_expect("sRN FREchoFilter", "sRA FREchoFilter 0"); /* as it was at power-up */
 }
 
 /* A name with a line's end would be two lines of the file, and one with other bytes could not be stored. */

@@ -105,6 +105,21 @@ static void the_servers_clock_is_not_set_by_hand(void **state)
     assert_int_not_equal(cola.shift_ns, 0);
 }
 
+/* A head that does not say its shift, or does not take one, has no clock that is set. */
+static void a_head_without_a_shift_is_not_set(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply refuses[][2] = {
+        {{"TIME:SHIFt?", "5", -221}}, {{"TIME:SHIFt?", "OK", 0}}, {{"TIME:SHIFt ", "ERR", -222}}};
+    cola_open_lms();
+    cola_authorise();
+    for (size_t i = 0; i < sizeof refuses / sizeof refuses[0]; i++) {
+        cola.replies = refuses[i];
+        cola_expect("sMN LSPsetdatetime 7E8 1 1 0 0 0 0", "sAN LSPsetdatetime 0");
+        assert_int_equal(cola.shift_ns, 0);
+    }
+}
+
 int main(void)
 {
 #define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
@@ -113,6 +128,7 @@ int main(void)
         CASE(frames_are_those_of_the_manuals),
         CASE(variables_are_written),
         CASE(the_servers_clock_is_not_set_by_hand),
+        CASE(a_head_without_a_shift_is_not_set),
     };
     return cmocka_run_group_tests_name("cola time", tests, NULL, NULL);
 }

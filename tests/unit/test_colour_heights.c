@@ -63,8 +63,36 @@ static void test_heights(void **state)
     }
 }
 
+/* A scene whose coordinates are those of the grid has the grid's heights. 5 km away, the surface would be 1.96 m lower. */
+static void test_scene_in_the_grid(void **state)
+{
+    (void)state;
+    static struct track t;
+    static const double anchor[3] = {500000, 5200000, 100}, axes[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    t.info = (struct scanhead_info){.geo = 1, .crs = NATIVE_CRS_UTM};
+    t.crs = NATIVE_CRS_UTM;
+    memcpy(t.info.anchor, anchor, sizeof anchor);
+    memcpy(t.info.station_m, anchor, sizeof anchor);
+    memcpy(t.info.axes, axes, sizeof axes);
+    station_pose_of(&t.info, &t.pose);
+    t.points.x[0] = anchor[0] + 3000;
+    t.points.y[0] = anchor[1] - 4000;
+    t.points.z[0] = anchor[2] + 7;
+    t.points.echo_count[0] = 1;
+    assert_true(fabs(colour_figure(COLOUR_HEIGHT, &t, 0) - 107) < 1e-9);
+    /* Points of a moving head, and those in the scene's own frame, have their height as it is, whatever the axes. */
+    memcpy(t.info.axes, (const double[9]){1, 0, 0, 0, 0, -1, 0, 1, 0}, sizeof axes);
+    t.info.moving = 1;
+    assert_true(fabs(colour_figure(COLOUR_HEIGHT, &t, 0) - 107) < 1e-9);
+    t.info.moving = 0;
+    t.info.crs = NATIVE_CRS_LOCAL;
+    assert_true(fabs(colour_figure(COLOUR_HEIGHT, &t, 0) - 107) < 1e-9);
+    t.points.echo_count[0] = 0; /* a shot without echo has none */
+    assert_true(isnan(colour_figure(COLOUR_HEIGHT, &t, 0)));
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_heights)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_heights), cmocka_unit_test(test_scene_in_the_grid)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -34,11 +34,18 @@ static void test_failures_together(void **state)
 {
     (void)state;
     struct scanhead *sh = open_head("usb");
+    script_events(0, 1); /* so that the first to fail is not the first of the ring */
+    expect_events(sh, 0, 1);
     for (int i = 0; i < 4; i++)
         fake_script(FAKE_IN, i % 2 ? LIBUSB_TRANSFER_STALL : LIBUSB_TRANSFER_ERROR, NULL, 0);
-    script_events(0, 3);
-    expect_events(sh, 0, 3);
+    script_events(1, 3);
+    expect_events(sh, 1, 3);
     assert_int_equal(bus.n_clear_halts, 1);
+    for (int i = 0; i < 16; i++) /* all reads */
+        fake_script(FAKE_IN, LIBUSB_TRANSFER_ERROR, NULL, 0);
+    script_events(3, 5);
+    expect_events(sh, 3, 5);
+    assert_int_equal(bus.n_clear_halts, 2);
     close_head(sh);
 }
 
@@ -68,6 +75,7 @@ static void test_submit_fails_for_a_while(void **state)
     bus.submit_fails = 3;
     expect_events(sh, 1, 100);
     assert_int_equal(bus.submit_fails, 0);
+    assert_int_equal(bus.n_clear_halts, 1); /* the three are one failure */
     close_head(sh);
 }
 

@@ -157,15 +157,16 @@ static void test_no_reply(void **state)
     static const struct host_source_ops ops = {
         .read = silent_read, .write = write_all, .wait = scripted_wait, .close = close_nothing};
     static const struct {
-        int error, rc;
+        int error, limit_ms, rc;
         const char *text;
-    } rows[] = {{EAGAIN, SCANHEAD_ETIMEOUT, "tcp:test:1: no reply to 'TIME?' within 7 ms"},
-                {EINVAL, SCANHEAD_EIO, "tcp:test:1: cannot read: Invalid argument"}};
+    } rows[] = {{EAGAIN, 7, SCANHEAD_ETIMEOUT, "tcp:test:1: no reply to 'TIME?' within 7 ms"},
+                {EAGAIN, 0, SCANHEAD_ETIMEOUT, "tcp:test:1: no reply to 'TIME?' within 0 ms"},
+                {EINVAL, 7, SCANHEAD_EIO, "tcp:test:1: cannot read: Invalid argument"}};
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         struct scanhead *sh = host_open(&(struct host_source){.ops = &ops, .fd = -1, .name = "tcp:test:1"});
         char reply[8];
         silent_error = rows[i].error;
-        assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, 7), rows[i].rc);
+        assert_int_equal(scanhead_command(sh, "TIME?", reply, sizeof reply, rows[i].limit_ms), rows[i].rc);
         assert_string_equal(scanhead_error(sh), rows[i].text);
         scanhead_close(sh);
     }

@@ -99,6 +99,22 @@ static int tear_down(void **state)
     return rig_tear_down(state);
 }
 
+static char said[400];
+
+static void hear(void *ctx, const char *words)
+{
+    (void)ctx;
+    if (strstr(words, "no waveform") != NULL) snprintf(said, sizeof said, "%s", words);
+}
+
+/* The repair counts points that lost their packets, where there are any. */
+static void check_said(size_t n_points, size_t n_packets)
+{
+    char lost[80];
+    snprintf(lost, sizeof lost, " %zu points have no waveform: ", n_points - n_packets);
+    if (n_packets >= n_points ? said[0] != '\0' : strstr(said, lost) == NULL) fail_msg("'%s', not '%s'", said, lost);
+}
+
 /* Points that are whole in the .las; of these, the last ones lack packets that are not whole in the .wdp. */
 static void check(size_t n_points, size_t n_packets)
 {
@@ -129,10 +145,12 @@ static void check(size_t n_points, size_t n_packets)
 
 static void repair_cut_to(size_t las_len, size_t wdp_len)
 {
+    static const struct sh_report report = {.warn = hear};
     struct repaired file;
     repair_write_file(repair_part, left.data, las_len);
     repair_write_file(wdp_part, left_wdp.data, wdp_len);
-    if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+    said[0] = '\0';
+    if (repair_file(repair_path, &report, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
     assert_true(file.was_left);
     repair_free(&file);
     assert_int_equal(access(wdp_part, F_OK), -1);
@@ -145,11 +163,15 @@ static void test_cut(void **state)
     const size_t front = front_of(&left), n = 2 * N;
     assert_int_equal(left.len, front + n * POINT);
     assert_int_equal(left_wdp.len, EVLR + n * PACKET);
+    assert_int_equal(front_of(&whole), front); /* with the descriptors of all packets that are there */
+    assert_int_equal(rig_uint(left.data + 100, 4), rig_uint(whole.data + 100, 4));
+    assert_memory_equal(left.data + 375, whole.data + 375, front - 375);
     for (size_t cut = 0; cut < 40; cut++) {
         const size_t las_len = front + (cut * 977) % (n * POINT + 1), wdp_len = (cut * 613) % (left_wdp.len + 1);
         struct repaired again;
         repair_cut_to(las_len, wdp_len);
         check((las_len - front) / POINT, wdp_len < EVLR ? 0 : (wdp_len - EVLR) / PACKET);
+        check_said((las_len - front) / POINT, wdp_len < EVLR ? 0 : (wdp_len - EVLR) / PACKET);
         assert_int_equal(access(wdp, F_OK) == 0, wdp_len >= EVLR);
         if (repair_file(repair_path, NULL, &again, &repair_err) != 0) fail_msg("%s", repair_err.text);
         if (!again.was_whole) fail_msg("cut to %zu and %zu: the repaired file is not whole", las_len, wdp_len);

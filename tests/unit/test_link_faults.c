@@ -276,12 +276,46 @@ static void test_udp(void **state)
     close(fd);
 }
 
+/* A session that was never reported ends without a word. A link that is away can't go away once more. A link that is
+ * plugged in twice keeps what has come. */
+static void test_udp_order(void **state)
+{
+    (void)state;
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)}, from;
+    socklen_t len = sizeof at;
+    char text[8];
+    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
+    const struct link_spec spec = {.type = LINK_UDP, .port = ntohs(at.sin_port)};
+    struct bench bench = bench_open(&spec);
+    assert_int_equal(cut(&bench, LINK_FAULT_UNPLUG, 0), SH_OK);
+    assert_true(is_calm(&bench, 1));
+    assert_int_equal(cut(&bench, LINK_FAULT_UNPLUG, 0), SH_ESTATE);
+    assert_int_equal(cut(&bench, LINK_FAULT_CABLE, 0), SH_ESTATE);
+    assert_int_equal(cut(&bench, LINK_FAULT_PLUG, 0), SH_OK);
+    bench_expect(&bench, LINK_OPENED, 0);
+    assert_int_equal(cut(&bench, LINK_FAULT_CABLE, 0), SH_OK);
+    assert_int_equal(cut(&bench, LINK_FAULT_UNPLUG, 0), SH_OK);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    assert_int_equal(cut(&bench, LINK_FAULT_PLUG, 0), SH_OK);
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench_write_all(&bench, 0, "one", 3);
+    assert_int_equal(recvfrom(fd, text, sizeof text, 0, (struct sockaddr *)&from, &len), 3);
+    assert_int_equal(sendto(fd, "kept", 4, 0, (struct sockaddr *)&from, len), 4);
+    assert_int_equal(cut(&bench, LINK_FAULT_PLUG, 0), SH_OK);
+    assert_int_equal(bench.ops->read(bench.link, 0, text, sizeof text), 4);
+    assert_int_equal(bench.ops->refused(bench.link), 0);
+    bench_close(&bench);
+    close(fd);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_table), cmocka_unit_test(test_tcp_disconnect), cmocka_unit_test(test_tcp_unplug),
         cmocka_unit_test(test_web),   cmocka_unit_test(test_pty_disconnect), cmocka_unit_test(test_pty_unplug),
-        cmocka_unit_test(test_udp),
+        cmocka_unit_test(test_udp),   cmocka_unit_test(test_udp_order),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

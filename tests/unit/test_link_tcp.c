@@ -104,6 +104,13 @@ static void test_tcp_endings(void **state)
     assert_int_equal(n, SH_ECLOSED);
     bench_expect(&bench, LINK_CLOSED, 0);
     assert_int_equal(bench_poll(&bench, 1, 0), 0);
+    /* The link's owner ends it. The client's own end is not waited for. */
+    fd = dial(bench_port(&bench));
+    bench_expect(&bench, LINK_OPENED, 0);
+    bench.ops->end(bench.link, 0);
+    bench_expect(&bench, LINK_CLOSED, 0);
+    assert_int_equal(fd_read(fd, &byte, 1), 0);
+    close(fd);
     bench_close(&bench);
 }
 

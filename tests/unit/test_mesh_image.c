@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Images of grids that are larger than a texture may be. The number of lines and rows that share a texel is reported,
- * for the scan with the largest. */
+/* Images of grids that are larger than a texture may be, and of a grid with loose points. The number of lines and rows
+ * that share a texel is reported, for the scan with the largest. */
+#include "core/scene.h"
 #include "tests/unit/recorder_rig.h"
 
-enum { PULSES = 20000 }; /* of a line, 1000 a second as the rig has them */
+enum { PULSES = 20000, FULL = 10 }; /* of a line, 1000 a second as the rig has them; lines of a full turn of the pan */
 
 static void begin_scan(uint32_t scan)
 {
@@ -67,8 +68,53 @@ static void the_largest_step_is_said(void **state)
     }
 }
 
+/* Ten lines of two shots are on a tube of 5 m radius. Further up in the first line, 60 shots hit a pole that nothing is
+ * beside. */
+static void put_tube_and_pole(void)
+{
+    enum { POLE = 60, GAP = 3 };
+    for (uint32_t line = 0; line < FULL; line++) {
+        const double angle = 2 * 3.14159265358979323846 * line / FULL;
+        const int32_t x = (int32_t)lrint(5000 * sin(angle)), y = (int32_t)lrint(5000 * cos(angle));
+        const struct rig_point p[2] = {{x, y, 0, -500, 1, 1, 1}, {x, y, 500, -500, 1, 1, 1}};
+        const uint64_t pulse = (uint64_t)line * PULSES;
+        rig_points(line, pulse, pulse, p, 2);
+        for (uint32_t i = 0; line == 0 && i < POLE; i++) {
+            const struct rig_point of_pole = {x, y, 1000 + 100 * (int32_t)i, -500, 1, 1, 1};
+            rig_points(line, pulse, pulse + GAP + i, &of_pole, 1);
+        }
+    }
+}
+
+/* Points that no triangle uses leave the others their lines: the seam is where it was, and its far side is at 1.05. */
+static void loose_points_ahead_of_the_seam(void **state)
+{
+    (void)state;
+    struct scene *scene;
+    struct sh_err err;
+    rig_begin();
+    begin_scan(1);
+    put_tube_and_pole();
+    if (rig_record(rig_path("a.obj"), (struct recorder_options){.long_edge = 0}, RIG_KEEP, &err) != SH_OK)
+        fail_msg("%s", err.text);
+    assert_non_null(strstr(rig_notes, "60 points left out that belong to no triangle"));
+    const struct scene_mesh_spec spec = {.file = rig_path("a.obj"), .scale = 1, .textures = 1};
+    if (scene_load(&spec, 1, 1e-3, NULL, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    float most = 0;
+    for (uint32_t i = 0; i < scene->n_triangles; i++)
+        for (int k = 0; k < 3; k++)
+            if (scene->uv[i][k][0] > most) most = scene->uv[i][k][0];
+    assert_int_equal(scene->n_triangles, 2 * FULL);
+    assert_true(fabs((double)most - 1.05) < 1e-6);
+    scene_free(scene);
+    static const char *const files[] = {"a.obj", "a.mtl", "a.png"};
+    for (int k = 0; k < 3; k++)
+        assert_int_equal(unlink(rig_path(files[k])), 0);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(the_largest_step_is_said)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(the_largest_step_is_said),
+                                       cmocka_unit_test(loose_points_ahead_of_the_seam)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -96,6 +96,7 @@ static void test_pieces(void **state)
             disk = mode;
             begin(&file, at);
             const size_t n = write_pieces(&file, 0);
+            assert_int_equal(outfile_flush(&file, &err), 0);
             assert_int_equal(outfile_patch(&file, at + 7, data + 7, 5000, &err), 0);
             assert_int_equal(outfile_close(&file, 1, &err), 0);
             expect_data(at, n);

@@ -235,10 +235,19 @@ static void test_polar(void **state)
     expect_comment("comment epsg 0");
 }
 
-/* Names that come after the points use the room left for them. Names without room are left out. */
+static char note[300];
+
+static void keep_note(void *ctx, const char *words)
+{
+    (void)ctx;
+    snprintf(note, sizeof note, "%s", words);
+}
+
+/* Names that come after the points use the room left for them. Names without room are left out, and counted. */
 static void test_late_names(void **state)
 {
     (void)state;
+    static const struct sh_report report = {.warn = keep_note};
     struct sh_err err;
     char name[256], comment[300];
     /* Lengths are all up to 36 and from 246 on; between them every 7th. */
@@ -252,7 +261,7 @@ static void test_late_names(void **state)
         put_points(0);
         put_surfaces(0, 2, name);
         if (len == sizeof name - 1) put_surfaces(3, 20, name); /* more than the descriptor has */
-        assert_int_equal(record(out_path, (struct recorder_options){0}, 1, &err), 0);
+        assert_int_equal(record(out_path, (struct recorder_options){.report = &report}, 1, &err), 0);
         read_ply(out_path, 0);
         assert_int_equal(n_vertices, 4);
         check_geo(0, 0, 2);
@@ -262,6 +271,11 @@ static void test_late_names(void **state)
     }
     snprintf(comment, sizeof comment, "comment label 22 %s | mat", name);
     assert_null(strstr(text, comment));
+    int n = 0;
+    for (const char *at = text; (at = strstr(at, "\ncomment label ")) != NULL; at++)
+        n++;
+    snprintf(comment, sizeof comment, " %d names of surfaces and heads left out", 23 - n);
+    assert_non_null(strstr(note, comment));
 }
 
 static void test_points_before_descriptor(void **state)

@@ -200,13 +200,47 @@ static void test_single_lines(void **state)
     expect_line("comment crs unknown, no points were recorded\n", 1);
 }
 
+/* The header has room for as many heads as were announced, each with the longest names, and for all that is known at
+ * the end alone: figures of 20 digits, the time, and frames that were not in order. */
+static void test_room(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    char *text;
+    size_t len;
+    uint64_t n_left_out;
+    static const uint32_t n_heads[] = {1, 2, PLY_MAX_HEADS};
+    for (size_t k = 0; k < sizeof n_heads / sizeof n_heads[0]; k++) {
+        const uint32_t n = n_heads[k];
+        begin();
+        track.moving = track.has_attributes = 1;
+        facts.columns = ply_columns_there(&track, 0);
+        facts.more_heads = n - 1;
+        for (uint32_t i = 0; i < n; i++) {
+            facts.head[i].station = 65535 - i;
+            memset(facts.head[i].idn, 'i', sizeof facts.head[i].idn - 1);
+            memset(facts.head[i].profile, 'p', sizeof facts.head[i].profile - 1);
+        }
+        const size_t room = ply_header_reserve(&facts, 0);
+        facts.n_heads = n;
+        facts.stats.seq_lost = facts.stats.reader_lost = facts.stats.dropped = facts.stats.bad_payload = UINT64_MAX;
+        facts.stats.repeated = facts.stats.late = facts.stats.restarts = facts.stats.pulses_lost = facts.n_unplaced =
+            UINT64_MAX;
+        facts.n_vertices = facts.n_without_attributes = facts.n_without_pose = UINT64_MAX;
+        facts.have_gps = 1;
+        facts.gps_s = 604800.0 * 9999 + 604799.999999;
+        assert_int_equal(ply_header_make(&facts, room, &text, &len, &n_left_out, &err), 0);
+        assert_int_equal(len, room);
+        assert_int_equal(n_left_out, 0);
+        free(text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_all),
-        cmocka_unit_test(test_least),
-        cmocka_unit_test(test_names),
-        cmocka_unit_test(test_single_lines),
+        cmocka_unit_test(test_all),          cmocka_unit_test(test_least), cmocka_unit_test(test_names),
+        cmocka_unit_test(test_single_lines), cmocka_unit_test(test_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -312,6 +312,7 @@ static void two_stations_are_two_objects(void **state)
     rig_anchor(&a);
     put_step(3);
     text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .mesh = 1, .n_heads = 2}, NULL);
+    has(text, "comment idn Maker,Model,SN1,1.0\ncomment profile other\n"); /* of the last scan */
     has(text, "comment station 1 scan 1 profile model\ncomment station 2 scan 2 profile other\n");
     free(text);
     rig_begin();

@@ -45,6 +45,12 @@ static void test_several_heads(void **state)
     char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 2}, NULL);
     assert_non_null(strstr(text, "comment station 1 idn Maker,Model,SN1,1\n"));
     assert_non_null(strstr(text, "comment station 2 idn Maker,Model,SN2,1\n"));
+    const char *end = strstr(text, "end_header\n");
+    char *single = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1, .n_heads = 1}, NULL);
+    /* Room was left for two lines of the second head, whose names may have 95 and 31 bytes. */
+    assert_true(end - text - (strstr(single, "end_header\n") - single) >=
+                (int)sizeof "comment station 2 idn \ncomment station 2 profile \n" - 1 + 95 + 31);
+    free(single);
     free(text);
     for (int other = 0; other < 2; other++) {
         rig_begin();

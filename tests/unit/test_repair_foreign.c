@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Repair and the files of other programs. Such files may end or go on in ways that no recorder writes, so they are
  * checked, and never changed. */
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -148,13 +149,53 @@ static void test_block_at_the_end(void **state)
     }
 }
 
+/* The longest block that may be is read whole. Its bytes are a hole in the file, so the disk keeps none of them. */
+static void test_longest_block(void **state)
+{
+    (void)state;
+    static const char front[] = PCAPNG_SECTION PCAPNG_INTERFACE, after[] = PCAPNG_INTERFACE;
+    enum { FRONT = sizeof front - 1, AFTER = sizeof after - 1, END = FRONT + PCAPNG_MAX_BLOCK };
+    struct repaired file = {0};
+    uint8_t head[8] = {9}, len[4];
+    le_put32(head + 4, PCAPNG_MAX_BLOCK);
+    le_put32(len, PCAPNG_MAX_BLOCK);
+    repair_name("f.pcapng");
+    const int fd = open(repair_path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    assert_int_equal(pwrite(fd, front, FRONT, 0), FRONT);
+    assert_int_equal(pwrite(fd, head, sizeof head, FRONT), sizeof head);
+    assert_int_equal(pwrite(fd, len, sizeof len, END - sizeof len), sizeof len);
+    assert_int_equal(pwrite(fd, after, AFTER, END), AFTER);
+    close(fd);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_OK);
+    assert_int_equal(file.was_whole, 1);
+    repair_free(&file);
+    unlink(repair_path);
+}
+
+/* After a block that is none, no more is held, however long the file is. */
+static void test_long_rest(void **state)
+{
+    (void)state;
+    static const char front[] = PCAPNG_SECTION PCAPNG_INTERFACE;
+    struct repaired file = {0};
+    repair_name("f.pcapng");
+    const int fd = open(repair_path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    assert_int_equal(pwrite(fd, front, sizeof front - 1, 0), sizeof front - 1);
+    static const uint8_t last[12] = {9, 0, 0, 0, 12, 0, 0, 0, 12};
+    assert_int_equal(pwrite(fd, last, sizeof last, 2 * PCAPNG_MAX_BLOCK + (1 << 20)), sizeof last);
+    close(fd);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EFORMAT);
+    expect_damaged_at("f.pcapng", sizeof front - 1);
+    repair_free(&file);
+    unlink(repair_path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_whole_elsewhere),
-        cmocka_unit_test(test_absurd_grid),
-        cmocka_unit_test(test_damaged_capture),
-        cmocka_unit_test(test_block_at_the_end),
+        cmocka_unit_test(test_whole_elsewhere), cmocka_unit_test(test_absurd_grid),
+        cmocka_unit_test(test_damaged_capture), cmocka_unit_test(test_block_at_the_end),
+        cmocka_unit_test(test_longest_block),   cmocka_unit_test(test_long_rest),
     };
     return cmocka_run_group_tests(tests, repair_set_up, repair_tear_down);
 }

@@ -171,6 +171,12 @@ static void clusters(void **state)
     scip_turn(9);
     rig.bytes[rig.len] = 0;
     assert_string_equal((char *)rig.bytes + 22, "\n0CBe\n\n");
+    protocol_rig_clear(&rig);
+    shot[3].range_m[0] = 0.1; /* the least range, DMIN, is no error: 100 is 64 + 36 */
+    scip_ask("GD0000000499\n", "");
+    scip_turn(10);
+    rig.bytes[rig.len] = 0;
+    assert_string_equal((char *)rig.bytes + 22, "\n01Te\n\n");
 }
 
 static void several_echoes(void)

@@ -295,6 +295,7 @@ static void played_malfunctions(void **state)
     check_played("29:99 28:99 27:99 26:99 25:99 24:99 23:99 22:99 21:99 20:99 20:21 20:98 ");
     scip_turn(line++);
     check_played("19:99 ");
+    scip_ask("DB10\nDB03\nDB10\n", "DB10\n03S\n\nDB03\n00P\n\nDB10\n00P\n\n"); /* it is over */
     scip_ask("QT\nDB04\nMD0000108000020\n", "QT\n00P\n\nDB04\n00P\n\nMD0000108000020\n00P\n\n");
     turns_of_a_stream(&line, 20); /* too short for it */
     assert_int_equal(rig.n_units, 20);

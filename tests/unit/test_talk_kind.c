@@ -91,6 +91,7 @@ static void lengths(void **state)
         {BYTES(COLA_MARKS "\0\0\0\5sRN A\3\2"), 14},
         {BYTES(COLA_MARKS "\0\x10\0\0s"), 0}, /* 1 MiB is the longest */
         {BYTES(COLA_MARKS "\0\x10\0\1s"), 1},
+        {BYTES(COLA_MARKS "\0\x10\0\1"), 1}, /* the length alone says so */
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         assert_int_equal(cola->request_len(rows[i].bytes, rows[i].len), rows[i].first);

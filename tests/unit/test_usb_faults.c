@@ -110,6 +110,39 @@ static void test_slow_requests(void **state)
     host_free(host);
 }
 
+static unsigned device_status(struct host *host)
+{
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_STATUS, 0, 0, 2, NULL), 2);
+    return le_get16(host_in);
+}
+
+/* A device that begins anew has been reset: it is awake, its transfers are gone, and U1 is off (USB 3.2, 9.4.9). A
+ * device that has no more than an address keeps that. */
+static void test_restart(void **state)
+{
+    (void)state;
+    struct host *host = host_new(&pair_model, USB_RATE_SUPER, USB_RATE_SUPER);
+    assert_int_equal(host_control(host, 0x00, USB_REQ_SET_ADDRESS, 5, 0, 0, NULL), 0);
+    usb_device_restart(host->device);
+    assert_int_equal(host->n_changes, 0);
+    const unsigned plain = device_status(host);
+    host_configure(host);
+    assert_int_equal(host_control(host, 0x00, USB_REQ_SET_FEATURE, USB_DEVICE_U1_ENABLE, 0, 0, NULL), 0);
+    assert_int_equal(device_status(host), plain | 1u << USB_DEV_STAT_U1_ENABLED);
+    host_submit(host, 1, 0x81, NULL, 64);
+    usb_device_suspend(host->device, 1);
+    usb_device_restart(host->device);
+    host_expect(host, 1, USB_GONE, 0);
+    assert_int_equal(device_status(host), plain);
+    host_submit(host, 2, 0x81, NULL, 64);
+    assert_int_equal(usb_device_write(host->device, 0x81, "abc", 3), 3);
+    host_expect(host, 2, USB_OK, 3);
+    usb_device_detach(host->device);
+    usb_device_restart(host->device);
+    assert_int_equal(host_control(host, 0x80, USB_REQ_GET_STATUS, 0, 0, 2, NULL), USB_STALL);
+    host_free(host);
+}
+
 /* ---- a head over USB/IP */
 
 static void expect_urb(struct client *c, uint32_t seqnum, int status, uint32_t actual)
@@ -320,7 +353,7 @@ int main(void)
         cmocka_unit_test(test_stall),         cmocka_unit_test(test_reset),
         cmocka_unit_test(test_unplug),        cmocka_unit_test(test_enumeration),
         cmocka_unit_test(test_reset_of_idle), cmocka_unit_test(test_slow_requests),
-        cmocka_unit_test(test_close),
+        cmocka_unit_test(test_restart),       cmocka_unit_test(test_close),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -109,6 +109,26 @@ static void test_stream(void **state)
     bench_close(&bench);
 }
 
+/* Bytes that a session left are not for the next one. A link's owner that learns of the end by writing reads no more. */
+static void test_left_over(void **state)
+{
+    (void)state;
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    client_import(&c, &bench);
+    client_configure(&c);
+    client_open_stream(&c);
+    const uint32_t seqnum = client_submit(&c, 0, 3, NULL, "*IDN?\n", 6);
+    assert_int_equal(bench_expect(&bench, LINK_READABLE, 0).session, 1);
+    assert_int_equal(client_control(&c, &r, 0x41, 0x22, 0, 2, 0, NULL), 0);
+    assert_int_equal(bench.ops->write(bench.link, 1, "reply", 5), SH_ECLOSED);
+    assert_true(client_reply(&c, &r, 0));
+    assert_true(r.seqnum == seqnum && r.status == 0 && r.actual == 6);
+    assert_int_equal(bench_expect(&bench, LINK_CLOSED, 0).session, 1);
+    close(c.fd);
+    bench_close(&bench);
+}
+
 static void test_commands(void **state)
 {
     (void)state;
@@ -346,9 +366,10 @@ static void test_close(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_list),     cmocka_unit_test(test_import),           cmocka_unit_test(test_stream),
-        cmocka_unit_test(test_commands), cmocka_unit_test(test_console_requests), cmocka_unit_test(test_serial_state),
-        cmocka_unit_test(test_unlink),   cmocka_unit_test(test_broken),           cmocka_unit_test(test_close),
+        cmocka_unit_test(test_list),         cmocka_unit_test(test_import),   cmocka_unit_test(test_stream),
+        cmocka_unit_test(test_left_over),    cmocka_unit_test(test_commands), cmocka_unit_test(test_console_requests),
+        cmocka_unit_test(test_serial_state), cmocka_unit_test(test_unlink),   cmocka_unit_test(test_broken),
+        cmocka_unit_test(test_close),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -246,6 +246,9 @@ static void test_documents(void **state)
     http_rig.fix.lon_deg = -179.9999;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "\"position\":\"89 59.99N 179 59.99W\"}"));
+    http_rig.fix.lat_deg = http_rig.fix.lon_deg = 0.0;
+    http_get("/cgi/status.json");
+    assert_non_null(strstr(http_body(), "\"position\":\"0 00.00N 0 00.00E\"}"));
     http_rig.pps = PROTOCOL_PPS_ERROR;
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "{\"pps_state\":\"Error\","));
@@ -263,6 +266,12 @@ static void test_documents(void **state)
     assert_non_null(strstr(http_body(), "\"phaselock\":{\"enabled\":\"On\",\"offset\":9001,\"offsetInput\":90.01},"));
     http_get("/cgi/status.json");
     assert_non_null(strstr(http_body(), "\"rpm\":600,\"lock\":\"On\",\"phase\":9000}"));
+    http_replies[5].reply = "359.99"; /* the greatest offset; what rounds to a whole turn is 0 */
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "\"offset\":35999,\"offsetInput\":359.99},"));
+    http_replies[5].reply = "359.996";
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "\"offset\":0,\"offsetInput\":0},"));
     http_replies[2].reply = "FIRSt"; /* the device has no such mode */
     http_get("/cgi/settings.json");
     assert_non_null(strstr(http_body(), "{\"laser\":\"On\",\"returns\":\"\",\"rpm\":600,"));
@@ -284,6 +293,25 @@ static void test_documents(void **state)
         assert_non_null(strchr(http_rig.line[i], '?')); /* reading changes nothing */
 }
 
+/* The snapshot has the four other pages. */
+static void test_snapshot(void **state)
+{
+    (void)state;
+    static const char *const parts[][2] = {{"{\"info\":", "/cgi/info.json"},
+                                           {",\"config\":", "/cgi/settings.json"},
+                                           {",\"status\":", "/cgi/status.json"},
+                                           {",\"diag\":", "/cgi/diag.json"}};
+    char want[4096] = "";
+    for (int i = 0; i < 4; i++) {
+        const size_t n = strlen(want);
+        http_get(parts[i][1]);
+        snprintf(want + n, sizeof want - n, "%s%s", parts[i][0], http_body());
+    }
+    strcat(want, "}");
+    http_get("/cgi/snapshot.hdl");
+    assert_string_equal(http_body(), want);
+}
+
 /* A name from a profile stays a string of JSON, and no part of a page. */
 static void test_names_are_escaped(void **state)
 {
@@ -298,17 +326,10 @@ static void test_names_are_escaped(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_curl),
-        TEST(test_mrpt),
-        TEST(test_urllib),
-        TEST(test_settings),
-        TEST(test_save),
-        TEST(test_idle_clients),
-        TEST(test_head_at_rest),
-        TEST(test_reset),
-        TEST(test_refused_by_the_head),
-        TEST(test_documents),
-        TEST(test_names_are_escaped),
+        TEST(test_curl),         TEST(test_mrpt),     TEST(test_urllib),
+        TEST(test_settings),     TEST(test_save),     TEST(test_idle_clients),
+        TEST(test_head_at_rest), TEST(test_reset),    TEST(test_refused_by_the_head),
+        TEST(test_documents),    TEST(test_snapshot), TEST(test_names_are_escaped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
