@@ -252,13 +252,32 @@ static void cells_lie_along_both_axes(void **state)
     }
 }
 
+/* The bounds of a part hold each corner of its triangles. Each corner of a rhombus is the only one at its end, and each
+ * in turn is the first one of both triangles. */
+static void each_corner_counts(void **state)
+{
+    (void)state;
+    static const double rhombus[4][3] = {{4, 1, 0}, {2, 2, 0}, {0, 1, 0}, {2, 0, 0}};
+    for (int first = 0; first < 4; first++) {
+        double corner[4][3], low[2], high[2];
+        for (int c = 0; c < 4; c++)
+            memcpy(corner[c], rhombus[(first + c) % 4], sizeof corner[c]);
+        add_quad((const double(*)[3])corner);
+        narrow(40, low, high);
+        for (int k = 0; k < 2; k++) {
+            expect("low", low[k], 0);
+            expect("high", high[k], k == 0 ? 4 : 2);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plate_is_looked_at_straight), cmocka_unit_test(the_view_limits_the_elevation),
         cmocka_unit_test(the_front_is_liked_best),       cmocka_unit_test(the_distance_fits_scene_and_head),
         cmocka_unit_test(the_view_holds_the_bounds),     cmocka_unit_test(the_fullest_cell_is_taken),
-        cmocka_unit_test(cells_lie_along_both_axes),
+        cmocka_unit_test(cells_lie_along_both_axes),     cmocka_unit_test(each_corner_counts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
