@@ -153,6 +153,39 @@ static void eight_joints_a_corner(void **state)
     scene_free(s);
 }
 
+/* Writes the skin with its first set of joints n times over. */
+static void put_sets(int n_sets, char *rest, size_t room)
+{
+    add_blocks();
+    int n = put_nodes(rest, room);
+    n += snprintf(rest + n, room - (size_t)n,
+                  "\"skins\":[{\"joints\":[1,2,3,4,5,6,7,8],\"inverseBindMatrices\":7}],"
+                  "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0");
+    for (int set = 0; set < n_sets; set++)
+        n += snprintf(rest + n, room - (size_t)n, ",\"JOINTS_%d\":3,\"WEIGHTS_%d\":4", set, set);
+    snprintf(rest + n, room - (size_t)n, "},\"indices\":2}]}],\"accessors\":[" SKIN_ACCESSORS "]");
+}
+
+/* Weights are divided by their sum, so a set that is there eight times moves a corner as the set alone does. There are
+ * eight sets at most. Corner 1 has no weight in the set, and so stays. */
+static void eight_sets_a_corner(void **state)
+{
+    (void)state;
+    char rest[8192];
+    put_sets(1, rest, sizeof rest);
+    struct scene *one = gltf_load(rest);
+    put_sets(8, rest, sizeof rest);
+    struct scene *eight = gltf_load(rest);
+    assert_true(one->n_vertices == 4 && eight->n_vertices == 4);
+    for (int k = 0; k < 4; k++)
+        for (int r = 0; r < 3; r++)
+            assert_true(fabs(one->vertex_m[k][r] - eight->vertex_m[k][r]) < 1e-12);
+    scene_free(one);
+    scene_free(eight);
+    put_sets(9, rest, sizeof rest);
+    gltf_refuse(rest, "has more than 8 sets of joints");
+}
+
 static void skins_that_do_not_fit(void **state)
 {
     (void)state;
@@ -215,6 +248,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(eight_joints_a_corner),
+        cmocka_unit_test(eight_sets_a_corner),
         cmocka_unit_test(skins_that_do_not_fit),
         cmocka_unit_test(attributes_that_do_not_fit),
     };
