@@ -163,6 +163,10 @@ static void missing_things_are_named(void **state)
     remove_made();
     put("r.mtl", "newmtl red\nKd 1 0 0\n");
     expect_warning("a.obj", "mtllib r.mtl g.mtl\n" QUADS, "a.obj, line 1: the material library 'g.mtl' is missing");
+    put("r.mtl", "newmtl red\nKd 1 0 0\n"); /* both libraries are there, and green is in none of them */
+    put("b.mtl", "newmtl blue\nKd 0 0 1\n");
+    expect_warning("a.obj", "mtllib r.mtl b.mtl\n" QUADS,
+                   "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
     put("r.mtl", "newmtl red\nKd 1 0 0\nnewmtl Green\nKd 0 1 0\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
                    "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
