@@ -207,8 +207,8 @@ static void windows_belong_to_points(void **state)
     }
 }
 
-/* In UTM the height is that above the ellipsoid. Its slope along a level beam is the range over the Earth's radius, which
- * is 6,371 km to 0.7 %: at the first sample, 800 m away, 1.26e-4 to 0.9e-6. Floats add 1e-9. */
+/* In UTM the height is that above the ellipsoid. Its slope along a level beam is the range over the Earth's radius,
+ * which is 6,371 km to 0.7 %: at the first sample, 800 m away, 1.26e-4 to 0.9e-6. Floats add 1e-9. */
 static void beams_bend_with_the_earth(void **state)
 {
     (void)state;

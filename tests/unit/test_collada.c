@@ -5,8 +5,8 @@
 
 #include "tests/unit/scene_files.h"
 
-/* A square of two triangles, z up, which Assimp turns to y up. Its first set of texture coordinates spans the square; in
- * the second one all are 0.5. Slots: the diffuse part, and the rest of the effect. */
+/* A square of two triangles, z up, which Assimp turns to y up. Its first set of texture coordinates spans the square;
+ * in the second one all are 0.5. Slots: the diffuse part, and the rest of the effect. */
 static const char DAE[] =
     "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
     "<asset><unit meter=\"1\"/><up_axis>Z_UP</up_axis></asset>"

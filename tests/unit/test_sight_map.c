@@ -167,8 +167,8 @@ static void each_cell_says_what_is_there(void **state)
     scene_free(scene);
 }
 
-/* A map that needs a number of bytes is the same with just that many. With fewer its cells are coarser, and some of them
- * ask the BVH where the memory does not hold the coarser ones either. */
+/* A map that needs a number of bytes is the same with just that many. With fewer its cells are coarser, and some of
+ * them ask the BVH where the memory does not hold the coarser ones either. */
 static void the_memory_holds(void **state)
 {
     (void)state;

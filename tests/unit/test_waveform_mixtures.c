@@ -164,7 +164,8 @@ static void tops_that_are_not_seen(void **state)
 }
 
 /* After the first limited sample nothing is seen any more. The last two samples before it give the place and the height
- * of the pulse, since a Gaussian of that width goes through both in one way only. Here both are well above the noise. */
+ * of the pulse, since a Gaussian of that width goes through both in one way only. Here both are well above the
+ * noise. */
 static void a_flank_gives_the_whole_pulse(void **state)
 {
     (void)state;
