@@ -215,8 +215,8 @@ static void test_sight_costs(void **state)
 }
 
 /* A memory of 32 MiB holds a part of the cells of several triangles (25 bytes each). So the map is made twice, the
- * second time with a quarter of the cells. An outline then crosses twice the share of them. Cells that do not fit then either
- * ask the BVH. The costs are again those of core/plan/cost.h. */
+ * second time with a quarter of the cells. An outline then crosses twice the share of them. Cells that do not fit
+ * then either ask the BVH. The costs are again those of core/plan/cost.h. */
 static void test_sight_in_a_small_memory(void **state)
 {
     (void)state;
