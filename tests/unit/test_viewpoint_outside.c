@@ -144,8 +144,8 @@ static void the_front_is_liked_best(void **state)
 
 /* A cube shows its backs, and a small plate beside it looks east. The cube fills as much of a view from a side as from
  * a corner, to a hundredth (33 by 33 degrees; 36 degrees by 26 to 37), so the front in the south is liked best. In a
- * part of a scene the share of fronts counts as well. It is 0 in the south, and less in the south-east than in the east:
- * the plate is seen at 45 degrees there, from farther away. */
+ * part of a scene the share of fronts counts as well. It is 0 in the south, and less in the south-east than in the
+ * east: the plate is seen at 45 degrees there, from farther away. */
 static void a_part_is_looked_at_from_its_fronts(void **state)
 {
     (void)state;
