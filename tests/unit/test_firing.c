@@ -5,8 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "core/cast/kernels_aim.h"
 #include "core/cast/kernels_times.h"
+#include "tests/common/aimed.h"
 
 static const int64_t HOUR_NS = INT64_C(3600000000000), DAY_NS = 24 * INT64_C(3600000000000);
 
@@ -332,7 +332,7 @@ static void angles_follow_the_table(void **state)
     for (run.firing_at = 0; run.firing_at < 3; run.firing_at++)
         for (uint32_t first = 0; first < 7; first++) {
             double mirror[N], pan[N];
-            kernel_angles_table(&run, first, N, mirror, pan);
+            aimed_angles(&run, first, N, mirror, pan);
             for (uint32_t i = 0; i < N; i++) {
                 const uint32_t k = run.firing_at + first + i, row = k % 3;
                 const uint64_t ticks = k / 3 * 10 + firing[row].tick - firing[run.firing_at].tick;
