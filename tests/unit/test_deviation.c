@@ -164,7 +164,9 @@ static void terms_give_the_same_sigma(void **state)
     head.angle_sigma_rad[1] = 3e-5;
     head.count_m = 3e-3;
     head.file_count_m = 4e-3;
+    memset(&t, 0x55, sizeof t);
     assert_true(deviation_terms_of(&head, &t));
+    assert_true(isnan(t.range_floor_m) && t.place_step_m < 0.01);
     double counts_m, sigma_m = deviation_sigma_m(&head, &TURNED, &counts_m);
     /* The face is 100 m away and turned by 60 degrees: cosine 1/2, to the right sqrt(3)/2, and nothing by the
      * mirror. */
@@ -194,7 +196,7 @@ static const struct {
     {{5, 10, -1}, 0.004, 0.004}, /* seen through the pane: the nearest surface counts */
     {{5, 10, -1}, -0.004, -0.004}, {{-0.0001, 10, 0}, -1.5, NAN}, /* a mixed point: its beam meets the wall, and the pane's edge at x = 0 is nearer */
     {{-3, 10, 1}, 40.0, NAN},                                     /* no surface is within max_m */
-    {{NAN, NAN, NAN}, 0.0, NAN},
+    {{NAN, NAN, NAN}, 0.0, NAN},   {{5, 10, 20}, 0.004, 0.004}, /* through the pane to the wall's other triangle, in which no place has x above z */
 };
 enum { N = sizeof POINT / sizeof POINT[0] };
 
