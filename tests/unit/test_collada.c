@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Materials of meshes that Assimp reads, on Collada: where texture coordinates lie, colours,
- * transparency, and what is said of the rest. */
+ * transparency, and what is said of the rest. And the functions through which Assimp reads files. */
 #include <math.h>
 
+#include "core/import/import_open.h"
 #include "tests/unit/scene_files.h"
 
 /* A square of two triangles, z up, which Assimp turns to y up. Its first set of texture coordinates spans the square;
@@ -125,12 +126,37 @@ static void colours_and_transparency(void **state)
     }
 }
 
+/* Assimp seeks from the begin, from where it is and from the end, as fseek does. Asking for the size moves nothing. */
+static void files_are_read_anywhere(void **state)
+{
+    (void)state;
+    FILE *stream = fopen(write_text("ten.txt", "0123456789"), "rb");
+    assert_non_null(stream);
+    struct aiFile file = import_open_stream(stream);
+    static const struct {
+        enum aiOrigin origin;
+        int by;
+        size_t at;
+    } row[] = {{aiOrigin_SET, 3, 3}, {aiOrigin_CUR, 4, 7}, {aiOrigin_CUR, -2, 5}, {aiOrigin_END, -1, 9}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        assert_int_equal(file.SeekProc(&file, (size_t)row[i].by, row[i].origin), aiReturn_SUCCESS);
+        assert_int_equal(file.FileSizeProc(&file), 10);
+        assert_int_equal(file.TellProc(&file), row[i].at);
+    }
+    assert_int_equal(file.SeekProc(&file, (size_t)-11, aiOrigin_END), aiReturn_FAILURE);
+    char digit;
+    assert_true(file.ReadProc(&file, &digit, 1, 1) == 1 && digit == '9');
+    fclose(stream);
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(coordinates_are_scaled_and_shifted),
         cmocka_unit_test(a_texture_has_its_set_of_coordinates),
         cmocka_unit_test(colours_and_transparency),
+        cmocka_unit_test(files_are_read_anywhere),
     };
     return cmocka_run_group_tests_name("collada", tests, make_folder, remove_folder);
 }

@@ -164,9 +164,7 @@ static void terms_give_the_same_sigma(void **state)
     head.angle_sigma_rad[1] = 3e-5;
     head.count_m = 3e-3;
     head.file_count_m = 4e-3;
-    memset(&t, 0x55, sizeof t);
     assert_true(deviation_terms_of(&head, &t));
-    assert_true(isnan(t.range_floor_m) && t.place_step_m < 0.01);
     double counts_m, sigma_m = deviation_sigma_m(&head, &TURNED, &counts_m);
     /* The face is 100 m away and turned by 60 degrees: cosine 1/2, to the right sqrt(3)/2, and nothing by the
      * mirror. */
@@ -183,6 +181,11 @@ static void terms_give_the_same_sigma(void **state)
     near_to(t.range_floor_m, 0.003);
     near_to(t.range_jitter_m, 0.04);
     near_to(t.range_sigma_per_m, 1e-5);
+    head.setup.detect = NULL; /* no noise at all */
+    memset(&t, 0x55, sizeof t);
+    assert_true(deviation_terms_of(&head, &t));
+    assert_true(isnan(t.range_floor_m) && isnan(t.range_jitter_m) && t.range_sigma_m == 0 && t.range_sigma_per_m == 0);
+    assert_true(t.ball_m == 0 && t.ball_per_m == 0);
     head.has_instrument_errors = 1;
     assert_false(deviation_terms_of(&head, &t));
 }
