@@ -207,6 +207,37 @@ static void windows_belong_to_points(void **state)
     }
 }
 
+/* In UTM the height is that above the ellipsoid. Its slope along a level beam is the range over the Earth's radius,
+ * which is 6,371 km to 0.7 %: at the first sample, 800 m away, 1.26e-4 to 0.9e-6. Floats add 1e-9. */
+static void beams_bend_with_the_earth(void **state)
+{
+    (void)state;
+    static const struct beam_view LEVEL = {0.0, 1.0, -5.0, -1.0, 1, PULSES};
+    const struct georef_spec place = {.crs = GEOREF_UTM, .station_m = {0, 0, 0}, .lat_deg = 47.0, .lon_deg = 9.0};
+    struct waves w = {.lit = {.near_m = 800.0, .far_m = 900.0, .rho = {0.8, 0.5}}};
+    struct beam_rig *rig = &w.lit.rig;
+    struct georef *utm;
+    struct sh_err err;
+    double d[3][PULSES];
+    open_waves(&w, &LEVEL, BEAM_SINGLE, ROOM);
+    assert_int_equal(georef_create(&place, &utm, &err), 0);
+    rig->setup.georef = utm;
+    rig->setup.layout = LINE_GEO;
+    beam_rig_line(rig, 0);
+    beam_rig_directions(rig, 0, d[0], d[1], d[2]);
+    assert_int_equal(rig->block.waves->n, PULSES);
+    for (uint32_t p = 0; p < PULSES; p++) {
+        const struct line_wave *wave = &rig->block.waves->wave[p];
+        const double from_m = wave->first * 0.5 * LIGHT_SPEED_M_S * SPEC.sample_s;
+        float up;
+        memcpy(&up, &wave->c, sizeof up);
+        const double want = d[2][p] + from_m * (1.0 - d[2][p] * d[2][p]) / 6371e3;
+        if (!(fabs((double)up - want) < 1e-6)) fail_msg("pulse %u: a slope of %.9g, not %.9g", p, (double)up, want);
+    }
+    georef_free(utm);
+    close_waves(&w);
+}
+
 /* Points are the same, byte by byte, whether there are waveforms or not. */
 static void points_stay_as_they_are(void **state)
 {
@@ -411,7 +442,7 @@ int main(void)
         cmocka_unit_test(windows_belong_to_points),       cmocka_unit_test(points_stay_as_they_are),
         cmocka_unit_test(lost_samples_are_counted),       cmocka_unit_test(echoes_are_found_in_samples),
         cmocka_unit_test(cut_footprints_have_two_echoes), cmocka_unit_test(dark_pulses_have_no_windows),
-        cmocka_unit_test(found_echoes_are_in_range),
+        cmocka_unit_test(found_echoes_are_in_range),      cmocka_unit_test(beams_bend_with_the_earth),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

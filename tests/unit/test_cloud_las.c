@@ -154,6 +154,26 @@ static void test_broken(void **state)
     }
 }
 
+/* A WKT whose brackets do not close ends where its record does, and says nothing for certain. */
+static void test_wkt_without_end(void **state)
+{
+    (void)state;
+    size_t len;
+    struct cloud cloud;
+    struct sh_err err = {0};
+    write_las(NATIVE_CRS_UTM, 32632, 1);
+    uint8_t *las = rig_read(rig_path("a.las"), &len), *wkt = memmem(las, len, "PROJCS[", 7);
+    assert_non_null(wkt);
+    for (; *wkt != 0; wkt++)
+        if (*wkt == ']') *wkt = ' ';
+    write_bytes(las, len);
+    free(las);
+    if (cloud_read_columns(rig_path("a.las"), 0, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    assert_int_equal(cloud.epsg, CLOUD_EPSG_UNKNOWN);
+    cloud_free(&cloud);
+    unlink(rig_path("a.las"));
+}
+
 static void put(uint8_t *to, int bytes, uint64_t v)
 {
     for (int i = 0; i < bytes; i++)
@@ -200,8 +220,11 @@ static void test_label_behind_others(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read), cmocka_unit_test(test_degrees),
-                                       cmocka_unit_test(test_label_behind_others), cmocka_unit_test(test_broken),
-                                       cmocka_unit_test(test_without_returns)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_read),
+                                       cmocka_unit_test(test_degrees),
+                                       cmocka_unit_test(test_label_behind_others),
+                                       cmocka_unit_test(test_broken),
+                                       cmocka_unit_test(test_without_returns),
+                                       cmocka_unit_test(test_wkt_without_end)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -258,18 +258,20 @@ static void test_pcd_that_is_no_position(void **state)
 }
 
 /* Coordinates in single precision are rounded, by up to 6e-8 of the largest one, and that is said from 0.1 mm on. As
- * text, or in double, they are as they stand. */
+ * text, or in double, they are as they stand. One of the three in single precision is enough. */
 static void test_pcd_precision(void **state)
 {
     (void)state;
     static const struct {
         const char *fields, *data;
-        int size, is_single;
+        int size[3], is_single;
         float far;
-    } row[] = {{XYZ, "binary", 4, 1, -5000},
-               {XYZ, "binary", 4, 1, 1000},
-               {XYZ, "ascii", 0, 0, 5000},
-               {"FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\n", "binary", 8, 0, 5000}};
+    } row[] = {{XYZ, "binary", {4, 4, 4}, 1, -5000},
+               {XYZ, "binary", {4, 4, 4}, 1, 1000},
+               {XYZ, "ascii", {0}, 0, 5000},
+               {"FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\n", "binary", {8, 8, 8}, 0, 5000},
+               {"FIELDS x y z\nSIZE 4 8 8\nTYPE F F F\nCOUNT 1 1 1\n", "binary", {4, 8, 8}, 1, 1000},
+               {"FIELDS x y z\nSIZE 8 8 4\nTYPE F F F\nCOUNT 1 1 1\n", "binary", {8, 8, 4}, 1, 1000}};
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
         char text[512];
         struct cloud cloud;
@@ -277,11 +279,11 @@ static void test_pcd_precision(void **state)
         size_t len = put_header(text, row[i].fields, 1, row[i].data);
         for (int k = 0; k < 3; k++) {
             const double v = k == 1 ? (double)row[i].far : 1;
-            if (row[i].size == 4)
+            if (row[i].size[k] == 4)
                 memcpy(text + len, &(float){(float)v}, 4);
-            else if (row[i].size == 8)
+            else if (row[i].size[k] == 8)
                 memcpy(text + len, &v, 8);
-            len += (size_t)(row[i].size > 0 ? row[i].size : sprintf(text + len, "%g ", v));
+            len += (size_t)(row[i].size[k] > 0 ? row[i].size[k] : sprintf(text + len, "%g ", v));
         }
         assert_int_equal(try(text, len, &cloud, &err), SH_OK);
         assert_int_equal(cloud.is_single, row[i].is_single);

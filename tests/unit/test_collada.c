@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Materials of meshes that Assimp reads, on Collada: where texture coordinates lie, colours,
- * transparency, and what is said of the rest. */
+ * transparency, and what is said of the rest. And the functions through which Assimp reads files. */
 #include <math.h>
 
+#include "core/import/import_open.h"
 #include "tests/unit/scene_files.h"
 
-/* A square of two triangles, z up, which Assimp turns to y up. Slots: the diffuse part, and the rest of the effect. */
+/* A square of two triangles, z up, which Assimp turns to y up. Its first set of texture coordinates spans the square;
+ * in the second one all are 0.5. Slots: the diffuse part, and the rest of the effect. */
 static const char DAE[] =
     "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
     "<asset><unit meter=\"1\"/><up_axis>Z_UP</up_axis></asset>"
@@ -23,9 +25,13 @@ static const char DAE[] =
     "<source id=\"gu\"><float_array id=\"gua\" count=\"8\">0 0 1 0 1 1 0 1</float_array>"
     "<technique_common><accessor source=\"#gua\" count=\"4\" stride=\"2\"><param name=\"S\" type=\"float\"/>"
     "<param name=\"T\" type=\"float\"/></accessor></technique_common></source>"
+    "<source id=\"gh\"><float_array id=\"gha\" count=\"8\">.5 .5 .5 .5 .5 .5 .5 .5</float_array>"
+    "<technique_common><accessor source=\"#gha\" count=\"4\" stride=\"2\"><param name=\"S\" type=\"float\"/>"
+    "<param name=\"T\" type=\"float\"/></accessor></technique_common></source>"
     "<vertices id=\"gv\"><input semantic=\"POSITION\" source=\"#gp\"/></vertices>"
     "<triangles count=\"2\" material=\"m\"><input semantic=\"VERTEX\" source=\"#gv\" offset=\"0\"/>"
-    "<input semantic=\"TEXCOORD\" source=\"#gu\" offset=\"0\" set=\"0\"/><p>0 1 2 0 2 3</p></triangles>"
+    "<input semantic=\"TEXCOORD\" source=\"#gu\" offset=\"0\" set=\"0\"/>"
+    "<input semantic=\"TEXCOORD\" source=\"#gh\" offset=\"0\" set=\"1\"/><p>0 1 2 0 2 3</p></triangles>"
     "</mesh></geometry></library_geometries>"
     "<library_visual_scenes><visual_scene id=\"v\"><node id=\"n\"><instance_geometry url=\"#g\"><bind_material>"
     "<technique_common><instance_material symbol=\"m\" target=\"#m\"><bind_vertex_input semantic=\"UV\" "
@@ -80,6 +86,18 @@ static void coordinates_are_scaled_and_shifted(void **state)
     scene_free(s);
 }
 
+static void a_texture_has_its_set_of_coordinates(void **state)
+{
+    (void)state;
+    struct scene *s = load_dae("<texture texture=\"p\" texcoord=\"CHANNEL1\"/>", "");
+    assert_int_equal(s->surface[0].texture, 1);
+    expect_uv(s, 0, 0, 0.5, 0.5);
+    scene_free(s);
+    s = load_dae("<texture texture=\"p\" texcoord=\"CHANNEL2\"/>", ""); /* without such a set it is the first */
+    expect_uv(s, 1, 1, 0, 0);
+    scene_free(s);
+}
+
 /* Colours of Collada are sRGB. A colour with a part beyond 1 is left out. */
 static void colours_and_transparency(void **state)
 {
@@ -108,11 +126,37 @@ static void colours_and_transparency(void **state)
     }
 }
 
+/* Assimp seeks from the begin, from where it is and from the end, as fseek does. Asking for the size moves nothing. */
+static void files_are_read_anywhere(void **state)
+{
+    (void)state;
+    FILE *stream = fopen(write_text("ten.txt", "0123456789"), "rb");
+    assert_non_null(stream);
+    struct aiFile file = import_open_stream(stream);
+    static const struct {
+        enum aiOrigin origin;
+        int by;
+        size_t at;
+    } row[] = {{aiOrigin_SET, 3, 3}, {aiOrigin_CUR, 4, 7}, {aiOrigin_CUR, -2, 5}, {aiOrigin_END, -1, 9}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        assert_int_equal(file.SeekProc(&file, (size_t)row[i].by, row[i].origin), aiReturn_SUCCESS);
+        assert_int_equal(file.FileSizeProc(&file), 10);
+        assert_int_equal(file.TellProc(&file), row[i].at);
+    }
+    assert_int_equal(file.SeekProc(&file, (size_t)-11, aiOrigin_END), aiReturn_FAILURE);
+    char digit;
+    assert_true(file.ReadProc(&file, &digit, 1, 1) == 1 && digit == '9');
+    fclose(stream);
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(coordinates_are_scaled_and_shifted),
+        cmocka_unit_test(a_texture_has_its_set_of_coordinates),
         cmocka_unit_test(colours_and_transparency),
+        cmocka_unit_test(files_are_read_anywhere),
     };
     return cmocka_run_group_tests_name("collada", tests, make_folder, remove_folder);
 }

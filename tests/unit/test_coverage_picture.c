@@ -2,6 +2,7 @@
 /* The coloured mesh of a coverage: each of its numbers beside the cell that it is of. */
 #include "core/bytes.h"
 #include "core/colour.h"
+#include "core/studio/coverage/inside.h"
 #include "tests/unit/coverage_rig.h"
 #include "tests/unit/scene_files.h"
 
@@ -177,11 +178,34 @@ static void nothing_is_seen(void **state)
     cover_close(c);
 }
 
+/* The corners and the triangles of a mesh are in memory before they are written, with the bytes of the file but for the
+ * number of corners of each face. That must be within what is allowed. */
+static void a_mesh_is_within_the_memory(void **state)
+{
+    (void)state;
+    struct cover *c = cover_open(cover_l_room(), 1.0, 1);
+    const struct file f = write_and_read(c, COVERAGE_SEEN);
+    const double mib = (double)(f.n_vertices * VERTEX + f.n_faces * (FACE - 1)) / 1048576.0;
+    struct sh_err err;
+    char corners[80];
+    free(f.bytes);
+    snprintf(corners, sizeof corners, "a mesh of cells of 1 m has %zu corners", f.n_vertices);
+    c->coverage->spec.memory_mib = mib * 1.000001;
+    free(write_and_read(c, COVERAGE_SEEN).bytes);
+    c->coverage->spec.memory_mib = mib * 0.999999;
+    assert_int_equal(coverage_write_mesh(c->coverage, path_in("none.ply"), COVERAGE_SEEN, NULL, &err), SH_EINPUT);
+    /* 1.5: half as many cells, and a little fewer */
+    if (strstr(err.text, corners) == NULL || strstr(err.text, "use a cell of at least 1.5 m") == NULL)
+        fail_msg("%s", err.text);
+    cover_close(c);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_and_colours_of_cells),
         cmocka_unit_test(nothing_is_seen),
+        cmocka_unit_test(a_mesh_is_within_the_memory),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -181,6 +181,11 @@ static void terms_give_the_same_sigma(void **state)
     near_to(t.range_floor_m, 0.003);
     near_to(t.range_jitter_m, 0.04);
     near_to(t.range_sigma_per_m, 1e-5);
+    head.setup.detect = NULL; /* no noise at all */
+    memset(&t, 0x55, sizeof t);
+    assert_true(deviation_terms_of(&head, &t));
+    assert_true(isnan(t.range_floor_m) && isnan(t.range_jitter_m) && t.range_sigma_m == 0 && t.range_sigma_per_m == 0);
+    assert_true(t.ball_m == 0 && t.ball_per_m == 0);
     head.has_instrument_errors = 1;
     assert_false(deviation_terms_of(&head, &t));
 }
@@ -190,11 +195,17 @@ static void terms_give_the_same_sigma(void **state)
 static const struct {
     double at[3], further_m, along_m;
 } POINT[] = {
-    {{-3, 10, 1}, 0.003, 0.003},   {{-3, 10, 1}, -0.002, -0.002}, {{3, 8, 1}, 0.001, 0.001},
+    {{-3, 10, 1}, 0.003, 0.003},
+    {{-3, 10, 1}, -0.002, -0.002},
+    {{3, 8, 1}, 0.001, 0.001},
     {{5, 10, -1}, 0.004, 0.004}, /* seen through the pane: the nearest surface counts */
-    {{5, 10, -1}, -0.004, -0.004}, {{-0.0001, 10, 0}, -1.5, NAN}, /* a mixed point: its beam meets the wall, and the pane's edge at x = 0 is nearer */
-    {{-3, 10, 1}, 40.0, NAN},                                     /* no surface is within max_m */
+    {{5, 10, -1}, -0.004, -0.004},
+    /* a mixed point: its beam meets the wall, and the pane's edge at x = 0 is nearer */
+    {{-0.0001, 10, 0}, -1.5, NAN},
+    {{-3, 10, 1}, 40.0, NAN}, /* no surface is within max_m */
     {{NAN, NAN, NAN}, 0.0, NAN},
+    /* through the pane to the wall's other triangle, in which no place has x above z */
+    {{5, 10, 20}, 0.004, 0.004},
 };
 enum { N = sizeof POINT / sizeof POINT[0] };
 

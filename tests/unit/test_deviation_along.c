@@ -291,7 +291,7 @@ static void sigma_by_the_signal(void **state)
 {
     (void)state;
     struct surface_table table;
-    struct detect_signal signal = {.floor2 = 9e-6};
+    struct detect_signal signal = {.floor2 = 9e-6, .per_distance = 1e-5};
     struct deviation_head one = {0};
     const struct cast_detect detect = {.signal = &signal, .noise_by_signal = 1, .surfaces = &table};
     struct deviation_hit hit = {100.0, {0, 1, 0}, {0, -1, 0}, 0};
@@ -307,7 +307,7 @@ static void sigma_by_the_signal(void **state)
         hit.label = label;
         const double sigma_m = deviation_sigma_m(&one, &hit, &counts_m);
         if (label == 0 || label == 2)
-            assert_true(fabs(sigma_m - 0.003) < 1e-12); /* jitter is 0, so the amplitude has no part in it */
+            assert_true(fabs(sigma_m - 0.004) < 1e-12); /* 1 mm of 100 m; jitter is 0, so is the amplitude's part */
         else
             assert_true(isnan(sigma_m));
         assert_true(counts_m == 0.0);

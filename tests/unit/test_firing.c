@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "core/cast/kernels_times.h"
+#include "tests/common/aimed.h"
 
 static const int64_t HOUR_NS = INT64_C(3600000000000), DAY_NS = 24 * INT64_C(3600000000000);
 
@@ -319,6 +320,28 @@ static void tables_that_do_not_fit_are_refused(void **state)
     assert_int_equal(e.tick_den, 1000);
 }
 
+/* A run may begin at any row of its table, and be cast in parts. Its pulses take one row after the other, and each time
+ * round the table the pan has turned by a sequence (struct schedule_run). */
+static void angles_follow_the_table(void **state)
+{
+    (void)state;
+    enum { N = 12 };
+    static const struct emitter_firing firing[3] = {{0, 0.125, 0.5}, {2, -0.25, 0.0}, {7, 0.375, 0.25}};
+    struct schedule_run run = {
+        .r = 5, .num = 3, .firing = firing, .n_firings = 3, .sequence_ticks = 10, .pan_turn_per_r = 0x1p-10};
+    for (run.firing_at = 0; run.firing_at < 3; run.firing_at++)
+        for (uint32_t first = 0; first < 7; first++) {
+            double mirror[N], pan[N];
+            aimed_angles(&run, first, N, mirror, pan);
+            for (uint32_t i = 0; i < N; i++) {
+                const uint32_t k = run.firing_at + first + i, row = k % 3;
+                const uint64_t ticks = k / 3 * 10 + firing[row].tick - firing[run.firing_at].tick;
+                assert_true(mirror[i] == firing[row].mirror_turn);
+                assert_true(pan[i] == (double)(5 + 3 * ticks) / 1024.0 + firing[row].pan_turn);
+            }
+        }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -333,6 +356,7 @@ int main(void)
         cmocka_unit_test(runs_say_the_same),
         cmocka_unit_test(sequences_last_a_ratio_of_nanoseconds),
         cmocka_unit_test(tables_that_do_not_fit_are_refused),
+        cmocka_unit_test(angles_follow_the_table),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

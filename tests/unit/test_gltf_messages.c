@@ -29,6 +29,8 @@ static void contradictions_are_named(void **state)
         {"\"scene\":0.5," NODE MESH MORE_ACCESSORS, ": scene is not a whole number from 0 on"},
         {"\"nodes\":[{\"mesh\":4294967295}]," MESH MORE_ACCESSORS,
          "nodes[0].mesh is 4294967295; allowed are indices below 4294967295"},
+        {"\"nodes\":[{\"mesh\":0," INSTANCES("\"_ID\":0") "}]," MESH MORE_ACCESSORS,
+         "nodes[0].extensions.EXT_mesh_gpu_instancing.attributes has none of TRANSLATION, ROTATION and SCALE"},
         {"\"nodes\":[{\"mesh\":0," INSTANCES("\"TRANSLATION\":0,\"SCALE\":3") "}]," MESH MORE_ACCESSORS,
          "nodes[0].extensions.EXT_mesh_gpu_instancing.attributes has 3 values of SCALE but 4 of another property"},
         {"\"nodes\":[{\"mesh\":0," INSTANCES("\"ROTATION\":4") "}]," MESH MORE_ACCESSORS,

@@ -153,6 +153,67 @@ static void eight_joints_a_corner(void **state)
     scene_free(s);
 }
 
+/* Writes the skin with its first set of joints n times over. bind: empty, or names the inverse bind matrices. */
+static void put_sets(int n_sets, const char *bind, char *rest, size_t room)
+{
+    add_blocks();
+    int n = put_nodes(rest, room);
+    n += snprintf(rest + n, room - (size_t)n,
+                  "\"skins\":[{\"joints\":[1,2,3,4,5,6,7,8]%s}],"
+                  "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0",
+                  bind);
+    for (int set = 0; set < n_sets; set++)
+        n += snprintf(rest + n, room - (size_t)n, ",\"JOINTS_%d\":3,\"WEIGHTS_%d\":4", set, set);
+    snprintf(rest + n, room - (size_t)n, "},\"indices\":2}]}],\"accessors\":[" SKIN_ACCESSORS "]");
+}
+
+#define BIND ",\"inverseBindMatrices\":7"
+
+/* Weights are divided by their sum, so a set that is there eight times moves a corner as the set alone does. There are
+ * eight sets at most. Corner 1 has no weight in the set, and so stays. */
+static void eight_sets_a_corner(void **state)
+{
+    (void)state;
+    char rest[8192];
+    put_sets(1, BIND, rest, sizeof rest);
+    struct scene *one = gltf_load(rest);
+    put_sets(8, BIND, rest, sizeof rest);
+    struct scene *eight = gltf_load(rest);
+    assert_true(one->n_vertices == 4 && eight->n_vertices == 4);
+    for (int k = 0; k < 4; k++)
+        for (int r = 0; r < 3; r++)
+            assert_true(fabs(one->vertex_m[k][r] - eight->vertex_m[k][r]) < 1e-12);
+    scene_free(one);
+    scene_free(eight);
+    put_sets(9, BIND, rest, sizeof rest);
+    gltf_refuse(rest, "has more than 8 sets of joints");
+}
+
+/* Without inverse bind matrices a joint's matrix is that of its node. Corner 1 has no weight in the first set, and so
+ * stays. */
+static void joints_without_bind_matrices(void **state)
+{
+    (void)state;
+    char rest[8192];
+    put_sets(1, "", rest, sizeof rest);
+    struct scene *s = gltf_load(rest);
+    assert_non_null(strstr(warnings, ": 1 vertices of a skin have no weights: no joint moves them"));
+    for (int k = 0; k < 4; k++) {
+        double want[3] = {0, 0, 0}, sum = 0;
+        for (int j = 0; j < 4; j++) {
+            double joint[3][4], to[3];
+            joint_matrix(joint_of(k, j), joint);
+            apply(joint, corner[k], to);
+            for (int r = 0; r < 3; r++)
+                want[r] += (double)weight[k][j] * to[r];
+            sum += (double)weight[k][j];
+        }
+        for (int r = 0; r < 3; r++)
+            assert_true(fabs(s->vertex_m[k][r] - (sum > 0 ? want[r] / sum : corner[k][r])) < 1e-12);
+    }
+    scene_free(s);
+}
+
 static void skins_that_do_not_fit(void **state)
 {
     (void)state;
@@ -214,8 +275,8 @@ static void attributes_that_do_not_fit(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(eight_joints_a_corner),
-        cmocka_unit_test(skins_that_do_not_fit),
+        cmocka_unit_test(eight_joints_a_corner),        cmocka_unit_test(eight_sets_a_corner),
+        cmocka_unit_test(joints_without_bind_matrices), cmocka_unit_test(skins_that_do_not_fit),
         cmocka_unit_test(attributes_that_do_not_fit),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

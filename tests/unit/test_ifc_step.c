@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Records of STEP files and their attributes, one by one, and the index of an IFC file's records. */
 #include "core/import/ifc/ifc_index.h"
+#include "core/import/ifc/ifc_unit.h"
 #include "tests/unit/scene_files.h"
 
 #define HEAD "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\n"
@@ -208,6 +209,26 @@ static void a_broken_index_is_named(void **state)
     expect_refusal(HEAD "#1=A(2,#);\n" END, "line 5: A #1 refers to #0, but there is no such record");
 }
 
+/* A record beyond the index's end is none of it. */
+static void a_project_is_one_of_the_records(void **state)
+{
+    (void)state;
+    struct ifc_index x;
+    double m;
+    assert_int_equal(open_index(&x, HEAD "#1=IFCWALL();\n#2=IFCPROJECT();\n#3=IFCPROJECT();\n" END), SH_OK);
+    for (size_t n = 0; n < 4; n++) {
+        char says[80];
+        x.n = n;
+        assert_int_equal(ifc_unit_find(&x, &m, &err), SH_EINPUT);
+        if (n == 2)
+            snprintf(says, sizeof says, "IFCPROJECT #2: not the 9 attributes that IFC defines");
+        else
+            snprintf(says, sizeof says, "a.ifc: %d IFCPROJECT records; allowed one", n < 3 ? 0 : 2);
+        if (strstr(err.text, says) == NULL) fail_msg("%s without '%s'", err.text, says);
+    }
+    ifc_index_close(&x);
+}
+
 /* The file's end is looked for in its last kilobyte. */
 static void the_end_is_near(void **state)
 {
@@ -238,6 +259,7 @@ int main(void)
         cmocka_unit_test(numbers_fill_their_attribute),
         cmocka_unit_test(records_are_found_by_number),
         cmocka_unit_test(a_broken_index_is_named),
+        cmocka_unit_test(a_project_is_one_of_the_records),
         cmocka_unit_test(the_end_is_near),
     };
     return cmocka_run_group_tests_name("ifc_step", tests, make_folder, remove_folder);

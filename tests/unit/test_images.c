@@ -393,6 +393,8 @@ static void hostile_files_take_no_gigabytes(void **state)
     memset(table + 5, 0xff, 16); /* 16 times 255 codes: the decoder's array has 257 entries */
     fails(write_file("table.jpg", tga, sizeof JPEG), "a table of more than 256 codes");
     fails(write_file("end.jpg", tga, (size_t)(table + 9 - tga)), "a table of more than 256 codes");
+    table[2] = 1; /* the segment is longer than 255 bytes */
+    fails(write_file("long.jpg", tga, sizeof JPEG), "a table of more than 256 codes");
     memcpy(tga, JPEG, sizeof JPEG);
     table = memmem(tga, sizeof JPEG, "\xff\xc4\0\x14\x10", 5);
     assert_non_null(table);

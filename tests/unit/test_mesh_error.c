@@ -114,6 +114,14 @@ static void float_columns_of_ply_are_told(void **state)
     write_file("hall.ply", ply, sizeof ply);
     check_accepted("hall.ply", "", "");
     check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* a step that is done is never refused */
+    static const float small[9] = {-0.25f, -0.25f, 0, 0.5f, -0.25f, 0, 0, 0.5f, 0};
+    memcpy(ply + sizeof head - 1, small, sizeof small);
+    const struct scene_mesh_spec spec = {.file = write_file("hall.ply", ply, sizeof ply), .scale = 1};
+    struct scene *s;
+    struct sh_err err;
+    if (load_spec(&spec, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_true(s->error_m >= 0.5 * 0x1p-24 && s->error_m < 0.55 * 6e-8); /* two digits, rounded up */
+    scene_free(s);
 }
 
 /* A millimetre shows in a scan, so the warning gives the remedy. */

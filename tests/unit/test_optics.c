@@ -287,6 +287,31 @@ static void colours_show_the_ranges_that_are_sent(void **state)
     close_optics(&o);
 }
 
+/* Each echo of a pulse has the colour of its own range: those of the pane, and that of the wall behind it. */
+static void colours_of_all_echoes(void **state)
+{
+    (void)state;
+    const struct cast_colour colour = {.scale = {.mode = COLOUR_RANGE, .low = 0.0, .high = 7.65}};
+    struct optics o;
+    struct schedule_line line;
+    struct detect_signal signal;
+    struct sh_err err;
+    open_window(&o, &signal);
+    o.detect.max_echoes = 3;
+    o.rig->setup.colour = &colour;
+    assert_int_equal(line_block_alloc_colours(&o.rig->block, &err), SH_OK);
+    schedule_get_line(&o.rig->segment, 0, &line);
+    assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, 100), 300);
+    for (uint32_t i = 0; i < 300; i++) {
+        uint8_t rgb[3];
+        assert_int_equal(o.rig->block.echo[i], (i % 3 + 1) | 0x30);
+        colour_between(0.0, 7.65, o.rig->block.a[i] * o.rig->setup.range_scale_m, rgb);
+        for (int k = 0; k < 3; k++)
+            assert_in_range(o.rig->block.rgb[i][k] + 1 - rgb[k], 0, 2);
+    }
+    close_optics(&o);
+}
+
 /* A mirror is on a body that moves: it is turned by 45 degrees about z through (0, 2, 0), then 1 m ahead. Beams that
  * meet it go on to the wall at x = 6: the way there plus the rest, at right angles. */
 static void a_mirror_that_moves(void **state)
@@ -340,6 +365,7 @@ int main(void)
         cmocka_unit_test(nothing_asked_for_changes_nothing),
         cmocka_unit_test(noise_never_touches_empty_shots),
         cmocka_unit_test(colours_show_the_ranges_that_are_sent),
+        cmocka_unit_test(colours_of_all_echoes),
         cmocka_unit_test(a_mirror_that_moves),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

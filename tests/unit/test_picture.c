@@ -109,6 +109,17 @@ static void triangles_have_their_area(void **state)
     picture_free(&p);
 }
 
+/* A triangle within one pixel covers some of its 4 x 4 places. These are at 0.125, 0.375, 0.625 and 0.875. With legs of
+ * 0.96 along two sides, the covered places are those whose coordinates add up to 0.96 at most: six. */
+static void small_triangles_are_seen(void **state)
+{
+    (void)state;
+    struct picture p = blank(12, 12);
+    picture_triangle(&p, (const double[3][2]){{2, 3}, {2.96, 3}, {2, 3.96}}, black);
+    assert_true(fabs(ink(&p, 2, 3) - 6 / 16.0) < 0.003 && fabs(all_ink(&p) - 6 / 16.0) < 0.003);
+    picture_free(&p);
+}
+
 /* A line has round ends: length times width, and a disc. From and to the same place it is the disc alone. */
 static void lines_have_their_width(void **state)
 {
@@ -358,6 +369,7 @@ int main(void)
         cmocka_unit_test(colours_of_lab),
         cmocka_unit_test(fills_and_blends),
         cmocka_unit_test(triangles_have_their_area),
+        cmocka_unit_test(small_triangles_are_seen),
         cmocka_unit_test(lines_have_their_width),
         cmocka_unit_test(texts_have_their_place),
         cmocka_unit_test(accents_add_no_width),

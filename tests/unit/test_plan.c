@@ -214,6 +214,37 @@ static void test_sight_costs(void **state)
     }
 }
 
+/* A memory of 32 MiB holds a part of the cells of several triangles (25 bytes each). So the map is made twice, the
+ * second time with a quarter of the cells. An outline then crosses twice the share of them. Cells that do not fit
+ * then either ask the BVH. The costs are again those of core/plan/cost.h. */
+static void test_sight_in_a_small_memory(void **state)
+{
+    (void)state;
+    const struct plan_sight_found found = {.one = 0.7, .nothing = 0.1, .few = 0.15, .ask = 0.05, .examined = 1000.0};
+    const struct plan_ray_cost *ray = &plan_ray_costs[2];
+    struct plan_sight_need need = SIGHT;
+    struct plan_row row;
+    need.n_triangles = 250000;
+    need.memory_bytes = 32 << 20;
+    need.forced = 1;
+    const double plane_ns = PLAN_COST_MILLION * 0.5, edge = sight_cells(need.pulses / need.share, need.memory_bytes);
+    const double in_view = need.share * 6.0 * edge * edge, fine = 0.2 * in_view, coarse = 0.4 * in_view / 4.0;
+    const double memory_bytes = (double)need.memory_bytes, holds = memory_bytes / (25.0 * coarse + 25.0);
+    const double fine_holds = memory_bytes / (25.0 * fine + 25.0);
+    assert_true(fine_holds < 0.9 && holds < 0.9);
+    const double made_ns =
+        2.0 * (PLAN_COST_SIGHT + PLAN_COST_SIGHT_TRIANGLE * 250000 + PLAN_COST_SIGHT_EXAMINED * 1000) +
+        PLAN_COST_SIGHT_CELL * (fine_holds * fine + holds * coarse);
+    const double bvh_ns = 0.1 * ray->miss + 0.9 * (ray->hit + plane_ns) + 0.2 * ray->border;
+    /* one, nothing, few and ask of the coarse cells: 0.525, 0.075, 0.3 and 0.1, by the same factor each */
+    const double few = holds * 0.3, ask = 0.4 - few;
+    const double map_ns =
+        0.6 * PLAN_COST_SIGHT_ONE + 0.525 * plane_ns + few * PLAN_COST_SIGHT_FEW + ask * (bvh_ns + PLAN_COST_SIGHT_ASK);
+    assert_int_equal(plan_sight_choose(&need, &found, &row), 1);
+    const double want_ns = map_ns - bvh_ns + made_ns / need.pulses;
+    if (fabs(row.cost_ns - want_ns) > 1e-9) fail_msg("%.12g instead of %.12g", row.cost_ns, want_ns);
+}
+
 static void test_sight_forced(void **state)
 {
     (void)state;
@@ -240,6 +271,7 @@ int main(void)
         cmocka_unit_test(test_sight_pays_to_a_pulse),
         cmocka_unit_test(test_sight_packets),
         cmocka_unit_test(test_sight_costs),
+        cmocka_unit_test(test_sight_in_a_small_memory),
         cmocka_unit_test(test_sight_forced),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -46,6 +46,19 @@ static void a_number_depends_on_seed_purpose_and_pulse_only(void **state)
     assert_true(rng_u64(rng_key(7 + (UINT64_C(1) << 32), RNG_RANGE), 1000) != first);
 }
 
+/* Two purposes of one number would share their numbers. */
+static void no_two_purposes_are_one(void **state)
+{
+    (void)state;
+    static const enum rng_purpose purpose[] = {
+        RNG_RANGE,       RNG_SCENE, RNG_GNSS, RNG_SIGNAL,   RNG_MIRROR, RNG_PAN,  RNG_BALL,
+        RNG_BALL_RADIUS, RNG_FAULT, RNG_PTP,  RNG_WAVEFORM, RNG_SPARSE, RNG_PLAN,
+    };
+    for (size_t i = 0; i < sizeof purpose / sizeof purpose[0]; i++)
+        for (size_t k = 0; k < i; k++)
+            assert_true(rng_key(7, purpose[i]) != rng_key(7, purpose[k]));
+}
+
 /* Standard errors of a normal sample: 1/sqrt(n), sqrt(2/n), sqrt(6/n), sqrt(24/n). */
 static void moments_are_those_of_a_normal(void **state)
 {
@@ -249,6 +262,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_finaliser_is_that_of_splitmix64),
         cmocka_unit_test(a_number_depends_on_seed_purpose_and_pulse_only),
+        cmocka_unit_test(no_two_purposes_are_one),
         cmocka_unit_test(moments_are_those_of_a_normal),
         cmocka_unit_test(neighbours_are_uncorrelated),
 #ifndef SH_SANITIZE /* they draw a million numbers each with the code of the others, so only as shipped */

@@ -163,6 +163,10 @@ static void missing_things_are_named(void **state)
     remove_made();
     put("r.mtl", "newmtl red\nKd 1 0 0\n");
     expect_warning("a.obj", "mtllib r.mtl g.mtl\n" QUADS, "a.obj, line 1: the material library 'g.mtl' is missing");
+    put("r.mtl", "newmtl red\nKd 1 0 0\n"); /* both libraries are there, and green is in none of them */
+    put("b.mtl", "newmtl blue\nKd 0 0 1\n");
+    expect_warning("a.obj", "mtllib r.mtl b.mtl\n" QUADS,
+                   "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
     put("r.mtl", "newmtl red\nKd 1 0 0\nnewmtl Green\nKd 0 1 0\n");
     expect_warning("a.obj", "mtllib r.mtl\n" QUADS,
                    "a.obj: 1 of its surfaces have a material that no library defines; the first: 'green'");
@@ -418,6 +422,15 @@ static void stl_as_text(void **state)
     refuse("a.stl", text, strlen(text) - 12, "cut off: the file ends where facet or endsolid is expected");
     refuse("a.stl", "solid\nfacet normal\nouter loop\nvertex 0 0\n", 39,
            "line 4: cut off: the file ends where a number of a vertex is expected");
+    static const char digits[] = "0123456789012345678901234567890123456789"; /* 40, the most of a word that is named */
+    static const char head[] = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 ";
+    for (int more = 0; more < 2; more++) {
+        char bad[160], says[160];
+        const int n = snprintf(bad, sizeof bad, "%sx%.*s\n", head, more ? 40 : 38, digits);
+        snprintf(says, sizeof says, "line 4: 'x%.*s' is found where a number of a vertex is expected", more ? 39 : 38,
+                 digits);
+        refuse("a.stl", bad, (size_t)n, says);
+    }
 }
 
 int main(void)

@@ -1,17 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /* What each cell of a map says, in a scene of four triangles, against the geometry on the faces of the cube. A map that
  * asks the BVH more often than it needs to has the right hits all the same, and nothing else would show it. */
+#include <malloc.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/sight.h"
+#include "core/sight/sight_inside.h"
 #include "core/vec3.h"
 #include "tests/common/made.h"
 
 /* As core/sight.h and core/sight/README.md have them: a face has CELLS x CELLS cells, in regions of 8 x 8 here. Of a
  * tile of 8 x 8 cells, one word is kept where all its cells say the same, else 64 more. */
-enum { FACES = 6, CELLS = 128, TILE = 8, TILES = CELLS / TILE, TRIANGLES = 4 };
+enum { FACES = 6, CELLS = 128, TILE = 8, TILES = CELLS / TILE, TRIANGLES = 4, ENOUGH = 1 << 24 };
 
 /* A triangle on a face: face 2 axis + 1 looks to the negative side. A corner lies at (sign, u, v) times its distance.
  */
@@ -123,11 +125,11 @@ static void count(int face, struct counts *c)
     }
 }
 
-static struct sight *make_map(const struct bvh *bvh)
+static struct sight *make_map(const struct bvh *bvh, uint64_t memory_bytes)
 {
     struct sight *sight = NULL;
     struct sh_err err;
-    struct sight_spec spec = {.bvh = bvh, .rays = 1e6, .memory_bytes = 1 << 24};
+    struct sight_spec spec = {.bvh = bvh, .rays = 1e6, .memory_bytes = memory_bytes};
     memcpy(spec.station_m, STATION_M, sizeof STATION_M);
     if (sight_create(&spec, 1, NULL, &sight, &err) != SH_OK) fail_msg("%s", err.text);
     return sight;
@@ -140,7 +142,7 @@ static void each_cell_says_what_is_there(void **state)
     (void)state;
     struct scene *scene = make_pieces();
     struct bvh *bvh = made_bvh(scene);
-    struct sight *sight = make_map(bvh);
+    struct sight *sight = make_map(bvh, ENOUGH);
     struct sight_info info;
     struct counts want = {0};
     const double all = FACES * CELLS * CELLS;
@@ -156,10 +158,58 @@ static void each_cell_says_what_is_there(void **state)
     assert_int_equal(info.records, want.records);
     if (info.lists < want.lists || info.lists > 2 * want.lists)
         fail_msg("%u words of lists, not %u", (unsigned)info.lists, want.lists);
-    const uint64_t least =
+    const uint64_t bytes =
         4 * FACES * TILES * TILES + 4 * TILE * TILE * want.blocks + 4 * info.lists + 128 * info.records;
-    assert_true(info.bytes >= least && info.bytes < least + least / 10 && info.bytes <= info.peak_bytes);
+    assert_true(info.bytes == bytes && info.bytes < info.peak_bytes);
     assert_true(info.build_s >= 0.0 && info.build_s < 100.0);
+    sight_free(sight);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
+/* A map that needs a number of bytes is the same with just that many. With fewer its cells are coarser, and some of
+ * them ask the BVH where the memory does not hold the coarser ones either. */
+static void the_memory_holds(void **state)
+{
+    (void)state;
+    struct scene *scene = make_pieces();
+    struct bvh *bvh = made_bvh(scene);
+    struct sight_info info;
+    struct sight *sight = make_map(bvh, ENOUGH);
+    sight_get_info(sight, &info);
+    sight_free(sight);
+    const uint64_t enough = info.peak_bytes;
+    int coarser = 0, asks = 0;
+    for (uint64_t memory_bytes = enough; memory_bytes > enough / 16; memory_bytes -= enough / 32) {
+        sight = make_map(bvh, memory_bytes);
+        sight_get_info(sight, &info);
+        sight_free(sight);
+        assert_true(info.peak_bytes <= memory_bytes);
+        assert_int_equal(info.cells == CELLS && info.ask == 0.0, memory_bytes == enough);
+        coarser += info.cells < CELLS && info.ask == 0.0;
+        asks += info.cells < CELLS && info.ask > 0.0;
+    }
+    assert_true(coarser > 0 && asks > 0);
+    sight = make_map(bvh, enough - 1);
+    sight_get_info(sight, &info);
+    sight_free(sight);
+    assert_int_equal(info.cells, CELLS / 2);
+    bvh_free(bvh);
+    scene_free(scene);
+}
+
+/* Room in its arrays that a map does not use is given back, but for what rounds a block up to a page. A head that locks
+ * its memory would hold that room. */
+static void unused_room_is_given_back(void **state)
+{
+    (void)state;
+    struct scene *scene = make_pieces();
+    struct bvh *bvh = made_bvh(scene);
+    struct sight *sight = make_map(bvh, ENOUGH);
+    struct sight_info info;
+    sight_get_info(sight, &info);
+    assert_true(malloc_usable_size(sight->leaf) + malloc_usable_size(sight->list) + malloc_usable_size(sight->record) <
+                info.bytes + 3 * 4096);
     sight_free(sight);
     bvh_free(bvh);
     scene_free(scene);
@@ -175,7 +225,7 @@ static void rays_through_each_cell(void **state)
     static uint32_t triangle[2][N];
     struct scene *scene = make_pieces();
     struct bvh *bvh = made_bvh(scene);
-    struct sight *sight = make_map(bvh);
+    struct sight *sight = make_map(bvh, ENOUGH);
     struct bvh_work *bvh_work = made_bvh_work();
     struct sight_work *work;
     struct sh_err err;
@@ -260,10 +310,9 @@ static void a_stop_leaves_no_map(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_cell_says_what_is_there),
-        cmocka_unit_test(rays_through_each_cell),
-        cmocka_unit_test(a_stop_leaves_no_map),
-        cmocka_unit_test(cells_by_rays_and_memory),
+        cmocka_unit_test(each_cell_says_what_is_there), cmocka_unit_test(the_memory_holds),
+        cmocka_unit_test(unused_room_is_given_back),    cmocka_unit_test(rays_through_each_cell),
+        cmocka_unit_test(a_stop_leaves_no_map),         cmocka_unit_test(cells_by_rays_and_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

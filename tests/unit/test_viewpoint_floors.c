@@ -45,7 +45,7 @@ static void add_room(const double lo[3], const double hi[3], double slope)
     }
 }
 
-static struct survey_best find(void)
+static struct survey_best find_with(const struct viewpoint_view *view)
 {
     static struct survey s;
     struct survey_best best = {0};
@@ -54,11 +54,16 @@ static struct survey_best find(void)
         (const double(*)[3])vertex_m, 4 * n_quads, (const uint32_t(*)[3])triangle, 2 * n_quads, NULL, NULL, 0};
     struct scene *scene = made_scene(&arrays);
     n_quads = 0;
-    assert_int_equal(survey_open(&s, scene, &VIEW, NULL, &err), SH_OK);
+    assert_int_equal(survey_open(&s, scene, view, NULL, &err), SH_OK);
     assert_int_equal(survey_floors(&s, NULL, &best, &err), SH_OK);
     survey_close(&s);
     scene_free(scene);
     return best;
+}
+
+static struct survey_best find(void)
+{
+    return find_with(&VIEW);
 }
 
 /* A room of 1.5 m is the lowest one. The head stands at 0.6 of its height, at most at 1.6 m. It sees all of the room.
@@ -144,7 +149,7 @@ static void land_may_have_a_surface_below(void **state)
     static const struct {
         double high_m, width_m;
         int is_land;
-    } rows[] = {{24, 100, 1}, {26, 100, 0}, {24, 75, 1}, {24, 66, 0}};
+    } rows[] = {{25, 100, 1}, {26, 100, 0}, {24, 75, 1}, {24, 66, 0}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
         for (int turned = 0; turned < (SANITIZED ? 1 : 2); turned++) {
             const double x = turned ? 100 : rows[i].width_m, y = turned ? rows[i].width_m : 100;
@@ -153,6 +158,40 @@ static void land_may_have_a_surface_below(void **state)
             add_level(99, 99, 100, 100, rows[i].high_m);
             assert_int_equal(find().ground_score > 0, rows[i].is_land);
         }
+}
+
+/* A scan of 10 lines is tried. Level land shows what lies below the horizon, a share of the lines. Lines in the middles
+ * of ten equal parts of the view count that share to the nearest tenth. The lines next to the horizon are 1.6 degrees
+ * from it, and hit the land of 1 km within 200 m. */
+static void lines_divide_the_view_evenly(void **state)
+{
+    (void)state;
+    static const double rows[][2] = {{0.56, 0.6}, {0.54, 0.5}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct viewpoint_view view = {0.1, 1000, -M_PI_2, M_PI_2 * (1 / rows[i][0] - 1)};
+        add_level(0, 0, 1000, 1000, 5);
+        const struct survey_best best = find_with(&view);
+        assert_true(best.ground_score > 0 && fabs(best.ground.seen - rows[i][1]) < 1e-9);
+    }
+}
+
+/* A wall on one side of a yard fills an angle from the head. All lines hit it between its foot and its top. The
+ * lines' azimuths interleave: 160 of them go evenly round, so their share differs by less than one of 160. */
+static void azimuths_go_evenly_round(void **state)
+{
+    (void)state;
+    static const double end[5][2] = {{0, 0}, {100, 0}, {100, 100}, {0, 100}, {0, 0}};
+    const struct viewpoint_view view = {0.1, 1000, angle_rad(1), angle_rad(8)};
+    for (int side = 0; side < 4; side++) {
+        const double *a = end[side], *b = end[side + 1];
+        add_level(0, 0, 100, 100, 0);
+        add_quad((const double[4][3]){{a[0], a[1], 0}, {b[0], b[1], 0}, {b[0], b[1], 25}, {a[0], a[1], 25}});
+        const struct survey_best best = find_with(&view);
+        const double *p = best.ground.position_m;
+        const double turn = atan2(b[0] - p[0], b[1] - p[1]) - atan2(a[0] - p[0], a[1] - p[1]);
+        const double share = fabs(remainder(turn, 2 * M_PI)) / (2 * M_PI);
+        assert_true(best.ground_score > 0 && fabs(best.ground.seen - share) < 1.0 / 160);
+    }
 }
 
 /* Returns which of two rooms the better place is in. */
@@ -190,9 +229,14 @@ static void the_better_room_is_taken(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(rooms_have_a_height),      cmocka_unit_test(floors_are_not_steep),
-        cmocka_unit_test(land_has_a_height),        cmocka_unit_test(a_roof_is_no_ground),
-        cmocka_unit_test(the_better_room_is_taken), cmocka_unit_test(land_may_have_a_surface_below),
+        cmocka_unit_test(rooms_have_a_height),
+        cmocka_unit_test(floors_are_not_steep),
+        cmocka_unit_test(land_has_a_height),
+        cmocka_unit_test(a_roof_is_no_ground),
+        cmocka_unit_test(the_better_room_is_taken),
+        cmocka_unit_test(land_may_have_a_surface_below),
+        cmocka_unit_test(lines_divide_the_view_evenly),
+        cmocka_unit_test(azimuths_go_evenly_round),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -110,6 +110,26 @@ static void sums_are_taken_apart(void **state)
     }
 }
 
+/* Two pulses whose maxima are one are found by their moments, which are exact where there is no noise. The steps that
+ * follow have nothing to do. */
+static void two_pulses_are_told_by_their_moments(void **state)
+{
+    (void)state;
+    static const double peaks[][2] = {{6.0, 6.0}, {6.0, 4.0}, {6.0, 1.5}, {1.5, 6.0}, {2.0, 8.0}};
+    const double s = finder_rig_of(w)->spread[0].sigma, width = 2.3548 * s;
+    for (size_t i = 0; i < sizeof peaks / sizeof peaks[0]; i++)
+        for (double apart = 0.5; apart <= 0.75; apart += 0.05) {
+            const struct finder_run run = window(NULL);
+            const struct finder_term want[2] = {{70.3, s, peaks[i][0]}, {70.3 + apart * width, s, peaks[i][1]}};
+            struct finder_peak peak[FINDER_PEAKS];
+            struct finder_mix mix;
+            set_sum(want, 2);
+            assert_int_equal(finder_peaks(&run, 0.5, peak, FINDER_PEAKS), 1);
+            finder_decompose(&run, peak, 1, 1, &mix);
+            expect_terms(&mix, want, 2, 0.01);
+        }
+}
+
 /* A top that is limited is found again by its flanks, and so is one that the window cuts off. */
 static void tops_that_are_not_seen(void **state)
 {
@@ -143,9 +163,61 @@ static void tops_that_are_not_seen(void **state)
     expect_terms(&mix, &cut, 1, 0.02);
 }
 
+/* After the first limited sample nothing is seen any more. The last two samples before it give the place and the height
+ * of the pulse, since a Gaussian of that width goes through both in one way only. Here both are well above the
+ * noise. */
+static void a_flank_gives_the_whole_pulse(void **state)
+{
+    (void)state;
+    const double s = finder_rig_of(w)->spread[0].sigma, limit = finder_rig_of(w)->limit;
+    for (double peak_of = 12.0; peak_of < 200.0; peak_of *= 1.3) {
+        const struct finder_term want = {70.3, s, peak_of};
+        uint8_t mark[N] = {0};
+        const struct finder_run run = window(mark);
+        struct finder_peak peak[4];
+        struct finder_mix mix;
+        int first = 0;
+        set_sum(&want, 1);
+        while (y[first] <= limit)
+            first++;
+        y[first] = 10.0;
+        mark[first] = FINDER_LIMITED;
+        for (int i = first + 1; i < N; i++) {
+            y[i] = 0.0;
+            mark[i] = i < first + 20 ? FINDER_BLIND : 0;
+        }
+        assert_int_equal(finder_peaks(&run, 0.5, peak, 4), 1);
+        finder_decompose(&run, peak, 1, 0, &mix);
+        assert_true(mix.limited == 1 && mix.open == 1);
+        expect_terms(&mix, &want, 1, 0.01);
+    }
+}
+
+/* No pulse is so steep that it rises from nothing to the limit within a sample. Then a height of e^9 times the limit,
+ * 39 dB above it, is the most that is believed. */
+static void a_height_is_believed_up_to_39_db(void **state)
+{
+    (void)state;
+    uint8_t mark[N] = {0};
+    const struct finder_run run = window(mark);
+    struct finder_peak peak[4];
+    struct finder_mix mix;
+    memset(y, 0, sizeof y);
+    y[70] = finder_rig_of(w)->limit;
+    mark[70] = FINDER_LIMITED;
+    memset(mark + 71, FINDER_BLIND, 20);
+    assert_int_equal(finder_peaks(&run, 0.5, peak, 4), 1);
+    finder_decompose(&run, peak, 1, 0, &mix);
+    assert_true(mix.n == 1 && fabs(mix.g[0].peak / y[70] / exp(9.0) - 1.0) < 1e-3);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_sum_is_fitted), cmocka_unit_test(sums_are_taken_apart),
-                                       cmocka_unit_test(tops_that_are_not_seen)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_sum_is_fitted),
+                                       cmocka_unit_test(sums_are_taken_apart),
+                                       cmocka_unit_test(two_pulses_are_told_by_their_moments),
+                                       cmocka_unit_test(tops_that_are_not_seen),
+                                       cmocka_unit_test(a_flank_gives_the_whole_pulse),
+                                       cmocka_unit_test(a_height_is_believed_up_to_39_db)};
     return cmocka_run_group_tests(tests, open_pulse, close_pulse);
 }
