@@ -37,7 +37,7 @@ struct ply_facts {
     struct scanhead_stats stats;
 };
 
-/* Returns those of the columns that points of the track have. To be called once the track has begun. */
+/* Returns those of the columns that points of the track have; other bits stay. To be called once the track has begun. */
 unsigned ply_columns_there(const struct track *track, unsigned columns);
 /* Returns the bytes of a binary row of these columns. */
 size_t ply_row_len(unsigned columns);

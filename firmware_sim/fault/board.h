@@ -54,7 +54,7 @@ int fault_board_add(struct fault_board *board, const struct fault *fault, int64_
 uint32_t fault_board_end(struct fault_board *board, uint32_t number, int64_t t_ns);
 
 /* Notes an injection, or its end (note->ended): writes the note to the truth, and passes it to the listeners. Only
- * injections are counted. */
+ * injections are counted. note->fault is the number of a fault of this board. */
 void fault_board_note(struct fault_board *board, const struct fault_note *note);
 /* Returns the number of the fault that was added last; 0: there never was one. */
 uint32_t fault_board_last(struct fault_board *board);

@@ -151,7 +151,8 @@ class Page {
     return result.value;
   }
 
-  /** Waits until the expression is true and returns its value. The page itself looks every 20 ms. */
+  /** Waits until the expression is true and returns its value. The page itself looks every 20 ms. An error has the
+   * figures of this page. */
   async until(expression, what = expression) {
     const limit_ms = DEADLINE_MS - 5000; // the page answers before send() gives up
     const answer = await this.send('Runtime.evaluate', {awaitPromise: true, returnByValue: true, expression: `new Promise((done, fail) => {
@@ -159,12 +160,12 @@ class Page {
         let value;
         try { value = (${expression}); } catch (error) { value = null; }
         if (value) done(value);
-        else if (performance.now() > end) fail();
+        else if (performance.now() > end) fail(JSON.stringify(window.scanhead?.head?.figures() ?? null));
         else setTimeout(ask, 20);
       };
       ask();
     })`});
-    if (answer.exceptionDetails) throw new Error(`${what}: not within ${limit_ms} ms`);
+    if (answer.exceptionDetails) throw new Error(`${what}: not within ${limit_ms} ms; ${answer.exceptionDetails.exception?.value}`);
     return answer.result.value;
   }
 

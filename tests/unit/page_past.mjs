@@ -283,7 +283,8 @@ test('a page asks a busy head for its description again, and takes a refusal for
       asked.push(path);
       const status = list.shift();
       if (status === 0) throw new TypeError('fetch failed');
-      return {ok: status === 200, status, json: async () => ({run: 7})};
+      const bytes = new TextEncoder().encode(status === 200 ? '{"run": 7}' : 'no');
+      return {ok: status === 200, status, arrayBuffer: async () => bytes.buffer};
     };
   };
   try {

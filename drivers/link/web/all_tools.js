@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module has the tools of the picture, in the order of their buttons, and what they share.
-import {fetchJson} from './page.js';
+import {fetchJson, newest} from './page.js';
 import {MeasureTool} from './measure_tool.js';
 import {PanoramaTool} from './panorama_tool.js';
 import {SectionTool} from './section_tool.js';
@@ -10,9 +10,11 @@ import {Tools} from './tools.js';
 // These are the errors that the head expects of its points. A recording and an older head report none.
 class Expected {
   #stations = [];
+  #begin = newest();
 
   async ask() {
-    this.#stations = (await fetchJson('/quality'))?.stations ?? [];
+    const isNewest = this.#begin(), quality = await fetchJson('/quality');
+    if (isNewest()) this.#stations = quality?.stations ?? [];
   }
 
   // Returns the errors that the head expects of a station's last scan; null: they are not known.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This panel shows events and errors in words, the newest on top, and the plan.
-import {bodyOf, byId, clock, fetchJson, grouped, make, metres, percent, say} from './page.js';
+import {bodyOf, byId, clock, fetchJson, grouped, make, metres, newest, percent, say} from './page.js';
 import {peerOf} from './head.js';
 import {sessionWords, stateName, stateWord} from './session.js';
 
@@ -95,9 +95,12 @@ const rowOf = (row) => make('tr', {},
 const table = (caption, heads, rows) => make('table', {class: 'plan'}, make('caption', {}, caption),
   make('thead', {}, make('tr', {}, ...heads.map((name) => make('th', {scope: 'col'}, name)))), make('tbody', {}, ...rows));
 
+const beginPlan = newest();
+
 // /plan has the rows of `scanhead plan --json`, or one text: "stage method; stage method".
 export async function showPlan() {
-  const plan = await fetchJson('/plan');
+  const isNewest = beginPlan(), plan = await fetchJson('/plan');
+  if (!isNewest()) return;
   const rows = Array.isArray(plan) ? plan : plan?.rows;
   const body = bodyOf('plan');
   if (Array.isArray(rows)) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This module connects the page's modules: a head and its points, or a recording.
-import {bodyOf, byId, fetchBytes, fetchJson, kept, say} from './page.js';
+import {bodyOf, byId, fetchBytes, fetchJson, kept, newest, say} from './page.js';
 import {Head} from './head.js';
 import {Cloud} from './cloud.js';
 import {Session, startTheme, why} from './session.js';
@@ -107,12 +107,13 @@ function startHead(cloud, view, names, keepsPast) {
     const player = timeline ? null : await ReplayPlayer.of(session, cloud, refused).catch(() => null);
     if (player) timeline = new Timeline(player);
   };
+  const begin = newest();
   const learn = async () => {
-    const came = cloud.cut();
+    const isNewest = begin(), came = cloud.cut();
     countFrames();
     findReplay();
     const info = await fetchJson('/head');
-    if (!info) return;
+    if (!info || !isNewest()) return;
     const now = [info.config, info.maker, info.model, info.serial].join();
     if (before && now !== before && cloud.count > 0) {
       const words = 'This is another head. The points of the one before are still shown; Clear, under Display, removes them.';
@@ -128,7 +129,8 @@ function startHead(cloud, view, names, keepsPast) {
     if (view) view.stations.fields = info.fields ?? [];
     stations.reload(info.stations ?? []).then(() => trials.offer(info.previews === true, info.run)).catch(() => {}); // the head is gone
     showPlan();
-    view?.setScene(await fetchBytes('/scene'));
+    const scene = await fetchBytes('/scene');
+    if (isNewest()) view?.setScene(scene);
   };
   stations.addEventListener('tell', ({detail}) => {
     bar.notice(detail.text, 6000, detail.kind);

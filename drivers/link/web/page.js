@@ -140,20 +140,37 @@ export const kept = {
   },
 };
 
-const AGAIN_MS = 100, AGAIN_MOST_MS = 3200; // a head that has no room for a request is asked again, ever less often
+const AGAIN_MS = 100, AGAIN_MOST_MS = 1600; // a head that has no room for a request is asked again, ever less often
 
-// Returns what `read` makes of the answer for one of the link's resources; null if there is none or it does not come.
-async function fetchPatiently(path, cache, read) {
-  for (let wait_ms = AGAIN_MS; wait_ms <= AGAIN_MOST_MS; wait_ms *= 2) {
+/** Returns the bytes of one of the link's resources; null if there is none or it does not come within some seconds. */
+export async function fetchBytes(path, cache = 'default') {
+  for (let wait_ms = AGAIN_MS; ; wait_ms *= 2) {
     try {
       const answer = await fetch(path, {cache});
-      if (answer.ok) return await read(answer);
+      if (answer.ok) return await answer.arrayBuffer();
       if (answer.status !== 408 && answer.status !== 503) return null;
     } catch { /* the connection broke */ }
+    if (wait_ms > AGAIN_MOST_MS) return null;
     await new Promise((done) => setTimeout(done, wait_ms));
   }
-  return null;
 }
 
-export const fetchJson = (path) => fetchPatiently(path, 'no-store', (answer) => answer.json());
-export const fetchBytes = (path) => fetchPatiently(path, 'default', (answer) => answer.arrayBuffer());
+/** Returns the JSON of one of the link's resources; null if there is none, it does not come, or it is none. */
+export async function fetchJson(path) {
+  const bytes = await fetchBytes(path, 'no-store');
+  try {
+    return bytes && JSON.parse(new TextDecoder().decode(bytes));
+  } catch {
+    return null;
+  }
+}
+
+/** Returns a function to be called where something begins that others may overtake. That function returns another one,
+ * which says whether nothing has begun since. */
+export function newest() {
+  let last = 0;
+  return () => {
+    const own = ++last;
+    return () => own === last;
+  };
+}

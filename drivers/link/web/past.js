@@ -38,6 +38,7 @@ export class Past {
   #seen = null; // it is the same, from earlier connections only
   #first = null; // it is the number of the first live points frame that was taken
   #need = null; // it is the number of the newest frame that only /past brings
+  #until_ms = 0; // frames that /past does not bring until then are waited for more seldom
   #takesLive = true;
   #takesPast = true;
 
@@ -124,7 +125,11 @@ export class Past {
     if (this.#isReading || this.#url === null) return;
     this.#isReading = true;
     const connection = this.#connection;
-    await this.#readAll(() => connection === this.#connection);
+    try {
+      await this.#readAll(() => connection === this.#connection);
+    } catch {
+      // A piece could not be taken. The next live frame that is left to /past begins anew.
+    }
     if (connection === this.#connection) this.#isReading = false;
   }
 
@@ -135,13 +140,14 @@ export class Past {
         return await this.#get(`${this.#url}?from=${this.#at}`);
       } catch {
         await sleep(wait_ms);
+        this.#until_ms = performance.now() + PATIENCE_MS; // nobody can say yet that the head's keeper is late
       }
     }
     return null;
   }
 
   async #readAll(goesOn) {
-    let until_ms = performance.now() + PATIENCE_MS;
+    this.#until_ms = performance.now() + PATIENCE_MS;
     for (;;) {
       const bytes = await this.#piece(goesOn);
       if (!goesOn()) return;
@@ -157,9 +163,9 @@ export class Past {
       }
       this.#push(bytes, head);
       const isAtEnd = head.next === head.end, misses = this.#need !== null && !isBefore(this.#need, head.next_seq);
-      if (!isAtEnd) until_ms = performance.now() + PATIENCE_MS;
+      if (!isAtEnd) this.#until_ms = performance.now() + PATIENCE_MS;
       else if (!misses) return this.decoder.flush(true);
-      const isLate = performance.now() > until_ms;
+      const isLate = performance.now() > this.#until_ms;
       if (isLate) this.decoder.flush(true);
       await sleep(!isAtEnd ? REST_MS : isLate ? SELDOM_MS : AGAIN_MS);
       while (goesOn() && !this.#hasRoom()) await sleep(REST_MS);
@@ -186,7 +192,6 @@ export class Past {
 
 async function getBytes(url) {
   const answer = await fetch(url);
-  if (answer.status === 404) return null;
-  if (!answer.ok) throw new Error(`${url}: ${answer.status}`);
-  return answer.arrayBuffer();
+  if (answer.status === 408 || answer.status === 503) throw new Error(`${url}: ${answer.status}`);
+  return answer.ok ? answer.arrayBuffer() : null;
 }
