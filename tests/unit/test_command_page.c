@@ -44,7 +44,7 @@ static const struct {
               {offsetof(struct head_limits, range_max_nm), "`range_max_m`"},
               {offsetof(struct head_limits, near_most_nm), "below each program's reach"},
               {offsetof(struct head_limits, far_least_nm), "above each program's `range_min_m`"},
-              {offsetof(struct head_limits, sigma_min_nm), "0, with a signal model `range_sigma_floor_m`,"},
+              {offsetof(struct head_limits, sigma_min_nm), "0 (with a signal model `range_sigma_floor_m`)"},
               {offsetof(struct head_limits, ball_max_nm), "100"}};
 
 static void add_bound(char text[256], const struct command_bound *bound, int decimals)
