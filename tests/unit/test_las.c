@@ -263,7 +263,7 @@ static void check_12(int colour)
         assert_int_equal(rig_uint(p + 28 + 2 * i, 2), 150 * 257);
     assert_non_null(strstr(rig_notes, "1 echoes left out: the sixth"));
     assert_non_null(strstr(rig_notes, "5 points of pulses with more than 5 echoes"));
-    assert_non_null(strstr(rig_notes, "LAS 1.2 has no place for labels and scan angles; they are left out"));
+    assert_non_null(strstr(rig_notes, "LAS 1.2 has no place for labels and exact scan angles; they are left out"));
 }
 
 static void test_las_12(void **state)
