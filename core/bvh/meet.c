@@ -141,11 +141,11 @@ static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *le
     struct lanes found;
     query->counters.leaves++;
     bvh_find_edges(query, leaf, &edges);
-    if (query->has_own)
-        judge_packet(query, &edges, 1, 0, asked, &found);
-    else
+    if (!query->has_own)
         judge_packet(query, &edges, 0, 0, asked, &found);
-    if (query->has_own && any(&found, DOUBT | DOUBT << SECOND)) {
+    else if (!query->is_turned)
+        judge_packet(query, &edges, 1, 0, asked, &found);
+    if (query->has_own && (query->is_turned || any(&found, DOUBT | DOUBT << SECOND))) {
         if (!query->is_turned) bvh_turn_origins(query);
         judge_packet(query, &edges, 1, 1, asked, &found);
     }

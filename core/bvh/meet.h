@@ -45,14 +45,16 @@ void bvh_note_hit(struct bvh_query *query, float *tfar, uint32_t lane, uint32_t 
  * the dot product 5. |p| itself is no measure, since it may be far smaller than its summands.
  *
  * Rays of a packet may begin at different points o. Then p and q are relative to c, the origin of one of them, and the
- * side is (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term is at most A L, with A = |o - c|. Where the first
- * term is greater than the doubt by more than A L, the second one is not needed. Elsewhere it is computed for three
- * edges, and rounds like the first, with A in place of F. For the other two edges it is a sum or difference of these
- * three terms, since the edges of a triangle add up to zero. The second term's error is therefore at most 2 * 15 + 1
- * units of A L. Adding it to the first term rounds by 1 unit of A L and 1 of F L. So F has 2 A in it. The doubt of
- * double precision (edges.h) is far less than the rest of the bound. */
+ * side is (p x (q - p)) . d + (q - p) . ((o - c) x d). The second term is at most A L, with A = |o - c|. So where the
+ * first term's size is above the doubt by more than A L, its sign is that of the side. Once a ray of the packet is in
+ * doubt at some leaf, the second term is computed, there and at all later leaves: for three edges, with A in place of F
+ * in its error. For the other two edges it is a sum or difference of these three terms, since the edges of a triangle
+ * add up to zero. The second term's error is therefore at most 2 * 15 + 1 units of A L. Adding it to the first term
+ * rounds by 1 unit of A L and 1 of F L. So 48 units of A L are added to the doubt. The doubt of double precision
+ * (edges.h) is far less than the rest of the bound. */
 #define BVH_SIDE_DOUBT (24.0F * 0x1p-24F)
-/* A L times this is added to the doubt of a ray from a point of its own: without the second term, and with it. */
+/* A L times this is added to the doubt of a ray from a point of its own: without the second term, and with it. The
+ * 0.002 are for the rounding of A and of these products, and for directions that are no exact unit vectors. */
 #define BVH_FIRST_DOUBT 1.002F
 #define BVH_BOTH_DOUBT  (2.002F * BVH_SIDE_DOUBT)
 

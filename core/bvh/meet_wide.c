@@ -114,10 +114,9 @@ WIDE void meet_triangle(struct bvh_query *query, float *tfar, const struct bvh_l
 }
 
 /* Rays that begin at points of their own: adds the second term of each edge's side (meet.h). */
-WIDE void add_own(struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES])
+WIDE void add_own(const struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES])
 {
     __m512 turned[3], more[BVH_EDGES];
-    if (!query->is_turned) bvh_turn_origins(query);
     for (int j = 0; j < 3; j++)
         turned[j] = _mm512_loadu_ps(query->turned[j]);
     for (int k = 0; k < 4; k++)
@@ -159,8 +158,10 @@ WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf
         dir[j] = _mm512_loadu_ps(query->dir_float + j * BVH_PACKET);
     for (int k = 0; k < BVH_EDGES; k++)
         side[k] = dot(edges.m[0][k], edges.m[1][k], edges.m[2][k], dir);
-    judge_both(side, own ? own_doubt(query, &edges, BVH_FIRST_DOUBT) : _mm512_set1_ps(edges.doubt), all, judged);
-    if (own && (judged[0].doubt | judged[1].doubt) != 0) {
+    if (!own || !query->is_turned)
+        judge_both(side, own ? own_doubt(query, &edges, BVH_FIRST_DOUBT) : _mm512_set1_ps(edges.doubt), all, judged);
+    if (own && (query->is_turned || (judged[0].doubt | judged[1].doubt) != 0)) {
+        if (!query->is_turned) bvh_turn_origins(query);
         add_own(query, &edges, side);
         judge_both(side, own_doubt(query, &edges, BVH_BOTH_DOUBT), all, judged);
     }

@@ -35,21 +35,22 @@ struct bvh_query {
     struct bvh_nested *nested;         /* for copies; of a query within a copy: NULL */
     double at_origin_m;                /* no hit is nearer than this */
     uint32_t width;                    /* rays of the call */
+    uint32_t unsure;                   /* a bit for each ray that may have another hit of lower number */
     int has_own;                       /* each ray begins at its own point, org; else all begin at `at` */
+    int is_turned;                     /* `turned` is set */
     double at[3], at_local[3];         /* prcs; from the BVH's origin. With own points at_local is the first of them */
     double most_m;                     /* greatest length of a float ray; INFINITY: any */
     /* [BVH_PACKET] numbers each, in the arrays of all rays or in `room`. A lane without a ray has any value. */
     const double *dir[3], *org[3], *local[3];
-    const float *dir_float;        /* [3][width] dir for Embree; BVH_PACKET elements of each may be read */
-    double room[9][BVH_PACKET];    /* for dir, org, local */
-    float apart_m[BVH_PACKET];     /* of own points: no ray begins further from at_local than this */
-    int is_turned;                 /* `turned` is set */
+    const float *dir_float; /* [3][width] dir for Embree; BVH_PACKET elements of each may be read */
+    /* Each array begins a cache line. */
+    double room[9][BVH_PACKET] __attribute__((aligned(64))); /* for dir, org, local */
+    float apart_m[BVH_PACKET];                               /* of own points: |x| + |y| + |z| from at_local, rounded */
     float turned[3][BVH_PACKET];   /* of own points, where leaves need them: (local - at_local) x dir */
     double start_m[BVH_PACKET];    /* where the float ray begins, along the ray */
     double range_m[BVH_PACKET];    /* out: the nearest so far; before a hit, the greatest that counts */
     uint32_t triangle[BVH_PACKET]; /* out: the hit */
     double hit_m[BVH_PACKET];      /* out: range of that hit; it counts as equal to range_m */
-    uint32_t unsure;               /* a bit for each ray that may have another hit of lower number */
     double near_m[BVH_PACKET];     /* of the nearest triangle that is missed by rounding alone; INFINITY: none */
     uint32_t near[BVH_PACKET];
     struct bvh_counters counters; /* counted up from packet to packet */
