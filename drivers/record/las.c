@@ -148,8 +148,9 @@ static int las_finish(void *rec, struct sh_err *err)
     recorder_report(rec, las->n_returns_cut,
                     "points of pulses with more than 5 echoes; LAS 1.2 counts up to 5, so 5 is written");
     if (las->facts.minor == 2 && las->facts.n_points != 0)
-        sh_warn(las->base.options.report, "%s: LAS 1.2 has no place for labels and exact scan angles%s; they are left out",
-                las->base.file.path, las->base.track.has_attributes ? ", amplitude and width" : "");
+        sh_warn(las->base.options.report,
+                "%s: LAS 1.2 has no place for labels and exact scan angles%s; they are left out", las->base.file.path,
+                las->base.track.has_attributes ? ", amplitude and width" : "");
     recorder_report(rec, las->n_no_angle,
                     "points without a scan angle (0 is written): the scan's pose is infinite or NaN");
     if (las->time_came_late)

@@ -40,7 +40,8 @@ int outfile_check(const struct outfile *file, struct sh_err *err);
 /* To be called about once a second: flushes, unless a part of the file was written since the last call. So no data wait
  * for longer than two calls, and a busy writer pays nothing. */
 int outfile_save(struct outfile *file, struct sh_err *err);
-/* Writes bytes anywhere in the file, or behind its end. Comes right after outfile_flush(), since it writes no whole blocks. */
+/* Writes bytes anywhere in the file, or behind its end. Comes right after outfile_flush(), since it writes no whole
+ * blocks. */
 int outfile_patch(struct outfile *file, uint64_t at, const void *data, size_t len, struct sh_err *err);
 /* Removes PATH.part, so that something else can be written as PATH. Only outfile_close may follow, which then only
  * frees. */
