@@ -12,6 +12,7 @@
 # not emulated: test_stamped QEMU's user mode takes the number of an interface for another one (IP_ADD_MEMBERSHIP)
 # not emulated: test_web_socket QEMU's user mode has no IP_MINTTL, by which a cable is drawn
 # not emulated: test_verdict_client the processes that its client leaves are those of QEMU
+# not emulated: test_limit it starts itself again, and nothing here starts QEMU for it
 # not emulated: test_config_shared /proc/self/exe is QEMU there
 program=$1
 shift
