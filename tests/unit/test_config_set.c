@@ -94,6 +94,7 @@ static void set_refuses(void **state)
         {"links[].type=tcp", "links[].type", "no index"},
         {"links[0.type=tcp", "links[0.type", "unknown key"},
         {"links[0]type=tcp", "links[0]type", "unknown key"},
+        {"links..type=tcp", "links..type", "unknown key"},
         {"links.type=tcp", "links.type", "unknown key; links is a list; allowed an index, as in links[0]"},
         {"head.prr_hz.max=1", "head.prr_hz.max", "unknown key; head.prr_hz has no keys that can be set"},
         {"scene.meshes.0.copies.0.heading_deg=1", "scene.meshes.0.copies.0.heading_deg",
