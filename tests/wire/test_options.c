@@ -240,6 +240,22 @@ static void test_help(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
+/* Without a command the program is used wrongly: the list that --help gives goes to standard error, not to standard
+ * output. */
+static void test_no_command(void **state)
+{
+    struct wire *wire = *state;
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, (const char *const[]){"--help", NULL}, "all", "err", -1)), 0);
+    assert_int_equal(wire_wait(wire, wire_spawn(wire, (const char *const[]){NULL}, "out", "err", -1)), 2);
+    char *all = wire_read(wire_path(wire, "all"), NULL), *out = wire_read(wire_path(wire, "out"), NULL),
+         *err = wire_read(wire_path(wire, "err"), NULL);
+    assert_string_equal(out, "");
+    assert_string_equal(err, all);
+    free(all);
+    free(out);
+    free(err);
+}
+
 /* Cuts a text into words that end at a comma or a blank, and returns whether one of them is a key, or begins with it
  * and a bracket. */
 static int names_key(const char *words, const char *key)
@@ -315,6 +331,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_options, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_help, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_command, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_list, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_grades, wire_setup, wire_teardown),
     };
