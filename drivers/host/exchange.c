@@ -22,14 +22,12 @@ static int take_items(struct scanhead *sh)
     }
 }
 
-/* Returns whether a line is the answer to *IDN?: four fields (IEEE 488.2). No other answer has three commas without
- * quotes. */
+/* Returns whether a line is the answer to *IDN?. Its last field names the stream; no other answer ends like this. */
 static int is_identity(const char *text)
 {
-    int commas = 0;
-    for (const char *p = text; *p != 0; p++)
-        commas += *p == ',';
-    return commas == 3 && strchr(text, '"') == NULL;
+    static const char last[] = "scanhead native ";
+    const char *comma = strrchr(text, ',');
+    return comma != NULL && strncmp(comma + 1, last, sizeof last - 1) == 0;
 }
 
 static int asks_identity(const char *command)

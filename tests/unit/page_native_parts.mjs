@@ -68,7 +68,7 @@ test('replies in order; an ERR; out of step after one that did not come', async 
   equal(await failing(replies.ask('A?', 0)), '0 no reply within 0 s', 'late');
   const c = replies.ask('C?', 1);
   equal(sent.join(), 'A?,B 7,A?,*IDN?', 'sent');
-  for (const line of ['late', 'a,b,c,d', '3']) replies.take(line);
+  for (const line of ['late', '1 a, 2 b, 3 c, 4 d', 'a,b,c,scanhead native 1', '3']) replies.take(line);
   equal(await c, '3', 'C');
   const d = failing(replies.ask('D?', 1));
   replies.close('gone');
@@ -95,7 +95,7 @@ test('the time of a command counts once it is the next to be answered', async ()
     equal(await b, '0 given up, as A? had no reply', 'B');
     const [c, d] = [replies.ask('C?', 7), replies.ask('D?', 8)]; // the head has not come into step yet
     equal(left(), '7000,8000', 'they wait to be sent');
-    for (const line of ['late', 'a,b,c,d']) replies.take(line);
+    for (const line of ['late', 'a,b,c,scanhead native 1']) replies.take(line);
     equal(left(), '7000', 'sent: C is next');
     for (const line of ['3', '4']) replies.take(line);
     equal([await c, await d, left(), sent.join()].join(), '3,4,,SITE:POSE 1,A?,B?,*IDN?,C?,D?', 'in step again');

@@ -108,10 +108,13 @@ static void test_command(void **state)
     memset(dt, 0, sizeof dt);
     put_points(head, 1, 1000);
     put_all(head, "LATE\r\n", 6); /* the reply to a command given up: never taken for a new one's */
-    struct script s = {
-        .fd = head, .expect = "*IDN?", .frames_before = 5, .frames_after = 3, .reply = "Maker,Model,SN1,1.0\r\n"};
+    struct script s = {.fd = head,
+                       .expect = "*IDN?",
+                       .frames_before = 5,
+                       .frames_after = 3,
+                       .reply = "Maker,Model,SN1,scanhead native 1\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
-    assert_string_equal(reply, "Maker,Model,SN1,1.0");
+    assert_string_equal(reply, "Maker,Model,SN1,scanhead native 1");
     struct script e = {
         .fd = head, .expect = "HEAD:PRR 5000000", .frames_before = 1, .reply = "ERR -222,\"Data out of range\"\r\n"};
     assert_int_equal(run_command(sh, &e, reply, sizeof reply), 0);
@@ -146,13 +149,15 @@ static void test_command_refused(void **state)
     assert_non_null(strstr(scanhead_error(sh), "TIME?"));
     assert_int_equal(recv(head, back, sizeof back, 0), 6);
     /* The earlier command's reply comes after the next one was given, and does not count for the next. */
-    struct script s = {
-        .fd = head, .expect = "HEAD:PRR?", .identity = "999\r\nMaker,Model,SN1,1.0\r\n", .reply = "12345678\r\n"};
+    struct script s = {.fd = head,
+                       .expect = "HEAD:PRR?",
+                       .identity = "999\r\nMaker,Model,SN1,scanhead native 1\r\n",
+                       .reply = "12345678\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
     assert_string_equal(reply, "12345678");
     assert_int_equal(scanhead_command(sh, ":*idn?", reply, sizeof reply, 1), SCANHEAD_ETIMEOUT);
     assert_int_equal(recv(head, back, sizeof back, 0), 7);
-    s.identity = "Maker,Model,SN1,1.0\r\nMaker,Model,SN1,1.0\r\n";
+    s.identity = "Maker,Model,SN1,scanhead native 1\r\nMaker,Model,SN1,scanhead native 1\r\n";
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
     assert_string_equal(reply, "12345678");
     s.identity = NULL;
@@ -189,7 +194,7 @@ static void test_command_queue_bound(void **state)
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), SCANHEAD_EFORMAT);
     struct script next = {.fd = head,
                           .expect = "HEAD:PRR?",
-                          .identity = "0\r\nMaker,Model,SN1,1.0\r\n",
+                          .identity = "0\r\nMaker,Model,SN1,scanhead native 1\r\n",
                           .frames_before = 1100 - 1024,
                           .big = 1,
                           .reply = "1\r\n"};
@@ -220,7 +225,8 @@ static void test_pty(void **state)
     put_all(master, out, native_encode_event(out, sizeof out, &e, 1, 0));
     expect_frame(sh, SCANHEAD_EVENT, &f);
     assert_string_equal(f.event_text, e.text);
-    struct script s = {.fd = master, .expect = "TIME?", .reply = "12\r\n", .identity = "Maker,Model,SN1,1.0\r\n"};
+    struct script s = {
+        .fd = master, .expect = "TIME?", .reply = "12\r\n", .identity = "Maker,Model,SN1,scanhead native 1\r\n"};
     assert_int_equal(run_command(sh, &s, reply, sizeof reply), 0);
     assert_string_equal(reply, "12");
     close(master);

@@ -65,8 +65,9 @@ static void test_identity_before(void **state)
     const int head = connect_anew(sh, door, "*IDN?");
     struct play p = {.fd = head, .turn = {{"TIME?", NULL, 0}}};
     assert_int_equal(command_played(sh, &p, "TIME?", reply, 1), SCANHEAD_ETIMEOUT);
-    struct play q = {.fd = head,
-                     .turn = {{"", NULL, 0}, {"*IDN?", SAYS("Maker,Model,SN1,1.0\r\n")}, {"X?", SAYS("9\r\n")}}};
+    struct play q = {
+        .fd = head,
+        .turn = {{"", NULL, 0}, {"*IDN?", SAYS("Maker,Model,SN1,scanhead native 1\r\n")}, {"X?", SAYS("9\r\n")}}};
     assert_int_equal(command_played(sh, &q, "X?", reply, WAIT_MS), 0);
     assert_string_equal(reply, "9");
     assert_int_equal(n_noticed, 0);

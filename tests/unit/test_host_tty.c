@@ -85,10 +85,10 @@ static void answer(struct head *head)
     }
     if (strcmp(head->line, "*IDN?") != 0)
         for (; head->owed > 0; head->owed--)
-            put(head, "Maker,Model,SN1,1.0\r\n");
+            put(head, "Maker,Model,SN1,scanhead native 1\r\n");
     if (strcmp(head->line, "*IDN?") == 0) {
         head->identities++;
-        put(head, "Maker,Model,SN1,1.0\r\n");
+        put(head, "Maker,Model,SN1,scanhead native 1\r\n");
     } else if (strcmp(head->line, "TIME?") == 0) {
         put(head, "12\r\n");
     } else if (strcmp(head->line, "SYST:ERR?") == 0) {
@@ -219,7 +219,7 @@ static void check_late_head(int lost)
     }
     assert_int_equal(pthread_create(&head.thread, NULL, play, &head), 0);
     expect_reply(sh, "TIME?", "12");
-    expect_reply(sh, "*IDN?", "Maker,Model,SN1,1.0");
+    expect_reply(sh, "*IDN?", "Maker,Model,SN1,scanhead native 1");
     expect_reply(sh, "TIME?", "12");
     end(&head, sh, slave);
     assert_true(head.identities >= waiting / question + 2);
@@ -264,7 +264,7 @@ static void test_slow_head(void **state)
     assert_int_equal(pthread_create(&head.thread, NULL, play, &head), 0);
     expect_reply(sh, "TIME?", "12");
     expect_reply(sh, "SYST:ERR?", "-222,\"Data out of range; 1,2,3\"");
-    expect_reply(sh, "*IDN?", "Maker,Model,SN1,1.0");
+    expect_reply(sh, "*IDN?", "Maker,Model,SN1,scanhead native 1");
     expect_reply(sh, "TIME?", "12");
     end(&head, sh, slave);
     assert_true(head.identities >= 3);

@@ -101,7 +101,7 @@ def late_replies(lines):
     head, theirs = pair()
     for line in lines:
         refused(head.query, line, 0.0)
-    replies = {"HEAD:PRR?": "1", "*IDN?": "a,b,c,d", ":*idn?": "a,b,c,d", "HEAD:LINes?": "2"}
+    replies = {"HEAD:PRR?": "1", "*IDN?": "a,b,c,scanhead native 1", ":*idn?": "a,b,c,scanhead native 1", "HEAD:LINes?": "2"}
 
     def answer():
         for line in theirs.makefile():
@@ -122,7 +122,7 @@ def late_answer():
         for line in theirs.makefile():
             asked += line.strip() == "*IDN?"
             if line.strip():
-                theirs.sendall({"*IDN?": b"a,b,c,d\r\n" if asked == 2 else b""}.get(line.strip(), b"a,b,c,d\r\n2\r\n"))
+                theirs.sendall({"*IDN?": b"a,b,c,scanhead native 1\r\n" if asked == 2 else b""}.get(line.strip(), b"a,b,c,scanhead native 1\r\n2\r\n"))
 
     threading.Thread(target=answer, daemon=True).start()
     assert head.query("HEAD:LINes?") == "2"
@@ -139,7 +139,7 @@ def half_a_frame():
         for line in theirs.makefile():
             if line.strip() == "*IDN?":
                 asked += 1
-                theirs.sendall((frame[:60] if asked == 1 else frame) + b"a,b,c,d\r\n")
+                theirs.sendall((frame[:60] if asked == 1 else frame) + b"a,b,c,scanhead native 1\r\n")
             elif line.strip():
                 theirs.sendall(b"2\r\n")
 
@@ -160,7 +160,7 @@ def dropped_frames():
     whose reply does not count for the next one."""
     frames = [framed(scanhead.ATTRIBUTES, 0, 16, struct.pack("<QII", i, 0, 0), i) for i in range(10)]
     wrong = framed(scanhead.DESCRIPTOR, 0, 4, b"abcd") + b"".join(frames[1:4])
-    replies = {"TIME?": b"".join(frames) + b"5\r\n", "SCAN:STARt": wrong, "*IDN?": b"6\r\na,b,c,d\r\n",
+    replies = {"TIME?": b"".join(frames) + b"5\r\n", "SCAN:STARt": wrong, "*IDN?": b"6\r\na,b,c,scanhead native 1\r\n",
                "HEAD:PRR?": b"7\r\n", "": b""}
 
     def answer(theirs):
@@ -225,7 +225,7 @@ def notices():
     def answer():
         for line in theirs.makefile():
             if line.strip() == "*IDN?":
-                theirs.sendall(b"*IDN?\r\na,b,c,d\r\n")
+                theirs.sendall(b"*IDN?\r\na,b,c,scanhead native 1\r\n")
             if line.strip() == "HEAD:PRR?":
                 theirs.sendall(b"HEAD:PRR?\r\n5\r\n" + frames[7][:40])
                 break

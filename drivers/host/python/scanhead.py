@@ -1123,7 +1123,7 @@ def _is_identity_query(line: str) -> bool:
 
 
 def _is_identity(reply: str) -> bool:
-    return reply.count(",") == 3 and '"' not in reply
+    return reply.rpartition(",")[2].startswith("scanhead native ")
 
 
 class Head:
@@ -1296,8 +1296,8 @@ class Head:
         self._unsettled = False
 
     def _pass_over(self, deadline_s: float) -> bool:
-        """Skips replies up to the answers to all questions for the identity, the only replies with three commas and no
-        quotes. Once one is there, the others have a moment, as they may be lost. Returns whether one came."""
+        """Skips replies up to the answers to all questions for the identity, the only replies whose last field names the
+        stream. Once one is there, the others have a moment, as they may be lost. Returns whether one came."""
         answered = False
         while self._asked:
             try:

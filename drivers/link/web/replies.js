@@ -13,7 +13,7 @@ export class CommandError extends Error {
   }
 }
 
-const isIdentity = (reply) => !reply.includes('"') && reply.split(',').length === 4;
+const isIdentity = (reply) => reply.slice(reply.lastIndexOf(',') + 1).startsWith('scanhead native ');
 const LATER_MS = 200; // where several *IDN? have no answer yet, each further answer may take this long
 
 export class Replies {
