@@ -282,7 +282,7 @@ static void fake_complete(int i, enum libusb_transfer_status status, const void 
         assert_true(used + (size_t)transfer->length < sizeof bus.written);
         memcpy(bus.written + used, transfer->buffer, (size_t)transfer->length);
         const int settles = transfer->length == 7 && memcmp(transfer->buffer, "\n*IDN?\n", 7) == 0;
-        const char *answer = settles ? "Maker,Model,SN1,1.0\r\n" : bus.answer;
+        const char *answer = settles ? "Maker,Model,SN1,scanhead native 1\r\n" : bus.answer;
         if (answer != NULL) fake_script(FAKE_IN, LIBUSB_TRANSFER_COMPLETED, answer, strlen(answer));
     }
     transfer->callback(transfer);

@@ -237,8 +237,8 @@ def notices():
     theirs.shutdown(socket.SHUT_WR)
     for _ in range(2):
         refused(head.next_frame, 5)
-    assert said[2:] == [("echo", at_byte + 7, 0, 5), ("echo", at_byte + 23, 0, 9), ("cut", at_byte + 37, 5, 40),
-                        ("closed", at_byte + 77, 0, 1)], said[2:]
+    assert said[2:] == [("echo", at_byte + 7, 0, 5), ("echo", at_byte + 39, 0, 9), ("cut", at_byte + 53, 5, 40),
+                        ("closed", at_byte + 93, 0, 1)], said[2:]
     assert (head.parser.cuts, head.echoes, head.unasked, head.parser.repeated) == (1, 2, 1, 1)
     print("noticed")
 
