@@ -134,6 +134,18 @@ VEC_INLINE void meet_triangle(struct bvh_query *query, float *tfar, const struct
     }
 }
 
+/* Judges a packet whose rays begin at points of their own, with the second term of each side where it may matter. */
+VEC_INLINE void judge_own(struct bvh_query *query, const struct bvh_edges *edges, const struct lanes *asked,
+                          struct lanes *found)
+{
+    if (!query->is_turned) {
+        judge_packet(query, edges, 1, 0, asked, found);
+        if (!any(found, DOUBT | DOUBT << SECOND)) return;
+        bvh_turn_origins(query);
+    }
+    judge_packet(query, edges, 1, 1, asked, found);
+}
+
 VEC_CLONES
 static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const struct lanes *asked)
 {
@@ -141,14 +153,10 @@ static void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *le
     struct lanes found;
     query->counters.leaves++;
     bvh_find_edges(query, leaf, &edges);
-    if (!query->has_own)
+    if (query->has_own)
+        judge_own(query, &edges, asked, &found);
+    else
         judge_packet(query, &edges, 0, 0, asked, &found);
-    else if (!query->is_turned)
-        judge_packet(query, &edges, 1, 0, asked, &found);
-    if (query->has_own && (query->is_turned || any(&found, DOUBT | DOUBT << SECOND))) {
-        if (!query->is_turned) bvh_turn_origins(query);
-        judge_packet(query, &edges, 1, 1, asked, &found);
-    }
     if (any(&found, EITHER)) meet_triangle(query, tfar, leaf, 0, &found);
     if (bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0 && any(&found, EITHER << SECOND))
         meet_triangle(query, tfar, leaf, 1, &found);

@@ -143,6 +143,19 @@ WIDE __m512 own_doubt(const struct bvh_query *query, const struct bvh_edges *edg
     return _mm512_add_ps(_mm512_set1_ps(edges->doubt), more_m);
 }
 
+/* Judges rays that begin at points of their own, with the second term of each side where it may matter. */
+WIDE void judge_own(struct bvh_query *query, const struct bvh_edges *edges, __m512 side[BVH_EDGES], unsigned valid,
+                    struct judged judged[2])
+{
+    if (!query->is_turned) {
+        judge_both(side, own_doubt(query, edges, BVH_FIRST_DOUBT), valid, judged);
+        if ((judged[0].doubt | judged[1].doubt) == 0) return;
+        bvh_turn_origins(query);
+    }
+    add_own(query, edges, side);
+    judge_both(side, own_doubt(query, edges, BVH_BOTH_DOUBT), valid, judged);
+}
+
 WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf, const int *valid, int own)
 {
     const __m512i asked = _mm512_loadu_si512(valid);
@@ -158,13 +171,10 @@ WIDE void meet(struct bvh_query *query, float *tfar, const struct bvh_leaf *leaf
         dir[j] = _mm512_loadu_ps(query->dir_float + j * BVH_PACKET);
     for (int k = 0; k < BVH_EDGES; k++)
         side[k] = dot(edges.m[0][k], edges.m[1][k], edges.m[2][k], dir);
-    if (!own || !query->is_turned)
-        judge_both(side, own ? own_doubt(query, &edges, BVH_FIRST_DOUBT) : _mm512_set1_ps(edges.doubt), all, judged);
-    if (own && (query->is_turned || (judged[0].doubt | judged[1].doubt) != 0)) {
-        if (!query->is_turned) bvh_turn_origins(query);
-        add_own(query, &edges, side);
-        judge_both(side, own_doubt(query, &edges, BVH_BOTH_DOUBT), all, judged);
-    }
+    if (own)
+        judge_own(query, &edges, side, all, judged);
+    else
+        judge_both(side, _mm512_set1_ps(edges.doubt), all, judged);
     if ((judged[0].in | judged[0].doubt) != 0) meet_triangle(query, tfar, leaf, 0, judged[0], own);
     if ((judged[1].in | judged[1].doubt) != 0 && bvh_leaf_ahead(bvh_leaf_rest(leaf)) != 0)
         meet_triangle(query, tfar, leaf, 1, judged[1], own);
