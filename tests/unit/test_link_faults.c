@@ -240,16 +240,26 @@ static void test_pty_unplug(void **state)
     assert_int_equal(rmdir(dir), 0); /* nothing left */
 }
 
+/* Opens a socket that datagrams come to. */
+static int open_receiver(int *port)
+{
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
+    socklen_t len = sizeof at;
+    const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
+    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
+    *port = ntohs(at.sin_port);
+    return fd;
+}
+
 static void test_udp(void **state)
 {
     (void)state;
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)}, from, again;
-    socklen_t len = sizeof at;
+    struct sockaddr_in from, again;
+    socklen_t len = sizeof from;
     char text[8];
-    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    const struct link_spec spec = {.type = LINK_UDP, .port = ntohs(at.sin_port)};
+    struct link_spec spec = {.type = LINK_UDP};
+    const int fd = open_receiver(&spec.port);
     struct bench bench = bench_open(&spec);
     bench_expect(&bench, LINK_OPENED, 0);
     bench_write_all(&bench, 0, "one", 3);
@@ -281,13 +291,11 @@ static void test_udp(void **state)
 static void test_udp_order(void **state)
 {
     (void)state;
-    struct sockaddr_in at = {.sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK)}, from;
-    socklen_t len = sizeof at;
+    struct sockaddr_in from;
+    socklen_t len = sizeof from;
     char text[8];
-    int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    assert_int_equal(bind(fd, (struct sockaddr *)&at, sizeof at), 0);
-    assert_int_equal(getsockname(fd, (struct sockaddr *)&at, &len), 0);
-    const struct link_spec spec = {.type = LINK_UDP, .port = ntohs(at.sin_port)};
+    struct link_spec spec = {.type = LINK_UDP};
+    const int fd = open_receiver(&spec.port);
     struct bench bench = bench_open(&spec);
     assert_int_equal(cut(&bench, LINK_FAULT_UNPLUG, 0), SH_OK);
     assert_true(is_calm(&bench, 1));
