@@ -11,6 +11,7 @@ struct scan {
     uint32_t crc;
     uint64_t bytes;
     struct native_descriptor descriptor;
+    uint32_t echoes; /* those that it was told to keep */
 };
 
 /* Sends the commands and scans. Returns its ticks, from SCAN_START to SCAN_END. */
@@ -26,6 +27,7 @@ static struct scan scan(struct rig *rig, const char *const *lines)
         const struct ring_tick *tick = rig_fill(rig);
         if (rig->work.scanning) {
             if (!in_scan) scan.descriptor = rig->work.descriptor;
+            if (!in_scan) scan.echoes = (uint32_t)rig->work.echoes;
             in_scan = 1;
             scan.crc = crc32c(scan.crc, tick->bytes, tick->len);
             scan.bytes += tick->len;
@@ -100,6 +102,31 @@ static void each_scan_has_its_own(void **state)
     assert_true(near.descriptor.range_min_m == 0.5 && back.bytes == near.bytes);
 }
 
+static void a_scan_keeps_the_echoes_that_were_told(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, BOOTED);
+    assert_int_equal(scan(rig, LINES("SCAN:ECH LAST")).echoes, BEAM_LAST);
+    assert_int_equal(scan(rig, LINES("SCAN:ECH STR")).echoes, BEAM_STRONGEST);
+    assert_int_equal(scan(rig, as_it_was).echoes, BEAM_ALL);
+    rig_close(rig);
+}
+
+/* The tick in which a scan ends brings its counts, also where that is no tick of telemetry. */
+static void a_scan_ends_with_its_counts(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, BOOTED);
+    memset(&rig->work.telemetry_frame, 0, sizeof rig->work.telemetry_frame);
+    scan(rig, LINES("SCAN:FRAM 1"));
+    const struct native_event *end = rig_event(rig, NATIVE_EV_SCAN_END);
+    assert_true(!rig->work.telemetry && end->b > 1000);
+    assert_true(rig->work.telemetry_frame.scan_fired == end->b);
+    rig_close(rig);
+}
+
 /* A limit of the configuration can be undone, up to that of the profile. */
 static void ranges_widen_up_to_the_profile(void **state)
 {
@@ -159,6 +186,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(commands_are_keys),
         cmocka_unit_test(each_scan_has_its_own),
+        cmocka_unit_test(a_scan_keeps_the_echoes_that_were_told),
+        cmocka_unit_test(a_scan_ends_with_its_counts),
         cmocka_unit_test(ranges_widen_up_to_the_profile),
         cmocka_unit_test(the_last_scan_is_described_as_it_was),
         cmocka_unit_test(what_can_not_be_is_refused),
