@@ -95,7 +95,7 @@ class Reach:
         shutil.rmtree(work, ignore_errors=True)
         os.makedirs(work)
         status, took_s = self.tree.run_test(self.shipped.program(program), LONGEST_S, f"{work}/log", **marked.environment(),
-                                            LLVM_PROFILE_FILE=f"{work}/%m.profraw")
+                                            SCANHEAD=f"{marked.work}/scanhead", LLVM_PROFILE_FILE=f"{work}/%m.profraw")
         found = {"key": key, "took_s": round(took_s, 3), "status": status, "lines": self.lines_of(marked, work)}
         with open(f"{self.name_of(program)}.new", "w", encoding="utf-8") as file:
             json.dump(found, file)
@@ -110,7 +110,8 @@ class Reach:
             return {}
         merged, library = f"{work}/all.profdata", f"{marked.work}/{LIBRARY}"
         self.tree.call(["llvm-profdata", "merge", "-sparse", "-o", merged, *profiles])
-        said = self.tree.call(["llvm-cov", "export", "-format=lcov", f"-instr-profile={merged}", library])
+        said = self.tree.call(["llvm-cov", "export", "-format=lcov", f"-instr-profile={merged}", library,
+                               f"-object={marked.work}/scanhead"])
         lines, code, name = {}, [], None
         for line in said.splitlines():
             if line.startswith("SF:"):

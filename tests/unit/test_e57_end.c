@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <sys/syscall.h>
 
+#include "drivers/record/e57_pages.h"
 #include "tests/unit/e57_rig.h"
 
 /* ---- replacements of libc's: the first call of one kind fails, and the file at its first synchronisation is kept */
@@ -79,6 +80,29 @@ static void test_failing_disk(void **state)
     }
 }
 
+/* A page with one byte of content is a page. */
+static void test_last_byte(void **state)
+{
+    (void)state;
+    const char *path = rig_path("pages");
+    static struct outfile file;
+    struct e57_pages pages = {.file = &file};
+    uint8_t content[E57_PAGE_CONTENT + 1];
+    struct sh_err err;
+    size_t len;
+    memset(content, 0x55, sizeof content);
+    assert_int_equal(outfile_open(&file, path, &err), SH_OK);
+    assert_int_equal(e57_put(&pages, content, sizeof content, &err), SH_OK);
+    assert_int_equal(e57_finish(&pages, &err), SH_OK);
+    assert_int_equal(outfile_close(&file, OUTFILE_KEEP, &err), SH_OK);
+    uint8_t *bytes = rig_read(path, &len);
+    assert_int_equal(len, 2 * E57_PAGE);
+    assert_true(e57_page_is_right(bytes) && e57_page_is_right(bytes + E57_PAGE));
+    assert_true(bytes[E57_PAGE] == 0x55 && bytes[E57_PAGE + 1] == 0);
+    free(bytes);
+    assert_int_equal(unlink(path), 0);
+}
+
 static int tear_down(void **state)
 {
     e57rig_free();
@@ -87,6 +111,7 @@ static int tear_down(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_header_comes_last), cmocka_unit_test(test_failing_disk)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_header_comes_last), cmocka_unit_test(test_failing_disk),
+                                       cmocka_unit_test(test_last_byte)};
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

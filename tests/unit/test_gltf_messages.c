@@ -86,6 +86,7 @@ static void versions_and_data_are_named(void **state)
     refuse_text("{\"asset\":{\"version\":\"3.0\"}}", "asset.version is 3.0; allowed are 1.0 and 2.x");
     refuse_text("{}", "asset.version is not there; allowed are 1.0 and 2.x");
     refuse_text("[]", "its JSON is not an object");
+    refuse_text("{\n\n\"asset\":{\"version\":2.0}!}", "its JSON can't be read: line 3, column 24: ");
 #define DATA(uri)                                                                                                  \
     "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"" uri "\"}],\"bufferViews\":["     \
     "{\"buffer\":0,\"byteLength\":36}]," NODE "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}]," \

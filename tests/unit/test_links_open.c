@@ -103,7 +103,8 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     assert_int_equal(id->n_geometries, 2);
     assert_true(id->geometry[0].lines_uhz == 15000000 && id->geometry[0].steps == 1080);
     assert_true(id->geometry[1].lines_uhz == 25000000 && id->geometry[1].steps == 720);
-    assert_null(id->fields);
+    static const struct cola_fields none;
+    assert_memory_equal(id->fields, &none, sizeof none);
     loop_free(loop);
     rig_close(rig);
 }

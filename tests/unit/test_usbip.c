@@ -279,14 +279,17 @@ static void test_unlink(void **state)
         assert_int_equal(r.command, 4);
         assert_int_equal(r.status, 0);
     }
-    /* One endpoint is halted, and one is missing. */
+    /* One endpoint is halted, and two are missing, the last of all among them. */
     assert_int_equal(client_control(&c, &r, 0x02, 3, 0, 0x83, 0, NULL), 0);
     client_submit(&c, 1, 3, NULL, NULL, 512);
     assert_true(client_reply(&c, &r, 1));
     assert_int_equal(r.status, EPIPE_WIRE);
-    client_submit(&c, 1, 9, NULL, NULL, 512);
-    assert_true(client_reply(&c, &r, 1));
-    assert_int_equal(r.status, ESHUTDOWN_WIRE);
+    static const uint32_t missing[] = {9, 15};
+    for (int i = 0; i < 2; i++) {
+        client_submit(&c, 1, missing[i], NULL, NULL, 512);
+        assert_true(client_reply(&c, &r, 1));
+        assert_int_equal(r.status, ESHUTDOWN_WIRE);
+    }
     /* This control URB contradicts its setup. */
     uint8_t setup[8] = {0x80, 6, 0, 1, 0, 0, 18, 0};
     client_submit(&c, 1, 0, setup, NULL, 8);

@@ -95,7 +95,6 @@ enum recording_news recording_count(struct recording_counts *c, const struct sca
     switch (frame->type) {
     case SCANHEAD_POINTS:
         c->within = 1;
-        c->ended = 0;
         c->pulses += frame->n_pulses;
         c->scan.pulses += frame->n_pulses;
         return RECORDING_NOTHING;
