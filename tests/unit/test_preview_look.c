@@ -30,6 +30,7 @@ static struct sh_err err;
 static struct head_settings applied; /* what the head gets */
 static struct config_station placed; /* as the place was looked for */
 static struct emitter emitter;       /* of the schedule; kind EMITTER_LINE: none */
+static enum emitter_kind cast_kind;  /* of the emitter that is cast */
 static uint64_t n_pulses;
 static struct site_tripod tripod; /* as the place has it */
 static int serves, n_freed;
@@ -64,6 +65,7 @@ void site_fill_spec(const struct site *of, const struct head_settings *settings,
 void coverage_scan_of(const struct site *of, uint32_t station, struct coverage_scan_at *at)
 {
     assert_true(of != &site && of->bvh == site.bvh && station == 1);
+    cast_kind = of->emitter.kind;
     memset(at, 0, sizeof *at);
     at->scan.segment.k0 = 1000;
     at->scan.segment.end_pulse = 1000 + n_pulses;
@@ -297,16 +299,22 @@ static void settings(void **state)
     end(NULL);
     make(NULL);
     emitter.kind = EMITTER_SPHERE; /* 720 steps a ring */
+    cfg->profile.emitter.kind = EMITTER_SPHERE;
     cfg->head.settings.lines_uhz = 3;
     look();
     free(body.bytes);
     assert_true(applied.step_udeg == 500000 && applied.prr_uhz == 720 * 3 && applied.lines_uhz == 3);
+    assert_int_equal(cast_kind, EMITTER_SPHERE); /* the settings have changed its steps */
     end(NULL);
     make(NULL);
     emitter.kind = EMITTER_BEAMS; /* it has a pattern of its own */
+    cfg->profile.emitter.kind = EMITTER_BEAMS;
+    site.emitter.kind = EMITTER_DIRECTIONS;
     look();
     free(body.bytes);
     assert_true(applied.step_udeg == 0 && applied.prr_uhz == 720000000000 && applied.lines_uhz == 1);
+    assert_int_equal(cast_kind, EMITTER_DIRECTIONS);
+    site.emitter.kind = EMITTER_LINE;
 }
 
 static void windows_that_do_not_go(void **state)

@@ -285,7 +285,7 @@ static void test_refused(void **state)
         int is_tcp;
         const char *option, *value, *said;
     } cases[] = {
-        {1, "--device-port", "1", "no such port; it has tcp 2112 of 10.0.0.1"},
+        {1, "--device-port", "1", "no such port; it has tcp 2112 of 10.0.0.1\n"},
         {1, "--link", "usb", "allowed pty, tcp, udp"},
         {1, "--link", "null", "allowed pty, tcp, udp"},
         {1, "--link", "web", "allowed pty, tcp, udp"},
