@@ -172,7 +172,7 @@ struct cast_setup {
 struct cast_counters {
     uint64_t decided;      /* struct bvh_counters */
     uint64_t few, asked;   /* with a sight: struct sight_counters */
-    uint64_t unfit;        /* echoes whose position did not fit into the wire's integers: sent as shots without echo */
+    uint64_t unfit;        /* echoes whose position did not fit into 32 bits: shots without echo, or fewer echoes */
     uint64_t faint;        /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
                           * without echo, or fewer echoes */
     uint64_t crowded;      /* echoes beyond max_echoes: the weakest, left out */
@@ -203,9 +203,9 @@ int caster_add_ahead(struct caster *caster, uint32_t pulses, struct sh_err *err)
  * sight, on a head that moves or has a disturbance, with beams of rings, with beams that begin beside the station, and
  * for all heads but line heads. A head that moves has its knots in the setup. emitter: the schedule's. */
 uint32_t caster_room_ahead(const struct caster *caster, const struct cast_setup *setup, const struct emitter *emitter);
-/* Finds the first hits of runs, each a line or a part of one. Later casts of pulses with these numbers take them, until
- * the next call or caster_forget. These casts must have the same setup, but for movers. Where the runs have more pulses
- * than there is room for, the last runs are left out. n_runs is at most CAST_AHEAD_RUNS. Call it only for a setup for
+/* Finds the first hits of runs, each a line or a part of one. Later casts of the same pulses take these hits, until the
+ * next call or caster_forget. Such casts must have the same setup, but for movers. Where the runs have more pulses than
+ * there is room for, the last runs are left out. n_runs is at most CAST_AHEAD_RUNS. Call it only for a setup for
  * which caster_room_ahead is not 0. Allocates nothing. */
 void caster_look_ahead(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                        uint32_t n_runs);
@@ -234,8 +234,8 @@ struct cast_hit {
 /* Casts a run's pulses as single rays without noise, and fills `hit` with the hits that the head can report. These hits
  * lie within the head's ranges and zones, and are at or above the detection threshold. A pane that is passed is a hit,
  * and so is the surface beyond it. A surface seen in a mirror is no hit: nothing is there. The head stands still. hit
- * has room for (1 + depth) run->n. Returns the number of hits. The hits are in order of chunks only. Allocates
- * nothing. */
+ * has room for (1 + depth) run->n. Returns the number of hits. The hits are in order of pulse, then of range.
+ * Allocates nothing. */
 uint32_t caster_meet(struct caster *caster, const struct cast_setup *setup, const struct schedule_run *run,
                      struct cast_hit *hit);
 

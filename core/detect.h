@@ -19,10 +19,10 @@
  * with the lens's parameters taken together into R_o, near which the signal is strongest).
  *
  * Detection. The signal carries Gaussian noise of sigma 1/k in units of the threshold, k the signal-to-noise
- * ratio at the threshold; it is detected where A + n/k >= 1, with probability Phi(k (A - 1)). So half of the
- * pulses see a target at the data sheet's range. Reflectance, relative to a white Lambertian target at that
- * range, hit head on, in the data sheet's air: (A + n/k) rho_min(R) / o(R). Amplitude in dB above the
- * threshold, as a head measures it, is 10 log10 (A + n/k). A detected echo has 0 dB or more.
+ * ratio at the threshold and n a standard normal number. The signal is detected where A + n/k >= 1, with probability
+ * Phi(k (A - 1)). So half of the pulses see a target at the data sheet's range. The reflectance is (A + n/k) rho_min(R)
+ * / o(R): relative to a white Lambertian target at that range, hit head on, in the data sheet's air. The amplitude in
+ * dB above the threshold, as a head measures it, is 10 log10 (A + n/k). A detected echo has 0 dB or more.
  *
  * Range noise. The time of an echo has a jitter of rise time over signal-to-noise ratio (M. Skolnik,
  * Introduction to radar systems, 1980), and a part that no signal makes smaller (clock, digits):
@@ -75,8 +75,8 @@ struct detect_signal {
 };
 
 /* Fails with SH_EINPUT where no air explains the reaches, or where sigma_floor_m is above sigma_m. Air does not explain
- * them where two have the same range, or where the signal falls less than with the square of the range. Some 10 % less
- * are taken for the data sheet's rounding. The error's text does not name a file. Reaches may come in any order. */
+ * them where two have the same range, or where the signal falls less than with the square of the range. A shortfall of
+ * less than 10 % counts as rounding of the data sheet. The text names no file. Reaches may come in any order. */
 int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_signal *signal, struct sh_err *err);
 
 /* Returns the amplitude A of the light that comes back from range_m. rho: the product E rho(i). */

@@ -37,8 +37,8 @@ int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((f
  * and terminal commands. */
 void sh_keep_line(char *text);
 
-/* Receives the reports of long work. Each member may be NULL. Called from the thread that does the
- * work. */
+/* Receives the reports of long work. Each member may be NULL. warn and progress are called from the
+ * thread that does the work. */
 struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */

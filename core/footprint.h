@@ -193,7 +193,7 @@ struct beam_probe {
 /* The scene, station and beam that outlines are made for. */
 struct beam_outlines_spec {
     const struct scene *scene;
-    const double *station_m; /* [3], prcs: where all pulses come from; at most exit_radius_m from it */
+    const double *station_m; /* [3], prcs: all pulses come from here, their sub-rays from at most exit_radius_m away */
     const struct beam *beam;
     double range_max_m;
     /* By label: surfaces of one kind send back the same. Edges where one kind ends are outlines, too, with or

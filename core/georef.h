@@ -54,7 +54,7 @@ struct georef_spec {
     int prcs_is_grid;   /* 1: prcs is easting, northing, height of a grid, and station_m the station's */
     int prcs_zone;      /* its zone: 1..60, or 0: UPS */
     int prcs_north;     /* its hemisphere: 1 or 0 */
-    /* Heights above it (utm, geodetic); NULL: ellipsoidal. Has to outlive the georef. */
+    /* Heights of the output are above this geoid (utm, geodetic); NULL: ellipsoidal. Must outlive the georef. */
     const struct georef_geoid *geoid;
 };
 
@@ -68,7 +68,7 @@ struct georef_place {
  * height. zone: 1..60, or 0: UPS; north: hemisphere of the false origin. SH_EINPUT: not finite, or outside of
  * the grid. */
 int georef_locate_utm(int zone, int north, const double grid_m[3], struct georef_place *out, struct sh_err *err);
-/* The place of a position in ECEF, and back. NaN outside of -90..90 degrees of latitude. */
+/* The place of a position in ECEF, and back. A latitude outside of -90..90 degrees gives a position of NaN. */
 int georef_locate_ecef(const double p_ecef[3], struct georef_place *out, struct sh_err *err);
 void georef_geodetic_to_ecef(const struct georef_place *place, double p_ecef[3]);
 
@@ -132,11 +132,11 @@ void georef_reverse(const struct georef *georef, const double d_crs[3], double p
 /* Position in the CRS minus anchor, the short way round in longitude. */
 void georef_difference(const struct georef *georef, const double p_crs[3], double d_crs[3]);
 
-/* Units of the CRS per count, so that a count is at most scale_m on the ground (utm, ecef, local: just
- * scale_m, of the grid) for points within reach_m of the centre, and so that their counts fit into 31 bits and a
- * sign. Degrees of longitude have a scale of their own: near a pole, differences are large in degrees and
- * short on the ground. Where 360 degrees don't fit otherwise, that scale alone is coarser, up to 2 pi reach_m
- * / 2^31 on the ground. SH_EINPUT, naming the smallest scale_m that would do, where the others don't fit. */
+/* Sets scale to the units of the CRS per count, for points within reach_m of the centre. A count is at most scale_m on
+ * the ground (utm, ecef, local: just scale_m, of the grid). Counts fit into 31 bits and a sign. Degrees of longitude
+ * have a scale of their own: near a pole, differences are large in degrees and short on the ground. Where 360 degrees
+ * don't fit otherwise, the scale of longitude alone is coarser, up to 2 pi reach_m / 2^31 on the ground. SH_EINPUT
+ * where another coordinate does not fit; the text names the smallest scale_m that would do. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
 /* The largest length of one count of these scales within reach_m, metres (on the ground, or of the grid):
  * scale_m, or that of longitude. */

@@ -7,7 +7,7 @@
  * IfcProjectedCRS. A record that is there, but not as IFC2x3/IFC4 define it, is an error. Nothing is guessed.
  *
  * IfcMapConversion.Scale is map units per unit of the model. Where IfcProjectedCRS has no MapUnit, the map's unit is
- * found from the unit of the model / Scale. Metre, the model's own unit, foot and US survey foot are tried in this
+ * found from the model's unit divided by Scale. Metre, the model's own unit, foot and US survey foot are tried in this
  * order, and the first one within 1 % of that quotient is taken. If none is, this is an error. */
 #ifndef CORE_IFC_SITE_H
 #define CORE_IFC_SITE_H

@@ -17,7 +17,7 @@
 #include "core/err.h"
 
 enum {
-    LINE_REFL_NONE = INT16_MIN,      /* reflectance is not modelled */
+    LINE_REFL_NONE = INT16_MIN,      /* reflectance is not modelled, or there is no echo */
     LINE_XYZ_NONE = INT32_MIN,       /* coordinate of a shot without echo */
     LINE_LABEL_NONE = 0xffff,        /* label of a shot without echo */
     LINE_MAX_ECHOES = 15,            /* echo number and count are four bits each on the wire */

@@ -126,8 +126,8 @@ struct plan_sight_need {
 };
 
 /* Shares of the pulses, by the cell of the map that they lie in. The cell shows one triangle, nothing, a few triangles,
- * or more than a few: then the BVH is asked (ask). A candidate list decides about half of these last cells, so half of
- * their share counts as few. small: so few rays hit the cell's triangles that the map leaves them to the BVH. */
+ * or more than a few: then the BVH is asked (ask). About half of the last kind get a list of candidates after all, so
+ * half of their share counts as few. small: the map leaves the cell to the BVH, since few rays hit its triangles. */
 struct plan_sight_found {
     double one, nothing, few, ask, small;
     double per_pulse; /* triangles that are seen and not small, per pulse */

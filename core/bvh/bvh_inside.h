@@ -57,7 +57,7 @@ struct bvh {
     const struct scene *scene;
     struct bvh_leaf *leaf; /* [n_leaves + 1] */
     uint32_t n_leaves;
-    struct bvh **mesh;     /* [scene->n_copied] of those that have copies */
+    struct bvh **mesh;     /* [scene->n_copied] of the meshes that have copies */
     struct bvh_copy *copy; /* [scene->n_copies] */
     /* [n_triangles + 1]: twice the number of the leaf that has a triangle's plane, plus 0 or 1: which of the leaf's two
      * planes it is. The last element stands for a miss: its plane is all NaN. */

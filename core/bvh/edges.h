@@ -67,9 +67,9 @@ static inline double blur(const double a[3], const double b[3])
 }
 
 /* For a ray whose distance from the line of an edge is within rounding: whether it passes between the edge's ends, or
- * misses one of them by no more than rounding. How far the ray misses an end is the end's distance from the ray. The
- * distance of the end from the line's point that is nearest to the ray is not used: where the ray goes almost along the
- * edge, the error of that point is far larger. */
+ * misses one of them by no more than rounding. The miss at an end is the end's distance from the ray. It is not
+ * measured from the line's point that is nearest to the ray: where the ray goes almost along the edge, the error of
+ * that point is far larger. */
 static inline int is_beside(const double a[3], const double b[3], const double dir[3])
 {
     double e[3], across[3];

@@ -29,7 +29,7 @@ enum {
     BVH_LEAF_BITS = 6,       /* lowest bits of each number of base_m, which hold the two figures below */
     BVH_LEAF_AHEAD_BITS = 4, /* how far triangle 1 follows triangle 0 in the scene's list, 0: there is none */
     BVH_LEAF_AHEAD = 1 << BVH_LEAF_AHEAD_BITS,
-    BVH_LENGTH_BITS = 17, /* a length is a float without its sign and this many lowest bits, rounded up */
+    BVH_LENGTH_BITS = 17, /* a length is a float, rounded up, whose sign and this many lowest bits are left out */
 };
 static inline uint32_t bvh_leaf_rest(const struct bvh_leaf *leaf)
 {

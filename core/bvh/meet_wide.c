@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests a packet of 16 rays against a leaf, with AVX-512. The hits are those of meet.c; the rays are bits of masks. As
- * compilers translate the loops of meet.c, these take 1.4 times as long. */
+/* Tests a packet of 16 rays against a leaf, with AVX-512. The hits are those of meet.c; the rays are bits of masks.
+ * The loops of meet.c, as compilers translate them, would take 1.4 times as long. */
 #include "core/bvh/meet.h"
 
 #if defined(__x86_64__) && !defined(VEC_ONE) /* measuring one instruction set: core/vecmath.h */

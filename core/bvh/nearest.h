@@ -20,9 +20,9 @@ VEC_INLINE float tfar_of(double nearest_m, double start_m)
     return float_above(nearest_m + BVH_SAME * nearest_m - start_m);
 }
 
-/* Takes a hit that counts as equal to the nearest: the lowest number wins. The stored hit may turn out to be too far
- * from the nearest to count as equal. Its low number may have kept out a hit that is near enough: the ray is cast
- * again. */
+/* Takes a hit that counts as equal to the nearest: the lowest number wins. The stored hit may have turned out to be too
+ * far to count as equal. Its low number may then have kept out a hit that does, so the ray is cast again
+ * (packet.c). */
 static inline void add_tied(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
 {
     const double nearest_m = query->range_m[lane];

@@ -51,7 +51,7 @@ int ahead_create(uint32_t pulses, struct cast_ahead **out, struct sh_err *err);
 void ahead_free(struct cast_ahead *ahead);
 /* Takes the runs that there is room for. */
 void ahead_begin(struct cast_ahead *ahead, const struct schedule_run *run, uint32_t n_runs);
-/* Opens the next window: sets `first` and `in_window` of the runs. Returns its pulses. */
+/* Opens the next window: sets `first` and `in_window` of the runs. Returns how many pulses the window has. */
 uint32_t ahead_open_window(struct cast_ahead *ahead);
 /* Takes the directions of run q's pulses in the window. */
 void ahead_aimed(struct cast_ahead *ahead, uint32_t q, const struct vec3_in *d);

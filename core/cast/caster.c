@@ -204,8 +204,8 @@ int caster_add_ahead(struct caster *caster, uint32_t pulses, struct sh_err *err)
     return ahead_create(pulses, &caster->ahead, err);
 }
 
-/* The rings of a sphere gain nothing: their pulses lie side by side already. The next line of other heads with an
- * emitter goes in the same directions once more. */
+/* A sphere gains nothing, since the pulses of its rings lie side by side already. Other heads with an emitter gain
+ * nothing, either: each of their lines goes in the same directions again. */
 uint32_t caster_room_ahead(const struct caster *caster, const struct cast_setup *s, const struct emitter *emitter)
 {
     const struct instrument *instrument = s->detect != NULL ? s->detect->instrument : NULL;

@@ -283,8 +283,8 @@ static void clear_list(struct caster *c, const struct chunk *k)
     l->n_secondary = 0;
 }
 
-/* Returns the part from which an echo comes: the part with the most light at most half the echo's width away.
- * Without such a part it is the nearest part at most two widths away. NULL: the echo is noise. */
+/* Returns the part from which an echo comes. It is the strongest of the parts that are within half the echo's width.
+ * Without such a part it is the nearest one, if that is less than two widths away. NULL: the echo is noise. */
 static const struct wave_part *part_of(const struct caster *c, const struct wave_pulse *p,
                                        const struct waveform_echo *echo)
 {

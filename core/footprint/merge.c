@@ -37,8 +37,8 @@ static double weight_of(const struct beam_return *r, int by_back)
     return by_back ? r->back : r->energy;
 }
 
-/* Returns the index of a return of the surface that most power comes back from. Many weak returns may be of one
- * surface. */
+/* Finds the surface from which most power comes back, perhaps by many weak returns. Returns the index of its first
+ * return. */
 static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
 {
     uint32_t best = 0;

@@ -19,10 +19,10 @@ void shim_ecef(double lat_deg, double lon_deg, double height_m, double p_ecef[3]
 
 /* Geodetic place (degrees, degrees, metres) of a geocentric position; NaN on failure. */
 void shim_locate_ecef(const double p_ecef[3], double place[3]);
-/* Easting and northing in a UTM zone, or in UPS for zone 0, to the degrees of a place: 0, or -1 with the
- * reason. */
+/* Finds the degrees of a place from easting and northing in a UTM zone, or in UPS for zone 0. Returns 0, or -1 with
+ * the reason. */
 int shim_locate_utm(int zone, int north, const double grid[2], struct georef_place *out, char *why, size_t len);
-/* A place in a grid, zone as for locate_in_grid: 0, or -1 with the reason. */
+/* Finds a place in a grid. zone: as for locate_in_grid. Returns 0, or -1 with the reason. */
 int shim_grid_at(const struct georef_place *place, int zone, struct locate_grid *out, char *why, size_t len);
 
 /* The default geoid with cubic interpolation, wholly in memory. NULL on failure, with the reason. */

@@ -246,8 +246,8 @@ int import_judge(struct import_apart *a, struct sh_err *err)
                       a->task.name, WEXITSTATUS(a->status));
 }
 
-/* Loads the task's library before the fork: the child of a process with threads must not load any, nor should each
- * child do it again. */
+/* Loads the task's library before the fork. The child of a process with threads must not load libraries, and each
+ * child would do it again. */
 static int load_library(const struct import_apart *a, struct sh_err *err)
 {
     if (a->task.read == import_assimp) return late_load(LATE_assimp, NULL, NULL, 0, err);

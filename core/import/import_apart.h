@@ -24,7 +24,7 @@ uint64_t import_memory_of(pid_t pid, enum import_memory which);
 /* A process that reads, as its parent sees it. */
 enum import_end { IMPORT_ENDED, IMPORT_STOPPED, IMPORT_TIME, IMPORT_MEMORY };
 struct import_apart {
-    struct import_task task; /* name, argv, b and limits by the caller */
+    struct import_task task; /* name, b, limits, and argv or read by the caller */
     int result_fd, note[2], pid_fd;
     pid_t pid;
     int64_t start_ns, end_ns; /* when it began, and when it must have ended */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The process that reads sets its limits, does the work, and writes the scene into the file of the task.
  *
- * For all but IFC it is a fork without exec. The parent may have threads; the fork has only a copy of the thread that
- * called fork. glibc lets such a process use malloc and stdio; libraries are loaded before the fork. The fork ends by
- * _exit, which runs no destructors. */
+ * Except for node, which reads IFC, it is a fork without exec. The parent may have threads; the fork has only a copy of
+ * the thread that called fork. glibc lets such a process use malloc and stdio; libraries are loaded before the fork.
+ * The fork ends by _exit, which runs no destructors. */
 #include "core/import/import_child.h"
 
 #include <errno.h>

@@ -13,8 +13,8 @@ struct mtl_line {
     uint64_t line;
 };
 /* Reads colours, opacities and textures of the surfaces from first_surface on. They come from the libraries that these
- * lines name; the first library that knows a material counts. Meshes often come without a library: they have no colours
- * then. Warnings say which libraries are missing, and where textures are wanted, which materials and textures are. */
+ * lines name; of each property the first definition counts. Meshes often come without a library, and have no colours
+ * then. Warnings name missing libraries and, where textures are wanted, missing materials and textures. */
 int read_mtl(struct scene_build *b, const struct mtl_line *line, size_t n, uint32_t first_surface, struct sh_err *err);
 int read_ply(struct scene_build *b, struct sh_err *err);
 int read_stl(struct scene_build *b, struct sh_err *err);

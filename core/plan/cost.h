@@ -42,7 +42,7 @@ static const struct plan_ray_cost plan_ray_costs[] = {
  * of their number. */
 #define PLAN_COST_MILLION 10.0
 /* Costs of making the map: a fixed part, a part per triangle, more for a triangle that is examined by itself, and a
- * part per cell that shows more than one. The last two lines are the memory of such cells. */
+ * part per cell that shows more than one triangle. The last two figures are the memory of such cells. */
 #define PLAN_COST_SIGHT          2.2e6
 #define PLAN_COST_SIGHT_TRIANGLE 28.0
 #define PLAN_COST_SIGHT_EXAMINED 440.0

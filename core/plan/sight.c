@@ -33,7 +33,7 @@ double plan_pulse_ns(double n_triangles, uint32_t packet)
 }
 
 /* Returns the number of cells of a map. The cells divide the six faces of a cube around the station (core/sight.h).
- * sight_cells chooses how many lie along an edge, by the number of pulses that would fill all directions as densely. */
+ * sight_cells chooses how many lie along an edge, for the pulses that all directions would have at this density. */
 static double cells(const struct plan_sight_need *need)
 {
     const double edge = sight_cells(need->pulses / need->share, need->memory_bytes);

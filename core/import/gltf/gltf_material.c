@@ -201,8 +201,8 @@ static int add_texture(struct gltf *g, uint32_t i, uint16_t *number)
 }
 
 /* u' = offset + turn * scale * u, from the upper left corner, with v down. A turn is counter-clockwise as one looks at
- * the mesh. The matrix is that of Khronos' viewer. In the example of the extension's text it shows the lower left
- * quarter of the image, as the text says. */
+ * the mesh. The matrix is that of Khronos' viewer. With it, the example in the text of KHR_texture_transform shows the
+ * lower left quarter of the image, as that text says. */
 static int read_lay(struct gltf *g, const json_t *info, const char *at, struct gltf_look *look)
 {
     const json_t *lay = gltf_extension(info, "KHR_texture_transform");
