@@ -59,7 +59,7 @@ struct ply_header {
     int n_elements, n_properties;
     struct ply_element element[PLY_MAX_ELEMENTS];
     struct ply_property property[PLY_MAX_PROPERTIES];
-    /* comment TextureFile: good until rows are read */
+    /* names in lines "comment TextureFile", valid until rows are read */
     int n_textures;
     struct text_span texture[PLY_MAX_TEXTURES];
     uint64_t texture_line[PLY_MAX_TEXTURES];

@@ -16,7 +16,7 @@
  * A trajectory has samples further apart. Between two samples the position is a cubic Hermite curve. The curve's
  * velocity at a sample is the derivative of the parabola through the sample and its two neighbours, or zero where the
  * platform stands before or after it. The attitude is slerp. On a circle of 10 m at 10 m/s sampled at 10 Hz
- * the error of the position is 0.16 mm; straight lines have 12.5 mm (tests/unit/test_pose.c). Before the
+ * the error of the position is 0.16 mm; straight lines would have 12.5 mm (tests/unit/test_pose.c). Before the
  * first and after the last sample the platform stands.
  *
  * Pure, except for reading the files. Trajectories are constant after creation, any thread. */
@@ -100,10 +100,10 @@ int trajectory_read_csv(const char *path, const struct sh_report *report, struct
 /* Reads way-points from a CSV file: x_m, y_m, z_m, speed_m_s, and pause_s where wanted. The platform goes
  * through them on the cubic Hermite curve described above. The way to the next point takes chord / speed_m_s;
  * the last point needs a speed, which is not used. At a point with pause_s the platform comes to rest smoothly, stands
- * for that time and starts smoothly. The platform heads along the path, with pitch and roll 0, about the axes that a
- * station has there: geoframe_level of frame, or the scene's own where frame is NULL. Samples are at most 0.02 s apart,
- * or 0.01 m of the way where that takes longer. A way shorter than 0.64 m has up to 64 samples, which may lie closer
- * together than 0.01 m. A pause has none within it. SH_EINPUT is also returned for more than POSE_MAX_KNOTS samples. */
+ * for that time and starts smoothly. The platform heads along the path, with pitch and roll 0. These angles count from
+ * the axes that a station has there: geoframe_level of frame, or the scene's own where frame is NULL. Samples are at
+ * most 0.02 s apart, or 0.01 m of the way where that takes longer. A way shorter than 0.64 m has up to 64 samples, even
+ * if they are less than 0.01 m apart. A pause has none within it. SH_EINPUT also for more than POSE_MAX_KNOTS. */
 int trajectory_read_waypoints(const char *path, const struct geoframe *frame, const struct sh_report *report,
                               struct trajectory **out, struct sh_err *err);
 

@@ -160,8 +160,8 @@ struct scene {
     uint8_t (*rgb)[3][4];          /* [n_triangles] of the corners */
     struct scene_texture *texture; /* [n_textures] */
     uint32_t n_textures;
-    /* Holes: [n_surfaces], NULL for surfaces without; NULL: no surface has any, and nothing is spent on them.
-     * The masks are owned by `mask`. */
+    /* [n_surfaces] the holes of each surface, owned by `mask`. An entry is NULL where the surface has none. The array
+     * is NULL where no surface has holes: they then cost nothing. */
     const struct texture_mask **cutout;
     struct texture_mask **mask; /* [n_masks] */
     uint32_t n_masks;

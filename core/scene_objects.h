@@ -18,7 +18,7 @@ struct scene_object {
     uint32_t surface; /* its first */
     uint32_t n_surfaces;
     uint64_t n_triangles; /* with those of copies */
-    uint64_t n_open;      /* edges of an odd number of triangles; 0 where it is closed */
+    uint64_t n_open;      /* edges that an odd number of triangles share; 0 where it is closed */
     double area_m2;
     double volume_m3; /* above 0 where its faces look outward; NaN: it is open or turned; 0: it is empty */
     enum scene_object_state state;

@@ -38,7 +38,7 @@ struct texture_source {
 struct texture_image {
     uint32_t width, height;
     uint8_t *rgba; /* NULL: not decoded */
-    int has_alpha; /* the file has an alpha channel, or a PNG a transparent colour. In TGA or BMP zeros don't count */
+    int has_alpha; /* the file has an alpha channel (in TGA, BMP: not of zeros alone), or a PNG a transparent colour */
 };
 
 /* SH_EINPUT, naming the file: can't be read, or is larger than allowed; SH_ENOMEM. texture_image_free is due in any

@@ -47,8 +47,8 @@ VEC_INLINE double vec_from_u64(uint64_t whole)
     return x - 0x1p52;
 }
 
-/* Adds the lower terms of the Taylor series of (sin y - y) / y^3, where z = y^2. In s come the higher terms, summed by
- * the caller. */
+/* Adds the lower terms of the Taylor series of (sin y - y) / y^3, where z = y^2. The caller gives the sum of the higher
+ * terms, s. */
 VEC_INLINE double vec_sine_series(double s, double z)
 {
     s = s * z + 1.0 / 6227020800.0;

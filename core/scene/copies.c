@@ -104,7 +104,7 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
 
 /* ---- places */
 
-/* A mesh is copied to these places. */
+/* A mesh, its outline, and the places that it is copied to. */
 struct copied {
     const struct scene *mesh;
     const struct scene_hull *hull;

@@ -130,8 +130,8 @@ static void bounds_of(const struct work *w, const uint32_t *triangle, uint32_t n
             vec3_bound(min, max, w->mesh->vertex_m[w->mesh->triangle[triangle[i]][c]]);
 }
 
-/* A long edge may face several short ones on the same line. None of them has a counterpart, but their sums cancel, and
- * nothing is open. Else edges leave an area open, whose mean width follows from their length. */
+/* A long edge may face several short ones on the same line. None of these has a counterpart, but their sums cancel, and
+ * nothing is open. Where they don't cancel, an area is open, and its mean width follows from the edges' length. */
 static enum scene_object_state objects_judge(const struct work *w, struct body_sum *sum, double diagonal_m,
                                              uint64_t *n_open)
 {

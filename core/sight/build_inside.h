@@ -3,9 +3,9 @@
  *
  * Triangles are sorted into regions, squares of cells on the faces (bins.c). Each region is then divided as Warnock's
  * algorithm does (J. Warnock, A hidden surface algorithm, 1969): a square is a leaf where no triangle may be seen in
- * it, or where one covers it and hides the others. A square is also a leaf where a few triangles all cover it, and
- * where only groups may be seen in it and one fills it, or the square is small. Else its quarters are examined, down to
- * a cell (region.c).
+ * it, or where one covers it and hides the others. A square is also a leaf where a few triangles all cover it. Where
+ * only groups may be seen in a square, it is a leaf if one of them fills it, or if it is small. Else its quarters are
+ * examined, down to a cell (region.c).
  *
  * Triangles that follow each other in the scene's list make a group. Where a group's triangles are so small that too
  * few rays meet each, the group is a candidate as a whole: the box around it says where it may be seen, and how near it

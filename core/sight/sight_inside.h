@@ -99,8 +99,8 @@ struct sight_record {
 /* core/bvh takes ranges within 1e-12 of each other for the same: the lowest triangle wins. Ranges that
  * differ by more than this are certainly different. */
 #define SIGHT_SAME 4e-12
-/* 1 / m. A ray does not hit the surface that it begins on: one nearer than BVH_AT_ORIGIN_M. Up to twice that
- * distance the BVH decides. */
+/* 1 / m. For core/bvh a ray begins on a surface nearer than BVH_AT_ORIGIN_M, and does not hit it. Surfaces nearer than
+ * twice that distance are left to core/bvh. */
 #define SIGHT_NEAR 1e6
 
 struct sight {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A recorded point cloud, and its distance from the scene. In: a PLY or LAS file, the scene's BVH, the
- * stations' georeferences. Out: points; per point a distance in metres and a triangle; statistics and coverage of
- * them.
+/* A recorded point cloud, and its distance from the scene. In: a PLY or LAS file, for positions alone also a PCD or
+ * text file; the scene's BVH, the stations' georeferences. Out: points; per point a distance in metres and a triangle;
+ * statistics and coverage of them.
  *
  * PLY: ASCII, or binary of either byte order, any number types. Element vertex has the properties x, y, z
  * and, where they are there, station (from 1), echo and label, as our recorder writes them. Everything else
@@ -139,7 +139,7 @@ struct cloud_stats {
     size_t far;    /* nothing within the reach of the search */
     size_t beyond; /* farther than the tolerance, far ones included */
     double mean_m, rms_m, p50_m, p95_m, p999_m, max_m;
-    size_t worst; /* the first point at max_m, the first far one if there is one; n when no point has
+    size_t worst; /* the first far point, or the first point at max_m if none is far; n when no point has
                      coordinates */
 };
 

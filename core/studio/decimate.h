@@ -37,9 +37,9 @@ struct decimated {
     double cell_m; /* 0: the mesh is as it was, vertex by vertex */
 };
 
-/* Makes a mesh of at most `most` triangles. A mesh that has no more stays as it is. The cell is chosen by the area
- * and by trying, mostly in one to four passes over the mesh. Memory: 4 bytes a vertex of the mesh, up to 700 bytes
- * for each of `most`, and the result. SH_EINPUT: most below DECIMATE_LEAST; SH_ENOMEM; SH_ESTOPPED. */
+/* Makes a mesh of at most `most` triangles. A mesh that has no more stays as it is. The cell is chosen by the area and
+ * by trying, mostly in one to four passes. Memory: 4 bytes a vertex of the mesh, up to 700 bytes for each of `most`,
+ * and the result. SH_EINPUT: most below DECIMATE_LEAST; SH_ESTATE: no cell gives so few; SH_ENOMEM; SH_ESTOPPED. */
 int decimate(const struct decimate_mesh *mesh, uint32_t most, const struct sh_report *report, struct decimated *out,
              struct sh_err *err);
 void decimated_free(struct decimated *mesh);

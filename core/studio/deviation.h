@@ -14,7 +14,7 @@
  * deviation along the beam: at an edge it may be any number, however good the point.
  *
  * A point is judged where noise alone causes its deviation: on a smooth face with no other surface near. Two balls of
- * DEVIATION_CLEAR sigma touch the face where the beam hits it, in front and behind; nothing else reaches into them.
+ * DEVIATION_CLEAR sigma (with counts) touch the face at the hit, in front and behind; nothing else reaches into them.
  * Otherwise large deviations would be taken for small ones of the other surface. Up to about DEVIATION_SAMPLE points
  * of a cloud are judged, evenly taken.
  *
@@ -29,13 +29,13 @@
  *     of positions     step / sqrt(12) / cos i; of polar ranges without the cosine
  * The two formulas hold where all places within a count are equally likely. The angles of a schedule may repeat a few
  * places: then the sigma of their rounding is from 0 to sqrt(3) times that of the formula.
- * Sigma is NaN where it is not known: noise by the signal on textured surfaces and of later echoes; errors of the
- * instrument.
+ * Sigma is NaN where it is not known: noise by the signal on surfaces with a texture or colours of vertices, and of
+ * later echoes; errors of the instrument.
  *
  * The distance has a bound where the only random effect is a ball. The bound is the sum of:
  *   the plan's errors of cast and georeferencing;
  *   half the diagonal of a count: sqrt(3)/2 counts of the coordinates, and of the file's where it rounds them again;
- *   half of sqrt(r^2 + (R a)^2 + (R b)^2), with the counts r of a polar range, else 0, and a, b of the encoders;
+ *   half of sqrt(r^2 + (R a)^2 + (R b)^2): r is the count of a polar range, else 0; a and b are those of the encoders;
  *   the ball's radius at that range, times its largest factor. */
 #ifndef CORE_STUDIO_DEVIATION_H
 #define CORE_STUDIO_DEVIATION_H

@@ -59,7 +59,7 @@ static void counted_free(void *p)
 #define STBI_MALLOC(size)     counted_alloc(size)
 #define STBI_REALLOC(p, size) counted_realloc(p, size)
 #define STBI_FREE(p)          counted_free(p)
-#define STBI_ASSERT(x)        ((void)0) /* one fails for a table of 256 short codes, though the index is in range */
+#define STBI_ASSERT(x)        ((void)0) /* an assertion fails for 256 short codes, though the index is in range */
 #ifdef __clang__ /* stb_image adds 0 to NULL, and copies 0 bytes from there; the address sanitizer stays on */
 #pragma clang attribute push(__attribute__((no_sanitize("undefined"))), apply_to = function)
 #endif
@@ -102,7 +102,7 @@ static int unpack(const struct texture_source *s, struct texture_image *image, s
     return SH_OK;
 }
 
-/* Many writers of TGA and BMP leave a fourth channel of zeros, which is no alpha. In a PNG it is one. */
+/* Many writers of TGA and BMP leave a fourth channel of zeros, which is no alpha. In a PNG zeros are alpha. */
 static void drop_unused_alpha(const uint8_t *bytes, struct texture_image *image)
 {
     size_t n = (size_t)image->width * image->height, i = 0;

@@ -7,7 +7,7 @@
 
 enum {
     DECOMPOSE_TURNS = 2,
-    DECOMPOSE_REACH = 64, /* samples before and after its centre in which a pulse is fitted to the residual, at most */
+    DECOMPOSE_REACH = 64, /* a pulse is fitted to the residual in up to so many samples on each side of its centre */
 };
 
 /* A mixture takes the samples from the foot before its first maximum to the foot after its last maximum. A foot is
@@ -91,7 +91,7 @@ static int decompose_limited(const struct finder_run *run, const struct finder_p
     return blind;
 }
 
-/* Returns 1 where nothing is left to fit. */
+/* Begins with one term for each maximum. Returns 1 where nothing is left to fit. */
 static int decompose_begin(const struct finder_run *run, const struct finder_peak *peak, uint32_t n,
                            struct finder_mix *mix)
 {

@@ -3,7 +3,7 @@
  *
  * h is the pulse as it leaves the receiver (waveform.h). One sample lies on each side of the crossing. Divided by the
  * peak, a sample is a share of the peak. The table of h says how long before its centroid h rises through that share.
- * So each sample alone gives a place of the echo's centroid. The table so corrects the range walk, and an echo of h's
+ * So each sample alone gives a place of the echo's centroid. This corrects the range walk, and an echo of h's
  * shape has no interpolation error. The result lies between both places, as the level lies between both samples. */
 #include "core/waveform/detect_inside.h"
 

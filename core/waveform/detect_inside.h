@@ -17,7 +17,7 @@
 enum { FINDER_SPREADS = 12, FINDER_LEADS = 64, FINDER_SHAPE = 769, FINDER_MIX = 8, FINDER_PEAKS = 64 };
 #define FINDER_NEAR       2.5                /* sigmas on both sides of an echo's centre that a fit of one term uses */
 #define FINDER_LEAST      0.75               /* least sigma of an echo, over the pulse's: only noise makes it less */
-#define FINDER_ROUGH      0.001              /* added to a learned misfit (over the peak): its samples lay elsewhere */
+#define FINDER_ROUGH      0.001              /* added to misfit and tail, which were learned on other samples */
 #define FINDER_FWHM       2.3548200450309493 /* of a Gaussian, in standard deviations */
 #define FINDER_LEAD_STEP  0.08
 #define FINDER_SHAPE_STEP (1.0 / 64.0) /* widths of the pulse */
@@ -56,7 +56,7 @@ struct finder {
     /* lead[k]: samples from the place where h rises through exp(-v v / 2) of its peak, v = k FINDER_LEAD_STEP, to the
      * centroid of h. */
     double lead[FINDER_LEADS];
-    int gaussian;                 /* h is one */
+    int gaussian;                 /* h is a Gaussian */
     double middle;                /* from the centroid of h to its middle, in widths */
     double reach[2];              /* where a term ends, in sigmas before and after its middle */
     double area, variance, third; /* of h: its sum over the samples, and central moments */

@@ -182,7 +182,7 @@ static int is_late(struct scanhead *sh, const char *command)
     return 1;
 }
 
-/* Comes into step with the replies, before the first exchange on a terminal and after a command that was given up.
+/* Skips old replies, before the first exchange on a terminal and after a command that was given up.
  * Between open() and raw mode the terminal echoes what the head sends, and the head takes the echo for commands;
  * another program may have left half a line. So an empty line ends that line, and all replies are skipped up to the
  * answer to a question of our own. The last thing that the head sent to the program before this one may be half a

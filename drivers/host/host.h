@@ -26,7 +26,7 @@ struct host_surface {
     char *object, *material; /* NULL: not seen */
 };
 
-/* Such frames, in their order. */
+/* Kept frames, in their order. */
 struct host_kept {
     struct host_node *first, *last, *current; /* current was handed out last, and is not in the list any more */
     size_t bytes;
@@ -52,8 +52,8 @@ struct host_notices {
 struct scanhead {
     struct host_source source;
     int ended;        /* no more bytes will come */
-    int lost;         /* because the device was unplugged */
-    int reset;        /* because the bus was reset, with the device still on it */
+    int lost;         /* ended, because the device was unplugged */
+    int reset;        /* ended, because the bus was reset, with the device still on it */
     int stuck;        /* half a command went out: nothing sensible can follow */
     int has_no_limit; /* the present call waits without a time limit, so a signal ends it */
     struct native_parser parser;

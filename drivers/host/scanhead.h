@@ -384,8 +384,8 @@ struct scanhead_emitter {
  * settings change within a scan, the head sends another emitter. */
 int scanhead_get_emitter(const struct scanhead *sh, struct scanhead_emitter *emitter);
 
-/* The place and attitude of a moving head at a time. Between two poses of one frame of SCANHEAD_POSES the head moves
- * along the straight line, and turns the shorter way about one fixed axis at constant rate (slerp), as it casts. */
+/* The place and attitude from which a moving head casts at a time. Between two poses of one frame of SCANHEAD_POSES it
+ * moves along the straight line, and turns the shorter way about one fixed axis at constant rate (slerp). */
 struct scanhead_pose {
     int64_t t_ns;         /* since the scan's start */
     double position_m[3]; /* scene frame */

@@ -19,7 +19,7 @@ struct table {
     uint64_t first_other; /* number of the first line that is neither a point nor names; n_other counts them */
 };
 
-/* A line with semicolons or commas has one cell between two of them; else blanks are between cells. */
+/* Returns what separates the cells of a line: semicolons if it has some, else commas if it has some, else blanks. */
 static char separator_of(const struct text *t)
 {
     const size_t len = strcspn(t->p, "\r\n");

@@ -20,7 +20,7 @@ static const double SAME_SHARE = 0.01, SAME_M = 2e-6;
  * can't pass between two of these rays. */
 static const double AROUND = 1.1;
 
-/* Surfaces that are nearer to each other than this can't be told apart, however small the noise. */
+/* Smaller balls are not searched: surfaces so near to each other can't be told apart, however small the noise. */
 static const double LEAST_CLEAR_M = 2e-5;
 
 struct work {

@@ -11,7 +11,7 @@ static double square(double v)
     return v * v;
 }
 
-/* The counts of both encoders, in radians; an angle is rounded by up to half of one. Where both are ideal, positions
+/* The counts of both encoders, in radians; an angle is rounded by up to half a count. Where both are ideal, positions
  * have the true angles. */
 static void encoder_steps(const struct cast_setup *setup, double step_rad[2])
 {

@@ -7,7 +7,7 @@
 
 enum { CLOSE_REACH = 3, SMOOTH_REACH = 3 };
 
-/* Depths that differ by more than that share of the depth are of two surfaces. */
+/* Depths that differ by more than this share of the depth are of two surfaces. */
 #define SAME_SURFACE 0.004f
 
 static const int compass[8][2] = {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
@@ -124,7 +124,7 @@ static int slope(const struct view *view, const float *depth_m, const int at[2],
     return 1;
 }
 
-/* Returns the brightness by Lambert's law, of a light at the upper left of the eye. 0.62 of it comes from all sides. */
+/* Returns the brightness by Lambert's law: 0.38 of the light is at the eye's upper left, 0.62 comes from all sides. */
 static float facing(const struct view *view, const float *depth_m, int x, int y)
 {
     static const int right[2] = {3, 0}, up[2] = {0, -3};

@@ -87,7 +87,7 @@ static double mib_of(const struct coverage *c, double pieces)
 
 static int refuse(const struct coverage *c, double pieces, struct sh_err *err)
 {
-    char named[32]; /* the cell as the message shows it, which is the one that is tried */
+    char named[32]; /* the cell as the message rounds it: this size is tried */
     double cell_m = c->spec.cell_m;
     int tries = 0;
     do {
@@ -185,7 +185,7 @@ static int cells_set_up(struct coverage *c, struct sh_err *err)
     }
     if (span_m / c->spec.cell_m > 1e9)
         return sh_fail(err, SH_EINPUT, "cells of %g m in a scene of %.3g m; allowed is a cell of at least %.2g m",
-                       c->spec.cell_m, span_m, 1.05e-9 * span_m); /* 5 % more than the two digits can round down */
+                       c->spec.cell_m, span_m, 1.05e-9 * span_m); /* 5 % more, since two digits may round it down */
     const double pieces = count_pieces(c, c->spec.cell_m);
     return mib_of(c, pieces) > c->spec.memory_mib || !(pieces < MAX_PIECES) ? refuse(c, pieces, err) : SH_OK;
 }

@@ -3,10 +3,10 @@
  * reads them. This file copies the nodes, and gives each list its empty node. A node holds the offset of its end in the
  * file, which grows by all empty nodes that were added before that end.
  *
- * A node (version 7500 and up) is its end's offset in the file, number and bytes of its properties, 64 bits each; the
- * length of its name, 8 bits; name, properties, nodes. The layout of the file's end is the one that Blender's exporter
- * writes. The time at which the file was made becomes the one that Assimp writes elsewhere in it, 1970-01-01 10:00, so
- * that the same mesh gives the same bytes. */
+ * A node (version 7500 and up) begins with the offset of its end in the file, the number of its properties, and their
+ * length in bytes: 64 bits each. The length of its name follows, 8 bits; then name, properties and nodes. The file's
+ * end is laid out as Blender's exporter does it. The file's time of creation becomes 1970-01-01 10:00, which Assimp
+ * writes elsewhere in the file, so that the same mesh gives the same bytes. */
 #include <string.h>
 
 #include "core/bytes.h"

@@ -11,7 +11,7 @@ enum { N_COLUMNS = COLUMNS * COLUMNS };
 
 static const double HEAD_M = 1.6, LEAST_ROOM_M = 1.5;
 static const double LEVEL = 0.7;             /* cosine of a floor's slope, 45 degrees */
-static const double LEAST_SEEN_INSIDE = 0.8; /* a room, with windows and doors */
+static const double LEAST_SEEN_INSIDE = 0.8; /* of the rays, in a room: the others may leave by windows and doors */
 
 struct floor {
     double at_m[3], room_m; /* room above it; INFINITY: the sky */

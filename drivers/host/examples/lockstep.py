@@ -19,8 +19,8 @@ import scanhead
 
 STEP_NS = 1_000_000
 
-# The car drives clockwise on a circle about the middle of the street. The head is in front of its middle, on its
-# roof; the walls are at x = +-20 m (lockstep.yaml, street.obj).
+# The car drives clockwise on a circle about the middle of the street. The head is on the car's roof, in front of the
+# car's middle. The walls are at x = +-20 m (lockstep.yaml, street.obj).
 SPEED_M_S, RADIUS_M, MOUNT_M, WALL_M = 5.0, 8.0, (0.0, 0.5, 1.8), 20.0
 
 # The largest error of a point: the head takes the car along a chord of 1 ms (speed^2 / radius * step^2 / 8: 0.39 um);
