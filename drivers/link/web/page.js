@@ -38,7 +38,7 @@ export function markField(field, isRight) {
 // Returns the number that a user has written, NaN for none: an empty text is not 0.
 export const numberOf = (text) => (text.trim() === '' ? NaN : Number(text.trim().replace('−', '-').replace(',', '.')));
 
-// Calls at most once in every `ms`; the last call always comes through.
+// Returns a function that runs call() at most once in every `ms`, and once more after its last use in that time.
 export function atMostEvery(ms, call) {
   let timer = 0, last = -Infinity;
   return () => {
