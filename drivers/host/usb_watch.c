@@ -62,7 +62,7 @@ static int64_t earlier_ns(int64_t a_ns, int64_t b_ns)
     return a_ns < b_ns ? a_ns : b_ns;
 }
 
-/* Sleeps until then, which is less than a second from now. Returns -1 if a signal comes. */
+/* Sleeps until until_ns, less than a second from now. Returns -1 if a signal comes. */
 static int sleep_until(int64_t until_ns)
 {
     const int64_t left_ns = until_ns - host_deadline_ns(0);

@@ -3,7 +3,7 @@
  *
  * Regular files and character devices (/dev/null, /dev/full) are taken; a directory, a FIFO, a socket or a block device
  * is refused. A FIFO needs a reader that is there already; a pty or TCP link doesn't. The first failed write (disk
- * full) ends the session; its LINK_CLOSED carries the reason as the peer. */
+ * full) ends the session; its LINK_CLOSED has the reason in `peer`. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>

@@ -76,7 +76,7 @@ enum link_event_kind {
 struct link_event {
     enum link_event_kind kind;
     int session;    /* 0..max_sessions-1 */
-    char peer[200]; /* the other side's name, for the log; of LINK_NOTICE: the message */
+    char peer[200]; /* the other side's name, for the log; LINK_NOTICE: the message; file's LINK_CLOSED: the reason */
 };
 
 /* Faults that can be injected into a link. */
@@ -103,13 +103,13 @@ struct link_ops {
     int is_cheap; /* 1: write() makes no system call, so that nothing is gained by collecting bytes */
 
     uint32_t faults;                               /* what fault() can do: LINK_FAULT_BIT of each */
-    uint32_t (*can)(const struct link_spec *spec); /* those that a link of this spec can do; NULL: all */
+    uint32_t (*can)(const struct link_spec *spec); /* faults that a link of this spec can do; NULL: all */
 
     /* Opens as spec says. When it fails, nothing of it stays. The text of err names the endpoint. */
     int (*open)(const struct link_spec *spec, void **link, struct sh_err *err);
 
-    /* The endpoint as a client would name it: "tty:/dev/pts/3", "tcp:127.0.0.1:40123", "file:/x/y". From any thread,
-     * while the link's own makes other calls. */
+    /* The endpoint as a client would name it: "tty:/dev/pts/3", "tcp:127.0.0.1:40123", "file:/x/y". Any thread
+     * may call it, while the link's thread makes other calls. */
     void (*endpoint)(const void *link, char *buf, size_t len);
 
     /* Largest number of bytes per second this link can carry. NULL where there is no fixed limit. */
@@ -121,8 +121,8 @@ struct link_ops {
      * of all links need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
-    /* read and write don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED:
-     * the session is gone (a LINK_CLOSED follows from poll). */
+    /* read and write don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED,
+     * or SH_EIO from `file`: the session is gone (a LINK_CLOSED follows from poll). */
     ssize_t (*read)(void *link, int session, void *buf, size_t len);
     ssize_t (*write)(void *link, int session, const void *buf, size_t len);
 

@@ -47,7 +47,7 @@ struct pty_link {
     int is_deaf;                /* no new client can be seen: the next poll fails */
     int open;                   /* a session is on, as the caller knows or is about to learn */
     unsigned count;             /* clients of the session; 0 with open set: the last seems to be gone */
-    int open_event_due;         /* its client is counted, but that client's open event may be still to come */
+    int open_event_due;         /* a client is counted whose open event may be still to come */
     int due_closed, due_opened; /* events that the caller still has to get, in this order */
 };
 
@@ -87,7 +87,7 @@ static void pty_note(struct pty_link *pty, uint32_t mask)
     } else if (pty->count > 0) {
         pty->count++;
     } else {
-        /* A session the caller has not heard of yet is not worth two events: its client is gone. */
+        /* A session that the caller has not heard of gets no LINK_CLOSED: its client is gone. */
         if (!pty->due_opened) pty->due_closed = 1;
         pty_device_drop_output(&pty->device);
         pty_begin(pty, 1);
@@ -169,7 +169,7 @@ static void pty_let_go(struct pty_link *pty)
     pty_read_inotify(pty, 0);
 }
 
-/* All clients are gone and what they wrote is read. Clients that come meanwhile are found at the end. */
+/* All clients are gone and what they wrote is read. pty_wait_for_client finds clients that come meanwhile. */
 static int pty_end(struct pty_link *pty)
 {
     pty_let_go(pty);
@@ -245,9 +245,9 @@ static ssize_t pty_write(void *link, int session, const void *buf, size_t len)
     return errno == EAGAIN || errno == EINTR ? 0 : SH_ECLOSED;
 }
 
-/* When the master is closed the kernel throws away what waits in the terminal. The kernel reports the count through the
- * slave alone, which we therefore open. The slave is opened only at the end, when no new client is expected, since the
- * watch would see our own opening. A slave that a client holds exclusively (TIOCEXCL) can't be opened. */
+/* When the master is closed the kernel throws away what waits in the terminal. The kernel tells only through the slave
+ * how much waits, so we open the slave. We do so only at the end, when no new client is expected, since the watch would
+ * see our own opening. A slave that a client holds exclusively (TIOCEXCL) can't be opened. */
 static int pty_unread(void *link, int session)
 {
     struct pty_link *pty = link;

@@ -13,7 +13,7 @@ ssize_t pty_line_read(const struct pty_line *line, int master, void *buf, size_t
     uint8_t sent[4096];
     if (!pty_rate_differs(master, line->baud, 0, &uart)) return read(master, buf, len);
     if (len > sizeof sent * UART_MOST_PER_BYTE) len = sizeof sent * UART_MOST_PER_BYTE;
-    if (len < UART_MOST_PER_BYTE) return 0; /* its owner has no room now */
+    if (len < UART_MOST_PER_BYTE) return 0; /* the caller has no room now */
     const ssize_t n = read(master, sent, len / UART_MOST_PER_BYTE);
     return n > 0 ? (ssize_t)uart_read(&uart, sent, (size_t)n, buf) : n;
 }

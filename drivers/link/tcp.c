@@ -251,7 +251,7 @@ static int tcp_cut(struct tcp_link *tcp, int session)
     return SH_OK;
 }
 
-/* Collects the sockets of its sessions. */
+/* Collects the sockets of the link's sessions. */
 static void tcp_sockets(const struct tcp_link *tcp, int fds[LINK_MAX_SESSIONS])
 {
     for (int s = 0; s < LINK_MAX_SESSIONS; s++)
@@ -282,7 +282,7 @@ static void tcp_speak(struct tcp_link *tcp, int resets)
 static int tcp_unplug(struct tcp_link *tcp)
 {
     if (tcp->listener.fd < 0) return SH_ESTATE;
-    tcp->is_silent = 0;      /* need not be undone: the silent sockets end here */
+    tcp->is_silent = 0;      /* the silence need not be undone: its sockets end here */
     close(tcp->listener.fd); /* the system turns clients away that wait there */
     tcp->listener.fd = -1;
     for (int s = 0; s < tcp->n_sessions; s++)

@@ -3,10 +3,10 @@
  *
  * The link sends unicast to any address, but broadcast only from an interface that the configuration names: to that
  * interface's own broadcast address, or to 255.255.255.255. The packets' source is then the interface's address, unless
- * the link names its source. But
- * the system's routes choose the interface for packets to 255.255.255.255, whatever their source is. So such packets
- * are sent to the named interface's own broadcast address instead. (SO_BINDTODEVICE would direct them, but takes a
- * privilege.) Multicast, too, goes out only on an interface that is named.
+ * the link names its source. But the system's routes choose the interface for packets to 255.255.255.255,
+ * whatever their source is. So such packets are sent to the named interface's own broadcast address instead.
+ * (SO_BINDTODEVICE would direct them, but takes a privilege.)
+ * Multicast, too, goes out only on an interface that is named.
  *
  * A source port may be one that a receiver on this machine listens on, too. So addresses are shared (SO_REUSEADDR), and
  * the socket is connected: it gets only what its receiver sends back. The socket never has its receiver's own address
@@ -116,7 +116,7 @@ static int find_network(const char *name, const struct sockaddr *to, struct netw
 }
 
 /* Broadcasts go out on the interface that is named, and on no other. Where `to` is 255.255.255.255, it becomes that
- * interface's broadcast address. *broadcast: whether it is a broadcast address. */
+ * interface's broadcast address. *broadcast: whether `to` is a broadcast address. */
 static int check_receiver(const struct link_spec *spec, struct sockaddr *to, struct network *net, int *broadcast,
                           struct sh_err *err)
 {

@@ -24,7 +24,7 @@ struct usb_link {
     uint32_t plugged;               /* attaches that the caller knows of */
     char news[200];                 /* to be reported; empty: none */
     char refused[64];               /* the client that was turned away last */
-    int n_refused;                  /* of those, to be reported */
+    int n_refused;                  /* clients turned away that are to be reported */
     struct usb_claims claims;       /* of the head's own identity */
 };
 
@@ -171,7 +171,7 @@ static int has_news(const struct usb_link *self, uint32_t want_write)
     return news;
 }
 
-/* The wait, no longer than until the back end has something to do. */
+/* Returns timeout_ms, or less where the back end has something to do before. */
 static int wait_ms(const struct usb_link *self, int timeout_ms)
 {
     const int64_t due_ns = self->ops->due_ns != NULL ? self->ops->due_ns(self->backend) : INT64_MAX;
@@ -260,7 +260,7 @@ static int fault_endpoint(struct usb_link *self, enum link_fault what, int sessi
     return SH_OK;
 }
 
-/* A reader that has no transfer pending would not learn that its session is over. */
+/* An idle reader has no transfer that ends with its session. So its next transfer ends as if it had been pending. */
 static int fault_reset(struct usb_link *self)
 {
     uint32_t idle = 0;

@@ -35,7 +35,7 @@ static void web_break_all(struct web_link *web)
         if (web->conn[i].wsi != NULL) web_break(web->conn[i].wsi);
 }
 
-/* Collects the sockets of all its clients. */
+/* Collects the sockets of all clients of the link. */
 static void web_sockets(const struct web_link *web, int fds[WEB_PLACES])
 {
     for (int i = 0; i < WEB_PLACES; i++)

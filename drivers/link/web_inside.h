@@ -129,7 +129,7 @@ static inline void web_set_phase(struct web_conn *conn, enum web_phase phase)
 
 /* web.c */
 void web_refused(struct web_link *web, const char *peer);
-/* Forgets a connection whose wsi has ended or belongs to nobody any more. Twice does no harm. */
+/* Forgets a connection whose wsi has ended or belongs to nobody any more. A second call does nothing. */
 void web_conn_end(struct web_conn *conn);
 /* Returns the session, if its owner may use it; else NULL. The session's client may be gone, and left something to be
  * read. */
@@ -154,8 +154,8 @@ struct lws *web_wait_for(struct web_link *web, int fd, struct web_conn *conn);
  * time to end its own. */
 void web_linger(struct web_link *web, struct web_conn *conn);
 
-/* web_request.c: judges a request. 0; the status of a refused request, with *words saying why; or WEB_FOREIGN. head:
- * its lines, len bytes with the empty one. */
+/* web_request.c: judges a request. Returns 0; the status of a refused request, with *words saying why; or
+ * WEB_FOREIGN. head: the lines of the request, len bytes with the empty line. */
 int web_request_read(const struct web_link *web, const char *head, size_t len, struct web_request *out,
                      const char **words);
 

@@ -47,8 +47,8 @@ static int rank_of(const struct web_place *place, int64_t now_us)
     }
 }
 
-/* Returns the client that is to go first, or -1. The client has the address `address`. Where that is NULL, it has the
- * address that holds the most places among those with a client that may go. */
+/* Returns the client of `address` that is to go first, or -1: none may go. With NULL it is a client of the address that
+ * holds the most places; addresses without a client that may go are left out. */
 static int find_silent(struct web_places places, const unsigned char *address, int64_t now_us)
 {
     int found = -1, found_n = 0, found_rank = 0;

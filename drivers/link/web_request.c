@@ -30,8 +30,8 @@ static int is_own_host(const struct web_link *web, const struct http_place *plac
            (own[0] != '\0' && strcasecmp(host, own) == 0);
 }
 
-/* An image or a script of another site's page is asked for without an Origin, but browsers then say in Sec-Fetch-Site
- * where it is from. Links from other sites to the page's own files work. */
+/* For an image or a script in another site's page a browser sends no Origin. Its Sec-Fetch-Site then says that the page
+ * is another site's. Links from other sites to the page's own files work. */
 static int is_foreign_part(const struct http_fields *f, const char *path)
 {
     struct web_page page;

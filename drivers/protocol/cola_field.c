@@ -59,7 +59,7 @@ static void take_no_part(struct cola_args *args)
     if (take_flag(args)) args->error = COLA_INVALID_DATA;
 }
 
-/* A record may lack the part of its type: that erases its field, and real scanners describe an empty field so. */
+/* A record without the part of its type erases its field. Real scanners describe an empty field by such a record. */
 static int has_part_of_type(const struct cola_record *r)
 {
     if (r->type == COLA_FIELD_RECTANGLE) return !r->is_segmented;

@@ -64,8 +64,8 @@ struct cola_fields {
 /* The inputs that are active at a device time, a bit each. *next_ns: when they may change next; INT64_MAX: never. */
 uint32_t cola_inputs_at(const struct cola_fields *fields, int64_t t_ns, int64_t *next_ns);
 
-/* The record of a field with a shape, on the grid of the head's beams. In some models the corner of a rectangle is
- * counted from the first beam, in others from 0. */
+/* The record of a field with a shape, on the grid of the head's beams. from_first: the angle of a rectangle's corner
+ * counts from the first beam, as in some models; else it counts from 0. */
 void cola_field_describe(const struct cola_field *field, const struct planar_head *head, int from_first,
                          struct cola_record *out);
 /* Reads a record of a request. COLA_INVALID_DATA: the record is of a radial or dynamic field, has a comment, has the

@@ -46,13 +46,13 @@ struct http_line {
     struct http_text method, target;
     int minor; /* of HTTP/1.x */
 };
-/* "POST /cgi/setting?x HTTP/1.1": 0, 400, or 505. */
+/* Reads "POST /cgi/setting?x HTTP/1.1". Returns 0, 400, or 505. */
 int http_read_line(struct http_text line, struct http_line *out);
 
 struct http_field {
     struct http_text name, value;
 };
-/* "Host: localhost": 0 or 400. */
+/* Reads "Host: localhost". Returns 0 or 400. */
 int http_read_field(struct http_text line, struct http_field *out);
 
 /* The fields that a server here looks at. Texts of fields that are missing have no bytes, and s is NULL. */
@@ -74,7 +74,7 @@ struct http_place {
     struct http_text host; /* an IPv6 address has its brackets */
     int port;              /* 80 where none is named */
 };
-/* "localhost:8080", of a Host or a URI: 0 or 400. */
+/* Reads "localhost:8080", of a Host or a URI. Returns 0 or 400. */
 int http_read_place(struct http_text text, struct http_place *out);
 
 /* A target's parts. place.s is NULL where it has none ("/a?b", not "http://localhost/a?b"). query is what follows the

@@ -21,8 +21,8 @@ enum { IPV4_LEN = 20, IPV6_LEN = 40, UDP_LEN = 8, TCP_LEN = 20 };
 
 struct rest {
     const uint8_t *p;
-    size_t len;     /* that the capture has */
-    size_t claimed; /* that the packet has, by its headers */
+    size_t len;     /* bytes that the capture has */
+    size_t claimed; /* bytes that the packet has, by its headers */
 };
 
 /* Bytes before the IP packet; -1: no IP. */

@@ -109,7 +109,7 @@ struct native_emitter { /* begin of an emitter payload, 64 bytes; then n_beams o
     uint64_t sequence_ns_num, sequence_ns_den; /* num / den ns is the time of a firing sequence (beams) or a pulse */
     int64_t first_ring_udeg; /* sphere: elevation of ring 0, rounded; the others follow by 180 deg / gaps */
     uint32_t echoes;         /* enum native_echoes: which echoes of a pulse are sent */
-    uint32_t gaps; /* sphere: gaps from ring to ring, pole to pole, if some rings are not scanned; 0: rings - 1 */
+    uint32_t gaps; /* sphere: gaps between rings from pole to pole, where not all rings are scanned; 0: rings - 1 */
 };
 enum native_echoes {
     NATIVE_ECHOES_ALL = 0,
@@ -337,7 +337,7 @@ struct native_stats {
     uint64_t seq_gaps, seq_lost;     /* jumps in seq, both ways; frames missing by forward jumps */
     uint64_t repeated, late;         /* frames dropped: they had come before; they came after newer ones */
     uint64_t restarts, cuts;         /* jumps back to another sequence; connections that ended within an item */
-    uint64_t bad_unseen; /* those of bad_payload that no gap shows: before a sequence's first frame, after its last */
+    uint64_t bad_unseen; /* frames of bad_payload that no gap shows: before a sequence's first frame, after its last */
 };
 
 /* Something wrong in the stream; scanhead.h says what n and at_byte mean for each kind. */
@@ -356,7 +356,7 @@ struct native_bad {
     int is_local;
     uint32_t seq;
     int64_t t_ns;
-    uint64_t at_byte, n, most; /* n: bytes so far; most: those that the frame of that header has */
+    uint64_t at_byte, n, most; /* n: bytes so far; most: length of the frame with that header */
 };
 
 struct native_parser {

@@ -184,7 +184,7 @@ static void count_notice(struct native_stats *stats, const struct native_notice 
 }
 
 /* Renews bad_unseen at a frame of the sequence. The frame's number shows all frames that are missing before it, broken
- * ones too, but none before the first frame of the sequence. So bad_unseen goes back to what it was at that frame. */
+ * ones too, but none before the first frame of the sequence. So bad_unseen goes back to its value at the first one. */
 static void see_bad(struct native_parser *parser, int is_first)
 {
     if (is_first)

@@ -11,7 +11,7 @@
 #include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/protocol.h"
 
-/* Marks the payload as what an injected flip may change, so that length and number in the header stay true. */
+/* Marks the payload: an injected flip may change it alone, so that length and number in the header stay true. */
 static void mark_payload(const uint8_t *frame, size_t len, uint8_t *mask)
 {
     (void)frame;

@@ -71,7 +71,7 @@ struct pcapng_packet {
 enum pcapng_item { PCAPNG_MORE = 0, PCAPNG_PACKET = 1, PCAPNG_OTHER = 2 };
 
 /* Takes the block that the bytes begin with. PCAPNG_MORE: they have no whole block yet; *used is 0, and reader->needed
- * says more. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
+ * says how many bytes are needed. PCAPNG_PACKET and PCAPNG_OTHER: *used bytes were the block.
  * SH_EFORMAT: this is no block, or a block that can't be read, as a packet of an interface that is not described; err
  * says at which byte of the file, and why. */
 int pcapng_read(struct pcapng_reader *reader, const uint8_t *bytes, size_t len, struct pcapng_packet *packet,

@@ -6,7 +6,7 @@
  *
  * A turn is whole once each place has its pulse, and its attributes where the head sends them: that is when the
  * beam has passed the last step. A turn with something missing is broken: it never comes out, and is counted. A turn
- * is not counted if the first frame came, the scan ended, the steps changed or a replay jumped within it.
+ * is not counted if within it the first frame came, the scan ended, the steps changed or a replay jumped.
  *
  * Pure. Nothing is allocated; real-time safe. */
 #ifndef DRIVERS_PROTOCOL_PLANAR_SCAN_H
@@ -16,7 +16,7 @@
 #include "drivers/protocol/native.h"
 
 enum {
-    PLANAR_MAX_STEPS = 3000,         /* that are cast in a turn */
+    PLANAR_MAX_STEPS = 3000,         /* steps that are cast in a turn */
     PLANAR_MAX_TURN = INT32_MAX / 4, /* steps of a turn: four times as many still fit into an int32_t */
     PLANAR_ECHOES = 4,               /* kept of a step: where it has more, the first three and the last */
     PLANAR_UNSEEN = 0xff,

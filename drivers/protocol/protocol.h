@@ -169,7 +169,7 @@ struct protocol_ops {
     const char *name;  /* of links[].protocol */
     uint32_t needs;    /* enum protocol_needs */
     uint32_t emitters; /* bit per enum native_emitter_kind of the heads that it can speak for; 0: all */
-    uint32_t n_beams;  /* that a head of beams must have; 0: any number */
+    uint32_t n_beams;  /* beams that a head of beams must have; 0: any number */
     uint32_t max_unit; /* bytes; no unit is longer */
     int brief;         /* 1: clients come for one request, and a silent one may have to make room for another */
     /* For the injected fault that checksums can't show: bits of a unit are changed, then its checksums are made right

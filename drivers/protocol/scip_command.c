@@ -151,7 +151,7 @@ static const char *fall_asleep(struct scip *s)
 static const struct command {
     char name[4];
     uint8_t n_params;  /* characters after the name */
-    uint32_t features; /* all of them, or the command is not there */
+    uint32_t features; /* a model that lacks one of them lacks the command */
     scip_handler *carry_out;
 } commands[] = {
     {"VV", 0, 0, scip_info_version},

@@ -262,8 +262,8 @@ export class Cloud {
   }
 }
 
-// Returns whether no point of a block that has a time is within a window of times. A block without times is in all of
-// them.
+// Returns whether a block's times are all outside of a window of times. A block without times is within every window.
+// The window null has all times in it.
 export const isOutside = (window, block) => window !== null && block.span.from <= block.span.to &&
   (block.span.to < window.from - block.began_s || block.span.from > window.to - block.began_s);
 

@@ -65,7 +65,7 @@ export class Keeper {
   }
 }
 
-// Returns the same frame, marked as sent to one reader alone. Such a frame has no sequence number.
+// Returns the same frame, marked as sent again, to one reader alone. Such a frame has no sequence number.
 function repeated(frame) {
   const bytes = frame.slice(), view = new DataView(bytes.buffer);
   bytes[3] |= REPEAT | LOCAL;

@@ -12,7 +12,7 @@ export class Losses {
   #byOverruns = 0; // pulses that the head lost, by OVERRUN events
   #byScanEnds = 0; // the same, by the ends of scans; events of either kind may be missing
   #damaged = 0; // missing frames that no READER_LOST explains, and that were reported
-  #unexplained = 0; // all such frames at the last telemetry
+  #unexplained = 0; // missing frames that no READER_LOST had explained at the last telemetry
   #scan = null;
   #isRunning = false;
   #shots = 0; // pulses received before the scan
@@ -105,7 +105,7 @@ export class Losses {
     return t !== null && t.scan === scan && STATES[t.state] === 'spin-down' ? t : null;
   }
 
-  // counts: those of a telemetry, or of SCAN_END without the pulses cast; null: all were lost. If this page joined the
+  // counts: those of a telemetry, or of SCAN_END without the pulses cast; null: neither came. If this page joined the
   // scan late, the pulses before that are missing, too.
   #end(scan, counts, shots) {
     if (!this.#isRunning || scan !== this.#scan) return;

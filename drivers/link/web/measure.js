@@ -250,7 +250,7 @@ export function decimalsOf(error) {
 
 const minus = (text) => text.replace('-', '−');
 
-// Returns a figure in words, rounded by its error: "2.104 m ± 2 mm", "90.02° ± 0.11°"; "2.104 m" if it is not known.
+// Returns a figure in words, rounded by its error: "2.104 m ± 2 mm", "90.02° ± 0.11°"; "2.104 m" without an error.
 export function figureText(unitName, {value, error}) {
   const isKnown = Number.isFinite(error), decimals = decimalsOf(isKnown ? error : unitName === '°' ? 0.05 : NaN);
   const gap = unitName === '°' ? '' : '\u00a0';

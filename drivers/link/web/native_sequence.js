@@ -20,7 +20,7 @@ export class Sequence {
   #gaps = []; // {first, n}
   #local = null; // the frame before, if it was LOCAL
   #lastLate = 0;
-  #lateRun = 0; // late frames in a row, up to that one
+  #lateRun = 0; // late frames in a row, up to #lastLate
   first = 0;
   n = 1;
 

@@ -38,7 +38,7 @@ export function markField(field, isRight) {
 // Returns the number that a user has written, NaN for none: an empty text is not 0.
 export const numberOf = (text) => (text.trim() === '' ? NaN : Number(text.trim().replace('−', '-').replace(',', '.')));
 
-// Calls at most once in every `ms`; the last call always comes through.
+// Returns a function that runs call() at most once in every `ms`, and once more after its last use in that time.
 export function atMostEvery(ms, call) {
   let timer = 0, last = -Infinity;
   return () => {
@@ -155,7 +155,7 @@ export async function fetchBytes(path, cache = 'default') {
   }
 }
 
-/** Returns the JSON of one of the link's resources; null if there is none, it does not come, or it is none. */
+/** Returns the JSON of one of the link's resources; null if there is none, it does not come, or it is no JSON. */
 export async function fetchJson(path) {
   const bytes = await fetchBytes(path, 'no-store');
   try {
@@ -165,8 +165,8 @@ export async function fetchJson(path) {
   }
 }
 
-/** Returns a function to be called where something begins that others may overtake. That function returns another one,
- * which says whether nothing has begun since. */
+/** Returns a function begin(), to be called where something begins that may be overtaken. begin() returns a function
+ * that says whether begin() was not called again since. */
 export function newest() {
   let last = 0;
   return () => {

@@ -38,7 +38,7 @@ export class Past {
   #seen = null; // it is the same, from earlier connections only
   #first = null; // it is the number of the first live points frame that was taken
   #need = null; // it is the number of the newest frame that only /past brings
-  #until_ms = 0; // frames that /past does not bring until then are waited for more seldom
+  #until_ms = 0; // after this time the page asks more seldom for frames that /past has not brought
   #takesLive = true;
   #takesPast = true;
 

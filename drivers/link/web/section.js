@@ -79,7 +79,7 @@ export class Section {
     return [...faces, {id: 'turn', at: add(this.middle, axes[1], arm), along: null}, {id: 'move', at: [...this.middle], along: null}];
   }
 
-  // Moves a face outward; it stops where the box is thin.
+  // Moves a face outward by by_m. Below 0 it moves inward, but the box stays at least THIN thick.
   push(id, by_m) {
     const [, axis, sign] = FACES.find(([name]) => name === id);
     const d = Math.max(by_m, THIN - 2 * this.half[axis]);

@@ -25,7 +25,7 @@ export class SectionTool {
   #says = make('p', {class: 'refusal', role: 'status'});
   #layer = make('div', {class: 'handles', role: 'group', 'aria-label': 'Handles of the section'});
   #handles = new Map(); // it maps an id to its element
-  #held = null; // this one is dragged: a hidden element would lose the pointer
+  #held = null; // the dragged handle is not hidden: a hidden element would lose the pointer
   #layerOn = (pen, camera) => this.#draw(pen, camera);
 
   constructor(view) {

@@ -15,7 +15,7 @@ import {Overlay} from './view_overlay.js';
 import {Programs} from './view_gl.js';
 import {listenTo} from './view_events.js';
 
-// The picture is drawn again if it shows more points that are gone from the cloud than this share of the capacity.
+// The picture is drawn again once the drawn points that are gone from the cloud exceed this share of its capacity.
 const GONE_SHARE = 0.04;
 
 export class View extends EventTarget {

@@ -4,7 +4,7 @@
 // from the top left corner.
 //
 // Depth is logarithmic: from NEAR_M to FAR_M each doubling of the distance has the same share of the 24 bits, so two
-// points 1.2 um apart at 1 m, or 1.2 mm at 1 km, have different depths. Shaders and test have the same formula.
+// points 1.2 um apart at 1 m, or 1.2 mm at 1 km, have different depths. The shaders have the formula of depthOf().
 //
 // A flat (orthographic) view has the scale that a perspective one has at the target. A flat view has neither a near nor
 // a far end: places behind its eye are drawn, too (flatDepthOf).

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // From the cloud's points, the class Scale finds the limits of the colours, and boxOf() finds the box of the view. The
-// limits change rarely, so that nothing flickers: each time the cloud has twice the points, and then only if the new
-// points lie far outside.
+// limits change rarely, so that nothing flickers: when the cloud has twice the points, and then only if the new points
+// lie far outside. The limits of the mode age change sooner.
 
 import {MODES, legendOf, robustLimits, sampleOf, widened} from './view_colours.js';
 
