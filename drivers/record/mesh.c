@@ -3,7 +3,7 @@
  *
  * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/studio/scan_mesh.h makes triangles of
  * the grid. A mesh is made when its scan is over, and the file when all scans are. Until then memory holds all points
- * of the present scan, and the points in triangles of earlier scans. A point takes about 110 bytes, its two triangles 24.
+ * of the present scan, and the points in triangles of earlier scans. A point takes about 110 bytes, its triangles 24.
  *
  * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of
  * the file) by itself. So is each sweep of the pan. Where line or row numbers go back, another part begins, too. */

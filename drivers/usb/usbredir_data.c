@@ -13,7 +13,7 @@
 #include "drivers/usb/usbredir_private.h"
 
 enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20, MAX_INTERRUPT = 1024 };
-/* Ids of our own transfers. No id of a guest that counts from 0 is the same. */
+/* Ids of our own transfers. A guest whose ids count from 0 never reaches them. */
 #define OWN_ID (1ull << 63)
 
 struct redir_transfer {
