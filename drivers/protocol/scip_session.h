@@ -38,7 +38,7 @@ struct scip {
     const struct scip_model *model;
     uint32_t features; /* enum scip_feature: those of the model with this firmware */
     int64_t now_ns;
-    int64_t epoch_ns, epoch_us_ns; /* when the time stamp is 0, and when the one in microseconds is */
+    int64_t epoch_ns, epoch_us_ns; /* when the time stamps are 0: that in ms, and that in us */
     int64_t laser_ns;              /* since when the laser is on */
     int64_t try_ns;                /* when to look at the head again for a request that waits for its first scan */
     int laser, time_mode, asleep;
@@ -67,7 +67,7 @@ void scip_answer(struct scip *s, const char *echo, size_t len, const char *statu
 void scip_command(struct scip *s);
 /* A command of the line at hand. Returns the status of the reply to it; NULL: it has replied by itself. */
 typedef const char *scip_handler(struct scip *s);
-/* len decimal digits; -1: others are among them. */
+/* Reads len decimal digits; -1: another character is among them. */
 int32_t scip_number(const char *text, size_t len);
 
 /* scip_info.c: VV, PP, II, %ST. */
@@ -77,7 +77,7 @@ static inline int scip_boots(enum protocol_head_state head)
     return head == PROTOCOL_HEAD_BOOT || head == PROTOCOL_HEAD_OFF;
 }
 scip_handler scip_info_version, scip_info_parameters, scip_info_state, scip_info_state_number;
-/* Lines per second of the head, 1e-6 Hz: `query` is HEAD:LINES? or that of the default. */
+/* Returns lines per second in 1e-6 Hz. query: HEAD:LINES? (the present rate), or HEAD:LINES? DEF (that at power-up). */
 uint64_t scip_lines_uhz(struct scip *s, const char *query);
 /* A range in whole millimetres, rounded; 0 where it is not above 0, or not below 4000 km. */
 uint32_t scip_millimetres(double range_m);
@@ -85,7 +85,7 @@ uint32_t scip_millimetres(double range_m);
 /* scip_measure.c */
 /* 0: there is no head yet, or it has steps that no command can name. */
 int scip_has_head(const struct scip *s);
-/* For BM, and for commands that switch the laser on by themselves. NULL, or the status to refuse with: 10 while
+/* Switches the laser on, for BM and for commands that imply it. Returns NULL, or the status to refuse with: 10 while
  * the head can't scan, 50 while it is out of order. */
 const char *scip_laser_on(struct scip *s);
 /* Ends stream and laser; a G or H that waits is answered with status 10. */

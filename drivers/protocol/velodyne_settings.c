@@ -148,8 +148,8 @@ static int read_decimal(const char *s, double limit, double *out)
     return *end == '\0' && *out < limit;
 }
 
-/* The device's page multiplies its field offsetInput by 100, so that the product may have many decimals, and sends both
- * fields. */
+/* The device's page sends `offset`, which is 100 times its field offsetInput, and offsetInput itself. The product may
+ * have many decimals. */
 static int set_phase(const struct posted *p, const char *value)
 {
     char line[40];

@@ -2,8 +2,8 @@
 /* Meshes of scans: .obj, .gltf, .glb and .fbx, and .ply with --mesh; points spread over the mesh: .ply with --sparse.
  *
  * The first echo of each shot is a point of the scan's grid (mesh_grid.h); core/studio/scan_mesh.h makes triangles of
- * the grid. A mesh is made when its scan is over, and the file when all scans are. All points of the scan at hand, and
- * points in triangles of earlier ones, are held until then, with about 110 bytes each; triangles with 12, two a point.
+ * the grid. A mesh is made when its scan is over, and the file when all scans are. Until then memory holds all points
+ * of the present scan, and the points in triangles of earlier scans. A point takes about 110 bytes, its triangles 24.
  *
  * Points without a triangle are left out and counted. So are echoes after the first. Each scan is a part (an object of
  * the file) by itself. So is each sweep of the pan. Where line or row numbers go back, another part begins, too. */

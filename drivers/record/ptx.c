@@ -27,7 +27,7 @@
 #include "drivers/record/recorder.h"
 
 enum {
-    PADDING_FREE = 1 << 24, /* 160 MiB of text, 256 MiB with colours: 4,500 lines of 3,700 pulses if only one came */
+    PADDING_FREE = 1 << 24, /* 160 MiB of text, 256 MiB with colours: a grid of 4,500 x 3,700 with one shot */
     PADDING_PER_SHOT = 8,
     N_KNOWN = 1024, /* intensities that are kept, by the stream's steps of 0.01 dB */
 };

@@ -37,7 +37,7 @@ enum ply_column {
     PLY_DEVIATION = 1 << 11, /* no word for it: it comes with the attributes, where the head sends it */
 };
 extern const char *const ply_column_words[]; /* by bit; NULL at the end */
-/* Reads such words with commas between them. "xyz" stands for none. Returns 0 if a word is not known, or comes
+/* Reads such words with commas between them. "xyz" adds no column. Returns 0 if a word is not known, or comes
  * twice. */
 int ply_columns_read(const char *text, unsigned *columns);
 
@@ -98,8 +98,8 @@ struct recorder_ops {
     int (*frame)(void *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
     /* All points have come: completes the file (counts in the header) and reports what the format had no room for. */
     int (*finish)(void *rec, struct sh_err *err);
-    /* Called about once a second: writes what has come to the disk, so that a repair finds it there. NULL: flushing the
-     * file is enough. */
+    /* Called about once a second: writes to the disk what has come so far, so that a repair finds it there. NULL:
+     * flushing the file is enough. */
     int (*save)(void *rec, struct sh_err *err);
     /* Frees what the recorder's own struct holds; also after begin has failed. */
     void (*release)(void *rec);

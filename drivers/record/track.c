@@ -131,8 +131,8 @@ static void set_emitter_limits(struct track *t)
         t->max_lines = whole_u32((double)t->max_lines * e->rings);
 }
 
-/* Returns the number in the scan of the beam that fires at t_ns: the last one whose time, in whole nanoseconds, is no
- * later. */
+/* Returns the number, in the scan, of the pulse that is fired at t_ns. Times are rounded down to whole nanoseconds, so
+ * it is the last pulse whose time is not later. */
 static uint64_t firing_at(const struct scanhead_emitter *e, uint64_t t_ns)
 {
     const u128 num = e->sequence_ns_num, den = e->sequence_ns_den, end = ((u128)t_ns + 1) * den;

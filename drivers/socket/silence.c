@@ -10,7 +10,7 @@
 
 #include "core/err.h"
 
-/* A peer that reads mostly confirms within 40 ms. After 200 ms (TCP_RTO_MIN) the system begins to repeat. */
+/* A peer that reads confirms within 40 ms as a rule. After 200 ms (TCP_RTO_MIN) the system begins to repeat. */
 enum { CONFIRM_MS = 200, MOST_HOPS = 255 };
 
 /* A socket of IPv6 may have a peer of IPv4, so it needs the options of both. */

@@ -2,8 +2,8 @@
 /* TCP sockets whose cable is pulled: nothing comes in, and nothing goes out.
  *
  * In: sockets that listen or are connected. From then on the system throws away each segment that comes for them,
- * without a word (RFC 5082: no segment with less than the largest TTL is taken). Silencing so takes no privilege. A
- * socket filter would do the same, but newer kernels ask for a privilege where it is for TCP. Two things still go out.
+ * without a word (RFC 5082: no segment with less than the largest TTL is taken). This needs no privilege. A socket
+ * filter would do the same, but on TCP sockets newer kernels ask for a privilege. Two things still go out.
  * The system repeats bytes that the peer had not confirmed, which is why sockets_silence waits for the confirmation.
  * And a peer that sends with a TTL of 255 is heard, and answered. The caller writes nothing meanwhile. */
 #ifndef DRIVERS_SOCKET_SILENCE_H

@@ -80,8 +80,8 @@ static void write_tx(struct ffs_console *console)
     offer_tx(console);
 }
 
-/* Called every second. If bytes wait and the host has taken none of them since, the host's port counts as closed, and
- * the waiting bytes are dropped. */
+/* Called every second. If bytes wait and the host has taken none of them since the last call, the host's port counts as
+ * closed. Bytes that are not in the tty yet are then dropped. */
 static void look_at_host(struct ffs_console *console)
 {
     uint64_t count;

@@ -118,8 +118,8 @@ uint32_t usb_device_attaches(const struct usb_device *device);
 
 /* Acts as if the host had reset the bus and configured the device again. */
 void usb_device_restart(struct usb_device *device);
-/* After a restart, for an endpoint without a pending transfer: the host's next transfer ends as pending ones did, so
- * that the host learns of the reset. due 0 takes that back, since a new reader begins. */
+/* After a restart, for an endpoint without a pending transfer. due 1: the host's next transfer ends as pending ones
+ * did, so that the host learns of the reset. due 0: a new reader begins, and its transfers don't end so. */
 void usb_device_set_gone_due(struct usb_device *device, uint8_t endpoint, int due);
 /* Halts the endpoint, until the host clears the halt. 0: there is no such endpoint now. */
 int usb_device_halt(struct usb_device *device, uint8_t endpoint);

@@ -13,7 +13,7 @@
 #include "drivers/usb/usbredir_private.h"
 
 enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20, MAX_INTERRUPT = 1024 };
-/* Ids of our own transfers, apart from the guest's as long as it counts from 0. */
+/* Ids of our own transfers. A guest whose ids count from 0 never reaches them. */
 #define OWN_ID (1ull << 63)
 
 struct redir_transfer {
@@ -34,7 +34,7 @@ static int status_of(enum usb_status status)
     return numbers[status];
 }
 
-/* Makes a transfer with room for bytes to the host. `bytes` counts them, or the bytes that came from the host. */
+/* Makes a transfer. room: bytes of room for data to the host. bytes: what is added to n_bytes, in either direction. */
 static struct redir_transfer *new_transfer(struct usbredir *self, uint32_t room, uint32_t bytes)
 {
     if (self->n_pending >= MAX_PENDING || self->n_bytes + bytes > MAX_PENDING_BYTES) return NULL;

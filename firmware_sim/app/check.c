@@ -103,7 +103,7 @@ static double bytes_of(const struct scene *scene, const struct bvh *bvh)
     return bytes;
 }
 
-/* Returns the most that the program had at once, also while it was loading. */
+/* Returns the most memory that the program has had so far, also while it was loading, in MB. */
 static double peak_mb(void)
 {
     struct rusage usage;

@@ -52,8 +52,8 @@ static void decode(const char *name, char *out)
     *out = '\0';
 }
 
-/* Tries the name as it stands, and decoded. Both may be a file of another machine: then its last part counts, whatever
- * its case. */
+/* Tries the name as it stands, then decoded. Either may be a path on another machine: then only its last part counts,
+ * in upper or lower case. */
 static int sidecars_find(const struct search *s, const char *name, char path[PATH_MAX])
 {
     const char *const folder[] = {s->here, s->folder};

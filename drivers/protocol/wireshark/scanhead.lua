@@ -1179,7 +1179,7 @@ local function new_flow()
 end
 
 -- Results of the first look at each packet, by packet number and content. Positions can't be the key, since at
--- the next look Wireshark may cut the same bytes at other places. Equal contents share a list, which is taken in turns.
+-- the next look Wireshark may cut the same bytes at other places. Equal contents in a packet get their results in turn.
 local memo
 
 local function memo_of(pinfo)
@@ -1369,9 +1369,9 @@ function Search:look_text()
   self:skip(self.len)
 end
 
--- Returns nothing if all bytes are used. Else the place where it waits, the number of bytes that it waits for (nil: not
--- known), and whether TCP must not join them. TCP must not in two cases: items before the place were found with bytes
--- from beyond it, or the place lies within bytes that the last search has kept.
+-- Returns nothing if all bytes are used. Else it returns the place where it waits, the number of bytes that it needs
+-- (nil: not known), and true if TCP must not join these bytes. That is so in two cases: items before the place were
+-- found with bytes from beyond it, or the place lies within bytes that the last search has kept.
 function Search:run()
   local waits, more
   while self.at < self.len and not waits do
@@ -1494,8 +1494,8 @@ local function is_of_head(tvb)
   return first_header(tvb) or tvb:raw(0, tvb:len()):find("scanhead native 1\r\n", 1, true) ~= nil
 end
 
--- Which side of a TCP connection is the head: the one that frames come from; before that the one with the known port,
--- or with the lower one.
+-- Which side of a TCP connection is the head: the side that frames come from. Until a frame comes, it is the side with
+-- the port of the preferences, or, if neither has this port, with the lower port.
 local function is_from_head(tvb, pinfo, conn)
   if not conn.head_port and is_of_head(tvb) then conn.head_port = pinfo.src_port end
   if conn.head_port then return pinfo.src_port == conn.head_port end

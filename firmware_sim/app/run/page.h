@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A head that runs gives a page more than its stream, by these functions. Behind them is a watch: an observer that
+/* By these functions a page gets more of a running head than the stream. Behind them is a watch: an observer that
  * reads the stream. `run` only opens, starts and closes the watch. The program scanhead has a watch
  * (firmware_sim/app/studio/watch); scanheadd has none, and its page shows the stream alone.
  *

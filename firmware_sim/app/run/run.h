@@ -26,7 +26,7 @@ struct run_options {
 
 /* serve.c: runs the loop from its start to its end, writes the statistics, and warns of losses. */
 int run_serve(const struct run_options *o, struct loop *loop, struct sh_err *err);
-/* Adds a web link for --view, where there is none. SH_EINPUT: there is no link at all. */
+/* Adds a web link for --view, where there is none. SH_EINPUT: no link at all, or no room for the one of --view. */
 int run_complete_links(const struct run_options *o, struct config *cfg, struct sh_err *err);
 void run_say_links(const struct loop *loop);
 

@@ -15,7 +15,7 @@ struct batch_job {
     uint32_t combination, station; /* from 0; from 1 */
     int is_done;                   /* 1: `entry` has the files that it must have */
     struct batch_entry entry;
-    const char *other; /* in words, what an entry for this job was made with instead; NULL: there is no such entry */
+    const char *other; /* what an entry of this job was made with that differs, in words; NULL: none differs */
 };
 
 struct batch {

@@ -115,7 +115,7 @@ static int scan(struct chooser *c, uint32_t place, const char *what, struct sh_e
     coverage_scan_of(c->f->site, c->f->result->base, at);
     at->scan.setup.bvh = c->f->site->bvh;
     at->scan.setup.sight = NULL;
-    if (at->scan.setup.tripod != NULL) { /* the cone goes with the head; the legs stand at a station: left out */
+    if (at->scan.setup.tripod != NULL) { /* the cone moves with the head; the legs stay at a station */
         tripod = *at->scan.setup.tripod;
         tripod.has_legs = 0;
         at->scan.setup.tripod = &tripod;
