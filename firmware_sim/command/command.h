@@ -252,7 +252,7 @@ struct command_result {
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
 
 void command_set_peer(struct command_device *dev, uint32_t session, const char *name);
-/* Never NULL. */
+/* Returns the name that command_set_peer gave to a session's client; empty: none. */
 const char *command_peer(const struct command_device *dev, uint32_t session);
 
 /* Work that a command began could not be done: puts the error into the queue, and makes it the command's reply. */
