@@ -63,7 +63,7 @@ struct soak_link {
     struct soak_ask ask;
     char failed[256];                 /* why the client gave up; empty: it did not */
     uint64_t bad_units;               /* datagrams that equal no clean one */
-    struct soak_datagrams *datagrams; /* NULL: the link speaks the native protocol */
+    struct soak_datagrams *datagrams; /* NULL: its datagrams are not compared */
     /* the client's own */
     struct scanhead *sh;
     char idn[256];
