@@ -246,9 +246,9 @@ struct command_result {
 };
 
 /* Carries out one line (without its end) from a session. Sessions count from 1; 0 is the device itself, which
- * is never refused control. Changes what a command sets in dev, and its queue and control; the loop changes dev->state.
- * A change of settings that is refused (-222, -221) leaves them as they were. While scanning, a change of
- * station is -221. */
+ * is never refused control. In dev it changes settings, defaults, server, server_default, shift_ns, queue and
+ * control; the loop changes state. A change of settings that is refused (-222, -221) leaves them as they were.
+ * While scanning, a change of station is -221. */
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
 
 void command_set_peer(struct command_device *dev, uint32_t session, const char *name);
