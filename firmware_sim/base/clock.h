@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The system's clocks. All code that reads the machine's time or waits for it does so here.
+/* The system's clocks, as firmware_sim reads them. core and drivers have core/monotonic.h instead.
  *
  * Out: ns, of CLOCK_MONOTONIC unless the name says otherwise. Device time (device.h) is a different time. */
 #ifndef FIRMWARE_SIM_BASE_CLOCK_H

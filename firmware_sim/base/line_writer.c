@@ -37,7 +37,7 @@ struct line_writer {
     uint64_t waiting;          /* lines in the queue, and in the piece that is being written */
     uint64_t gap[LINE_KINDS];  /* lines dropped that the file does not report yet */
     uint64_t pieces;           /* written so far, or given up after an error */
-    _Atomic uint64_t own_lost; /* where the caller has no count */
+    _Atomic uint64_t own_lost; /* the count where the caller gave none */
     _Atomic int error;         /* errno of the first failure */
     char last[LINE_MOST_BYTES];
     int closing, done, abandoned;

@@ -241,18 +241,18 @@ struct command_result {
     struct command_replay_change replay;
     int error;                     /* 0, or the number that was queued */
     int took_control;              /* this command gave the session control */
-    int changes;                   /* belongs in the journal: effect is not NONE or RELEASE */
+    int changes;                   /* belongs in the journal: effect is not NONE, TAKE or RELEASE */
     char reply[COMMAND_MAX_REPLY]; /* one line without its end; empty for an empty line (no reply at all) */
 };
 
 /* Carries out one line (without its end) from a session. Sessions count from 1; 0 is the device itself, which
- * is never refused control. Changes dev->settings, dev->queue and dev->control; the loop changes dev->state.
- * A change of settings that is refused (-222, -221) leaves them as they were. While scanning, a change of
- * station is -221. */
+ * is never refused control. In dev it changes settings, defaults, server, server_default, shift_ns, queue and
+ * control; the loop changes state. A change of settings that is refused (-222, -221) leaves them as they were.
+ * While scanning, a change of station is -221. */
 void command_execute(struct command_device *dev, uint32_t session, const char *line, struct command_result *out);
 
 void command_set_peer(struct command_device *dev, uint32_t session, const char *name);
-/* Never NULL. */
+/* Returns the name that command_set_peer gave to a session's client; empty: none. */
 const char *command_peer(const struct command_device *dev, uint32_t session);
 
 /* Work that a command began could not be done: puts the error into the queue, and makes it the command's reply. */

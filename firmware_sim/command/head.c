@@ -2,7 +2,7 @@
 #include "firmware_sim/command/head.h"
 
 /* One row per state, one column per event. NO: the event is refused and the state stays. A movement that was
- * given up may still end (SPUN_UP after STOP): that event falls on NO. FAIL is taken in every state with
+ * given up may still end (SPUN_UP after STOP): that event is refused. FAIL is taken in every state with
  * power. While the mirror turns, RESET brakes it first. During the self test there is nothing to reset yet. */
 enum { NO = -1 };
 

@@ -25,7 +25,7 @@ struct command_derived {
     void (*range)(const struct command_device *dev, int64_t *min, int64_t *max);
     /* The reason for that range: " as HEAD:PRR is 300000"; "" if there is none. */
     void (*because)(const struct command_device *dev, char *text, size_t len);
-    /* Into dev->settings; returns -1 when it failed. The value is within the range. */
+    /* Into dev->settings; returns -1 when it failed. The value is within the range, but DEF may be beyond it. */
     int (*write)(struct command_call *call, int64_t value);
 };
 
@@ -61,7 +61,7 @@ int command_setting_is_free(const struct command_device *dev, const struct comma
                             enum head_state state);
 
 /* Gives the number in call->value in the row's unit. Outside of the range it returns -1, after error -222 with the
- * allowed range. So it does for a number that is too fine for the unit; that error has the allowed multiples. */
+ * allowed range. A number that is too fine for the unit fails in the same way, with the allowed multiples. */
 int command_value_in_range(struct command_call *call, int64_t min, int64_t max, int64_t *value);
 
 #endif

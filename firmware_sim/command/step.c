@@ -202,7 +202,7 @@ static int write_planar(struct command_call *call, int64_t step_ndeg)
     return 0;
 }
 
-/* The range over all geometries. The caller narrows it to those of the present line rate. */
+/* The range over all geometries. The caller narrows it to the steps of the present line rate. */
 static void planar_range(const struct command_device *dev, int64_t *min, int64_t *max)
 {
     for (uint32_t i = 0; i < dev->limits.n_geometries; i++) {

@@ -34,7 +34,7 @@ void cfg_choose_geometry(struct cfg_reader *rd, struct config *cfg);
 
 /* Checks head.range_min_m and range_max_m, and limits the profile in cfg and its programs to them. */
 void cfg_limit_range(struct cfg_reader *rd, struct config *cfg);
-/* Copies ranges, noise and step into the scan's settings, which commands may change. After all checks. */
+/* Copies ranges, noise and step into the scan's settings, which commands may change. To be called after all checks. */
 void cfg_take_scan_settings(struct config *cfg);
 
 #endif

@@ -204,8 +204,8 @@ static void check_beam(struct cfg_reader *rd, const struct config *cfg)
     else if (cfg_has_profile(rd) && has_footprint && p->pulse_width_ns < LEAST_PULSE_NS)
         cfg_fail_key(
             rd, "beam.mode",
-            "pulse_width_ns of head profile %s is %.10g: too short to separate echoes of a footprint; allowed single, "
-            "or a pulse_width_ns of at least %.10g",
+            "pulse_width_ns of head profile %s is %.10g: too short to join a footprint's echoes of one surface; "
+            "allowed single, or a pulse_width_ns of at least %.10g",
             p->name, p->pulse_width_ns, LEAST_PULSE_NS);
 }
 

@@ -145,7 +145,7 @@ static void refuse_key_of_other(struct cfg_reader *rd, const struct config *cfg,
                      emitter_names[cfg->profile.emitter.kind], allowed);
 }
 
-/* Refuses keys that are defined only for a mirror and a pan. */
+/* Refuses errors of a mirror, which only a line head has. */
 static void check_instrument(struct cfg_reader *rd, const struct config *cfg)
 {
     static const char *const of_mirror[] = {

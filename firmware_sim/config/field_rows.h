@@ -38,7 +38,7 @@
              "share one. TiM7xx: the first field of a set has output 1, and so on."},
     {"inputs", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_INPUTS, LIST_OF(input, n_inputs), .flags = CFG_SPECIAL,
      .help = "Digital inputs of a SICK scanner, for links that speak cola: when they are active. In a TiM7xx they choose "
-             "the set of fields. They are the bits of a number, the first input its lowest; the set is one more than "
+             "the set of fields. They are the bits of a number, input 1 is its lowest bit; the set is one more than "
              "that number."},
     {"inputs[]", .type = CFG_MAP, .help = "A time in which an input is active. An input may have several."},
     {INPUT(input), CFG_COUNT, NULL, NULL, 1, 4, .example = "1", .help = "Number of the input."},

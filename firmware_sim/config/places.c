@@ -57,7 +57,7 @@ static void check_anchor(struct cfg_reader *rd, struct config *cfg)
     }
 }
 
-/* Keys of the forms; height_m is part of two. */
+/* The keys that belong to one form. height_m is not among them, since it belongs to two. */
 static const struct {
     const char *path;
     enum config_place place;

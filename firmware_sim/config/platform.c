@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks of the platform's keys against each other: the part of a trajectory, and where and when it stops. The length
- * of a trajectory is known only from its file (firmware_sim/site/platform.c). */
+/* Checks of the platform's keys against each other: the part of a trajectory, and the places and times of stops. The
+ * length of a trajectory is known only from its file (firmware_sim/site/platform.c). */
 #include "firmware_sim/config/check_places.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/table/given.h"

@@ -177,7 +177,7 @@ static int name_profile(struct cfg_reader *rd, struct config_profile *profile)
     return SH_OK;
 }
 
-/* Returns whether it has no diagnostic. */
+/* Reads a profile's file, and checks it. Returns whether the file has no diagnostic. */
 static int read_profile(struct cfg_reader *rd, const char *file, struct config_profile *profile,
                         struct config_diagnostics *diagnostics)
 {

@@ -267,8 +267,8 @@ static void a_footprint_needs_a_head_that_has_one(void **state)
         {"0.1", "0.007", "0.00035", "rings", NULL},
         {"0.099", "0.007", "0.00035", "single", NULL},
         {"0.099", "0.007", "0.00035", "rings",
-         "pulse_width_ns of head profile mine is 0.099: too short to separate echoes of a footprint; allowed single, or "
-         "a pulse_width_ns of at least 0.1"},
+         "pulse_width_ns of head profile mine is 0.099: too short to join a footprint's echoes of one surface; allowed "
+         "single, or a pulse_width_ns of at least 0.1"},
     };
     char *text = read_source("config/heads/any-rate.yaml"), *parts[3], with[64], beam[64], want[320];
     for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {

@@ -222,13 +222,13 @@ static void each_line_of_next(void **state)
         "       x m        y m        z m  height m     gains m2        %    estimated      sees m2\n"
         "     1.000      2.000      3.000     1.500        5.000   12.500        5.500        6.000\n"
         "     4.000      5.000      6.000         -        4.000   10.000        3.750        4.500\n"
-        "with the first of them 3.000 m2 (7.500 %) are seen by none:\n"
+        "with the first of them 3.000 m2 (7.500 %) are seen by no station:\n"
         "  - {name: next-1, position_m: [1.000, 2.000, 3.000]}\n"
         "\nnext station 2: the best places, by a whole scan from each\n"
         "       x m        y m        z m  height m     gains m2        %    estimated      sees m2\n"
         "     4.000      5.000      6.000         -        2.000    5.000        0.500        3.500\n"
         "     1.500      2.500      3.500     1.500        0.250    0.625        0.125        0.750\n"
-        "with the first of them 1.000 m2 (2.500 %) are seen by none:\n"
+        "with the first of them 1.000 m2 (2.500 %) are seen by no station:\n"
         "  - {name: next-2, position_m: [4.000, 5.000, 6.000], heading_deg: 90.5}\n");
     free(text);
 }

@@ -285,7 +285,7 @@ static void a_leap_second(void **state)
     pps(3, 83, 102);
     expect(FAULT_LEAP_SECOND, 1, 1, NULL);
     begin(FAULT_LEAP_SECOND, 4, 0);
-    expect(FAULT_LEAP_SECOND, 1, 0, "the minute was not over");
+    expect(FAULT_LEAP_SECOND, 1, 0, "the minute with the leap second was not over");
 }
 
 static void states_show_boots(void **state)

@@ -15,7 +15,7 @@ struct coverage_next_options {
     const char *candidates; /* a file of places instead; NULL: none */
     double step_deg;        /* between rays */
     int step_given;         /* --step-deg is there, which is an error where rays are pulses of the head */
-    long scans;             /* of the best places each round */
+    long scans;             /* how many of the best places are scanned in each round */
 };
 
 enum coverage_place { COVERAGE_PLACE_OPEN, COVERAGE_PLACE_WITHIN, COVERAGE_PLACE_CHOSEN };
@@ -37,7 +37,7 @@ struct coverage_next_tried {
 struct coverage_next_round {
     uint32_t n_tried;
     struct coverage_next_tried tried[COVERAGE_MOST_SCANS];
-    double none_m2; /* area that no station sees, nor the best place */
+    double none_m2; /* area that neither the stations nor the best place see */
 };
 
 struct coverage_next {

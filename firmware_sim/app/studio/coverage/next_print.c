@@ -52,7 +52,7 @@ static void print_round(const struct coverage_next *next, const struct coverage_
                p->position_m[2], height, tried->gain_m2, coverage_percent(tried->gain_m2, result->sums.area_m2),
                estimate_of(next, number, tried->place), tried->seen_m2);
     }
-    printf("with the first of them %.3f m2 (%.3f %%) are seen by none:\n  - %s\n", r->none_m2,
+    printf("with the first of them %.3f m2 (%.3f %%) are seen by no station:\n  - %s\n", r->none_m2,
            coverage_percent(r->none_m2, result->sums.area_m2),
            ready_line(&next->place[r->tried[0].place], number + 1, line));
 }

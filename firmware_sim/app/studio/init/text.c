@@ -41,8 +41,8 @@ static void choose_window(const struct config_profile *p, const struct viewpoint
     scan->line_stop_deg = clamp(ceil(10.0 * angle_deg(at->line1_rad)) / 10.0, fov_min_deg, fov_max_deg);
 }
 
-/* A head with fixed pulse rates gets the next one below; lines and pan then follow from it, so that steps along and
- * across the lines stay alike. */
+/* A head with fixed pulse rates gets the largest one that is not above the wanted rate. Lines and pan then follow from
+ * it, so that steps along and across the lines stay alike. */
 static void choose_rates(const struct config_profile *p, double sweep_deg, struct init_scan *scan)
 {
     const double most_hz = fmin(MOST_LINES_HZ, floor(from_micro(p->pan_max_udeg_s) / scan->step_deg));

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* scanhead map --perspective: a picture of points as seen from a place. In: the options, and a configuration whose
- * stations are scanned, or a recorded cloud, or both: then the cloud is shown, and the configuration says where its
- * stations are. Out: a PNG. */
+ * stations are scanned, or a recorded cloud. With both, the cloud is shown, and the configuration says where the
+ * cloud's stations are. Out: a PNG. */
 #ifndef FIRMWARE_SIM_APP_STUDIO_MAP_VIEW_H
 #define FIRMWARE_SIM_APP_STUDIO_MAP_VIEW_H
 

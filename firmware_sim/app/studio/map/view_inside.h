@@ -42,7 +42,7 @@ struct picturing_figures {
 };
 void picturing_add(struct picturing *p, const double xyz_m[3], const struct picturing_figures *f);
 
-/* Draws and writes. */
+/* Draws the points, and writes the picture to its file. */
 int picturing_finish(struct picturing *p, struct sh_err *err);
 
 #endif

@@ -61,10 +61,10 @@ struct preview_site {
 int preview_site_open(const struct preview_work *work, const struct preview_request *request, struct preview_site **out,
                       struct sh_err *err);
 
-/* preview_look and preview_next make bodies, whose formats README.md has. number: the preview's. */
+/* These four functions make bodies, whose formats README.md has. number: the preview's. */
 int preview_look(const struct preview_work *work, const struct preview_request *request, uint32_t number,
                  struct web_body *out, struct sh_err *err);
-/* Offsets in such a body: searches read cells and hits from there. */
+/* Offsets in the body of preview_look: searches read cells and hits from there. */
 enum { PREVIEW_HEAD_BYTES = 72, PREVIEW_CELLS_AT = 72, PREVIEW_HITS_AT = 24, PREVIEW_FRONT_AT = 28 };
 /* seen has request->n_named previews. */
 int preview_next(const struct preview_work *work, const struct preview_request *request,

@@ -26,7 +26,7 @@
 enum { JOBS = 64, MOST_BYTES = 96 << 20, MOST_PASSED = 6 };
 static const double BLIND_CELL_M = 1e3, BLIND_MIB = 4096.0;
 static const int64_t FORGOTTEN_NS = 2000000000; /* a page that waits asks again far sooner */
-static const int64_t LATELY_NS = 500000000;     /* it does so after 0.2 s at most; requests take some time, too */
+static const int64_t LATELY_NS = 500000000;     /* a page asks again after 0.2 s at most; requests take time, too */
 
 enum job_state { JOB_FREE, JOB_WAITING, JOB_WORKING, JOB_DONE };
 
@@ -54,7 +54,7 @@ struct preview {
     struct sites sites;
     struct preview_work work;
     struct coverage *blind; /* without cells; used where the options have no coverage */
-    struct sh_err why;      /* why there is no `blind` either */
+    struct sh_err why;      /* why `blind` could not be made */
     /* ending: all work stops. gives_way: the present work stops for a place. is_place_asked: a place was asked for. */
     atomic_int ending, gives_way, is_place_asked;
     pthread_t thread;

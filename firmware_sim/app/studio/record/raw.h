@@ -30,7 +30,7 @@ struct raw_place {
 
 struct raw;
 
-/* UDP and TCP. Functions return SH_OK or SH_E. */
+/* The operations of a source, UDP or TCP. Functions return SH_OK or SH_E. */
 struct raw_ops {
     /* Opens sockets and connections; may wait up to r->wait_s. close follows in any case. */
     int (*open)(struct raw *r, struct sh_err *err);

@@ -13,7 +13,7 @@
 enum { TALK_PIECE = 65536 };
 
 struct talk_end {
-    struct raw_input input; /* the first member, so that a pointer to it is also one to the end */
+    struct raw_input input; /* the first member: a pointer to it also points to the struct talk_end */
     struct talk *talk;
     int number;
     int fd;      /* end 0 is this program: -1 */
@@ -42,7 +42,7 @@ int talk_open(struct talk *talk, struct raw *r, const int fd[2], int64_t began_n
 int talk_wait_for(const struct talk *talk, struct pollfd *fds, int *timeout_ms);
 /* Sends what the ends did not take before. */
 int talk_push(struct talk *talk, struct sh_err *err);
-/* The recording ends before the connection does: end 0 closes it. */
+/* The recording ends before the connection does: writes frames as if end 0 closed it. */
 int talk_finish(struct talk *talk, struct sh_err *err);
 void talk_close(struct talk *talk);
 

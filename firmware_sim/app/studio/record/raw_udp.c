@@ -11,7 +11,7 @@
 enum { RETRY_MS = 100 };
 
 struct port {
-    struct raw_input input; /* first, so that an input is its port */
+    struct raw_input input; /* the first member: a pointer to it also points to the struct port */
     struct raw *r;
     struct stamped_socket socket;
     struct stamped_datagram datagram;

@@ -251,9 +251,9 @@ static void put_words(FILE *out, const struct report *r)
         "<dt>Expected</dt><dd>The RMS deviation along the beam that follows from the configured noise (of ranges, angles "
         "and places) and from rounding: of angles by the encoders, of coordinates on the wire. It is worked out for "
         "each judged point from its range and incidence.</dd>\n"
-        "<dt>Bound</dt><dd>Noise with a normal distribution has no bound. Without it no point may be farther from "
-        "the scene than the sum of these: the errors that the plan allows, half a count per axis of the numbers on the "
-        "wire, half a count of the encoders, and the radius of the ball within which places are moved.</dd>\n",
+        "<dt>Bound</dt><dd>Noise with a normal distribution has no bound. Without such noise no point may be farther "
+        "from the scene than the sum of these: the errors that the plan allows, half a count per axis of the numbers "
+        "on the wire, half a count of the encoders, and the radius of the ball within which places are moved.</dd>\n",
         out);
     fprintf(
         out,

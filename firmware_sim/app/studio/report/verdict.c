@@ -84,10 +84,10 @@ static void judge_bound(struct report_verdict *v, const struct figures *f, int f
 
 enum { JUDGED_LEAST = 100 };
 
-/* z^2 of a normal deviation has a variance of 2; six standard errors of its mean are exceeded once in 5e8. A
- * fiftieth is added, since sigma is exact only to first order, and the noisy points themselves decide where faces are
- * smooth. For the mean a hundredth of sigma is added. Positions and encoder angles are rounded to counts. That rounding
- * adds between nothing and three times its expected variance (core/studio/deviation.h). */
+/* z^2 of a normal deviation has a variance of 2. Its mean is off by more than six standard errors once in 5e8. To this
+ * limit 0.02 is added, since sigma is exact only to first order, and the noisy points decide where faces are smooth. To
+ * the limit of the mean of z 0.01 is added. Rounding of positions and encoder angles to counts adds between nothing and
+ * three times its expected variance (core/studio/deviation.h). */
 static void judge_noise(struct report_verdict *v, const struct figures *f)
 {
     const double n = (double)f->noisy, tolerance = 6.0 * sqrt(2.0 / n) + 0.02, z2 = f->z_rms * f->z_rms;
@@ -115,8 +115,8 @@ static void beyond_everything(struct report_verdict *v, const struct figures *f,
              reach);
 }
 
-/* With a footprint only points on smooth faces are judged. A cloud of another place has too few of them for a
- * judgement. */
+/* With a footprint only points on smooth faces are judged. A cloud that was scanned at another place has too few of
+ * them for a judgement. */
 static int can_judge_bound(const struct report_subject *s, const struct report_verdict *v)
 {
     return s->head->setup.beam == NULL || v->beyond > 0 || 2 * s->figures->along >= s->figures->points;

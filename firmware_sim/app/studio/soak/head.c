@@ -369,7 +369,7 @@ static const char *why_unseen(const struct soak_link *link, enum fault_kind kind
 {
     switch (kind) {
     case FAULT_LEAP_SECOND:
-        return "the minute was not over";
+        return "the minute with the leap second was not over";
     case FAULT_PTP_LOST:
     case FAULT_PTP_FAULTY:
     case FAULT_PTP_GRANDMASTER:

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The head reports a fault in the thread of the link, before the client can see it. Frames are identified by their
- * numbers, which are the same on all links. */
+/* The head reports a fault in the thread of the link. The client can see a fault of a frame only after that. Frames are
+ * identified by their numbers, which are the same on all links. */
 #include <string.h>
 
 #include "drivers/host/scanhead.h"

@@ -58,12 +58,12 @@ struct soak_link {
     int have_pulse;
     uint64_t pulse0;   /* of the last points frame */
     double usual_rate; /* of the mirror, rad/s; 0: not known */
-    int64_t offset_ns; /* the smallest time from a frame's own to its arrival */
+    int64_t offset_ns; /* the smallest time from a frame's device time to its arrival */
     int have_offset;
     struct soak_ask ask;
     char failed[256];                 /* why the client gave up; empty: it did not */
     uint64_t bad_units;               /* datagrams that equal no clean one */
-    struct soak_datagrams *datagrams; /* NULL: the link speaks the native protocol */
+    struct soak_datagrams *datagrams; /* NULL: its datagrams are not compared */
     /* the client's own */
     struct scanhead *sh;
     char idn[256];

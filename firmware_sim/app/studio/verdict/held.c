@@ -12,8 +12,8 @@
 #include "firmware_sim/app/studio/verdict/family.h"
 #include "firmware_sim/app/studio/verdict/held.h"
 
-/* States of /proc/net/tcp (tcp_states.h of Linux): the client's end is open, and the head's is so, too, or has
- * closed. */
+/* States of /proc/net/tcp (tcp_states.h of Linux) in which the client's end is open. ESTABLISHED: the head's end is
+ * open, too. CLOSE_WAIT: the head's end has closed. */
 enum { STATE_ESTABLISHED = 1, STATE_CLOSE_WAIT = 8, PATH_BYTES = 320, MAX_ADDRESSES = 256 };
 
 /* Calls `see` for each line of a file until a call returns 1. Returns 1 then, else 0. */

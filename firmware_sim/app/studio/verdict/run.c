@@ -139,7 +139,7 @@ static int has_points(struct run *r)
     return atomic_load(&r->stream.points_ns) != 0;
 }
 
-/* For waits of a fixed time. The client's end and a signal end these waits, too. */
+/* Waits of a fixed time use this. The client's end and a signal end these waits, too. */
 static int never(struct run *r)
 {
     (void)r;

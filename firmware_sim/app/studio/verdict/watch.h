@@ -12,7 +12,7 @@
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/loop/links.h"
 
-/* The head ended a session, or turned its client away. Times of clock_now_ns(); 0: not yet. */
+/* A fault ended a session, made its client end it, or kept a client out. Times of clock_now_ns(); 0: not yet. */
 struct watch_break {
     uint32_t link; /* from 1 */
     enum fault_kind kind;

@@ -10,8 +10,8 @@
 #include "core/vec3.h"
 #include "firmware_sim/app/studio/view/stream.h"
 
-/* Returns the edge ratio, rounded upwards. For a float f, ratio <= f then holds just where it holds for the exact
- * ratio. */
+/* Returns the edge ratio, rounded upwards. For each float f, ratio <= f then holds exactly where it holds for the
+ * unrounded ratio. */
 static float ratio_of(const double (*xyz_m)[3], const uint32_t f[3], double mean_m)
 {
     const double *a = xyz_m[f[0]], *b = xyz_m[f[1]], *c = xyz_m[f[2]];

@@ -204,7 +204,7 @@ static int is_due(const struct watch *w)
     return w->dirty && clock_now_ns() - w->published_ns >= (rest_ns > PUBLISH_NS ? rest_ns : PUBLISH_NS);
 }
 
-/* Takes the next frame. Where there is none yet the function sleeps first, unless the head would wait for it. */
+/* Takes the next frame. Where there is none yet the function sleeps first, unless the head waits for the observer. */
 static int next_frame(const struct watch *w, struct scanhead_frame *frame)
 {
     if (w->options.cpu_share > 0.0) {
