@@ -8,16 +8,14 @@
 #   1. accuracy, stability, unit: they compute; beside them the guests, which take longest and so begin first, and the
 #      recipes, which mostly wait
 #   2. wire, which mostly waits; beside it two tests that wait for other people's clients
-#   3. those that need a head in real time, but mostly wait: beside each other
-#   4. those that drive a head at its limits, or that spin: each has the machine to itself
+#   3. those that drive a head at its limits, or that spin: each has the machine to itself
 set -eu
 build=$1
 part=${2:-}
-waiting="three_heads head_faults fault_times slow_reader pty gnss fault_links sessions grabber_hokuyo grabber_velodyne raw_replay signals same_stream"
-waiting="$waiting clients join soak"
 alone="bench_cli latency overrun ring_threads"
 beside="grabber_sick gpsd" # other people's clients take their time
 longest="beside leaks meshes beam_reference range sight_cast coordinates plan beam georef_default attributes moving travel ticks"
+longest="$longest verdict soak time_server models python slow_reader sight_recipes head_faults fault_times"
 
 wanted() {
     [ -z "$part" ] || [ "$part" = "$1" ]
@@ -34,7 +32,7 @@ runs() { # FOLDER NAME [BUILD]
 # programs FOLDER [BUILD]: the test programs of a folder, the longest first, without those that run apart.
 programs() {
     for name in $longest $(cd "tests/$1" && ls test_*.c | sed 's/^test_//; s/\.c$//'); do
-        case " $beside $waiting $alone $seen " in *" $name "*) continue ;; esac
+        case " $beside $alone $seen " in *" $name "*) continue ;; esac
         seen="$seen $name"
         ! runs "$1" "$name" "${2:-}" || echo "${2:-$build/test}/tests/$1/test_$name"
     done
@@ -69,5 +67,5 @@ apart() {
         if [ -z "$part" ] && [ -e "tests/unit/test_$name.c" ]; then echo "$build/asan/tests/unit/test_$name"; fi
     done
 }
-set -- "$@" --5 $(apart $waiting) -- $(apart $alone)
+set -- "$@" -- $(apart $alone)
 exec bash tests/run_tap.sh -t 1200 -j "$(getconf _NPROCESSORS_ONLN)" "$@"

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # Runs test programs that print TAP (cmocka programs, scripts) and adds up.
 #
-#   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [--M PROGRAM...] [-- PROGRAM...]
+#   run_tap.sh [-t SECONDS] [-j N] PROGRAM... [-- PROGRAM...]
 #
 # SECONDS per program; default $TAP_LIMIT_S, or 300; longer by the load, where more want to run than there are processors.
 # A test program ends itself then, and says where it was (tests/common/limit.c). A program that goes on for GRACE_S
@@ -180,10 +180,9 @@ wait_all() {
 beside=0
 for program; do
     case $program in
-    --*)
+    --)
         wait_all
-        at_a_time=${program#--} beside=0
-        at_a_time=${at_a_time:-1}
+        at_a_time=1 beside=0
         ;;
     +*)
         beside=$((beside + 1)) # it stays counted once it has ended: one more at a time does no harm
