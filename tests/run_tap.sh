@@ -7,8 +7,8 @@
 # SECONDS per program; default $TAP_LIMIT_S, or 300; longer by the load, where more want to run than there are processors.
 # A test program ends itself then, and says where it was (tests/common/limit.c). A program that goes on for GRACE_S
 # more, such as a script, is killed with all that it started. N programs at a time, default 1; a program that begins
-# with `+` runs beside these. Programs after `--M` begin once all before have ended, M at a time. Programs after `--`
-# have the machine to themselves, one after the other.
+# with `+` runs beside these. Programs after `--` begin once all before have ended, one
+# after the other.
 # Prints one line per program, in the order given, and the tables of those that have some. For one that fails, it
 # prints all output but the passed tests. The reasons of skips follow.
 # The last line is `N passed, N failed, N skipped`. Exit status 1 when anything failed, 2 for wrong usage.
