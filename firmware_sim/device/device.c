@@ -321,7 +321,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
-    /* `told`: the run was to end before this tick. If it is over without that, its one scan ended in this tick. */
+    /* told: the run had to end before this tick. Else its only scan ended, or its self-test failed, in this tick. */
     const int told = device->ending || tick >= device->end_tick;
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;
