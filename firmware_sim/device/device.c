@@ -182,11 +182,10 @@ static void warn_refused(const struct device *device)
 {
     const struct device_journal *journal = &device->journal;
     if (journal->n_refused == 0) return;
-    sh_warn(
-        device->options.report,
-        "journal: %.200s:%u: %.60s: %s; of %zu replayed commands the head refused %zu, so the session is another one",
-        device->options.replay, journal->refused->line_no, journal->refused->line, journal->why, journal->at,
-        journal->n_refused);
+    sh_warn(device->options.report,
+            "journal: %.200s:%u: %.60s: %s; of %zu replayed commands the head refused %zu, so the session differs",
+            device->options.replay, journal->refused->line_no, journal->refused->line, journal->why, journal->at,
+            journal->n_refused);
 }
 
 int device_close_journal(void *self, struct sh_err *err)
