@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The command line of both programs: scanhead, and with HEAD_ALONE scanheadd, which is the head alone, for a board. */
+/* The command line of both programs: scanhead, and scanheadd (HEAD_ALONE), which is the head alone, for a board. */
 #include <errno.h>
 #include <fcntl.h>
 #include <malloc.h>
@@ -116,7 +116,7 @@ int main(int argc, char **argv)
 {
     hold_streams();
     own_pipes();
-    /* Memory of meshes goes back to the system at once, however large the file was that was freed before. */
+    /* malloc would raise this threshold with each large block that is freed, and then keep memory of meshes. */
     mallopt(M_MMAP_THRESHOLD, 4 << 20);
 #ifdef HEAD_ALONE
     app_program = "scanheadd";

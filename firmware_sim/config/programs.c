@@ -143,7 +143,7 @@ static enum config_from grade_of(const struct cfg_reader *rd, const char *path, 
     return (enum config_from)(rd->from[cfg_row(rd, cfg_find(&rd->table, path))][i] - 1);
 }
 
-/* Sets the figures that the file leaves out to those of the head as a whole. */
+/* Gives the program the figures of the head as a whole where the file leaves figures out. */
 static void complete(const struct cfg_reader *rd, const struct config_profile *p, uint32_t i,
                      struct config_program *program)
 {

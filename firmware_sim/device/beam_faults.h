@@ -19,7 +19,7 @@ struct device_beam {
     const struct head_settings *settings;
     int64_t tick_ns;
     int64_t held_uhz; /* the rotor's speed while its phase is held (phase_lock.c); 0: it runs free */
-    double free_ppm;  /* the error of its speed then */
+    double free_ppm;  /* the error of its speed while it runs free */
     uint32_t version; /* of the board's list that `fault` was taken from */
     uint32_t n;
     struct device_beam_fault {

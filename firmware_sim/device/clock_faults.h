@@ -19,8 +19,8 @@ void device_run_clock_faults(struct head_faults *faults, struct head_clock *cloc
 int device_has_clock_fault(const struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 void device_count_clock_fault(struct head_faults *faults, enum fault_kind kind, int64_t t_ns);
 
-/* Return how late all faults together make a sentence, at most 10 s, or a PPS pulse. Each fault makes every other pulse
- * late, from the first in its window on. */
+/* Return how late all faults together make a sentence (at most 10 s), or a PPS pulse. In its window, a fault makes the
+ * first pulse late, then the third, and so on. */
 int64_t device_sentence_late_ns(const struct head_faults *faults, int64_t t_ns);
 int64_t device_pulse_late_ns(const struct head_faults *faults, int64_t edge_ns);
 

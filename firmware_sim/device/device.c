@@ -182,11 +182,10 @@ static void warn_refused(const struct device *device)
 {
     const struct device_journal *journal = &device->journal;
     if (journal->n_refused == 0) return;
-    sh_warn(
-        device->options.report,
-        "journal: %.200s:%u: %.60s: %s; of %zu replayed commands the head refused %zu, so the session is another one",
-        device->options.replay, journal->refused->line_no, journal->refused->line, journal->why, journal->at,
-        journal->n_refused);
+    sh_warn(device->options.report,
+            "journal: %.200s:%u: %.60s: %s; of %zu replayed commands the head refused %zu, so the session differs",
+            device->options.replay, journal->refused->line_no, journal->refused->line, journal->why, journal->at,
+            journal->n_refused);
 }
 
 int device_close_journal(void *self, struct sh_err *err)
@@ -321,7 +320,7 @@ int device_claim(struct device *device, struct device_work *work)
         device_describe(device, work);
     work->telemetry = tick % device->tick_hz == 0 && !off;
     if (work->telemetry || ends_scan(work)) fill_telemetry(device, tick, &work->telemetry_frame);
-    /* `told`: the run was to end before this tick. If it is over without that, its one scan ended in this tick. */
+    /* told: the run had to end before this tick. Else its only scan ended, or its self-test failed, in this tick. */
     const int told = device->ending || tick >= device->end_tick;
     if (!was_over && (told || device->over)) device->journal.end_tick = told ? tick : tick + 1;
     device->over |= told;

@@ -143,7 +143,7 @@ int device_claim(struct device *device, struct device_work *work);
 void device_lost(struct device *device, const struct device_work *work);
 /* Ends the use of a work, delivered or lost. Call it once for each claimed work. Any thread; takes no lock. */
 void device_done(struct device_work *work);
-/* Holds the site of a scan, by the scan's number, for callers without its works. NULL: that is neither the scan at hand
+/* Holds the site of a scan, by the scan's number, for callers that claim no ticks. NULL: it is neither the scan at hand
  * nor the last one. If stations have moved since the last scan, its site has their present places. The site is valid
  * until device_let_go, which must come before device_free, and soon after the scan's end. Takes the device's lock for a
  * moment. Any thread. */
@@ -158,11 +158,11 @@ int device_is_idle(struct device *device);
 /* Ends the run: stops a running scan first. Not for signal handlers. */
 void device_end(void *self);
 
-/* Carries out one command line for a session (from 1). */
+/* Carries out one command line for a session (from 1). released: how many ticks are released, for queries. */
 void device_command(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
 /* The same for a session of another protocol (drivers/protocol): control is given back at once, without an event. */
 void device_command_once(void *self, uint32_t session, const char *line, uint64_t released, struct command_result *out);
-/* A line ended that was too long for the command set. */
+/* A line that was too long for the command set has ended. */
 void device_overlong(void *self, uint32_t session, struct command_result *out);
 /* A session has begun; who: its kind of link and address, for others to read. */
 void device_session_opened(void *self, uint32_t session, const char *who);
@@ -201,8 +201,8 @@ const struct site *device_hold_site(struct device *device, struct device_version
 void device_give_back(struct device_version *version);
 const struct site *device_site_of(const struct device_version *version);
 
-/* Stored settings of a protocol's sessions (settings_file.h). Both functions return 1 where the head keeps nothing, 0
- * else. */
+/* Stored settings of a protocol's sessions (settings_file.h). Both functions return 1 where the head keeps nothing, or
+ * the text can't be stored; 0 else. */
 int device_store(void *self, const char *name, const char *text);
 int device_stored(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);
 
@@ -226,7 +226,7 @@ enum protocol_pps device_pps(void *self, int64_t t_ns, int64_t *hour_ns);
  * mirror changes speed. */
 uint64_t device_rests_from(void *self);
 
-/* The last power-up. While power is off, all but the time are those of the power-up before. */
+/* The last power-up. While power is off, all members but t_ns are those of the power-up before. */
 struct device_power_up {
     int64_t t_ns;       /* device time at which power came, or will come back; 0: it has always been on */
     uint32_t ons;       /* how often power has come, including the first time */

@@ -135,8 +135,8 @@ void device_count_duration(struct device *device, uint64_t tick);
 void device_begin_scan(struct device *device, uint64_t tick);
 /* Claims the tick's part of the scan that is on: descriptor, names, pulses; and the scan's end. */
 void device_claim_scan(struct device *device, uint64_t tick, struct device_work *work);
-/* Whether descriptor and anchor go out again in this tick, for readers that join late or because they were lost.
- * Between scans they are those of the last one; before the first, those of scan 0 with the settings of power-up. */
+/* Whether descriptor and anchor go out again in this tick: for readers that join late, or because these frames were
+ * lost. Between scans they are those of the last scan; before the first, those of scan 0 with power-up's settings. */
 int device_is_repeated(const struct device *device, uint64_t tick);
 void device_before_scans(struct device *device);
 void device_describe(struct device *device, struct device_work *work);
@@ -168,7 +168,7 @@ void device_take_move(struct device *device, int64_t t_ns, struct command_result
 void device_end_move(struct device *device);
 
 /* live_pose.c */
-/* Returns the end of the head's path, since the scan's start; INT64_MAX: there is none. */
+/* Returns when the head's path ends the scan, since its start; INT64_MAX: no path ends it. */
 int64_t device_path_end_ns(const struct device *device);
 /* The head's pose at a device time; 0: it stands at its station. A trajectory runs from the start of the
  * last scan to its end; then the platform stands there until the next scan begins. */

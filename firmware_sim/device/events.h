@@ -35,8 +35,8 @@ void device_push_event(struct device_events *events, enum native_event_code code
                        const char *text);
 /* Puts as many events into the work as fit. */
 void device_take_events(struct device_events *events, struct device_work *work);
-/* Adds an event for an error of a session, or of the head (0). Each of these gets at most DEVICE_ERRORS_A_SECOND such
- * events in a second of device time. Further errors are held back. */
+/* Adds an event for an error of a session, or of the head (0). Each session, and the head, gets at most
+ * DEVICE_ERRORS_A_SECOND such events in a second of device time. Further errors are held back. */
 void device_push_error(struct device_events *events, uint32_t session, int number, const char *text);
 /* Adds an event for each session of which errors were held back in a second that is over, with their number. is_over:
  * the run is over, so seconds that are not over count, too. */

@@ -4,7 +4,7 @@
  * In: the head's pose and the true time (head_clock.h). Out: fixes with the position of its antenna at multiples
  * of 1/rate_hz of UTC. drivers/protocol makes NMEA 0183 sentences of them.
  *
- * The receiver runs from power-up on, also while the head does not scan. (In the pace fast device time itself
+ * The receiver runs from power-up on, also while the head does not scan. (In the pace `fast`, device time itself
  * stands still while the head has nothing to do.) The antenna is at the head's origin plus gnss.lever_arm_m
  * in the head's frame. The receiver's noise, if any, is normal and independent east, north and up. The noise is keyed
  * by noise.seed and the number of the position since power-up. Thread: constant after the clock is powered

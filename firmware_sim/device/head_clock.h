@@ -36,7 +36,7 @@ enum { HEAD_CLOCK_CHANGES = 64 };
 struct head_clock_change {
     int64_t jump_ns;  /* it is set forward by this */
     int64_t gain_ppt; /* its gain rises by this, in 1e-12 */
-    int stands;       /* 1: it stands from now on; -1: no more for this reason */
+    int stands;       /* 1: one more reason to stand; -1: one reason is over */
 };
 
 __extension__ typedef __int128 head_clock_wide;

@@ -76,7 +76,7 @@ void head_faults_init(struct head_faults *faults, struct fault_board *board, int
  * Returns 1 when one of the faults is active or has just ended. */
 int head_faults_step(struct head_faults *faults, uint64_t kinds, const struct head_faults_tick *tick);
 
-/* Returns the fault of a kind that is active and comes next in the list: after NULL the first, after the last NULL. */
+/* Returns the next active fault of a kind in the list after `before`; NULL: the first. Returns NULL after the last. */
 struct head_fault *head_faults_next(struct head_faults *faults, enum fault_kind kind, const struct head_fault *before);
 
 /* Does the same for a kind that strikes at an event, such as a boot. The event is at t_ns: the function returns faults

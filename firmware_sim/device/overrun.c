@@ -45,7 +45,7 @@ void device_say_lost_lines(struct device_overrun *overrun, uint64_t tick)
     overrun->lines_said = journal + truth;
 }
 
-/* Puts the events of a lost tick before later ones, unless they are forgotten. An overrun event is taken back instead:
+/* Puts the events of a lost tick before later ones; is_forgotten: drops them. An overrun event is taken back instead:
  * the next one reports its losses and the new ones. So a long overload can't fill the room for events. */
 static void take_back(struct device_overrun *overrun, const struct device_work *work, int is_forgotten)
 {

@@ -18,19 +18,19 @@
 
 struct settings_file;
 
-/* Reads the file, or makes an empty one. path and profile must outlive it. SH_EINPUT: the file is no such file, broken,
- * of another head profile, or another process has it; also SH_EIO and SH_ENOMEM. report takes a failure to write; NULL:
+/* Reads the file, or makes an empty one. path and profile must outlive it. SH_EINPUT: the file is broken, of another
+ * form or head profile, or another process has it; also SH_EIO and SH_ENOMEM. report takes a failure to write; NULL:
  * nobody does. */
 int settings_file_open(const char *path, const char *profile, const struct sh_report *report,
                        struct settings_file **out, struct sh_err *err);
 
-/* Reads the file as settings_file_open does, but neither makes nor locks it: a head may have it. A file that is missing
- * is right. */
+/* Reads the file as settings_file_open does, but neither makes nor locks it: a head may have it. A missing file is
+ * no error. */
 int settings_file_check(const char *path, const char *profile, struct sh_err *err);
 
 /* Replaces what is stored under a name: whole lines with their '\n'; empty: nothing is stored there any more.
- * SH_EINPUT: a character is not printable ASCII, an empty line, a missing end, or too long for the file; or a name of
- * more than 31 bytes, or a ninth name. Nothing changes then. Any thread; never waits for the file. */
+ * SH_EINPUT: a line is empty, too long, not printable ASCII or without its end; the text is too long; the name has
+ * more than 31 bytes, or is a ninth one. Nothing changes then. Any thread; never waits for the file. */
 int settings_file_put(struct settings_file *file, const char *name, const char *text);
 
 enum { SETTINGS_FILE_TEXT = 2048 }; /* of all that is stored under a name, with the NUL */

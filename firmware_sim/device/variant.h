@@ -23,7 +23,7 @@ struct device_variant {
     _Atomic uint32_t users;
 };
 
-/* All of them. */
+/* All variants of a device. */
 struct device_variants {
     struct device_variant *list;
     const struct device_moves *moves; /* the device's, with the present site */

@@ -34,7 +34,7 @@ int fault_board_close(struct fault_board *board, struct sh_err *err);
 int fault_board_is_filling(const struct fault_board *board);
 void fault_board_free(struct fault_board *board);
 
-/* Changes with the list; 0: it has always been empty. Real-time safe. */
+/* Returns a number that changes with the list; 0: the list has always been empty. Real-time safe. */
 uint32_t fault_board_version(const struct fault_board *board);
 /* Copies the list, and returns its version. */
 uint32_t fault_board_copy(struct fault_board *board, struct fault_entry entries[FAULT_MAX], uint32_t *n);

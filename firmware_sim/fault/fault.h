@@ -81,7 +81,7 @@ enum fault_kind fault_act_of(enum fault_kind kind, uint32_t acts);
 /* Returns n; if that is 0, the default of the kind. */
 uint32_t fault_n(const struct fault *fault);
 
-/* Whether the fault strikes there, without regard to its count. index: in the list; link: the spot's. */
+/* Whether the fault strikes there, without regard to its count. index: the fault's number; link: the spot's. */
 int fault_strikes(const struct fault *fault, uint32_t index, uint32_t link, const struct fault_spot *spot);
 /* Returns a random number that belongs to fault and place; `draw` tells the draws of one place apart, from 1. */
 uint64_t fault_random(const struct fault *fault, uint32_t index, uint32_t link, uint64_t number, uint32_t draw);

@@ -38,7 +38,7 @@ struct faulty_link {
     struct faulty_session session[LINK_MAX_SESSIONS];
     struct faulty_connections connections;
     int64_t plug_ns;          /* clock: when an unplugged link is there again; 0: it is */
-    struct fault_note pulled; /* of the last pull of the cable; at its end `ended` is set, and t_ns to the end's time */
+    struct fault_note pulled; /* of the last pull of the cable; at its end `ended` is 1, and t_ns is the end's time */
     int resets;               /* 1: what was connected is reset once that cable is in again */
     int plug_failed;          /* it could not come back so far, and that was reported */
     int64_t refuse_until_ns;  /* clock: until then clients are turned away */

@@ -49,7 +49,7 @@ void faulty_next(struct faulty_link *link, int session, int is_reply, int64_t t_
 /* All bytes from before device time t_ns were written to the session; INT64_MAX: none will follow. Passes on what is
  * due. Returns 1 if write() takes more; 0: not now; negative: as write(). */
 int faulty_pass(struct faulty_link *link, int session, int64_t t_ns);
-/* A command of the session changed the faults. The command's own reply is the last of the next n ones. */
+/* A command of the session changed the faults. The command's own reply is the last of the next n_replies. */
 void faulty_changed(struct faulty_link *link, int session, uint64_t n_replies);
 
 /* Notes the end of a pulled cable: it is plugged in, or another fault of the link replaces it, or the run ends. Does

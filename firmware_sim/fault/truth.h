@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The truth: a file that says what was injected, where, and when.
  *
- * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: a writer may be
- * called by any number of threads, and never waits for the file: a thread of its own writes that (line_writer.h). Where
+ * In: a note of one fault. Out: a line of JSON in a file, and a line of text for the journal. Thread: any number of
+ * threads may write notes. They never wait for the file, which a thread of its own writes (line_writer.h). Where
  * the file is slower than faults strike, {"missing":n} stands for n lines that were dropped. */
 #ifndef FIRMWARE_SIM_FAULT_TRUTH_H
 #define FIRMWARE_SIM_FAULT_TRUTH_H
@@ -15,9 +15,9 @@ struct fault_note {
     uint32_t fault; /* number of the entry, from 1 */
     enum fault_kind kind;
     int64_t t_ns;           /* device time */
-    uint32_t link, session; /* from 1; 0: in the head */
+    uint32_t link, session; /* from 1; 0: none, as in the head */
     int of;                 /* enum fault_of */
-    uint64_t number;        /* of the frame, reply or connection, as this fault counts them */
+    uint64_t number;        /* of the frame or reply, as this fault counts them; of the connection on its link */
     int has_seq;            /* a frame of the native protocol, with its sequence number and type: */
     uint32_t seq, type;
     int has_pulse;

@@ -120,7 +120,7 @@ static int cut(struct change *c)
     return 1;
 }
 
-/* Marks the bits that may change in the wire's mask. Returns how many. */
+/* Marks in the wire's mask the bits that may change. Returns how many. */
 static uint64_t mark_bits(const struct change *c)
 {
     const struct fault *f = &c->fault->entry.fault;
@@ -274,8 +274,8 @@ static int echo(struct change *c)
     return put_before(c, piece);
 }
 
-/* Sends the previous reply in the place of this one. Where there is none, or it is the same, a native client gets
- * OK or, where this one is OK, 0. */
+/* Sends the previous reply in place of this one. Where that is missing or the same, a native client gets OK, or gets 0
+ * instead of OK. */
 static int wrong_reply(struct change *c)
 {
     struct wire *wire = c->wire;

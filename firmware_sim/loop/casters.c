@@ -21,8 +21,8 @@ static int may_claim(struct loop *loop)
     return pace != PACE_FAST || !device_is_idle(loop->device);
 }
 
-/* Whether as many ticks as the caster wants may be claimed now. They are half of the ticks ahead at most, so the
- * release of those that are on their way makes room for them. With claim_lock held. */
+/* Whether as many ticks as the caster wants may be claimed now. They are at most half of the ticks ahead, so there
+ * is room for them once the ticks on their way are released. With claim_lock held. */
 static int has_room(const struct loop_caster *caster)
 {
     const struct casters *casters = &caster->loop->casters;
@@ -53,7 +53,7 @@ static int claim_tick(struct loop_caster *caster, uint32_t i)
     return 1;
 }
 
-/* Sets how many ticks the caster wants, of which the first is claimed: about those up to the pulse `end`. */
+/* Sets how many ticks the caster wants, with the one claimed already: about those up to the pulse `end`; 0: one. */
 static void set_wanted(struct loop_caster *caster, uint64_t end)
 {
     const struct device_work *first = &caster->work[0];
@@ -176,8 +176,8 @@ static void *caster_main(void *arg)
     return NULL;
 }
 
-/* In the pace `fast` there is time to claim several ticks. The ticks ahead have one share more than there are casters,
- * so that a caster need not wait until all of its last ticks are released. */
+/* In the pace `fast` there is time to claim several ticks. The ticks ahead are cut into one share more than there are
+ * casters, so that a caster need not wait until all of its last ticks are released. */
 static int create_caster(struct loop *loop, uint32_t n, struct loop_caster *caster, struct sh_err *err)
 {
     const uint64_t room = loop->casters.ahead_ticks / (n + 1);

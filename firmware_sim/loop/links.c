@@ -43,7 +43,7 @@ static void advise(const struct config *cfg, double share, char *text, size_t le
 }
 
 /* A link of the native protocol that can't carry the stream is refused before it loses any of it. The other protocols
- * are not checked: their rates depend on what clients ask for. A link of these loses whole units, which are counted. */
+ * are not checked: their rates depend on what clients ask for. Such a link loses whole units, which are counted. */
 static int check_capacity(const struct links *links, const struct config *cfg, const struct pump *pump,
                           struct sh_err *err)
 {

@@ -16,7 +16,7 @@ static void count_lost(struct pump *pump, uint32_t n, uint64_t pulses)
     atomic_fetch_add(&pump->stream->counters->reader_lost_pulses, pulses);
 }
 
-/* Reports the session to the error queue, once until its reader has caught up again. */
+/* Reports a loss of the session to the error queue; the next one only after its reader has caught up. */
 static void lost_frames_report(struct pump *pump, struct session *s)
 {
     if (!s->lost.lagging) {

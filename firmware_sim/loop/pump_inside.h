@@ -53,7 +53,7 @@ struct session {
     } lost;          /* lost_frames.c */
     uint8_t *out;
     uint32_t out_len, out_pos;       /* bytes from out_pos on are not written yet */
-    uint32_t frames_from, frames_to; /* in out: replies before and after */
+    uint32_t frames_from, frames_to; /* the part of `out` with frames; replies are before and after it */
     struct session_commands commands;
     /* of a protocol that is not native */
     struct pump *pump;
@@ -125,8 +125,8 @@ int session_is_done(const struct pump *pump, const struct session *s);
 int session_pass(struct pump *pump, struct session *s, int is_last);
 /* Whether bytes that were written wait in the link. */
 int session_waits(const struct pump *pump, const struct session *s);
-/* In the paces that wait, sessions take no frames while the file of the truth is behind. The sessions' clients still
- * get their replies. */
+/* In the paces that wait, sessions with faults take no frames while files of the source are behind (files_fill). Their
+ * clients still get their replies. */
 int session_waits_for_files(const struct pump *pump);
 /* Returns the number of the session on its link. */
 static inline int session_index(const struct pump *pump, const struct session *s)

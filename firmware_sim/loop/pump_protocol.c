@@ -286,7 +286,7 @@ static int has_room(const struct session *s)
     return unit_queue_room(&s->units) >= s->units.cap / 2;
 }
 
-/* How many bytes the protocol is given at once now. While answers have no room it still goes on once the input buffer
+/* Returns how many bytes the protocol is given now. Where answers have no room, it gets some only once the input buffer
  * is full: a client that sends and never reads loses answers. Datagrams stay whole. */
 static uint32_t piece_of(const struct pump *pump, const struct session *s)
 {

@@ -53,7 +53,7 @@ struct loop_source_ops {
     int (*close_files)(void *self, struct sh_err *err);
 
     /* ---- where the source makes its ticks itself; else NULL. One thread, the player's. */
-    /* No tick has more bytes. */
+    /* Returns an upper bound of a tick's bytes. */
     uint32_t (*most_bytes)(const void *self);
     uint32_t (*usual_bytes)(const void *self);
     /* Descriptor, emitter and anchor, for clients that join before the first tick. */

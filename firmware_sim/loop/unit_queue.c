@@ -6,7 +6,7 @@
 
 #include "core/err.h"
 
-/* The head before each unit in the queue. */
+/* The header before each unit in the queue. */
 struct unit_head {
     struct unit_kind kind;
     uint32_t len;

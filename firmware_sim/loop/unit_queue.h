@@ -12,7 +12,7 @@
 struct unit_queue {
     uint8_t *bytes;
     uint32_t cap;
-    uint32_t begin, end; /* units lie between these, each after its head */
+    uint32_t begin, end; /* units lie between these, each after its header */
     uint32_t n;          /* units */
     uint32_t out;        /* bytes of the oldest one that are written */
 };

@@ -22,7 +22,7 @@ uint32_t worker_usual_bytes(const struct site *site);
 
 /* ---- lines ahead (core/cast.h): for a caster that claims several ticks before it makes the first one */
 int worker_add_ahead(struct worker *worker, struct sh_err *err);
-/* Returns the pulse up to which ticks should be claimed, of which `work` is the first. 0: only that one. */
+/* Returns the pulse up to which to claim ticks, after the first one, `work`. 0: no more ticks. */
 uint64_t worker_end_ahead(struct worker *worker, const struct device_work *work);
 /* Finds the hits of n consecutive ticks. worker_end_ahead of the first one was not 0. worker_fill then takes these
  * hits, until worker_forget, or until another scan begins. */

@@ -38,7 +38,7 @@ static int goes_on(const struct device_work *work, const struct device_work *fir
            memcmp(&work->segment, &first->segment, sizeof work->segment) == 0;
 }
 
-/* Fewer pulses than those of two lines have hardly any neighbours. */
+/* Does nothing for less than two lines: their pulses have hardly any neighbours. */
 void worker_look_ahead(struct worker *worker, const struct device_work *work, uint32_t n)
 {
     struct schedule_run run[CAST_AHEAD_RUNS];

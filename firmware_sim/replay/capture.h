@@ -28,7 +28,7 @@ struct capture_place {
 struct capture_counts {
     uint64_t packets, others; /* all; those that are neither TCP nor UDP */
     uint64_t fragments, damaged;
-    uint64_t backward, untimed; /* packets with a time before that of an earlier one; without any */
+    uint64_t backward, untimed; /* packets with a time before an earlier packet's; packets without a time */
     uint64_t unknown_links;     /* packets of link types that are not read */
     unsigned unknown_link;      /* the last one of these */
     uint64_t missing_bytes;     /* of TCP streams and of packets that were cut off */

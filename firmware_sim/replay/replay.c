@@ -66,8 +66,8 @@ static enum loop_source_tick next(void *self, uint64_t tick, int may_idle, int a
     if (r->playing && !wishes.paused) {
         const struct ring_tick before = r->tick;
         r->tick = (struct ring_tick){.scan = before.scan};
-        /* Time without frames passes at once only where nobody counts it: --duration does, and so do devices'
-         * protocols. */
+        /* Time without frames passes at once only where nobody counts it. --duration and the protocols of devices
+         * count it. */
         replay_fill(r, tick, may_idle && r->end_tick == UINT64_MAX && !r->is_device);
         replay_count(r);
         r->tick.n_cast += before.n_cast;

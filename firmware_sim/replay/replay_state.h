@@ -36,7 +36,7 @@ struct replay {
     int speed_changed, loop;
     int64_t position_ns; /* of the frame that was sent last, since the first one */
     int wants_again;     /* it is to begin anew by itself */
-    int n_clients;       /* sessions, without those that file, null and udp links open for themselves */
+    int n_clients;       /* sessions, but not those that links of type file, null and udp open by themselves */
     int ends_then;       /* the run ends when the recording was played */
     uint32_t times;      /* how often it was begun so far */
     uint64_t frames;     /* sent */

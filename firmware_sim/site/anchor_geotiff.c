@@ -13,7 +13,7 @@
 
 /* Two libraries agree on the same projection to nanometres; other grids differ by metres. */
 #define SAME_GRID_M 1e-3
-/* From here on the tangent frame's error is worth a warning. */
+/* An error of the tangent frame gets a warning from this value on. */
 #define CORNER_M 0.01
 
 /* The scene's rasters, as one. */

@@ -30,8 +30,8 @@ static int open_trial(struct trial *trial, struct site *site, const struct sh_re
 
 /* ---- beams */
 
-/* Returns why the scene, in which nothing moves, has no outlines; NULL: it has some. Holes that textures cut have none,
- * and those of copies are not made. */
+/* Returns why the scene, in which nothing moves, has no outlines; NULL: it has some. Outlines are not
+ * made for holes that textures cut, and for copies. */
 static const char *has_no_outlines(const struct scene *scene)
 {
     return scene->cutout != NULL ? "outlines of holes that textures cut (scene.cutouts) are not known"

@@ -179,7 +179,7 @@ static void warn_of_coarse_counts(const struct site *site, const struct sh_repor
         FINEST_M * MOST_RANGE_COUNTS / (polar ? 1.0 : 2.0));
 }
 
-/* Returns the longest count of a station, in metres. The reach is that of scale_station: beyond it no point lies, and
+/* Returns the longest count of a station, in metres, within the reach of scale_station. Beyond it no point lies, though
  * a count of longitude may be longer there. */
 static double count_m(const struct site *site, const struct site_station *s)
 {

@@ -30,7 +30,7 @@ struct placement {
 int placement_find(const struct config *cfg, uint32_t i, const struct placement_anchor *anchor, const struct bvh *bvh,
                    struct placement *out, struct sh_err *err);
 
-/* Returns the distance of two places on the Earth, along a straight line through it. */
+/* Returns the length of the straight line between two places on the Earth, in metres. */
 double placement_apart_m(const struct georef_place *a, const struct georef_place *b);
 
 /* Sets the columns of `level`: right, forward and up at a place, in the scene frame. Without an anchor, up is z. */

@@ -112,7 +112,7 @@ static void add_range(const struct site *site, struct site_plan *plan)
     plan_say(&plan->row[plan->n++], "range", method, 0.0, 0.0, why);
 }
 
-/* Adds a row for the first tripod. Where there are more, the row names the station of this one. */
+/* Adds a row for the first tripod. Where there are several, the row names that tripod's station. */
 static void add_tripods(const struct site *site, struct site_plan *plan)
 {
     char text[200], why[sizeof plan->row->why];

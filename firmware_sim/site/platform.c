@@ -11,9 +11,9 @@
 #include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 
-/* Limits for the head's poses: the largest distance of its path from the trajectory; and the longest time between poses
- * where the head moves further than LONGEST_M from one to the next, or turns by over 0.01 rad. Recorded trajectories
- * have such steps. */
+/* Limits for the head's poses. Their path is within TOLERANCE_M of the trajectory. Two poses are at most LONGEST_NS
+ * apart, as recorded ones are. They may be further apart while the head moves by at most LONGEST_M and turns by at most
+ * 0.01 rad. */
 static const double TOLERANCE_M = 1e-4, LONGEST_M = 0.01;
 static const int64_t LONGEST_NS = 10000000;
 

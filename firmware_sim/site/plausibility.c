@@ -22,7 +22,7 @@ static const double EMPTY_SHARE = 0.05;
 enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
 _Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
 
-/* Returns the program of the configured pulse rate, which has the smallest and the largest range. */
+/* Returns the program of the configured pulse rate. It gives the head's smallest and largest range. */
 static const struct config_program *program_of(const struct site *site)
 {
     const struct config *cfg = site->cfg;

@@ -164,7 +164,7 @@ struct site {
 /* A path is cut into stretches whose poses are within this distance of a centre. */
 #define SITE_STRETCH_M 1000.0
 
-/* Extents go this much beyond the head's largest range, for noise. */
+/* Extents are this many times the head's largest range, for noise. */
 #define SITE_MARGIN 1.01
 
 enum site_purpose {

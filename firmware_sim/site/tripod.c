@@ -104,7 +104,7 @@ void site_describe_tripod(const struct site_station *s, char *text, size_t len)
 
 /* ---- legs */
 
-/* A leg begins this part of its length below the top. Otherwise a head at the top itself would be inside all legs. */
+/* A leg's mesh leaves out this share of the leg at the top. Otherwise a head at the top would be inside all legs. */
 static const double LEG_BEGINS = 0.1;
 
 /* Makes a prism along the leg, from LEG_BEGINS of the leg's length to its end. */

@@ -140,7 +140,7 @@ static void warn_noise(const struct config *cfg, const struct waveform *waveform
         snprintf(advice, sizeof advice, "; waveform.bandwidth_mhz=%.0f is enough", ceil(1e-6 * enough_hz));
     sh_warn(report,
             "%s: waveform.echoes: the level of an echo is %.2g times the noise (threshold_snr %.3g, times %.2g, the "
-            "peak of a pulse after the receiver), so many echoes are of noise alone; at %g times or more, few are%s",
+            "peak of a pulse after the receiver): many echoes are of noise alone; at %g times or more, few are%s",
             cfg->file, peak / spec->noise, 1.0 / spec->noise, peak, LEAST_SNR, advice);
 }
 

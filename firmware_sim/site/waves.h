@@ -25,8 +25,8 @@ struct site_waves {
 };
 
 /* Makes site->waves; NULL where the configuration has no waveforms. Warns where a count of the digitiser is
- * too coarse for echoes that the head detects. SH_EINPUT also where the stream would have more than 400 MB of waveforms
- * per second (MOST_BYTES_S in waves.c). */
+ * too coarse for echoes that the head detects, and where many echoes are noise. SH_EINPUT also where the stream would
+ * have more than 400 MB of waveforms per second (MOST_BYTES_S in waves.c). */
 int site_set_up_waves(struct site *site, const struct sh_report *report, struct sh_err *err);
 void site_free_waves(struct site *site);
 

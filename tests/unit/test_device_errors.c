@@ -60,7 +60,7 @@ static void keep_warning(void *ctx, const char *text)
     strcpy(ctx, text); /* sh_warn has 512 bytes */
 }
 
-/* A journal has commands that had an effect. Where the head refuses some, the session is another one, and that is said
+/* A journal has commands that had an effect. Where the head refuses some, the session differs, and that is said
  * once, with the first of them. */
 static void a_replay_says_what_it_refused(void **state)
 {

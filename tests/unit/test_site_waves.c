@@ -213,12 +213,11 @@ static void a_bandwidth_that_is_advised_is_enough(void **state)
         const double peak = waveform_pulse_peak(site->waves->waveform);
         if (times == 1) break;
         assert_true(peak < 5.0 * s->noise);
-        snprintf(
-            says, sizeof says,
-            "test.yaml: waveform.echoes: the level of an echo is %.2g times the noise (threshold_snr %.3g, times "
-            "%.2g, the peak of a pulse after the receiver), so many echoes are of noise alone; at 5 times or more, "
-            "few are; waveform.bandwidth_mhz=",
-            peak * cfg->profile.threshold_snr, cfg->profile.threshold_snr, peak);
+        snprintf(says, sizeof says,
+                 "test.yaml: waveform.echoes: the level of an echo is %.2g times the noise (threshold_snr %.3g, times "
+                 "%.2g, the peak of a pulse after the receiver): many echoes are of noise alone; at 5 times or more, "
+                 "few are; waveform.bandwidth_mhz=",
+                 peak * cfg->profile.threshold_snr, cfg->profile.threshold_snr, peak);
         const char *at = strstr(warned, says);
         if (at == NULL) fail_msg("%s instead of %s", warned, says);
         advised = strtod(at + strlen(says), NULL);
@@ -228,7 +227,7 @@ static void a_bandwidth_that_is_advised_is_enough(void **state)
     assert_string_equal(warned, "");
     snprintf(waveform, sizeof waveform, "echoes: fraction, bandwidth_mhz: %.6f", advised / 1.1 - 2.0); /* rounded up */
     spec_of(waveform, "noise: {range: off}\n");
-    assert_non_null(strstr(warned, "so many echoes are of noise alone"));
+    assert_non_null(strstr(warned, "many echoes are of noise alone"));
 }
 
 /* ---- blocks and the plan */

@@ -11,11 +11,11 @@
 struct cfg_reader;
 struct config_diagnostics;
 
-/* "FILE:LINE: text", without the line when it is 0. Within a value of --set: "--set KEY: character LINE of the value:
+/* Adds "FILE:LINE: text", without LINE when it is 0. In a value of --set it is "--set KEY: character LINE of the value:
  * text". Returns code. */
 int cfg_fail_file(struct cfg_reader *rd, int code, int line, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
-/* "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
+/* Adds "FILE:LINE: KEY: text", or "--set KEY: text" when line is CFG_FROM_SET. */
 int cfg_fail(struct cfg_reader *rd, int line, const char *name, const char *fmt, ...)
     __attribute__((format(printf, 4, 5)));
 /* Does the same for the value of a key, which is bad from now on. */
@@ -24,7 +24,7 @@ int cfg_fail_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t it
 /* Reports an unknown key below the section parent ("" for the top), suggests a similar key and lists the known ones.
  * The similar key is marked bad, so that it is not reported as missing, too. */
 int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32_t item, const char *word);
-/* Adds a diagnostic in the order of its place. */
+/* Adds a diagnostic. The list is in the order of `place`: the source, then the line. Returns code. */
 int cfg_add_diagnostic(struct config_diagnostics *diagnostics, uint64_t place, int code, const char *text);
 
 #endif

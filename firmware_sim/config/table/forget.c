@@ -54,7 +54,7 @@ void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
         if (!cfg_is_in(row->path, key->path)) continue;
         if (row->type == CFG_LIST)
             cfg_forget_list(rd, row->path);
-        else if (cfg_list_of(&rd->table, row) == cfg_list_of(&rd->table, key)) /* else it went with its list */
+        else if (cfg_list_of(&rd->table, row) == cfg_list_of(&rd->table, key)) /* else dropped with its list */
             forget_value(rd, row, item);
     }
     if (strncmp(key->path, "stations[]", 10) == 0 && cfg_is_in("stations[].scanner", key->path))

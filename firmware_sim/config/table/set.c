@@ -58,7 +58,7 @@ static void to_generic(struct set *set)
     set->path[used] = '\0';
 }
 
-/* Cuts the path after its longest beginning that is a known key, which may be none. */
+/* Cuts the path to its longest beginning that is a known key. Returns that key; NULL: there is none. */
 static const struct cfg_key *cut_to_known(const struct cfg_reader *rd, char *path)
 {
     const struct cfg_key *key = NULL;

@@ -367,7 +367,7 @@ static void read_map(struct walk *w, const yaml_node_t *node, const char *path, 
 
 /* ---- the document */
 
-/* of: the document to walk. The document is the same as main, the file, or it is a value of --set. */
+/* of: the document to walk. It is main, which is the file's, or the document of a value of --set. */
 static void begin_walk(struct walk *w, struct cfg_reader *rd, struct cfg_document *of, struct cfg_document *main)
 {
     *w = (struct walk){.rd = rd, .doc = &of->doc, .of = of, .main = main, .from_set = of != main};
