@@ -131,7 +131,7 @@ static void large_and_twice(void **state)
     free_torn(&t);
 }
 
-/* If there are no more vertices than faces, they are those of the file, even two at one place. */
+/* If there are no more vertices than faces, the file's vertices stay as they are, even two at one place. */
 static void shared_vertices_stay(void **state)
 {
     (void)state;
