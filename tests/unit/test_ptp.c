@@ -304,7 +304,7 @@ static void a_jump_of_the_clock_is_corrected(void **state)
 
 /* ---- the path */
 
-/* Runs to 40 s and returns what the follower measured each second from 20 s on. */
+/* Takes what the follower measured at each second from 20 s to 39 s, and the error of the clock. */
 static void measure(const char *set, const char *fault, int64_t offset_ns[20], int64_t error_ns[20])
 {
     struct rig *rig = follow(&set, set != NULL, &fault, fault != NULL);

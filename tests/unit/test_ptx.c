@@ -178,7 +178,7 @@ static void test_poses(void **state)
 static const struct rig_point wall = {1000, -2000, 3000, INT16_MIN, 0, 1, 1};
 static const char WALL[] = "2.000000 1.000000 3.000000 0.500000";
 
-/* A scan of 2 frames, each 100 degrees at 10 degrees and 1 line per second, with 20 pulses a second. */
+/* A scan of so many frames, each 100 degrees at 10 degrees and 1 line per second, with 20 pulses a second. */
 static void put_descriptor(uint32_t frames)
 {
     static uint8_t out[1024];

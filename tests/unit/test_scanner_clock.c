@@ -40,7 +40,7 @@ static void it_begins_with_power(void **state)
     }
 }
 
-/* Does as an answer to a request with the present settings. */
+/* Shifts the date, as an answer to a request with the present settings does. */
 static void shift(struct rig *rig, int64_t by_ns)
 {
     struct device_time_server server;
