@@ -31,14 +31,14 @@ static void a_soak_is_locked(void **state)
     send_clean(soak);
     TAKES(1, (see(soak, FIRST, 0, 0.0), 0));
     TAKES(1, (soak_heard(soak, &drop), 0));
-    TAKES(2, (soak_heard(soak, &boot), 0)); /* of the head, so of each link */
+    TAKES(2, (soak_heard(soak, &boot), 0)); /* a fault of the head is noted by both links */
     TAKES(1, (soak_saw_notice(link, &gap), 0));
     TAKES(1, (soak_saw_inside(link, &event), 0));
     TAKES(1, (soak_saw_state(link, "boot"), 0));
     TAKES(1, soak_is_head_seen(link));
     TAKES(1, (soak_saw_open(link), 0));
     TAKES(1, (soak_saw_no_open(link), 0));
-    TAKES(2, (soak_saw_end(link), 0)); /* and that of the clean reader */
+    TAKES(2, (soak_saw_end(link), 0)); /* the link's lock, and the clean reader's */
     TAKES(1, soak_clean_get(soak, FIRST, &frame));
     TAKES(1, soak_clean_top(soak));
     TAKES(1, soak_clean_t_ns(soak));
@@ -73,7 +73,7 @@ static void a_watch_is_locked(void **state)
     TAKES(1, watch_is_whole(w));
     TAKES(1, watch_over_ns(w));
     TAKES(1, watch_first_open_ns(w));
-    w->broken[0].peer[0] = '\0'; /* no system's table has to be read */
+    w->broken[0].peer[0] = '\0'; /* without a peer no table of the system is read */
     TAKES(1, held_any(w));
     TAKES(1, (watch_end(w), 0));
     watch_free(w);

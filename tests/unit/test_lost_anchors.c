@@ -68,7 +68,7 @@ static void an_anchor_lost_with_its_tick_comes_with_the_next(void **state)
     unlink(path);
 }
 
-/* The ticks after it were claimed already when it was lost. */
+/* When the anchor's tick is lost, the ticks after it are claimed already. */
 static void an_anchor_lost_late_comes_late(void **state)
 {
     (void)state;
@@ -85,7 +85,7 @@ static void an_anchor_lost_late_comes_late(void **state)
     unlink(path);
 }
 
-/* The tick that repeats it may be lost, too. */
+/* The tick that repeats the anchor may be lost, too. */
 static void an_anchor_lost_again_comes_again(void **state)
 {
     (void)state;

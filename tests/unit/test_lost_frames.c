@@ -31,7 +31,7 @@ static void report(void *self, int number, const char *text)
 static const struct loop_source_ops ops = {.report = report};
 static const struct loop_source source = {&ops, NULL};
 
-/* The session reads an empty tick whose next frame has this number, when so many ticks are released after it. */
+/* The session reads an empty tick whose next frame has this number. `behind` more ticks are released after it. */
 static uint32_t read_tick(struct session *s, uint32_t first_seq, uint64_t behind)
 {
     uint8_t frames[REPLY_ROOM];
@@ -80,7 +80,8 @@ static void each_episode_is_reported_once(void **state)
     assert_int_equal(counters.reader_lost_frames, 60);
 }
 
-/* Reads a tick of n_cast pulses after pulses_before, with one frame of this number. Returns the number of lost ones. */
+/* Reads a tick with one frame, of this number, and n_cast pulses after pulses_before. Returns how many frames were
+ * lost. */
 static uint32_t read_pulses(struct session *s, uint8_t *buf, uint32_t first_seq, uint64_t pulses_before,
                             uint64_t n_cast)
 {
@@ -106,8 +107,8 @@ static size_t expect_loss(const uint8_t *frame, uint64_t frames, uint64_t pulses
     return native_frame_len(frame);
 }
 
-/* The announcement goes before the frames of the tick that showed the loss: how many frames and pulses, and how many
- * frames of this session in all. */
+/* The announcement goes before the frames of the tick that showed the loss. It has the lost frames and pulses, and all
+ * frames that this session lost so far. */
 static void a_loss_is_announced_and_counted(void **state)
 {
     (void)state;
@@ -116,7 +117,7 @@ static void a_loss_is_announced_and_counted(void **state)
     struct native_header header;
     s->id = 9;
     s->cursor = 100;
-    s->came_at = 101; /* the first tick is looked back at */
+    s->came_at = 101; /* the first tick only prepares the session */
     strcpy(s->peer, "127.0.0.1:5");
     atomic_store(&stream.ring.released, 500);
     assert_int_equal(read_pulses(s, buf, 40, 1000, 10), 0);

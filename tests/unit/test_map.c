@@ -75,7 +75,7 @@ static void test_size(void **state)
     assert_true(layout.left + layout.map_width <= layout.width && layout.top + layout.map_height < layout.height);
     free(picture.rgb);
     map_free(map);
-    map = make(0, 0, 10, 7.04, 0.5); /* 20 x 14.08 pixels: the part of one counts */
+    map = make(0, 0, 10, 7.04, 0.5); /* 20 x 14.08 pixels: a part of a pixel counts as one */
     map_get_layout(map, &layout);
     assert_int_equal(layout.map_width, 20);
     assert_int_equal(layout.map_height, 15);

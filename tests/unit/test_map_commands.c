@@ -167,7 +167,7 @@ static void long_frames_are_drawn_whole(void **state)
     assert_string_equal(on_err, "scanhead: m.svg: 41186 points drawn, 0 outside of the area\n");
 }
 
-/* Returns where the mark of a station is: pixels to the right and down. */
+/* Finds where the mark of a station is: pixels to the right and down. */
 static void mark_of(const char *svg, const char *name, double at[2])
 {
     char title[64];

@@ -72,8 +72,8 @@ static void heights_of_the_corners_count(void **state)
     assert_true(legend_m(flat) == 0.0);
 }
 
-/* 1000 pixels have points. Bins are of a metre: heights from 0 m to 1024 m make 1024 of them. Most pixels are in the
- * bins from 100 m and 200 m. Up to 4 strays at an end are less than half a percent. 5 are as much, and stay. */
+/* 1000 pixels have points. Heights from 0 m to 1024 m make 1024 bins of a metre. Most pixels are in the bins from 100 m
+ * and 200 m. 4 strays at an end are less than half a percent, and are left out; 5 strays stay. */
 static void few_strays_change_no_hues(void **state)
 {
     (void)state;

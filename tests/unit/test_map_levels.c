@@ -22,8 +22,8 @@ static void add(struct map *map, int column, int row, double z_m)
     map_add_points(map, 1, &x, &y, &z_m);
 }
 
-/* Levels are 0.1 m high, or as high as a pixel is wide. Up to 4 of them are no wall, as a floor and a ceiling have; 14
- * are one. Levels are counted from the first point's height, whatever that is. */
+/* Levels are 0.1 m high, or as high as a pixel is wide. Up to 4 levels with points, as of a floor and a ceiling, are no
+ * wall; 14 are one. Levels are counted from the first point's height, whatever that is. */
 static void levels_make_a_wall(void **state)
 {
     (void)state;
@@ -107,8 +107,8 @@ static void expect_pixel(const struct map *map, const struct picture *picture, u
         fail_msg("%u, %u: %d %d %d, not %d %d %d", column, row, got[0], got[1], got[2], want[0], want[1], want[2]);
 }
 
-/* Heights go from the lowest to the highest of the pixels' lowest points. Half a percent of the pixels at either end
- * are left out: none of so few. A ceiling hides nothing. */
+/* Heights go from the lowest to the highest of the pixels' lowest points. Half a percent of the pixels are left out at
+ * either end, which is none of so few pixels. A ceiling hides nothing. */
 static void heights_are_hues(void **state)
 {
     (void)state;
@@ -143,8 +143,9 @@ static void heights_are_hues(void **state)
     map_free(map);
 }
 
-/* The two lowest and the two highest of 401 pixels are beyond the scale's ends: a two-hundredth are 2.005. The scale
- * has 1024 steps, and its ends are those of steps. A pixel shows the lowest of its neighbours. */
+/* Half a percent of 401 pixels is 2.005, so the scale leaves out the two lowest and the two highest. From the lowest to
+ * the highest there are 1024 steps, and the scale ends at the end of a step. A pixel shows the lowest of its
+ * neighbours. */
 static void a_few_heights_are_beyond(void **state)
 {
     (void)state;

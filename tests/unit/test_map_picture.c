@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Pictures of map --perspective: points on a wall before the eye have the colours that their figures give, without
- * shading exactly so. */
+/* Pictures of map --perspective: points on a wall before the eye have the colours of their figures; without shading
+ * exactly these. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -154,7 +154,7 @@ static void what_is_not_known_is_an_error(void **state)
 
 /* ---- whole pictures: marks, names and legends */
 
-/* Points of a row: its height, which is their range, too; what they are of; how many there are. */
+/* A row of points: its height, which is also their range; their surface and station; their number. */
 struct row {
     double z_m;
     uint16_t label, station;
@@ -272,7 +272,7 @@ static struct picture expected_rows(struct legend *l)
     return picture;
 }
 
-/* Surfaces with the most points come first, of as many points the first label; stations come by their number. */
+/* Surfaces with more points come first; among equals the lower label does. Stations come by their number. */
 static void a_picture_has_marks_and_a_legend(void **state)
 {
     static const struct legend cases[] = {

@@ -25,7 +25,7 @@ static double next(void)
     return x / 0x1p32;
 }
 
-/* Places in a cube of 1 m around 0; the last ones are those of the first again. */
+/* Places in a cube of 1 m around 0; the last SAME places repeat the first ones. */
 static void make(void)
 {
     memset(entry, 0, sizeof entry);
@@ -98,7 +98,7 @@ static void near_places_are_found(void **state)
     assert_int_equal(match_index_near(&index_of, (const double[3]){NAN, 0, 0}, NULL, NULL), 0);
 }
 
-/* Groups have what all of theirs have, at their root. */
+/* The root of a group has the sums of all its members. */
 static void groups_add_up(void **state)
 {
     (void)state;

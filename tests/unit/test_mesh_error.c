@@ -113,7 +113,7 @@ static void float_columns_of_ply_are_told(void **state)
     memcpy(ply + sizeof head - 1 + sizeof v, face, sizeof face);
     write_file("hall.ply", ply, sizeof ply);
     check_accepted("hall.ply", "", "");
-    check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* a step that is done is never refused */
+    check_accepted("hall.ply", "  tolerance_m: 1e-9\n", ""); /* what the writer has rounded is never refused */
     static const float small[9] = {-0.25f, -0.25f, 0, 0.5f, -0.25f, 0, 0, 0.5f, 0};
     memcpy(ply + sizeof head - 1, small, sizeof small);
     const struct scene_mesh_spec spec = {.file = write_file("hall.ply", ply, sizeof ply), .scale = 1};
@@ -145,8 +145,9 @@ static void a_coarse_mesh_is_to_be_moved(void **state)
     }
 }
 
-/* Corners at 0 and 1 are made 100 times larger and then 100 times smaller. In units of 6e-8 the corner's error is 1,
- * then 100 and 100 for the factor, then 2 and 1 for the other factor. The place at 100 is no error. */
+/* Corners at 0 and 1 are made 100 times larger and then 100 times smaller. In units of 6e-8 the corner's error is 1.
+ * Times 100 it is 100, and rounding adds 100. Times 0.01 it is 2, and rounding adds 1. So it is 3, though the corner
+ * was at 100 on the way. */
 static void an_error_is_scaled_as_the_mesh_is(void **state)
 {
     (void)state;

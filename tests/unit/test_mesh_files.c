@@ -344,7 +344,7 @@ static uint64_t get64(const char *p)
 }
 
 /* After the last list come 16 bytes, 4 zeros, 1 to 16 zeros up to a multiple of 16, the version, 120 zeros, and the
- * mark of the end. Readers know the mark; Blender's exporter has its bytes. */
+ * mark of the end. Readers look for the mark. Its bytes here are those of Blender's exporter. */
 static void check_end(const char *fbx, size_t at, size_t end)
 {
     static const char zero[120];

@@ -170,7 +170,7 @@ static void test_takes(void **state)
     free(t);
 }
 
-/* Heads without rows and columns, single lines, and moving heads whose places are in no other system. */
+/* Heads without rows and columns, single lines, and moving heads with points in another CRS are refused. */
 static void test_check(void **state)
 {
     (void)state;

@@ -4,7 +4,7 @@
 #include "core/scene.h"
 #include "tests/unit/recorder_rig.h"
 
-enum { PULSES = 20000, FULL = 10 }; /* of a line, 1000 a second as the rig has them; lines of a full turn of the pan */
+enum { PULSES = 20000, FULL = 10 }; /* pulses of a line, 1000 a second as in the rig; lines of a turn */
 
 static void begin_scan(uint32_t scan)
 {
@@ -32,7 +32,7 @@ static void begin_scan(uint32_t scan)
     rig_anchor(&a);
 }
 
-/* Two lines of two shots make triangles, and there is one more shot in that many rows. */
+/* Two lines of two shots make triangles, and one more shot of each line is in the last of `rows` rows. */
 static void put_wall(uint32_t rows)
 {
     for (uint32_t line = 0; line < 2; line++) {
@@ -86,7 +86,7 @@ static void put_tube_and_pole(void)
     }
 }
 
-/* Points that no triangle uses leave the others their lines: the seam is where it was, and its far side is at 1.05. */
+/* Points that no triangle uses do not move the texture of the others: the seam's far side stays at 1.05. */
 static void loose_points_ahead_of_the_seam(void **state)
 {
     (void)state;

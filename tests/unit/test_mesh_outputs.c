@@ -91,7 +91,7 @@ static int stop_now(void *ctx)
     return 1;
 }
 
-/* A stop among the vertices is one of the whole file, though the few faces after them would be written. */
+/* A stop among the vertices gives up the whole file, though its few faces would not ask for a stop. */
 static void a_stop_among_vertices(void **state)
 {
     (void)state;
@@ -140,7 +140,7 @@ static const char *attribute(const json_t *root, const char *bin, size_t mesh, c
     return bin + json_integer_value(offset) + json_integer_value(from);
 }
 
-/* Each vertex, whatever the order: readers of glTF may get them sorted by another rule. */
+/* Finds the vertex, in whatever order the writer put them. */
 static void expect_vertex(const json_t *root, const char *bin, size_t mesh, uint32_t v)
 {
     size_t n, n_normal, n_uv;

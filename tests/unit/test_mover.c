@@ -85,7 +85,7 @@ static void a_move_after_the_end_is_refused_at_once(void **state)
     }
 }
 
-/* Moves as the thread does, without one. */
+/* Does all that the mover's thread does, without a thread. */
 static void move_now(struct rig *rig, const char *line)
 {
     struct command_result result;
@@ -97,9 +97,8 @@ static void move_now(struct rig *rig, const char *line)
 }
 
 /* A plane that touches the Earth leaves it by r^2 / 2R: 0.02 mm at 16 m, and 0.8 mm at 100 m. So georeferencing by a
- * plane is within 0.3 mm in the scene, whose corners are up to 15 m away, and is not from a place 90 m farther.
- * SYSTem:PLAN? reports the plan at the present place. A change of the plan stands once in the journal, before its
- * command. */
+ * plane is within 0.3 mm for corners up to 15 m away. From a place 90 m farther it is not. SYSTem:PLAN? reports the
+ * plan at the present place. A change of the plan stands once in the journal, before its command. */
 static void the_plan_is_that_of_the_present_place(void **state)
 {
     (void)state;

@@ -234,7 +234,7 @@ static void who_asks_holds_the_site_of_now(void **state)
     rig_close(rig);
 }
 
-/* The site of a scan is that of the last one alone, and stays as it is while it is held. */
+/* Only the last scan's site can be held. A held site stays as it is. */
 static void who_asks_holds_the_site_of_a_scan(void **state)
 {
     (void)state;

@@ -176,7 +176,7 @@ static void test_cut_with_their_points(void **state)
     }
 }
 
-/* The descriptor announces them, and does not change where there are none. */
+/* A descriptor announces attributes in eight bytes at its end. Without attributes it lacks these bytes. */
 static void test_descriptor(void **state)
 {
     (void)state;

@@ -5,8 +5,8 @@
 
 enum { SIZES_EACH = SANITIZED ? 1 : 4 }; /* of the pieces in which each damage is fed */
 
-/* Returns how many counted frames a damaged range costs, from the layout of the stream: a jump is only seen between
- * good ones. */
+/* Checks how many counted frames a damaged range costs, by the layout of the stream. A gap shows only between good
+ * frames. */
 static void check_seq(size_t hurt_from, size_t hurt_to)
 {
     uint64_t lost = 0, gaps = 0, pending = 0;
@@ -126,10 +126,9 @@ static int is_boundary(size_t at)
     return at == stream_len;
 }
 
-/* Losing [from, to) leaves the same bytes as losing that stretch some bytes later, where the bytes after both ends are
- * equal, or earlier, where those before are (headers begin alike, payloads end in zeros). If such a shift makes the
- * loss begin where a piece ends, or end where one begins, that piece is whole after all; the first of two takes the
- * bytes. */
+/* Headers begin alike and payloads end in zeros. So losing a range some bytes later or earlier than [from, to) may
+ * leave the same bytes. If a later range begins at a border of pieces, the piece before it is whole after all. If an
+ * earlier range ends at a border, the piece after it is. Takes such a range, if possible a later one. */
 static void slide_to_piece(size_t *from, size_t *to)
 {
     for (size_t n = 0;; n++) {

@@ -78,7 +78,7 @@ static void test_forgets(void **state)
         for (uint32_t seq = 16; seq < 40; seq++)
             expect(seq, NATIVE_NO_NOTICE, seq, 1);
         assert_int_equal(take(20, 1), NATIVE_RESTARTED);
-        expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* came, was missing: before */
+        expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* 15 came, 12 was missing: before */
     }
     /* A late frame fills its place. Another one with its number is of another sequence. */
     memset(&sequence, 0, sizeof sequence);
@@ -126,7 +126,7 @@ static void test_long_gaps(void **state)
     expect(2 * NATIVE_GAP_MOST + 3, NATIVE_GAP, NATIVE_GAP_MOST + 2, NATIVE_GAP_MOST + 1);
     for (uint32_t seq = NATIVE_GAP_MOST + 5; seq < NATIVE_GAP_MOST + 400; seq++)
         expect(seq, seq == NATIVE_GAP_MOST + 5 ? NATIVE_RESTARTED : NATIVE_NO_NOTICE, seq, 1);
-    /* A jump by half of the numbers or more is one back. */
+    /* A jump by half of all numbers or more is a jump back. */
     memset(&sequence, 0, sizeof sequence);
     expect(0, NATIVE_NO_NOTICE, 0, 1);
     expect(0x80000000u, NATIVE_GAP, 1, 0x7fffffffu);
@@ -201,7 +201,7 @@ static void test_local(void **state)
     expect(101, NATIVE_NO_NOTICE, 101, 1); /* their number, 0, does not count */
 }
 
-/* Each of these makes a frame another one. */
+/* With the same number, a frame that differs in one of these fields is another frame. */
 static void test_same_number(void **state)
 {
     (void)state;

@@ -24,7 +24,7 @@ static size_t by_definition(const char *a, const char *b)
     return least(same, 1 + least(by_definition(a + 1, b), by_definition(a, b + 1)));
 }
 
-/* All pairs of words of up to four letters of two. */
+/* All pairs of words of up to four letters from an alphabet of two. */
 static void distances_are_those_of_the_definition(void **state)
 {
     (void)state;

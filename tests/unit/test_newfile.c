@@ -251,7 +251,8 @@ static void test_end_between_open_and_lock(void **state)
     unlink(path);
 }
 
-/* The second writer begins just before the first one's file gets its name, which is still being written. */
+/* The second writer begins just before the first one's file gets its name, and is refused: that file is still being
+ * written. */
 static void test_begin_before_rename(void **state)
 {
     (void)state;
@@ -269,7 +270,7 @@ static void test_begin_before_rename(void **state)
 static void test_one_writer_in_place(void **state)
 {
     (void)state;
-    char pid[96], name[16]; /* that of an emulator where one runs this program */
+    char pid[96], name[16]; /* of this program, or of the emulator that runs it */
     int fd, again;
     prctl(PR_GET_NAME, name);
     snprintf(pid, sizeof pid, "process %ld (%s)", (long)getpid(), name);
@@ -277,7 +278,7 @@ static void test_one_writer_in_place(void **state)
     assert_int_equal(write(fd, "one", 3), 3);
     expect_error(newfile_open(path, &again, &err), SH_EINPUT, path, pid);
     expect_error(newfile_append(path, &again, &err), SH_ESTATE, path, pid);
-    expect_error(newfile_check(path, &err), SH_EINPUT, path, pid); /* it would go on without a name */
+    expect_error(newfile_check(path, &err), SH_EINPUT, path, pid); /* once replaced, the writer's file has no name */
     expect_missing(part);
     expect_text(path, "one");
     close(fd);
@@ -287,8 +288,7 @@ static void test_one_writer_in_place(void **state)
     unlink(path);
 }
 
-/* A file is begun in place while another is on its way to that name. The first stays, and so does the other beside
- * it. */
+/* A file is begun in place while a part file is to get that name. The file stays, and so does the part file. */
 static void test_begun_in_place_meanwhile(void **state)
 {
     (void)state;

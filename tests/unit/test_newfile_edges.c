@@ -100,8 +100,8 @@ static void test_another_completes(void **state)
     unlink(path);
 }
 
-/* A shell has redirected output to a file, to which it has written before, and writes afterwards: nothing is lost,
- * whether it appends or not. */
+/* A shell redirects our output to a file, and writes to it before and afterwards. Nothing is lost, whether the shell
+ * appends or not. */
 static void test_redirected(void **state)
 {
     (void)state;
@@ -123,7 +123,7 @@ static void test_redirected(void **state)
     }
 }
 
-/* A file system without locks: a whole file is one's own all the same. */
+/* On a file system without locks a whole file is opened for writing all the same. */
 static void test_without_locks(void **state)
 {
     (void)state;

@@ -175,13 +175,13 @@ static void a_name_that_is_taken(void **state)
 }
 
 /* Where a file system can't rename without replacing, or has no hard links either, a name that is taken stays all the
- * same. Any other error is one. */
+ * same. Any other error is reported. */
 static void a_name_is_kept_on_any_file_system(void **state)
 {
     (void)state;
     static const struct {
         int renameat2, link, code;
-        const char *says; /* on a free name; NULL: it is given */
+        const char *says; /* for a free name; NULL: the file gets it */
     } is[] = {{EINVAL, 0, SH_OK, NULL},
               {ENOSYS, 0, SH_OK, NULL},
               {EINVAL, EPERM, SH_OK, NULL},
@@ -258,7 +258,7 @@ static void a_file_that_was_replaced(void **state)
     unlink(path);
 }
 
-/* Before long work the question leaves no file, and has the answer of the work itself. */
+/* newfile_check, asked before long work, leaves no file, and fails where the work itself would. */
 static void paths_that_cannot_be_made(void **state)
 {
     (void)state;

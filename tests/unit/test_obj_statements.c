@@ -17,8 +17,8 @@ static struct scene *load_textured(const char *name, const char *text)
     return scene;
 }
 
-/* A negative number counts back from where its face stands, also where another corner of it comes later; in each file
- * of a scene by itself. */
+/* A negative number counts back from its face's line, even if a vertex of the face comes later. Each file of a scene
+ * counts by itself. */
 static void faces_before_their_vertices(void **state)
 {
     (void)state;

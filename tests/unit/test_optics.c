@@ -6,7 +6,8 @@
 #include "core/surface.h"
 #include "tests/common/made.h"
 
-/* The wall ahead is a mirror. The room continues in it as its own image, and each ray as if there were no mirror. */
+/* The wall ahead is a mirror. The room continues in it as its own image, and each ray goes on as if there were no
+ * mirror. */
 static void a_mirror_shows_the_room_behind_it(void **state)
 {
     (void)state;
@@ -111,8 +112,8 @@ static void a_pane_and_what_is_behind_it(void **state)
     close_optics(&o);
 }
 
-/* With a range resolution of 10 cm both sides of the pane are one echo, between them by their returned light, and with
- * its sum. The wall stays separate. With a resolution of 1 mm there are three. */
+/* With a range resolution of 10 cm both sides of the pane make one echo. Its light is their sum, and its range is their
+ * mean, weighted by light. The wall stays separate. With a resolution of 1 mm there are three. */
 static void what_is_too_near_is_one_echo(void **state)
 {
     (void)state;
@@ -261,8 +262,8 @@ static void noise_never_touches_empty_shots(void **state)
     close_optics(&o);
 }
 
-/* Points move by up to half a metre, 50 steps of the colours. The colour is that of the range in the point, but for the
- * step that a range's rounding to counts may cross. */
+/* Points move by up to half a metre, 50 steps of the colours. A colour is that of the range that is sent, to one step:
+ * rounding to counts may move the range by so much. */
 static void colours_show_the_ranges_that_are_sent(void **state)
 {
     (void)state;

@@ -104,7 +104,7 @@ static void test_pieces(void **state)
     disk = AS_IT_IS;
 }
 
-/* A whole buffer may be asked for, while it holds less than the block of the file's end. */
+/* A whole buffer may be asked for, although the buffer holds bytes that do not fill a block. */
 static void test_whole_buffer(void **state)
 {
     struct outfile file;

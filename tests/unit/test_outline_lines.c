@@ -357,9 +357,8 @@ static void see_a_step_or_none(void *ctx, uint32_t n, const struct vec3_in *dir,
     }
 }
 
-/* Where rays see a step all along the edges, they are the same outlines as without rays. Where
- * rays see none, there is none. The beam is so wide that a piece of an edge is one part, or so narrow that it has
- * many. */
+/* Where rays see a step all along the edges, the outlines are the same as without rays. Where rays see no step, there
+ * is no outline. The beam is so wide that a piece of an edge is one part, or so narrow that it has many. */
 static void a_step_all_along(void **state)
 {
     (void)state;

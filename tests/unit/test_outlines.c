@@ -80,9 +80,9 @@ static void make_edge(const double around[3], double turn_rad, double corner[3][
     }
 }
 
-/* Directions have three components of the same size, two, or one: where faces of a cube meet, and where the cells of a
- * face are the most oblique. The beam is half of 20 mrad wide, many cells. Up to 0.99 of that the footprint surely
- * reaches the edge, as directions are rounded to floats by 1e-7. */
+/* Directions go to corners, edges and middles of a cube: where its faces meet, and where cells are the most oblique.
+ * The beam has a half-width of 10 mrad, many cells. Up to 0.99 of that the footprint surely reaches the edge, as
+ * directions are rounded to floats by 1e-7. */
 static void edges_are_found_in_any_direction(void **state)
 {
     (void)state;

@@ -169,7 +169,7 @@ static void a_stall_is_caught_up(void **state)
         assert_int_equal(m->n_lost, 0);
         assert_true(late_of(m, 19) < MS && late_of(m, 20) > 280 * MS);
         if (naive) {
-            assert_true(late_of(m, 199) > 280 * MS); /* it waits for a beat as often as it releases a tick */
+            assert_true(late_of(m, 199) > 280 * MS); /* one wait for a beat per tick: it never catches up */
             continue;
         }
         assert_in_range(atomic_load(&m->counters.late_blocks), 30, 35);

@@ -284,9 +284,9 @@ static void stand_still_for_200_ms(int sleep)
     if (sleep == 25) syscall(SYS_clock_nanosleep, CLOCK_MONOTONIC, 0, &STILL_200_MS, NULL);
 }
 
-/* With one tick of 10 ms ahead, 20 ticks are late, and those until it has caught up. If it waited for a beat for each,
- * it would be late for the rest of the run: some 58 ticks. A machine with other work only adds late ones, so one of
- * TRIES runs has to show it. */
+/* With one tick of 10 ms ahead, 20 ticks are late, and some more until the thread has caught up. If it waited for a
+ * beat before each tick, it would be late to the end of the run: some 58 ticks. A machine with other work only adds
+ * late ones, so one of TRIES runs has to show it. */
 enum { TRIES = 20 };
 
 static int caught_up(void)

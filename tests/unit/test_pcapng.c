@@ -145,7 +145,6 @@ static void test_damaged(void **state)
     }
 }
 
-/* The layout is that of capinfos: 64-bit options after interface and time. */
 /* Reads blocks until one fails. Returns why; NULL: none did. */
 static const char *why_not(const uint8_t *file, size_t len)
 {

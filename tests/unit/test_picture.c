@@ -168,8 +168,8 @@ static struct extent draw_word(const char *text, enum picture_anchor anchor, con
     return e;
 }
 
-/* Whether the last pixel with ink is within its row's or column's reach of the end, 2.04; a round end may just miss the
- * next pixel's centre. */
+/* Returns whether the last pixel with ink is 0.9 to 2.05 pixels beyond the end. Ink reaches 2.04; a round end may miss
+ * the next pixel's centre. */
 static int ends_at(long pixel, double end, int sign)
 {
     const double beyond = sign * ((double)pixel + 0.5 - end);

@@ -96,7 +96,7 @@ static void test_what_cannot_be_had(void **state)
     assert_false(plan_holds(&some[0], &TOLERANCE) || plan_holds(&some[1], &TOLERANCE));
 }
 
-/* Nothing is chosen there: the row has the method that is always used. */
+/* For the cast nothing is chosen: the row has the method that is always used. */
 static void test_cast(void **state)
 {
     (void)state;
@@ -134,7 +134,7 @@ static void test_sight_pays(void **state)
     need.pulses = 1e4;
     assert_false(plan_sight_may_pay(&need));
     choose_sight(&need, NULL, "none", "0.01 million pulses of a scan are too few");
-    need.n_triangles = 0; /* the saving by triangle is lost to the fixed cost */
+    need.n_triangles = 0; /* even without triangles a map costs too much */
     assert_false(plan_sight_may_pay(&need));
     need = SIGHT;
     need.memory_bytes = 1 << 20; /* most cells do not fit, and ask the BVH */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* `scanhead plan`: what it prints, as JSON and as text, are the rows of the site's plan, member by member. The last row
- * is measured anew each time, so of it only the words count. */
+/* `scanhead plan` prints the rows of the site's plan, as JSON and as text, member by member. The last row is measured
+ * anew each time, so only its words are compared. */
 #include "firmware_sim/app/app.h"
 #include "tests/unit/device_rig.h"
 #include "tests/unit/output_rig.h"
@@ -12,8 +12,8 @@
 #include "firmware_sim/site/site.h"
 
 static char config_file[96];
-/* A beam, and coordinates in UTM, may be had in several ways, most of which the plan leaves out. The second station has
- * another scanner, of which the plan is not. */
+/* A beam, and coordinates in UTM, have several methods each, most of which the plan leaves out. The second station has
+ * another scanner, which this plan does not cover. */
 static const char *const SETS[] = {"beam.mode=auto", "output.crs=utm", "output.layout=geo",
                                    "scene.anchor={source: explicit, origin_m: [0, 0, 0], lat_deg: 52, lon_deg: 15, "
                                    "height_m: 40}",

@@ -175,7 +175,7 @@ static enum georef_method planned(const struct georef *georef, const struct plan
     return method;
 }
 
-/* The tolerance is a bound itself, so that one at the limit still holds. */
+/* The tolerance equals the bound of a method, and this method still holds. */
 static void the_cheapest_polynomial_that_holds(void **state)
 {
     (void)state;

@@ -35,15 +35,15 @@ static void sample(double cell_rad, double rays, struct plan_sight_found *found)
     beam_rig_close(&rig);
 }
 
-/* A share p among 1,024 pulses scatters by the root of p (1 - p) / 1024. The draw is always the same; five of that are
- * allowed. */
+/* A share p of 1,024 pulses has a standard error of the root of p (1 - p) / 1024. Five of these are allowed; the draw
+ * is always the same. */
 static void near_share(double got, double p)
 {
     if (!(fabs(got - p) <= 5.0 * sqrt(p * (1.0 - p) / DRAWN))) fail_msg("%g instead of %g", got, p);
 }
 
-/* A cell shows several where its square crosses an edge: within half of its width of the middle, or, on the right, of
- * the horizon. */
+/* A cell shows several surfaces if its square crosses an edge. Its distance from the middle or, on the right, from the
+ * horizon is then below half its width. */
 static void cells_of_each_kind(void **state)
 {
     (void)state;
@@ -109,9 +109,9 @@ static void a_plan_of_the_view(void **state)
     beam_rig_close(&rig);
 }
 
-/* In the half of the pulses that meet the pane, a depth of 0 misses the wall behind it. A depth of 1 is right. Where
- * none of 8,192 pulses was wrong, 95 % of Poisson's distributions with a mean of 2.996 would have had one; the limit's
- * formula is right to a hundredth. */
+/* In the half of the pulses that meet the pane, a depth of 0 misses the wall behind it. A depth of 1 is right. When
+ * none of 8,192 pulses is wrong, the limit is a mean of 2.996 wrong ones: such a mean gives one or more in 95 % of
+ * draws (Poisson). The limit's formula is right to a hundredth. */
 static void a_pane_before_a_wall(void **state)
 {
     (void)state;

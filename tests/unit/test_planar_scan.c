@@ -252,7 +252,7 @@ static void turns_are_missing(void **state)
     expect(1, 1, 2);
 }
 
-/* These turns were never to be whole, but for the last one. */
+/* These turns could not become whole, so they are no losses. Only the last one is a loss. */
 static void what_is_no_loss(void **state)
 {
     (void)state;

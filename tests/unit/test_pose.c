@@ -78,7 +78,7 @@ static void test_samples_that_are_no_pose(void **state)
 }
 
 /* Velocities are those of a parabola through three samples, at the ends too. So a parabola stays one, with samples at
- * any distance. Rounding: 1e-15 of 30 m, some times. */
+ * any distance. A few roundings, of 1e-15 of 30 m, are allowed. */
 static void test_parabola(void **state)
 {
     (void)state;
@@ -108,7 +108,7 @@ static void test_pause(void **state)
         trajectory_at(tr, t, &pose, &frame);
         assert_true(pose.position_m[0] == 1.0);
     }
-    trajectory_at(tr, 1.0 - 1e-3, &pose, &frame); /* within (1 - t)^2 of it, some times: at rest */
+    trajectory_at(tr, 1.0 - 1e-3, &pose, &frame); /* at rest: off by a few times (1 - t)^2 */
     assert_true(fabs(pose.position_m[0] - 1.0) < 5e-6);
     trajectory_free(tr);
 }

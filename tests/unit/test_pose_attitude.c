@@ -68,7 +68,7 @@ static void test_heading_stays_below_a_turn(void **state)
 }
 
 /* With the nose straight up or down, heading and roll turn about one axis, and only their sum or difference counts. The
- * angles that come back give the same attitude, also just beside the pole. Nearer to it than 1e-9 roll is added to the
+ * angles that come back give the same attitude, also just beside the pole. Nearer to it than 1e-9, roll is added to the
  * heading. */
 static void test_pole(void **state)
 {
@@ -145,7 +145,7 @@ static void test_short_way(void **state)
     }
 }
 
-/* Straight up and straight down heading and roll turn about one axis. Their difference, or sum, is reported as
+/* With the nose straight up or down, heading and roll turn about one axis. Their difference, or sum, is reported as
  * heading. */
 static void test_straight_up(void **state)
 {

@@ -28,8 +28,8 @@ static double share(double f, int from_rest, int to_rest)
 }
 
 /* Legs of 10 m at 2 m/s go along x; each point may have a pause of 1.5 s. Samples are every 0.02 s. Where two legs
- * meet, the acceleration jumps by up to 4 * 10 m / (5 s)^2. A quarter of it times 0.02 s is the error of the velocity
- * there, and 0.02 s / 8 of that the error halfway between two samples: 2e-5 m. */
+ * meet, the acceleration jumps by up to 4 * 10 m / (5 s)^2. A quarter of this jump times 0.02 s is the velocity's error
+ * there. That error times 0.02 s / 8 is the error halfway between two samples: 2e-5 m. */
 static void test_rests(void **state)
 {
     (void)state;
@@ -69,9 +69,9 @@ static void test_rests(void **state)
 }
 
 /* Three points define a parabola: y goes by 3 m/s, and x from -3 to 3 m/s within 4 s, so x is 0.75 (t - 2)^2. The
- * heading is that of the way at each time. At the ends the way is known to one side alone, for 0.1 ms: half of its
- * turning rate of 0.25 rad/s is 1.3e-5 rad. Between samples every 0.02 s the turn is even: its second derivative, below
- * 0.5 rad/s^2, times 0.02^2 / 8. */
+ * heading is that of the way at each time. At an end the heading is taken over 0.1 ms to one side. Half of that at a
+ * turning rate of 0.25 rad/s is an error of 1.3e-5 rad. Between samples, every 0.02 s, the turn is even. Its error is
+ * the second derivative, below 0.5 rad/s^2, times 0.02^2 / 8. */
 static void test_heading(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Poses of a live platform as lines over UDP: which lines are poses, and what a line that is none says. A datagram ends
- * with a pose of its own time, which shows that all lines before it were read. */
+/* Poses of a live platform as lines over UDP: which lines are poses, and how the others are reported. A datagram ends
+ * with a pose that has a time of its own: once this pose is there, all lines before it were read. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <math.h>

@@ -149,8 +149,8 @@ static void test_waypoints(void **state)
         trajectory_at(tr, t, &p, &frame);
         assert_true(fabs(p.position_m[1] - 20) < 1e-12 && fabs(frame - 2) < 1e-12);
     }
-    /* The body comes to rest, and starts from it. In a leg's last or first share f it covers f * (2 - f), twice f * f
-     * at most. The curve there has 3 times the mean speed at most. */
+    /* The body comes to rest, and starts from it. In the last or first share f of a leg's time it covers (2 - f) * f^2
+     * of the leg. Three times 2 * f^2 is allowed. */
     static const double f = 0.05;
     trajectory_at(tr, 4.0 - 2.0 * f, &p, &frame);
     assert_true(20 - p.position_m[1] > 0 && 20 - p.position_m[1] < 3 * 10 * 2 * f * f);
@@ -159,7 +159,7 @@ static void test_waypoints(void **state)
     trajectory_at(tr, 2.0 * f, &p, &frame); /* and at the ends it is in motion */
     assert_true(p.position_m[1] > 10 * f / 2);
     trajectory_free(tr);
-    /* A pause in a bend: the car stands as it came and leaves as it stands, without a jerk of its nose. */
+    /* At a pause in a bend the car keeps the heading with which it came, and leaves with it: no jump. */
     write_file("x_m,y_m,z_m,speed_m_s,pause_s\n0,0,0,5,0\n0,20,0,5,1\n20,20,0,5,0\n");
     if (trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     struct pose before;
@@ -171,7 +171,7 @@ static void test_waypoints(void **state)
         before = p;
     }
     trajectory_free(tr);
-    /* A corner: the heading turns from north to east, in the end along the last leg. */
+    /* At a corner the heading turns from north to east. At the end it is that of the last leg. */
     write_file("x_m,y_m,z_m,speed_m_s\n0,0,0,10\n0,50,0,10\n50,50,0,10\n100,50,0,10\n");
     if (trajectory_read_waypoints(file_path, NULL, NULL, &tr, &err) != SH_OK) fail_msg("%s", err.text);
     trajectory_at(tr, 5.0, &p, &frame);
@@ -224,7 +224,7 @@ static void test_columns_and_frames(void **state)
     trajectory_free(tr);
 }
 
-/* Limits are allowed themselves. A pause of less than a second is one, too. */
+/* The limits themselves are allowed. A pause may be shorter than a second. */
 static void test_speeds_and_pauses(void **state)
 {
     (void)state;
@@ -278,7 +278,7 @@ static void test_slow_waypoints(void **state)
     const struct pose mount = {.quat = {1, 0, 0, 0}};
     struct pose_path got;
     assert_int_equal(find_path(tr, 0, 1e9, &mount, &got, &err), SH_OK);
-    assert_true(got.n < 3100 && got.error_m <= 1e-4); /* legs of 5.0 to 5.5 m, each step of theirs in up to three */
+    assert_true(got.n < 3100 && got.error_m <= 1e-4); /* legs of 5.0 to 5.5 m, each sample in up to three knots */
     free(got.knot);
     trajectory_at(tr, 5000.0, &p, &frame);
     pose_to_angles(p.quat, &h, &pitch, &roll);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* core/pose: which samples and way-points are allowed. Each limit itself is, and what is refused is named with its
- * line and its limits (core/pose.h). */
+/* core/pose: which samples and way-points are allowed. Each limit itself is allowed. A refusal names the line and the
+ * limits (core/pose.h). */
 #include <unistd.h>
 
 #include "tests/unit/file_rig.h"

@@ -105,7 +105,7 @@ static void the_counter_stays_within_the_hour(void **state)
     expect(&pps, 4 * SECOND, PROTOCOL_PPS_LOCKED, 0);
 }
 
-/* The head's clock gains 500 ppm: each locked pulse sets it right, and without pulses it goes away. */
+/* The head's clock gains 500 ppm: each locked pulse sets it right, and without pulses it drifts. */
 static void the_heads_own_clock_drifts(void **state)
 {
     (void)state;

@@ -48,8 +48,8 @@ static void next_within(struct room *r, uint32_t beside, const char *box, char j
 }
 
 /* Only the surface in a section counts. In the right leg the head misses at most floor and ceiling, which have 4 m2
- * each there. In the upper leg it sees nothing; the section has 14.4 m2 of walls and 8 m2 of floor and ceiling there,
- * which cells of 0.2 m count to 0.1 m along their 6 m of edges. A box that is turned by 90 degrees has its sides
+ * each there. In the upper leg it sees nothing. There the section has 14.4 m2 of walls and 8 m2 of floor and ceiling.
+ * Cells of 0.2 m may add 0.1 m along the 8.8 m of its cut. A box that is turned by 90 degrees has its sides
  * exchanged. */
 static void test_next_in_section(void **state)
 {
@@ -194,7 +194,7 @@ static void test_bodies(void **state)
     room_close(&r);
 }
 
-/* All readers of an answer share it, and it stays for them once 64 later ones have taken its slot. */
+/* All readers of an answer share it. They keep it when 64 later answers have taken its slot. */
 static void test_shared(void **state)
 {
     (void)state;

@@ -155,8 +155,9 @@ static double expected_share(const struct program *p, double reflectance, double
 }
 
 /* Targets of 90 and 20 % stand 2 % before the reach and 2 % behind it. Each rate is set by command within the scan,
- * which began at another one. At least 20,000 pulses each: 4.75 standard errors are 0.017 of p = 1/2; 104 comparisons,
- * false alarm 2e-4 in all. Facets and cosines move the range by 1e-5 of it, and so the share by 1e-4. */
+ * which began at another one. With at least 20,000 pulses each, 4.75 standard errors are 0.017 at p = 1/2. The 104
+ * comparisons together have a false alarm with 2e-4. Facets and cosines move the range by 1e-5 of it, and so the share
+ * by 1e-4. */
 static void targets_vanish_at_the_reach_of_each_program(void **state)
 {
     (void)state;
@@ -337,8 +338,8 @@ static void a_rate_between_them_is_refused(void **state)
 
 enum { TICKS = 160 };
 
-/* A session goes through all rates, or its journal is replayed, without a command. `seen` gets the counts of each
- * tick. */
+/* Runs a session that goes through all rates or, without a command, the replay of its journal. `seen` gets the counts
+ * of each tick. */
 static void run_session(const struct device_options *options, struct seen seen[TICKS])
 {
     static const char *const sets[] = {"scene.meshes[0].scale=230", "surfaces[0].reflectance=0.2"};

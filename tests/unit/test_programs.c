@@ -319,8 +319,8 @@ static void check_grade(const char *path, const char *text, const char *figure)
             fail_msg("%s: %s without a source: %.60s", path, sourced[i], figure);
 }
 
-/* Every line of a profile that has a value has a grade. A figure with a source names it: there, or before the first key
- * for all figures of the grade. */
+/* Every line of a profile that has a value has a grade. A figure of a data sheet, or a quoted one, names its source:
+ * beside it, or before the first key for all of its grade. */
 static void shipped_figures_have_a_grade(void **state)
 {
     (void)state;

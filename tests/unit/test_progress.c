@@ -20,7 +20,7 @@ static void test_left(void **state)
     assert_true(progress_left_s(&pace, "comparing", -1, 15 * S) < 0);
 }
 
-/* Work is told apart by its name up to a colon; only so much of it is kept. */
+/* Work is told apart by its name up to a colon. Only the beginning of a long name is kept. */
 static void test_names(void **state)
 {
     (void)state;

@@ -99,7 +99,7 @@ static void take(struct model *m, int64_t offset_ns)
     }
 }
 
-/* The time that the clock shows, by the model as of the last Sync before: there is one for each second. */
+/* The time that the clock shows, by the model of the last Sync before it; `at` has one for each second. */
 static int64_t modelled_ns(const struct model *at, int64_t t_ns)
 {
     struct model m = at[t_ns / SECOND_NS];
@@ -304,7 +304,7 @@ static void a_jump_of_the_clock_is_corrected(void **state)
 
 /* ---- the path */
 
-/* Runs to 40 s and returns what the follower measured each second from 20 s on. */
+/* Takes what the follower measured at each second from 20 s to 39 s, and the error of the clock. */
 static void measure(const char *set, const char *fault, int64_t offset_ns[20], int64_t error_ns[20])
 {
     struct rig *rig = follow(&set, set != NULL, &fault, fault != NULL);
@@ -328,8 +328,8 @@ static void an_asymmetry_is_not_seen(void **state)
     assert_true(llabs(offset_ns[19]) <= 1 && llabs(error_ns[19] - 700) <= 1);
 }
 
-/* A measurement differs from the clock's error by the jitter, which is within its limit, uses both sides, and is the
- * same each time; with another seed it is another one. Twenty draws on one side have the probability 2^-19. */
+/* A measurement differs from the clock's error by the jitter. The jitter is within its limit and goes to both sides. It
+ * is the same each time, and another one with another seed. Twenty draws on one side have the probability 2^-19. */
 static void jitter_is_bounded_and_repeatable(void **state)
 {
     (void)state;

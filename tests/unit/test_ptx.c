@@ -178,7 +178,7 @@ static void test_poses(void **state)
 static const struct rig_point wall = {1000, -2000, 3000, INT16_MIN, 0, 1, 1};
 static const char WALL[] = "2.000000 1.000000 3.000000 0.500000";
 
-/* A scan of 2 frames, each 100 degrees at 10 degrees and 1 line per second, with 20 pulses a second. */
+/* A scan of so many frames, each 100 degrees at 10 degrees and 1 line per second, with 20 pulses a second. */
 static void put_descriptor(uint32_t frames)
 {
     static uint8_t out[1024];
@@ -211,8 +211,8 @@ static void put_shots(uint32_t frames, const uint32_t *line, const uint32_t *row
         rig_points(line[i], 100000 * (uint64_t)i, 100000 * (uint64_t)i + 50 * row[i], &wall, 1);
 }
 
-/* Lines and pulses that no scan of this descriptor has are not filled up to: another grid begins, and no point is lost.
- * A scan has 2 x (10 + 1) lines and 20 + 1 pulses in each, by the descriptor. */
+/* No grid is filled up to a line or a pulse that no scan of this descriptor has. Another grid begins, and no point is
+ * lost. A scan has 2 x (10 + 1) lines and 20 + 1 pulses in each, by the descriptor. */
 static void test_far(void **state)
 {
     (void)state;
@@ -240,8 +240,8 @@ static void test_far(void **state)
     }
 }
 
-/* The padding of earlier files of the recording is gone. In all there are 2^24 places, and 8 more for each shot: two
- * shots in a grid of 18 lines leave 16 places. */
+/* The files of a recording share 2^24 places of padding, and 8 more for each shot. Two shots in a grid of 18 lines need
+ * 16 places. */
 static void test_shared_padding(void **state)
 {
     (void)state;
@@ -342,7 +342,7 @@ static int stop(void *ctx)
     return ++asked >= stop_at;
 }
 
-/* The pass at the end asks, and gives the file up: at the first column, and within long ones. */
+/* The pass at the end asks for a stop at each column. It gives the file up at the first one, or at the third one. */
 static void test_stop(void **state)
 {
     (void)state;

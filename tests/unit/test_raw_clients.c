@@ -355,7 +355,7 @@ static void clients(void **state)
     talks[1]->was_reset = 1;
     assert_int_equal(raw_tcp.finish(&r, &err), SH_OK);
     expect("finish201 end201 ");
-    assert_string_equal(warned, "client C1: the connection was reset\n"); /* the end of the recording is none */
+    assert_string_equal(warned, "client C1: the connection was reset\n"); /* the end of the recording is no reset */
     expect_json("{\"connections\":2,\"refused_connections\":0,\"sent_bytes\":10,\"received_bytes\":20}\n");
     refuse(SH_OK, NULL);
     raw_tcp.close(&r);

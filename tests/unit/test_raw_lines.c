@@ -135,7 +135,7 @@ static void exit_statuses(void **state)
     run_rc = SH_OK;
 }
 
-/* It is known whether raw data are wanted before anything else is read. After -- there are no options. */
+/* raw_is_wanted looks for --raw before the line is read. After -- there are no options. */
 static void who_wants_raw_data(void **state)
 {
     static const struct {

@@ -247,7 +247,8 @@ static void put_all(struct json *json, const void *of)
     json_close_object(json);
 }
 
-/* At the end: the statistics of each port, not before the last packet; what was dropped is missing. */
+/* At the end the statistics of each port are written, not with an earlier time than the last packet. A recording with
+ * dropped packets is incomplete. */
 static void the_end(void **state)
 {
     struct sh_err err;

@@ -167,7 +167,7 @@ static int pass(int number)
     return talk.end[number].input.pass(&talk.end[number].input, &err);
 }
 
-/* n bytes come from an end, at a time; or its end, or its break. */
+/* At this time n bytes come from an end; a code in place of n closes or breaks it. */
 static void come(int number, ssize_t n, int64_t t_ns)
 {
     ends[number].n = n;
@@ -276,7 +276,8 @@ static void an_end_breaks(void **state)
     }
 }
 
-/* An end to which nothing can be sent may still have said something. Once it has not, it broke the connection. */
+/* An end that takes nothing more may still have sent bytes. Once all are read, it counts as the one that broke the
+ * connection. */
 static void an_end_is_deaf(void **state)
 {
     struct sh_err err;

@@ -156,7 +156,7 @@ static void expect_lost(uint32_t frames, uint64_t pulses)
     assert_looks_at_nothing();
 }
 
-/* Nobody takes the tick any more that would have shown the loss. */
+/* The tick that would have shown the loss is not taken any more. */
 static void frames_that_were_overtaken_are_lost(void **state)
 {
     (void)state;
@@ -375,7 +375,7 @@ static void let_power_go(void)
 }
 
 /* A session is cut off once it has taken all from before that tick. Where the pace waits for readers, all must be
- * written, too; else a client that takes no more holds nobody up. */
+ * written, too. In other paces a client that takes no more is not waited for. */
 static void power_goes_once_a_session_has_its_ticks(void **state)
 {
     (void)state;

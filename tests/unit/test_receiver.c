@@ -86,7 +86,7 @@ static void follows_what_comes(void **state)
         /* The pulse is 0.5 ms late, and taken for the second. */
         {{"faults[0].kind=pps_jitter", "faults[0].for_ms=0.5", "faults[0].from_s=3", NULL},
          {{3.5, LOCKED, 1}, {3.6, LOCKED, 1.0995}, {4.6, LOCKED, 2.1}}},
-        /* A late sentence without its second's pulse having changed is a second behind; so is the time. */
+        /* A sentence that comes after the next pulse names the second before it, so the time is a second behind. */
         {{"faults[0].kind=nmea_late", "faults[0].for_ms=1200", "faults[0].from_s=3", "faults[0].until_s=6", NULL},
          {{4.4, LOCKED, 1.9},
           {4.6, LOCKED, 2.1},
@@ -236,7 +236,7 @@ static void the_rotor_is_where_the_lock_wants_it(void **state)
     }
 }
 
-/* Without pulses, and without the lock, the motor goes away by its own error: 300 ppm of 10 turns are 1.08 degrees a
+/* Without pulses, and without the lock, the motor drifts by its own error: 300 ppm of 10 turns are 1.08 degrees a
  * second. */
 static void the_phase_is_lost_with_the_pulses(void **state)
 {
@@ -258,8 +258,8 @@ static void the_phase_is_lost_with_the_pulses(void **state)
     rig_close(rig);
 }
 
-/* A speed that is no whole number of turns a second is at another azimuth at each pulse: nothing holds it. A new one is
- * held at the second pulse after it. Another head has no such rotor. */
+/* A speed that is no whole number of turns a second is at another azimuth at each pulse: nothing holds it. A new speed
+ * is held from the second pulse after its command. Another head has no such rotor. */
 static void only_whole_turns_are_held(void **state)
 {
     (void)state;
@@ -296,7 +296,7 @@ static void late_pulses_have_their_second(void **state)
         assert_true(pps->b >= due_ns && pps->b <= due_ns + 50000000);
         late_ticks += pps->b >= due_ns + 1000000;
     }
-    assert_true(late_ticks >= 2); /* in ticks after the second's: of 1 ms, one in 50 is not */
+    assert_true(late_ticks >= 2); /* in a later tick than was due, as 49 of 50 pulses are */
     rig_close(rig);
 }
 

@@ -139,7 +139,7 @@ static const struct lines_row RAW[] = {
     {"--send : it is empty", {"record --raw tcp:a:1 -o a.pcapng --send="}},
 };
 
-/* Each option goes with each format that has it: then all that is wrong is that there is no such configuration. */
+/* Each option goes with each format that has it. The only error left is the missing configuration. */
 static const struct lines_row GOOD[] = {
     {"scanhead: none.yaml: cannot be opened: No such file or directory; a YAML file is needed",
      {"record none.yaml -o a.ply --empty-shots", "record none.yaml -o a.e57 --empty-shots",

@@ -49,7 +49,7 @@ static void test_another_station(void **state)
     assert_non_null(strstr(e57rig_xml, "scan 2, station 2"));
 }
 
-/* All frames of its beginning are lost. Pulses go back, or the number of the scan differs. */
+/* All frames of the second scan's beginning are lost. Pulses go back, or the number of the scan differs. */
 static void test_same_station(void **state)
 {
     (void)state;
@@ -133,7 +133,7 @@ static void test_poses_of_another_scan(void **state)
     free(text);
 }
 
-/* An anchor holds up to 100 ms, and the next one is lost: its points have no place. */
+/* An anchor is valid up to 100 ms, and the next anchor is lost: points after that have no place. */
 static void test_anchor_of_another_stretch(void **state)
 {
     (void)state;

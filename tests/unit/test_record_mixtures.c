@@ -267,8 +267,8 @@ static const struct native_emitter ten_rings = {.kind = NATIVE_EMIT_SPHERE,
                                                 .sequence_ns_den = 1,
                                                 .first_ring_udeg = -90000000};
 
-/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. An eleventh is not, also after
- * the descriptor and what belongs to it were repeated. */
+/* A sphere of ten rings has ten lines, and the first and the last one are in one grid. An eleventh line begins another
+ * grid, even if descriptor, emitter and anchor were repeated before it. */
 static void test_lines_of_rings(void **state)
 {
     (void)state;

@@ -130,7 +130,7 @@ int outfile_check_left(const char *part, const char *path, struct sh_err *e)
     return call(e, "part:%s:%s", part, path);
 }
 
-/* NAME-NUMBER.las, for a name of a file in a folder without digits. */
+/* Returns whether the path is a name of one scan: that of all scans with -NUMBER before its ending. */
 int app_is_name_of_scan(const char *of_all, size_t ending, const char *path)
 {
     const size_t stem = strlen(of_all) - ending;

@@ -86,8 +86,8 @@ static void test_ply(void **state)
     expect_ply("comment the first scan starts at GPS week 2347 second 259190.000000\n", 1);
 }
 
-/* The time comes after the first points. For the running scan it is the start's time all the same. LAS keeps the time
- * that it began with. */
+/* The time comes after the first points. The start of the running scan gets its time all the same. Only LAS goes on
+ * with times since the start. */
 static void put_late(uint32_t code, uint64_t gps)
 {
     rig_begin();

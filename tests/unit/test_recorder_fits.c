@@ -20,7 +20,7 @@ static const char *refusal_of(const char *path, const struct recorder_options *o
     return err.text;
 }
 
-/* 2^31 - 1 steps of 1 mm are 2147483.647 m; points may be as near as the head's range. */
+/* 2^31 - 1 steps of 1 mm are 2147483.647 m; a station may be farther by the head's range. */
 static void test_las(void **state)
 {
     (void)state;

@@ -153,7 +153,7 @@ static void *play(void *arg)
     return NULL;
 }
 
-/* Only after the recorder has seen all of it. */
+/* Returns whether the head is over and the recorder has taken all of its frames. */
 static int is_over(void)
 {
     return atomic_load(&head.over) && atomic_load(&head.taken) >= atomic_load(&head.sent);

@@ -51,7 +51,7 @@ static int64_t time_of(struct recording *r, enum native_type type)
     return 0;
 }
 
-/* Ten of sixteen pulses were sent with the sixteenth, or with an earlier frame. */
+/* Only ten of sixteen pulses come. They went out when the sixteenth was due, or before, with the next frame. */
 static void points_go_out_with_what_follows(void **state)
 {
     (void)state;
@@ -153,8 +153,8 @@ static void put_local(FILE *f, int64_t t_ns)
 }
 
 /* Numbers that go back far are those of another head. The frame that shows it says so, and no other one, also when the
- * recording is read again. A frame for one reader has the time of the frame before it; the first one has that of the
- * first other frame, which is known once the recording was read. */
+ * recording is read again. A frame for one reader has the time of the frame before it. At the very beginning it has the
+ * time of the frame after it, once the recording was read. */
 static void another_head_begins(void **state)
 {
     (void)state;
@@ -221,7 +221,7 @@ static void the_last_time_is_that_of_the_last_frame(void **state)
     expect_last(4);
 }
 
-/* Behind the begin of a frame that is cut stands a whole one, which shows only at the end of the file. */
+/* A whole frame lies within the length of a frame that is cut, so it shows only at the end of the file. */
 static void a_frame_behind_a_cut_one_counts(void **state)
 {
     (void)state;

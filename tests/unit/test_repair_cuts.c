@@ -40,7 +40,7 @@ static int repair(const void *data, size_t len, struct repaired *file, struct by
     return 1;
 }
 
-/* Returns where both begin to be the same: after the header, which a repair changes. */
+/* Returns where a whole file and a repaired one begin to be the same: after the header, which a repair changes. */
 static size_t begin_of(const struct bytes *b)
 {
     static const char last[] = "\nend_header\n";
@@ -213,7 +213,8 @@ static void test_huge_numbers(void **state)
         "ply\nformat binary_little_endian 1.0\nelement vertex -3\nproperty double x\nend_header\n12345678",
         "ply\nformat binary_little_endian 1.0\nelement vertex 3 y\nproperty double x\nend_header\n12345678",
         "ply\nformat ascii 1.0\nelement edge 3\nproperty double x\nend_header\n1\n"};
-    /* The first has eight bytes, and is made right where its header has room for that: by blanks it has. */
+    /* The first file has one row of eight bytes, and is repaired. Blanks in its comment make up for the shorter
+     * count. */
     for (size_t i = 1; i < sizeof ply / sizeof ply[0]; i++)
         expect_refused("h.ply", ply[i], strlen(ply[i]));
     struct repaired file;

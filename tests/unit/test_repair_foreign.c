@@ -172,7 +172,7 @@ static void test_longest_block(void **state)
     unlink(repair_path);
 }
 
-/* After a block that is none, no more is held, however long the file is. */
+/* After bytes that are no block, no more is kept in memory, however long the file is. */
 static void test_long_rest(void **state)
 {
     (void)state;

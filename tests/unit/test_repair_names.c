@@ -373,7 +373,7 @@ static void test_scans_of_a_stream(void **state)
     }
 }
 
-/* Bytes wait for two calls at most. A file that is written anyway is left alone. */
+/* Bytes wait for two calls at most. A call writes nothing if bytes were written since the last call. */
 static void test_save(void **state)
 {
     (void)state;

@@ -22,8 +22,8 @@ static void expect_next_error(struct replay *r, const char *start, const char *t
     if (strncmp(error, start, strlen(start)) != 0 || strstr(error, text) == NULL) fail_msg("%s, not %s", error, start);
 }
 
-/* A client goes: an error where it had control, or while the recording is played; half a line is an error by itself.
- * The client's control is free then. */
+/* A client that goes is an error if it had control, or while the recording is played. Half a line is an error by
+ * itself. The client's control is free then. */
 static void a_client_that_goes_is_an_error_where_it_is_missed(void **state)
 {
     (void)state;

@@ -165,7 +165,7 @@ static void settings_follow_the_frames(void **state)
     free(r);
 }
 
-/* States go out with their ticks; a device of another protocol scans all the time. An unknown state is none. */
+/* States go out with their ticks; a device of another protocol scans all the time. An unknown state is ignored. */
 static void states_are_taken(void **state)
 {
     (void)state;
@@ -189,7 +189,7 @@ static const char *state_at(struct replay *r, uint64_t released)
     return result.reply;
 }
 
-/* A state holds once the tick that contains it is released: ticks 0 to n - 1 are when n are. */
+/* A state holds once the tick that contains it is released. After n ticks, ticks 0 to n - 1 are. */
 static void a_state_holds_from_its_tick_on(void **state)
 {
     (void)state;

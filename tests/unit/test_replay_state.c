@@ -56,8 +56,8 @@ static int play(const struct replay_options *given, uint64_t first_tick, int mos
     return n;
 }
 
-/* Frames are sent at the end of the tick that has their time; at half the speed that is one later. Time that goes back
- * by more than a second is that of another head, whose first frame comes with the next tick. */
+/* Frames are sent at the end of the tick that has their time; at half the speed, one tick later. Time that goes back by
+ * more than a second is that of another head, whose first frame comes with the next tick. */
 static void frames_go_out_in_their_ticks(void **state)
 {
     (void)state;
@@ -85,7 +85,7 @@ static void frames_go_out_in_their_ticks(void **state)
     }
 }
 
-/* When it is repeated, each time is a sequence of its own. Frames for one reader have no number. */
+/* Each round of a repeated recording has a sequence of its own. Frames for one reader have no number. */
 static void each_time_has_its_numbers(void **state)
 {
     (void)state;
@@ -217,7 +217,8 @@ static void a_command_seeks_paces_and_loops(void **state)
     free(cfg);
 }
 
-/* A part ends 0.5 ms after its last frame. A seek to between them is to its end, where a loop begins anew. */
+/* A part ends 0.5 ms after its last frame. A seek to a time between these two goes to the end, where a loop begins
+ * anew. */
 static void a_seek_to_the_end_of_a_part_is_its_end(void **state)
 {
     (void)state;

@@ -97,8 +97,8 @@ static void test_axis_of_bins(void **state)
     free(svg);
 }
 
-/* A line of the scale goes from side to side at its value. Its figure ends 6 units before the line. In letters of 12
- * units digits are some 8.6 high, so that they are in the middle where they stand 4.3 below the line. */
+/* A line of the scale goes from side to side at its value. Its figure ends 6 units before the line. Digits of 12 units
+ * are some 8.6 high, so their middle is on the line when they stand 4.3 below it. */
 static void test_scale(void **state)
 {
     static const char line[] = "<line class=\"axis\" x1=\"70\"";
@@ -334,7 +334,8 @@ static void draw_figures(FILE *out)
         fputc(';', out), page_number(out, numbers[i]);
 }
 
-/* Four digits, with three decimals at most, in the largest unit of which there is one when it is rounded. */
+/* Figures have four digits, with three decimals at most, in the largest unit that makes the rounded figure 1 or
+ * more. */
 static void test_figures_as_text(void **state)
 {
     (void)state;

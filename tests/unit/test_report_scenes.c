@@ -27,8 +27,8 @@ static int times_in(const char *text, const char *what)
     return n;
 }
 
-/* A cloud of this many points in the middle of tile i of a row, one point more on each further tile. Tiles are 1 m
- * wide. Nothing is recorded: the points lie exactly on the floor. */
+/* Writes a row of n tiles, 1 m wide, and a cloud with i + 1 points in the middle of tile i. Nothing is recorded: the
+ * points lie exactly on the floor. */
 static void write_tiles(int n)
 {
     int points = 0, vertex = 1;
@@ -121,7 +121,7 @@ static void points_in_a_mirror_are_left_out(void **state)
     has(on_err, "; the scene has 2 surfaces, from 0\n");
 }
 
-/* The colours of a page's map, from the scene on: seven of the ramp. */
+/* A page's map has seven colours of the ramp, from distance 0 on. */
 static void has_ramp(const char *page)
 {
     char want[800] = "<linearGradient id=\"ramp\">";

@@ -162,7 +162,7 @@ static void test_text_of_noise(void **state)
     assert_int_equal(judge(&few), REPORT_WITHIN); /* 100 are enough */
 }
 
-/* All counts along: a bound that grows with the range is that of the farthest point. */
+/* The largest bound is kept. It grows with the range, so it is that of the farthest point. */
 static void test_largest_bound(void **state)
 {
     const struct deviation_head head = {.setup = {.layout = LINE_POLAR, .mirror_counts = 1e3, .pan_counts = 1e3},

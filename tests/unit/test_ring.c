@@ -128,8 +128,8 @@ static void a_tick_lost_while_it_is_filled_is_not_read(void **state)
     assert_int_equal(read_tick(ring.n_slots, "text"), RING_READ);
 }
 
-/* Casters are so late that the ring has come round before them: the slot of their tick says that a later one is lost.
- * If they filled it, that would be neither released nor lost. */
+/* Casters are so late that the ring has come round: the slot of their tick says that a later tick is lost. If they
+ * filled the slot, that later tick would be neither released nor lost. */
 static void a_tick_lost_a_round_ago_is_not_filled(void **state)
 {
     (void)state;
@@ -364,7 +364,7 @@ static void a_slot_in_use_is_not_claimed(void **state)
     assert_non_null(ring_claim(&ring, ring.n_slots + 2));
 }
 
-/* Each count is added to its own. */
+/* Each count is added to the same count of the sum. */
 static void hits_add_up(void **state)
 {
     const struct ring_hits a = {1, 20, 300, 4000, 50000, 600000}, b = {2, 30, 400, 5000, 60000, 700000};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* These are tests of the random generator. All seeds are fixed, so a run can't fail by chance. The limits are chosen as
- * if they weren't: each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for one
- * in 700). */
+ * for random seeds: each check would fail for one good generator in 10^5 or fewer (about 140 checks, so together for
+ * one in 700). */
 #include "tests/common/cases.h"
 
 #include <math.h>
@@ -46,7 +46,7 @@ static void a_number_depends_on_seed_purpose_and_pulse_only(void **state)
     assert_true(rng_u64(rng_key(7 + (UINT64_C(1) << 32), RNG_RANGE), 1000) != first);
 }
 
-/* Two purposes of one number would share their numbers. */
+/* Two purposes with one key would draw the same numbers. */
 static void no_two_purposes_are_one(void **state)
 {
     (void)state;
@@ -265,7 +265,7 @@ int main(void)
         cmocka_unit_test(no_two_purposes_are_one),
         cmocka_unit_test(moments_are_those_of_a_normal),
         cmocka_unit_test(neighbours_are_uncorrelated),
-#ifndef SH_SANITIZE /* they draw a million numbers each with the code of the others, so only as shipped */
+#ifndef SH_SANITIZE /* each draws a million numbers by code that other tests run, so only as shipped */
         cmocka_unit_test(streams_are_uncorrelated),
         cmocka_unit_test(the_distribution_is_normal),
 #endif

@@ -145,8 +145,8 @@ static void page_close(struct watch *watch)
     strcat(calls, "c");
 }
 
-/* The observer may hold the head back where the clients of a web link may, and time is not real. Then it has as much of
- * a processor as it needs. Without a web link there is no page. */
+/* If the clients of a web link may hold the head back, so may the observer. Unless the pace is realtime, it then has as
+ * much of a processor as it needs. Without a web link there is no page. */
 static void a_page_is_opened_for_web_links(void **state)
 {
     static const struct run_page fake = {page_open, page_link, page_source, page_start, page_close};

@@ -76,7 +76,8 @@ static void the_sphere_has_the_boxs_volume(void **state)
     assert_in_range((uint64_t)(-1000 * volume()), 1000 * 5 * 3 * 2.5 - 1000 * 12 * 5 * 0.09, 1000 * 5 * 3 * 2.5);
 }
 
-/* A ring of 36 columns and 5 rows is a tube: V - E + F = 0, and the two borders of 36 edges each are in one face. */
+/* A ring of 36 columns and 5 rows is a tube: V - E + F = 0, and each edge of the two borders, of 36 edges each, is in
+ * one face only. */
 static void a_full_turn_closes(void **state)
 {
     (void)state;

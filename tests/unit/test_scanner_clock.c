@@ -40,7 +40,7 @@ static void it_begins_with_power(void **state)
     }
 }
 
-/* Does as an answer to a request with the present settings. */
+/* Shifts the date, as an answer to a request with the present settings does. */
 static void shift(struct rig *rig, int64_t by_ns)
 {
     struct device_time_server server;
@@ -72,7 +72,7 @@ static void a_power_cycle_begins_anew(void **state)
     expect(rig, "TIME:SERV?", "NONE,127.0.0.1,9,0,ETH");
     device_get_time_server(rig->device, &server);
     assert_int_equal(server.power_ons, 2);
-    server.power_ons = 1; /* nor does one from before the power cycle */
+    server.power_ons = 1; /* nor does an answer from before the power cycle */
     assert_int_equal(device_shift_date(rig->device, &server, -S), 0);
     expect(rig, "TIME:SHIF?", "0");
     rig_close(rig);

@@ -71,7 +71,7 @@ static void with_a_profile_of_its_own_it_begins_anew(void **state)
     assert_true(own.noise.range == RANGE_NOISE_ON);
     /* 16 pulses in 55.296 us, by the manual. */
     assert_true(llabs(own.head.settings.prr_uhz - 289351851852) < 1000000);
-    /* Nor does it take what has no default. The file's head keeps all of it. */
+    /* The scanner takes no key without a default, either. The file's head keeps all of it. */
     const char *const sets[] = {"head={profile: sphere, step_deg: 2, name: N, settings_file: f}",
                                 "instrument.pan_index_deg=1"};
     assert_loads(load_second("{head: {profile: velodyne-vlp16}}", sets, 2));

@@ -39,7 +39,7 @@ static void says(int rc, const char *want)
     assert_string_equal(err.text, want);
 }
 
-/* A line counts before a mesh's name. Of a long path the end stands in messages. */
+/* A message has the line or, without one, the mesh's name. It has only the end of a long path. */
 static void places_in_messages(void **state)
 {
     (void)state;
@@ -285,12 +285,12 @@ static void colours_of_files(void **state)
     static const double numbers[] = {0.0, 0.5, 1.0, 1.0000001, 1.9};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++)
         build_rgb_look(&range, numbers[i]);
-    assert_true(build_rgb_scale(&range) == 255.0); /* none is 2 */
+    assert_true(build_rgb_scale(&range) == 255.0); /* no number is 2 or more */
     build_rgb_look(&range, 2.0);
     assert_true(build_rgb_scale(&range) == 1.0); /* and three are above 1, one between 0 and 1 */
     build_rgb_look(&range, 0.25);
     build_rgb_look(&range, 0.75);
-    assert_true(build_rgb_scale(&range) == 255.0); /* as many */
+    assert_true(build_rgb_scale(&range) == 255.0); /* as many on either side of 1 */
 }
 
 int main(void)

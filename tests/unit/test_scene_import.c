@@ -155,7 +155,7 @@ static void colours_beyond_their_range_are_left_out(void **state)
     }
 }
 
-/* Colours of Collada are as they are shown. A_ONE: what is opaque has 1. */
+/* Colours of Collada are as they are shown. With A_ONE an opacity of 1 is opaque. */
 static void colours_and_transparency_of_collada(void **state)
 {
     (void)state;

@@ -107,7 +107,7 @@ static void kept_surfaces_are_as_they_were(void **state)
     }
 }
 
-/* Without colours and texture coordinates of any mesh there are none afterwards. */
+/* If no mesh has colours or texture coordinates, the scene has none afterwards. */
 static void written_out_copies_are_as_they_were(void **state)
 {
     (void)state;

@@ -88,8 +88,7 @@ static void bodies_are_judged(void **state)
         one(BOX "f 8 7 6 5\n", x_m, SCENE_OBJECT_TURNED, 0, 52, 0);
         /* The top's edges have corners in their middles, which the sides don't have. */
         one(BOX "v 1 0 4\nv 1 3 4\nf 5 9 10 8\nf 9 6 7 10\n", x_m, SCENE_OBJECT_CLOSED, 0, 52, 24);
-        /* Half of the top: its own three edges that others have are closed, and an edge of 3 m is left on either
-         * side. */
+        /* Half of the top closes two edges. Its diagonal and the two other edges of the top stay open. */
         one(BOX "f 5 6 7\n", x_m, SCENE_OBJECT_OPEN, 3, 49, 0);
     }
 }
@@ -123,9 +122,10 @@ static void a_small_hole_is_open(void **state)
         0, SCENE_OBJECT_OPEN, 4, 52 - 1e-6, 0);
 }
 
-/* A slit over the whole top counts from a mean width of half of 1e-5 of the body on. Its area is what the sums over its
- * own edges say, which grows with its width; the width comes from the edges without a counterpart: the slit's sides of
- * 3 m, and twice an edge of 2 m beside two of 1 m. The volume lacks a pyramid on the slit, 2 m high. */
+/* A slit over the whole top is an opening from a mean width of 0.5e-5 of the body's diagonal on. The width is the
+ * slit's area, as the sums over its edges give it, by the length of edges without a counterpart. These are the slit's
+ * sides of 3 m, and at either end an edge of 2 m beside two of 1 m. The volume lacks a pyramid on the slit, 2 m
+ * high. */
 static void a_slit_counts_by_its_width(void **state)
 {
     (void)state;

@@ -56,7 +56,8 @@ static void free_torn(struct torn *t)
     free(t->bytes);
 }
 
-/* number[i]: the first vertex with the bits of vertex i, counted among the first ones. Returns how many there are. */
+/* number[i]: which of the different places vertex i has, in the order of their first vertices. Returns how many there
+ * are. */
 static uint32_t weld_naively(const struct torn *t, uint32_t *number)
 {
     uint32_t n = 0;
@@ -131,7 +132,7 @@ static void large_and_twice(void **state)
     free_torn(&t);
 }
 
-/* If there are no more vertices than faces, they are those of the file, even two at one place. */
+/* If there are no more vertices than faces, the file's vertices stay as they are, even two at one place. */
 static void shared_vertices_stay(void **state)
 {
     (void)state;
