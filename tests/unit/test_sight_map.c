@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What each cell of a map says, in a scene of four triangles, against the geometry on the faces of the cube. A map that
- * asks the BVH more often than it needs to has the right hits all the same, and nothing else would show it. */
+ * asks the BVH more often than it needs to has the right hits all the same. Only these tests show it. */
 #include <malloc.h>
 #include <math.h>
 #include <stdlib.h>

@@ -344,7 +344,7 @@ static void each_reason_is_enough(void **state)
     assert_int_equal(soak.n_failures, 0);
 }
 
-/* Acts that nobody noticed by the end are missed, of each list. */
+/* Acts, refusals and plugs that nobody noticed by the end are missed. */
 static void open_acts_are_missed(void **state)
 {
     (void)state;

@@ -130,7 +130,7 @@ static void of_sizes_of_views(void **state)
     }
 }
 
-/* Nothing is written of these. */
+/* None of these meshes is written. */
 static void of_meshes(void **state)
 {
     (void)state;

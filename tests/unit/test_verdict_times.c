@@ -171,7 +171,7 @@ static void faults_that_leave_sessions(void **state)
     }
 }
 
-/* The end of a power cycle is when clients can come back, of those that are away still. */
+/* Clients that a power cycle sent away, and that are away still, can come back from its end on. */
 static void power_comes_back(void **state)
 {
     const struct fault_note ended = {.kind = FAULT_POWER_CYCLE, .ended = 1};

@@ -193,8 +193,8 @@ static void a_flank_gives_the_whole_pulse(void **state)
     }
 }
 
-/* No pulse is so steep that it rises from nothing to the limit within a sample. Then a height of e^9 times the limit,
- * 39 dB above it, is the most that is believed. */
+/* This signal rises from nothing to the limit within a sample, more steeply than any pulse. The height is then e^9
+ * times the limit: more than 39 dB above it is not believed. */
 static void a_height_is_believed_up_to_39_db(void **state)
 {
     (void)state;

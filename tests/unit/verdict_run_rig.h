@@ -33,7 +33,7 @@ extern char warned[512];
 extern const char *protocol; /* of the client's link */
 extern struct checks seen;   /* as the checks got it */
 extern uint32_t must_ask;
-extern double match_m;            /* as points are compared with */
+extern double match_m;            /* the limit with which points are compared */
 extern void (*client_does)(void); /* once it was started */
 extern const char *short_of;
 extern int is_short;
