@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What carries a head: each error and warning with its numbers and limits, and the stops of a head at its stations. */
+/* Carriers of a head: each error and warning with its numbers and limits, and the stops of a head at its stations. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>

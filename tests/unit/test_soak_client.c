@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a client of a soak does with each result of the library, and when: the order of its calls, with their times. */
+/* A client of a soak: its calls at each result of the library, in their order and with their times. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

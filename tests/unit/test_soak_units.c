@@ -146,7 +146,7 @@ static void drops_and_flips(void **state)
     }
 }
 
-/* What is left of a cut packet is no packet of the stream. */
+/* The rest of a cut packet is no packet of the stream. */
 static void cut_packets(void **state)
 {
     (void)state;

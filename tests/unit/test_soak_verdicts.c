@@ -160,7 +160,7 @@ static void standard_output(void **state)
     rmdir("new");
 }
 
-/* What was judged before is written all the same. */
+/* Runs that were judged before are written all the same. */
 static void runs_that_fail(void **state)
 {
     (void)state;

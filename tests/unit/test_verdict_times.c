@@ -124,7 +124,7 @@ static void there_and_back(void **state)
     assert_int_equal(watch_over_ns(&w), 1090 * MS); /* the latest of all */
 }
 
-/* Of several faults on a link the one that lasts longest counts, and of equal ones the later one. */
+/* If there are several faults on a link, the one that lasts longest counts, and the later of equal ones. */
 static void several_faults(void **state)
 {
     (void)state;

@@ -68,7 +68,7 @@ static void a_sum_is_fitted(void **state)
         finder_mix_fit(&task, &mix);
         expect_terms(&mix, want, 3, 1e-3);
         assert_true(mix.chi2 < 1e-4);
-        /* What one term leaves are the other two. */
+        /* One term leaves the other two. */
         mix = (struct finder_mix){.n = 1, .g = {want[0]}};
         finder_mix_rest(&task, &mix, rest);
         for (uint32_t i = lo; i <= 95; i++) {

@@ -16,7 +16,7 @@
 
 enum { NOT_EVER = 1000000000 };
 
-/* What happens when, ms after the start: NOT_EVER where a test does not say otherwise. */
+/* The times at which things happen, in ms after the start: NOT_EVER where a test does not say otherwise. */
 struct plan_of_run {
     int up, connects, first_points, last_points; /* points come evenly with device time */
     int ends;                                    /* the client ends by itself */
