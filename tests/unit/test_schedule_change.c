@@ -214,7 +214,7 @@ static void frames_fewer_than_done_end_with_the_one_at_hand(void **state)
                 seg.end_pulse == 3000 * 3000);
 }
 
-/* In the third frame: as many frames as are done, that many with the current one, and one more. */
+/* In the third frame the number of frames is set to those done, to those with the current one, and to one more. */
 static void frames_may_be_set_to_those_done(void **state)
 {
     (void)state;
@@ -247,8 +247,8 @@ static void a_pan_that_stops_ends_its_frame_and_keeps_its_angle(void **state)
     assert_true(line.last_of_frame && line.frame == 1);
 }
 
-/* Any settings that a profile and a configuration allow, anywhere up to 2^50 pulses and 146 years. UBSan then finds
- * overflows and divisions by zero. */
+/* Returns any settings that a profile and a configuration allow. They are tried up to 3 * 2^48 pulses and 95 years.
+ * UBSan finds overflows and divisions by zero. */
 static struct schedule_spec wild_spec(uint64_t *seed)
 {
     struct schedule_spec s = {0};
@@ -315,10 +315,9 @@ static void whatever_is_allowed_is_consistent(void **state)
     }
 }
 
-/* 2.2 MHz is 454.54 ns a pulse. Settings change any number of times. Back at one rate for m pulses, these take the
- * floor of the whole, and the rest of a nanosecond is carried along. In this test the rate changes every seventh pulse,
- * from 2.2 to 1.1 MHz (twice as long) and back. The time of pulse k is the floor of the sum, to the nanosecond, after
- * 20,000 changes. */
+/* A pulse lasts 454.54 ns at 2.2 MHz. Where settings change, the rest of a nanosecond is carried along, however often
+ * they do. In this test the rate changes every seventh pulse, from 2.2 to 1.1 MHz (twice as long) and back. The time of
+ * pulse k is the floor of the sum, to the nanosecond, after 20,000 changes. */
 static void no_part_of_a_nanosecond_is_lost(void **state)
 {
     (void)state;

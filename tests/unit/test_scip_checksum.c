@@ -85,7 +85,7 @@ static void a_scan_in_microseconds(void **state)
 {
     (void)state;
     static uint8_t clean[256];
-    scip_open_head("UTM-30LX-EW 2", 1440, 0, 39, 20, -1, 40); /* any other; firmware 1.2.3 */
+    scip_open_head("UTM-30LX-EW 2", 1440, 0, 39, 20, -1, 40); /* any other model; its firmware is 1.2.3 */
     protocol_rig_describe(&rig, 0);
     scip_flat(1.035);
     scip_ask("%MD0000000001001\n", "%MD0000000001001\n00P\n\n");

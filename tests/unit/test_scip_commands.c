@@ -201,7 +201,7 @@ static void time_adjustment(void **state)
 
     scip_open("UTM-30LX");
     rig.ops->time(rig.protocol, 16000000 * 1000000LL);
-    scip_ask("TM1\n", "TM1\n00P\nm2@0?\n\n"); /* as found on real ones */
+    scip_ask("TM1\n", "TM1\n00P\nm2@0?\n\n"); /* as real devices answer */
     scip_ask("TM0\n", "TM0\n00P\n\n");
     scip_ask("BM\n", "BM\n10Q\n\n");
     scip_ask("MD0000108001000\n", "MD0000108001000\n10Q\n\n");
@@ -332,7 +332,7 @@ static void a_client_that_goes_reboots_at_once(void **state)
     }
 }
 
-/* After a reboot without a head all that a session had is as at power-up: time mode, sleep, bit rate, a scan that was
+/* If there is no head to reboot, all that a session had is as at power-up: time mode, sleep, bit rate, a scan that was
  * asked for, a malfunction. The reboot is over, too. */
 static void a_reboot_begins_anew(void **state)
 {

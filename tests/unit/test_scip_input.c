@@ -47,7 +47,7 @@ static void overlong_lines(void **state)
     scip_ask("QT\n", "QT\n00P\n\n");
 }
 
-/* Each of many lines that come at once has its answer, in order. The owner counts those without room. */
+/* Each of many lines that come at once has its answer, in order. Answers without room are lost. */
 static void ten_thousand_at_once(void **state)
 {
     (void)state;

@@ -99,7 +99,7 @@ static void usts(void **state)
     }
 }
 
-/* %ST: three digits and their sum: 3 * 48 + n, modulo 64, and 48 is 64 + n. */
+/* %ST answers three digits and a sum character. For digits of sum n that is (3 * 48 + n) modulo 64, plus 48: 64 + n. */
 static void numbers_of_states(void **state)
 {
     (void)state;

@@ -141,7 +141,7 @@ static void a_single_scan_begins_with_the_laser(void **state)
     }
 }
 
-/* A cluster has its least range, without errors. The cluster has an error where there is nothing else. */
+/* A cluster has the least of its ranges. The cluster has an error code only where none of its steps has a range. */
 static void clusters(void **state)
 {
     (void)state;

@@ -49,7 +49,7 @@ static void asked_while_it_stops(void **state)
     rig.ops->time(rig.protocol, 1000000000);
     assert_int_equal(rig.n_lines, 3);
     assert_string_equal(rig.line[2], "SCAN:START");
-    /* The first scan has come. A stop after that is meant. */
+    /* The first scan has come. A stop after it is on purpose: the head is not started again. */
     scip_turn(41);
     assert_true(rig.len > 3000);
     protocol_rig_clear(&rig);
@@ -57,7 +57,7 @@ static void asked_while_it_stops(void **state)
     assert_int_equal(rig.n_lines, 0);
 }
 
-/* A turn that is left out may as well be broken. */
+/* A turn that is left out in any case may be a broken one. */
 static void skipped_and_broken(void **state)
 {
     (void)state;
@@ -68,7 +68,7 @@ static void skipped_and_broken(void **state)
     scip_turn(1);
     scip_decode_only(&got, 3, 0);
     assert_int_equal(got.time_ms, 25);
-    scip_open("UTM-30LX-EW"); /* one that is broken is one of three, and no more */
+    scip_open("UTM-30LX-EW"); /* a broken turn is one of the three that are left out */
     scip_ask("MD0000108000300\n", "MD0000108000300\n00P\n\n");
     scip_part(0, 0, 500);
     scip_line_end(0, 0);
@@ -259,7 +259,7 @@ static void the_clock_wraps(void **state)
     assert_int_equal(got.time_ms, 100);
 }
 
-/* Writes all replies since, a line each: the two digits of an echo and its status, or only the status. */
+/* Checks all replies since the last call: the two digits of each echo, and its status. */
 static void check_played(const char *want)
 {
     char text[512] = "";

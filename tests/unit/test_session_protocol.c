@@ -231,7 +231,7 @@ static void a_failing_link_ends_the_session(void **state)
     }
 }
 
-/* A client that joins gets the last descriptor first, which then has no number. Where fields are watched, a session
+/* A client that joins first gets the last descriptor, as a frame without a number. Where fields are watched, a session
  * begins with earlier ticks, but with none from before power came. */
 static void a_client_joins_late(void **state)
 {

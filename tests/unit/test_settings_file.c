@@ -181,7 +181,7 @@ static void a_check_neither_makes_nor_locks_it(void **state)
     begin();
 }
 
-/* Room for so many names, so much under each, and so long a setting; one more is too much. */
+/* A file has room for 8 names and for 2047 bytes under each of them. One more is too much. */
 static void a_file_has_its_limits(void **state)
 {
     (void)state;
@@ -225,7 +225,7 @@ static void a_file_has_its_limits(void **state)
     }
 }
 
-/* Also after the file was written anew, which gives it another inode. */
+/* The second head is refused, also after the file was written anew, which gives the file another inode. */
 static void two_heads_have_no_file_in_common(void **state)
 {
     (void)state;
@@ -298,7 +298,7 @@ static void count_warning(void *ctx, const char *text)
     atomic_fetch_add(&n_warnings, 1);
 }
 
-/* A folder in the place of the new file: its writer says so at once, and at the end. The settings themselves stay. */
+/* A folder is in the place of the new file: the writer reports it at once and at the end. The settings stay. */
 static void a_failure_to_write_is_said(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* How many triangles a sight would examine one by one. A wall of 2,048 small triangles is seen from 20 m. Listed row by
- * row, 32 that follow each other lie close together, and so few rays come to them that the BVH takes those. Listed at
- * random, the same 32 span the wall, and each of them has to be examined. */
+ * row, 32 that follow each other lie close together, and so few rays come to them that they are left to the BVH. Listed
+ * at random, the same 32 span the wall, and each of them has to be examined. */
 #include "core/sight.h"
 #include "core/vec3.h"
 #include "tests/common/cases.h"
@@ -44,9 +44,9 @@ static double examined(const uint32_t *at, double rays)
     return n;
 }
 
-/* A group of 32 is left to the BVH where fewer than 32 * 64 rays come to its box, on the cube whose faces have 24 units
- * of area. From 4 million rays, 13 come to the box of a row (3.2 m by 1 cm), and about 8,500 to that of scattered
- * triangles (about 6.4 m by 3.2 m). */
+/* A group of 32 is left to the BVH where fewer than 32 * 64 rays come to its box. Rays are even on a cube, whose faces
+ * have 24 units of area. From 4 million rays, 13 come to the box of a row (3.2 m by 1 cm), and about 8,500 to that of
+ * scattered triangles (about 6.4 m by 3.2 m). */
 static void order_decides(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What each cell of a map says, in a scene of four triangles, against the geometry on the faces of the cube. A map that
- * asks the BVH more often than it needs to has the right hits all the same, and nothing else would show it. */
+/* These tests compare what each cell of a map says, in a scene of four triangles, with geometry on the cube's faces. A
+ * map that asks the BVH more often than it needs to has the right hits all the same. Only these tests show it. */
 #include <malloc.h>
 #include <math.h>
 #include <stdlib.h>
@@ -79,7 +79,7 @@ static enum lies lies(const struct piece *p, int i, int j)
 
 enum { NOTHING = -1, SEVERAL = -2 };
 
-/* What a cell says: the one triangle that all its rays hit, or NOTHING, or SEVERAL. */
+/* Returns what a cell says: the one triangle that all its rays hit, or NOTHING, or SEVERAL. */
 static int says(int face, int i, int j)
 {
     int sees = NOTHING;

@@ -41,8 +41,8 @@ static uint64_t asked_for(const struct bvh *bvh, const double ray[3])
     return asked;
 }
 
-/* In a closed room rays are on a spiral of the golden angle. None of them is in doubt, so none asks the BVH. The six
- * axes are where four corners meet, with the most to their middles. */
+/* In a closed room rays are on a spiral of the golden angle. None of them is in doubt, so none asks the BVH. At the six
+ * axes the corners of four cells meet, farthest from the middles of the cells. */
 static void rays_that_are_there_are_known(void **state)
 {
     (void)state;

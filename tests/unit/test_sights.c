@@ -81,7 +81,7 @@ static void expect_seen(const char *head, double least_share, double most_share)
     site_free(site);
 }
 
-/* The share of a window is its width by the difference of its limits' sines. The margin adds a little. */
+/* The share of a window is its width times the difference of its limits' sines, over 4 pi. The margin adds a little. */
 static void test_view(void **state)
 {
     (void)state;
@@ -96,7 +96,7 @@ static void test_view(void **state)
     expect_seen("profile: velodyne-vlp16", 0.02, 0.2);
 }
 
-/* A cone is seen where any direction in it is. Seen directions are turned by less than its width. */
+/* A cone is seen where any direction in it is. The cones here have a seen direction just within their border. */
 static void test_cones(void **state)
 {
     (void)state;

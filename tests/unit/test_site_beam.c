@@ -96,8 +96,8 @@ static void the_search_for_pulses_is_bounded(void **state)
     if (load(head, "beam: {mode: auto}\n", &cfg, &err) != SH_OK || site_load(&cfg, &report, &site, &err) != SH_OK)
         fail_msg("%s", err.text);
     assert_int_equal(n_bounds, 1);
-    /* 2,796 of the draws are cast, and with five standard errors 3,061. Where none of these is wrong, the limit at 95 %
-     * is 2.996 of them, here right to a hundredth. */
+    /* About 2,796 of the draws are cast, 3,061 with five standard errors. If none of them has a wrong number of echoes,
+     * the limit at 95 % is 2.996 pulses. The plan's formula is right to a hundredth. */
     assert_true(site->plan.beam.echo_share > 0.99 * 2.996 / 3061);
     site_free(site);
 }

@@ -88,8 +88,8 @@ static void surfaces_without_colours_are_counted(void **state)
     assert_string_equal(warned, "");
 }
 
-/* A picture that can't be read is reported when the scene is loaded, or where the scene does not need it, here. Both
- * surfaces keep the colour of their material. */
+/* A picture that can't be read is reported when the scene is loaded. If the scene does not need the picture (cutouts:
+ * off), output.colour reports it. */
 static void a_picture_that_is_none(void **state)
 {
     (void)state;

@@ -25,7 +25,7 @@ static int remove_files(void **state)
     return remove_folder(state);
 }
 
-/* Square 0, 0 is the lower left one, a hole; one texel each. */
+/* Square 0, 0, the lower left one, is a hole. Each square is one texel. */
 static int make_files(void **state)
 {
     static uint8_t rgba[SQUARES * SQUARES][4];
@@ -41,7 +41,7 @@ static int make_files(void **state)
     return png_image_write_to_file(&image, path, 0, rgba, 0, NULL) ? 0 : -1;
 }
 
-/* moves: the board does, at a speed that takes it nowhere. */
+/* moves: the board is a body that moves, too slowly to leave its place. */
 static int load_site(const char *more, const char *cutouts, int moves, struct config *cfg, struct site **site,
                      struct sh_err *err)
 {

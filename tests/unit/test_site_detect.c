@@ -82,7 +82,7 @@ static void write_surfaces(uint32_t n)
     free(text);
 }
 
-/* Labels are 16 bits, and 65535 means none. 65534 are left, and half of them are for ghosts. */
+/* Labels are 16 bits, and 65535 means none. A scene has up to 65534, and half of them are for ghosts. */
 static void ghosts_need_labels(void **state)
 {
     (void)state;
@@ -121,8 +121,8 @@ static void found_echoes_have_room(void **state)
     }
 }
 
-/* The pulse of 3 ns behind a receiver of 10 MHz, whose answer is 31 ns long (0.312 / B): its peak is a tenth. So the
- * level is 0.8 times the noise of 1/8. The bandwidth that the warning names is enough. */
+/* A receiver of 10 MHz has an answer 31 ns long (0.312 / B), so it lowers the peak of the pulse of 3 ns to a tenth. The
+ * level is then 0.8 times the noise of 1/8. The bandwidth that the warning names is enough. */
 static void a_level_within_noise_is_said(void **state)
 {
     (void)state;
@@ -140,7 +140,7 @@ static void a_level_within_noise_is_said(void **state)
     const char *enough = strstr(warned, "waveform.bandwidth_mhz=");
     assert_non_null(enough);
     const double mhz = atof(strchr(enough, '=') + 1);
-    for (int less = 0; less < 2; less++) { /* named to 10 %, and 1 MHz */
+    for (int less = 0; less < 2; less++) { /* the warning names it to 10 % and 1 MHz */
         snprintf(text, sizeof text, "signal: {model: on}\nwaveform: {echoes: gaussians, bandwidth_mhz: %.0f}\n",
                  less ? 0.9 * mhz - 1.0 : mhz);
         if (load(text, &site) != SH_OK) fail_msg("%s", err.text);

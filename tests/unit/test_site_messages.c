@@ -133,7 +133,7 @@ static const struct {
      "stations:\n  - {position_m: [-20, 0, 2], lat_deg: 50, lon_deg: 11.9997, height_m: 0}\n"
      "  - {position_m: [20, 0, 2], lat_deg: 50, lon_deg: 12.0003, height_m: 0}\n" SINGLE "output: {crs: utm, layout: geo}\n",
      {"FILE: station station-2 is in EPSG 32633, station station-1 in 32632: their points have no common system"}},
-    /* 10^2 thresholds and 255 - 0 counts are less than one a threshold; 10^3 are 3.92 */
+    /* 30 dB are 10^3 thresholds, 3.92 for each of 255 counts; 24 dB are 251 thresholds, less than one a count */
     {"profile: any-rate", 1, STATION SINGLE "signal: {model: on}\nwaveform: {send: on, bits: 8, baseline_counts: 0, "
      "full_scale_db: 30}\n",
      {"FILE: waveform.full_scale_db: a count of the samples is 3.92 times the detection threshold, so they don't show weak "

@@ -76,9 +76,9 @@ static void a_place_is_taken_as_it_is(void **state)
     site_free(first);
 }
 
-/* Without an anchor the first place fixes the scene on the Earth: 100 m to the east, 40 m to the north, and up, are
- * that on the Earth, too. At 60 degrees of latitude a degree of longitude is 55.8 km, within half a percent of half of
- * 111.3 km, and one of latitude 111.4 km. */
+/* Without an anchor the first place fixes the scene on the Earth: a move by 100 m east, 40 m north and 3 m up is the
+ * same there. At 60 degrees of latitude a degree of longitude is 55.8 km, within half a percent of half of 111.3 km,
+ * and one of latitude 111.4 km. */
 static void on_the_earth_it_moves_along(void **state)
 {
     (void)state;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* What carries a head: each error and warning with its numbers and limits, and the stops of a head at its stations. */
+/* Carriers of a head: each error and warning with its numbers and limits, and the stops of a head at its stations. */
 #include "tests/unit/site_rig.h"
 
 #include <math.h>
 
 static struct site *site;
 
-/* Each text of path.csv or way.csv replaces the file. */
+/* Loads a site with these sections. The test has written path.csv or way.csv before. */
 static int load_at(const char *stations, const char *platform, const char *head)
 {
     char text[1024];
@@ -70,7 +70,7 @@ static void a_part_lies_on_the_trajectory(void **state)
 static void a_path_has_limits(void **state)
 {
     (void)state;
-    /* Every 10 ms, and a knot more each for the interval's end and for the start. */
+    /* There is a pose every 10 ms, one more at the interval's end, and one more at the start. */
     write_in("path.csv", LINES "0,0,0,2,0,0\n101000,1e9,0,2,0,1\n");
     refuse(ONE, GOES ", start_s: 0.25", "",
            ": platform.file: the trajectory needs up to 10100002 poses from 0.25 s on; allowed 10000000");

@@ -64,7 +64,7 @@ static void out_of_reach(void **state)
 {
     (void)state;
     write_box(-0.2, 0);
-    load("0, 0, 790", 1, "", ""); /* 800 m; the corners are 42 m aside, the face itself is within */
+    load("0, 0, 790", 1, "", ""); /* the face is 790 m below, within the range of 800 m */
     assert_null(strstr(warned, "no surface within"));
     load("0, 0, 801", 1, "", "");
     says("station 1 station-1 at 0 0 801 m: no surface within range_max_m, 800 m");
@@ -232,7 +232,7 @@ static void fields_that_no_link_speaks_of(void **state)
 }
 
 #ifndef SH_SANITIZE /* the house is large, and loading it has a test of its own */
-/* config/README.md calls them ready to run. */
+/* config/README.md calls these configurations ready to run. */
 static void configurations_of_this_tree_are_silent(void **state)
 {
     (void)state;

@@ -38,7 +38,7 @@ static void the_legs_of_other_stations_keep_their_scale(void **state)
     site_free(site);
 }
 
-/* Ranges and noise are those of the new settings. Others stay those of power-up, since no plan depends on them. */
+/* Ranges and noise are those of the new settings. The other settings stay as at power-up: no plan depends on them. */
 static void the_plan_has_the_new_settings(void **state)
 {
     (void)state;

@@ -74,7 +74,7 @@ static void expect_edge(const struct site_view *view, double elevation_deg, doub
     }
 }
 
-/* The pan stops at most a line (0.2 deg) beyond its window. At the horizon an azimuth's margin is the angle itself. */
+/* The pan stops at most a line (0.2 deg) beyond its window. At the horizon azimuths have an elevation's margin. */
 static void a_window_has_four_edges(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a client of a soak does with each result of the library, and when: the order of its calls, with their times. */
+/* A client of a soak: its calls at each result of the library, in their order and with their times. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -186,8 +186,8 @@ static void have_session(void)
     at->in_session = 1;
 }
 
-/* A client is done with the last frame that a fault can have hit, in a session, with points less than 500 ms ago. From
- * then on it only reads, and asks nothing. */
+/* A client is done once it has seen the last frame that a fault can have hit, if it has a session and got points less
+ * than 500 ms ago. From then on it only reads. */
 static void it_is_done(void **unused)
 {
     static const struct turn script[] = {{SCANHEAD_OK, 0, 0, NULL},
@@ -225,7 +225,7 @@ static void drain(void)
     atomic_store(&soak.phase, SOAK_DRAINS);
 }
 
-/* Packets are compared until one came after the last that a fault can have hit, and on to the soak's end. */
+/* Packets are done once one came after the last that a fault can have hit. They are compared on to the soak's end. */
 static void packets_are_done(void **unused)
 {
     static const struct turn script[] = {{0, 0, 0, NULL},

@@ -138,12 +138,12 @@ static void a_port_may_be_taken(void **state)
     socklen_t len = sizeof at;
     struct link_spec other;
     (void)state;
-    assert_null(soak_datagrams_open(&spec, &other)); /* that of this test */
+    assert_null(soak_datagrams_open(&spec, &other)); /* this test has the port */
     assert_int_equal(bind(out, (struct sockaddr *)&at, sizeof at), 0);
     assert_int_equal(getsockname(out, (struct sockaddr *)&at, &len), 0);
     soak_datagrams_close(link_at.datagrams);
     spec.port = ntohs(at.sin_port);
-    link_at.datagrams = soak_datagrams_open(&spec, &clean); /* it is free at the own address */
+    link_at.datagrams = soak_datagrams_open(&spec, &clean); /* at the link's own address the port is free */
     assert_non_null(link_at.datagrams);
     spec.address[0] = '\0';
     assert_null(soak_datagrams_open(&spec, &other));
@@ -180,8 +180,8 @@ static void packets_wait_for_the_clean_ones(void **state)
     assert_true(link_at.bad_units == 0 && link_at.bad_bytes == 0);
 }
 
-/* The clean stream is a b a c a d. A packet is the nearest one of its content, from the expected place on in both
- * directions, and the later one of two that are equally near. */
+/* The clean stream is a b a c a d. A packet is taken for the clean one of equal content that is nearest to the expected
+ * place, before or after it. Of two that are equally near, the later one counts. */
 static void equal_packets_are_told_by_their_place(void **state)
 {
     static const struct {

@@ -161,7 +161,7 @@ static void so_many_are_kept(void **state)
     assert_int_equal(at->row[FAULT_SELF_TEST].noticed, SOAK_MAX_MOMENTS);
 }
 
-/* The jump is of 0.5 s. The jump is noticed where the clock went on by that much, less or more by up to a half. */
+/* The jump is of 0.5 s. The jump is noticed where the clock is ahead by 0.25 to 0.75 s. */
 static void a_jump_of_the_clock(void **state)
 {
     static const struct {
@@ -250,7 +250,7 @@ static void a_pulse_is_lost(void **state)
     expect(FAULT_PPS_LOST, 1, 0, NULL);
 }
 
-/* 40 ms late, give or take a quarter. */
+/* A pulse 40 ms late or early, give or take a quarter of that, is noticed. */
 static void a_pulse_is_late(void **state)
 {
     static const struct {

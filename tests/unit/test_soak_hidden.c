@@ -67,7 +67,7 @@ static void a_fault_without_a_place(void **state)
     note.link = 2; /* there is no such link */
     soak_heard(soak, &note);
     note.link = 1;
-    note.ended = 1; /* its end is no fault of its own */
+    note.ended = 1; /* the end of a fault is no further fault */
     soak_heard(soak, &note);
     assert_int_equal(link->row[FAULT_FLIP].injected, 1);
     assert_int_equal(link->ask.others, 2); /* these explain an odd reply */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Which links of a soak get a client, and why others do not. */
+/* These tests check which links of a soak get a client, and why others do not. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -90,7 +90,7 @@ static void points(int64_t t_ms)
     points_of(POINTS, t_ms);
 }
 
-/* Whether a fault that begins at 100 ms is noticed at a rate, in a frame at 150 ms. */
+/* Checks whether a fault that begins at 100 ms is noticed at a rate, in a frame at 150 ms. */
 static void expect_at(const struct fault *what, double at_rate, int noticed)
 {
     end(NULL);

@@ -344,7 +344,7 @@ static void each_reason_is_enough(void **state)
     assert_int_equal(soak.n_failures, 0);
 }
 
-/* Acts that nobody noticed by the end are missed, of each list. */
+/* Acts, refusals and plugs that nobody noticed by the end are missed. */
 static void open_acts_are_missed(void **state)
 {
     (void)state;
@@ -362,7 +362,7 @@ static void open_acts_are_missed(void **state)
     assert_int_equal(soak.n_failures, 1); /* the counts add up */
 }
 
-/* What the head says it left out stands in the sheet once the clients have ended. */
+/* Once the clients have ended, the sheet has the number of frames that the head says it left out. */
 static void left_out_frames_are_those_of_the_head(void **state)
 {
     struct scanhead_frame frame;

@@ -67,7 +67,7 @@ static void come(unsigned number)
     soak_saw_unit(at, soak_unit(number), digest_of(soak_unit(number)), BYTES);
 }
 
-/* The units from one to another come, which is not among them. */
+/* The units `from` to `to` - 1 come. */
 static void come_all(unsigned from, unsigned to)
 {
     while (from < to)
@@ -80,7 +80,7 @@ static void bad_unit(uint64_t bytes)
     at->bad_bytes += bytes;
 }
 
-/* All that came later. Returns how many reasons for a bad verdict there are. */
+/* All units from this one on come, and are judged. Returns how many reasons for a bad verdict there are. */
 static unsigned judge_after(unsigned from)
 {
     come_all(from, N + 1);
@@ -108,7 +108,7 @@ static void clean_packets(void **state)
     assert_true(at->lost_plain == 0 && at->wrong_plain == 0 && at->unknown == 0 && at->in_session == 1);
 }
 
-/* Those before the first one that came do not count, and a lost one later does. */
+/* Packets that are lost before the first one came do not count; a later lost one does. */
 static void lost_packets(void **state)
 {
     (void)state;
@@ -146,7 +146,7 @@ static void drops_and_flips(void **state)
     }
 }
 
-/* What is left of a cut packet is no packet of the stream. */
+/* The rest of a cut packet is no packet of the stream. */
 static void cut_packets(void **state)
 {
     (void)state;
@@ -226,7 +226,7 @@ static void copies_and_order(void **state)
     expect_row(FAULT_REORDER, 1, 0, 0, NULL);
 }
 
-/* Garbage is a packet of its own, and each bad one stands for one of them. */
+/* Each piece of garbage is a packet of its own, and each bad packet counts as one piece of garbage. */
 static void garbage(void **state)
 {
     (void)state;

@@ -28,7 +28,7 @@ static const char *or_none(const char *text)
     return text != NULL ? text : "none";
 }
 
-/* All checks are passed but the first, which is not judged, and the last, which may be found. */
+/* All checks pass but two: the first is not judged, and the last has a finding in the runs of found_in. */
 int verdict_run(struct config *cfg, const struct verdict_options *o, struct verdict *v, struct sh_err *err)
 {
     n_runs++;
@@ -143,7 +143,7 @@ static void several_scenarios(void **state)
     rmdir("there");
 }
 
-/* The sheet makes room for what goes to standard output. */
+/* The sheet goes to standard error where standard output has JSON or the truth. */
 static void standard_output(void **state)
 {
     (void)state;
@@ -160,7 +160,7 @@ static void standard_output(void **state)
     rmdir("new");
 }
 
-/* What was judged before is written all the same. */
+/* Runs that were judged before are written all the same. */
 static void runs_that_fail(void **state)
 {
     (void)state;
@@ -244,7 +244,7 @@ static void long_folders(void **state)
     }
 }
 
-/* No file that a run writes may be one that the command line names, too, but for the client's points. */
+/* The command line may name no file that a run writes, except for the client's points. */
 static void files_of_runs(void **state)
 {
     static const struct {

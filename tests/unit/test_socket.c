@@ -26,7 +26,7 @@ static int listen_here(char name[64])
     return fd;
 }
 
-/* Connects one: fd[0] is the client, fd[1] the other end. */
+/* Connects two sockets: fd[0] is the client, fd[1] the other end. */
 static void connect_pair(int fd[2])
 {
     char name[64];
@@ -218,7 +218,7 @@ static void test_bytes(void **state)
     assert_int_equal(socket_write(fd[1], "d", 1), 1);
     assert_int_equal(socket_write(fd[0], "last", 4), 4);
     close(fd[0]);
-    /* Its peer is gone: no SIGPIPE, and its last words are heard first. */
+    /* The peer is gone. There is no SIGPIPE, and the bytes that it sent last are read first. */
     assert_int_equal(socket_write(fd[1], "x", 1), SH_ECLOSED);
     assert_int_equal(socket_write_heard(fd[1], "x", 1), 0);
     assert_int_equal(socket_read(fd[1], text, 3), 3);

@@ -14,7 +14,7 @@ struct window {
     uint32_t steps, gaps;                                       /* 360 / step and 180 / step, rounded by hand */
 };
 
-/* Compares a / b with c / d: whether a / b >= c / d - 1 micro-degree, in whole numbers. */
+/* Returns whether numerator / denominator is at least udeg - 1, in whole numbers. */
 static int at_least(int64_t numerator, int64_t denominator, int64_t udeg)
 {
     return numerator >= (udeg - 1) * denominator;

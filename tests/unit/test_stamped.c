@@ -132,7 +132,7 @@ static void a_datagram_of_ipv6_too(void **state)
     stamped_close(&other);
 }
 
-/* What has no room is counted, by the socket at once and by the datagram after it. */
+/* Datagrams without room are counted, by the socket at once and by the next datagram that comes. */
 static void lost_datagrams_are_counted(void **state)
 {
     (void)state;

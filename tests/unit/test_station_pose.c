@@ -153,7 +153,7 @@ static void put_line_end(uint32_t line, uint64_t pulse0, uint32_t n_fired)
     rig_put(out, native_encode_line_end(out, sizeof out, &end, 0));
 }
 
-/* The line's end counts before the times. If it is missing, times at the descriptor's 1 kHz count. */
+/* The line's end decides the rows. If it is missing, the times decide, at the descriptor's 1 kHz. */
 static void test_rows(void **state)
 {
     (void)state;

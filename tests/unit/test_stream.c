@@ -136,8 +136,8 @@ static void a_power_cycle_leaves_nothing_to_the_next_line(void **state)
     assert_int_equal(read_echoes(4, 2, 1), 2 + 1);
 }
 
-/* Makes a tick of a scan with n_cast pulses, then telemetry and the scan's end where `cast` is not 0: so many pulses
- * were to be cast up to it. */
+/* Makes a tick of a scan with n_cast pulses, then telemetry and the scan's end where `cast` is not 0. `cast` pulses
+ * were to be cast in the whole scan. */
 static struct ring_slot *make_pulses(uint64_t tick, uint32_t scan, uint64_t n_cast, uint64_t cast)
 {
     uint8_t bytes[512];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is said of figures that maps, views, meshes, viewpoints and scenes of arrays can't take: whole lines, with each
+/* Messages about figures that maps, views, meshes, viewpoints and scenes of arrays can't take: whole lines, with each
  * figure in its place. */
 #include <math.h>
 #include <stdio.h>
@@ -130,7 +130,7 @@ static void of_sizes_of_views(void **state)
     }
 }
 
-/* Nothing is written of these. */
+/* None of these meshes is written. */
 static void of_meshes(void **state)
 {
     (void)state;

@@ -27,7 +27,7 @@ static void what_is_left_has_its_own_numbers(void **state)
     assert_string_equal(scene->surface[0].object, "b");
     assert_string_equal(scene->surface[1].object, "c");
     static const uint16_t label[4] = {0, 0, 1, 1};
-    static const uint32_t t[4][3] = {{0, 2, 1}, {2, 3, 1}, {2, 4, 3}, {4, 5, 3}}; /* two vertices less before each */
+    static const uint32_t t[4][3] = {{0, 2, 1}, {2, 3, 1}, {2, 4, 3}, {4, 5, 3}}; /* numbers of vertices are two less */
     assert_memory_equal(scene->label, label, sizeof label);
     assert_memory_equal(scene->triangle, t, sizeof t);
     assert_true(scene->vertex_m[0][0] == 1 && scene->vertex_m[5][2] == 7);
@@ -138,7 +138,7 @@ static void targets_are_chosen_in_all_meshes(void **state)
     site_free(site);
 }
 
-/* Of a mesh with copies, each copy of a target counts. */
+/* If a mesh has copies, each copy of a target counts. */
 static void targets_count_in_all_copies(void **state)
 {
     (void)state;

@@ -224,7 +224,8 @@ static void integers(void **state)
     }
 }
 
-/* Each first code of a form with one byte more, the last of each, and what Unicode 15, table 3-7, leaves out. */
+/* These are the last character of each length, the first one of each longer length, and codes that Unicode 15, table
+ * 3-7, leaves out. */
 static void characters_of_utf8(void **state)
 {
     (void)state;

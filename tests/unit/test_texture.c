@@ -98,7 +98,7 @@ struct seen {
     uint32_t n, light, dark;
 };
 
-/* The bound is half of 0.01 dB, and of a texel's 65534th of a reflectance of 0.02 or more. */
+/* The bound is half a step of 0.01 dB, and half a step of a texel, 1 / 65534, at a reflectance of 0.02 or more. */
 static const double TOLD_DB = 0.005 + 4.343 * 0.5 / 65534.0 / 0.02;
 
 /* Casts over the board and compares the reflectance of each pulse with its square's. Pulses within `near` squares of
@@ -197,7 +197,7 @@ static double reflectance(int srgb)
     return texel * (0.2126 + 0.7152 * light_of(0.8) + 0.0722 * light_of(0.5));
 }
 
-/* A texel's share of 65534 steps may be none, all, or half. A label without one has its surface's. */
+/* A texel's share of 65534 steps may be none, all, or half. A label without a texel has its surface's value. */
 static void texels_in_labels(void **state)
 {
     (void)state;

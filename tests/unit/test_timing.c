@@ -47,7 +47,7 @@ static struct timing_moment event(uint32_t code, uint64_t a, int64_t t_ns)
     return take();
 }
 
-/* n pulses from pulse0 on, in a line from line_t0 on. The last fires dt after the first. There are two points each. */
+/* n pulses from pulse0 on, in a line from line_t0 on. The last fires dt after the first. Each pulse has two points. */
 static struct timing_moment points(uint32_t line, uint64_t pulse0, uint32_t n, int64_t t0_ns, int64_t line_t0_ns,
                                    uint32_t dt_ns)
 {

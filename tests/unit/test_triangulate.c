@@ -88,8 +88,8 @@ static void crossing_polygon_is_told(void **state)
     assert_int_equal(n_warnings, 1);
     assert_non_null(strstr(warnings, "bow.obj: the outlines of 1 polygons cross themselves"));
     scene_free(s);
-    /* The first and the fourth edge cross at (1, 2). All ears can be cut off but for one corner, and what is left lies
-     * the right way round. */
+    /* The first and the fourth edge cross at (1, 2). One corner that is cut off is no ear, and the last triangle turns
+     * left. So this corner alone shows the crossing. */
     s = load_text("star.obj", "v 2 1 0\nv 0 3 0\nv 3 1 0\nv 0 1 0\nv 2 3 0\nv 2 0 0\nv 1 2 0\nv 1 1 0\n"
                               "f 1 2 3 4 5 6 7 8\n");
     assert_non_null(strstr(warnings, "star.obj: the outlines of 1 polygons cross themselves"));

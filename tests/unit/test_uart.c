@@ -82,7 +82,7 @@ static int level_at_tick(const uint8_t *sent, size_t n, uint64_t tick, uint64_t 
     return bit % 10 == 0 ? 0 : sent[bit / 10] >> (bit % 10 - 1) & 1;
 }
 
-/* A tick is so short that half a bit of either side has a whole number of them. */
+/* Half a bit of either side is a whole number of ticks. */
 static size_t simulate(const struct uart *uart, const uint8_t *sent, size_t n, uint8_t *out)
 {
     const uint64_t g = gcd(uart->sender_baud, uart->receiver_baud);

@@ -122,13 +122,13 @@ static void *keep(void *arg)
         latched_put(&shared, frame);
         encode(frame, NATIVE_EMITTER, i);
         latched_put(&shared, frame);
-        for (volatile int rest = 0; rest < 2000; rest++) /* in the head it is a second */
+        for (volatile int rest = 0; rest < 2000; rest++) /* in the head this takes a second */
             continue;
     }
     return arg;
 }
 
-/* A reader beside the one that stores them never gets a frame that is half of one and half of another. */
+/* A thread that reads while another one stores frames never gets half of one frame and half of another. */
 static void copies_are_whole(void **state)
 {
     (void)state;

@@ -94,7 +94,7 @@ static void test_usbip_refused(void **state)
 }
 
 /* Within the time between two attempts an injected fault unplugs the device and plugs it in. The device is plugged in
- * once: vhci_attach fails the test where the end before was not taken. */
+ * once: a second vhci_attach would fail the test. */
 static void test_unplugged_meanwhile(void **state)
 {
     (void)state;

@@ -206,7 +206,7 @@ static void test_reset(void **state)
     bench_close(&bench);
 }
 
-/* A reader that had no transfer pending learns of it by its next one, and a later reader by none. */
+/* A reader without a pending transfer learns of the reset by its next one. A later reader does not learn of it. */
 static void test_reset_of_idle(void **state)
 {
     (void)state;

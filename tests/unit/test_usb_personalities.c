@@ -253,7 +253,7 @@ static void test_serial_state(void **state)
         assert_int_equal(note.actual, sizeof ready);
         assert_memory_equal(bytes, ready, sizeof ready);
     }
-    /* Either interface ends the session when it is set anew. Only the control one is the port's life. */
+    /* Either interface ends the session when it is set anew. Only the control one also resets the port's state. */
     for (unsigned interface = CONSOLE_DATA_INTERFACE + 1; interface-- > 0;) {
         memcpy(rig.in, ((const uint8_t[]){1, 2, 3, 4, 0, 0, 8}), 7);
         assert_int_equal(control(&rig, 0x21, 0x20, 0, CONSOLE_INTERFACE, 7), 0);
@@ -369,7 +369,7 @@ static void test_own_requests(void **state)
         if (got != cases[i].want) fail_msg("case %zu: %d, not %d", i, got, cases[i].want);
     }
     assert_int_equal(rig.head.personality->n_sessions, 2);
-    assert_true(rig.head.session[0].open); /* by 3, and no wrong request has ended it */
+    assert_true(rig.head.session[0].open); /* value 3 opened it, and no wrong request has ended it */
     assert_false(rig.head.session[1].open);
     /* Where the data of a request are still to come, the answer is that of a right one, and nothing is done. */
     assert_int_equal(usb_device_control(rig.head.device, &coding, NULL, 7), 0);
@@ -382,7 +382,7 @@ static void test_own_requests(void **state)
         assert_int_equal(rig.in[1], 0xee);
         assert_int_equal(control(&rig, 0x41, 0x22, 1, 2, 0), 0);
     }
-    /* After a reset that no transfer has told of, the next one would; but not that of a new reader. */
+    /* If no transfer has told of a reset, the reader's next one does. The transfer of a new reader does not. */
     uint8_t bytes[8];
     struct usb_transfer in = {.endpoint = STREAM_IN, .length = sizeof bytes, .data = bytes};
     usb_device_set_gone_due(rig.head.device, STREAM_IN, 1);
@@ -393,7 +393,7 @@ static void test_own_requests(void **state)
     usb_device_free(rig.head.device);
 }
 
-/* Requests of other identities are refused: a TiM has no stream request, and no port's. */
+/* Requests of other identities are refused: a TiM has no requests of a stream or a port. */
 static void test_foreign_requests(void **state)
 {
     (void)state;

@@ -220,7 +220,7 @@ static void expect_ready(struct client *c)
     assert_memory_equal(r.data, ready, sizeof ready);
 }
 
-/* The request waits: an answer would come before that to the unlink. */
+/* The request waits: its answer would come before that of the unlink. */
 static void expect_no_notice(struct client *c)
 {
     client_unlink(c, client_submit(c, 1, 2, NULL, NULL, 16));

@@ -257,8 +257,8 @@ static void test_short_not_ok(void **state)
     bench_close(&bench);
 }
 
-/* Requested bytes that were not received count up to 64 MiB (drivers/usb/usbip_private.h), the last one as well. One
- * byte more cuts the client off. */
+/* Requested bytes that were not received may be 64 MiB (drivers/usb/usbip_private.h). One byte more cuts the client
+ * off. */
 static void test_bytes_pending(void **state)
 {
     (void)state;

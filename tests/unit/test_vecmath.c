@@ -104,7 +104,7 @@ static void they_lie_on_the_unit_circle(void **state)
     assert_true(worst <= 2.0 * sqrt(2.0) * SINCOS_ERROR);
 }
 
-/* A part of a turn is given beyond the last bit, with the remainder of its double. */
+/* The angle is finer than a double: a double and its remainder. Sine and cosine come as two doubles each, too. */
 static void fine_sine_and_cosine(void **state)
 {
     (void)state;

@@ -81,8 +81,8 @@ static uint32_t parse(struct seen *seen)
     return n;
 }
 
-/* A turn and some more, in frames of all sizes, through 0 degrees: half a unit of range, half a hundredth of a
- * degree. */
+/* The head makes more than one turn, through 0 degrees, in frames of all sizes. Errors are at most half a unit of range
+ * and half a hundredth of a degree. */
 static void test_client_gets_what_was_measured(void **state)
 {
     (void)state;

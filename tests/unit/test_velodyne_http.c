@@ -293,7 +293,7 @@ static void test_documents(void **state)
         assert_non_null(strchr(http_rig.line[i], '?')); /* reading changes nothing */
 }
 
-/* The snapshot has the four other pages. */
+/* The snapshot has the four documents info, settings, status and diag. */
 static void test_snapshot(void **state)
 {
     (void)state;

@@ -36,7 +36,7 @@ static const uint8_t *packet(uint32_t i)
     return rig.bytes + (size_t)512 * i;
 }
 
-/* Opens another session, at a device time. */
+/* Notes the time that is asked for, and gives the rig's fix. */
 static int note_time(void *ctx, int64_t t_ns, struct nmea_fix *fix)
 {
     const struct protocol_rig *r = ctx;
@@ -141,7 +141,7 @@ static void test_without_utc(void **state)
         assert_int_equal(packet(0)[i], 0);
 }
 
-/* After a power cycle the seconds since the calibration, whose reason is power-on, count from its end. */
+/* After a power cycle the reason for the calibration is power-on. Its seconds count from the end of the cycle. */
 static void test_after_power_cycle(void **state)
 {
     (void)state;

@@ -94,7 +94,7 @@ static void test_what_the_shell_leaves(void **state)
     assert_int_equal(kill(-client.pid, 0), -1);
 }
 
-/* Programs that leave the group, with their own session or as timeout does. Then each prints its process number. */
+/* Some programs leave the group, with their own session or as timeout does. Then each prints its process number. */
 static void test_what_leaves_the_group(void **state)
 {
     (void)state;

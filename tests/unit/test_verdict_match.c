@@ -13,7 +13,7 @@
 
 enum { N = 600, PER_FRAME = 10, TICK_NS = 1000000 };
 
-/* The head: 60 frames of 10 points, one each millisecond. Point i is somewhere of its own. */
+/* The head: 60 frames of 10 points, one each millisecond. Each point has a place of its own. */
 static double xyz[N][3];
 static struct own_frame frames[N / PER_FRAME];
 static struct own_stream stream;
@@ -100,7 +100,7 @@ static void test_repeated(void **state)
     span[1] = (struct watch_span){2, 0, INT64_MAX};
     watch.n_span = 2;
     assert_int_equal(try(&cloud, 1e-5).repeated, 0);
-    /* The second was sent nothing of that frame, which is number 5: more than two ticks after its end. */
+    /* The second session ended more than two ticks before that frame, number 5, so it was not sent it. */
     span[1].to_ns = 2 * TICK_NS;
     assert_int_equal(try(&cloud, 1e-5).repeated, PER_FRAME);
     /* A fault took that frame away from it. */
@@ -228,7 +228,7 @@ static void test_rounding(void **state)
         {{{1.23457, 12.3457, -123.457}, {0.123457, 2, 3}}, 1e-3}, /* %g has six digits */
         {{{5.0, 6.0, 7.0}, {8.0, 9.0, 4.0}}, 1.0},
         {{{0.0, 0.0, 0.0}, {NAN, NAN, NAN}}, 1.0},
-        {{{1.2345, 2.0, 3.0}, {4.0, 5.0, 6.0}}, 1e-4}, /* any of them has the most digits */
+        {{{1.2345, 2.0, 3.0}, {4.0, 5.0, 6.0}}, 1e-4}, /* any coordinate may have the most digits */
         {{{1.0, 2.0, 3.25}, {4.0, 5.0, 6.0}}, 1e-2},
         {{{1.0, 2.0, 3.0}, {4.0, 5.0, 6.125}}, 1e-3},
     };

@@ -124,7 +124,7 @@ static void there_and_back(void **state)
     assert_int_equal(watch_over_ns(&w), 1090 * MS); /* the latest of all */
 }
 
-/* Of several faults on a link the one that lasts longest counts, and of equal ones the later one. */
+/* If there are several faults on a link, the one that lasts longest counts, and the later of equal ones. */
 static void several_faults(void **state)
 {
     (void)state;
@@ -171,7 +171,7 @@ static void faults_that_leave_sessions(void **state)
     }
 }
 
-/* The end of a power cycle is when clients can come back, of those that are away still. */
+/* Clients that a power cycle sent away, and that are away still, can come back from its end on. */
 static void power_comes_back(void **state)
 {
     const struct fault_note ended = {.kind = FAULT_POWER_CYCLE, .ended = 1};

@@ -58,7 +58,7 @@ static void test_a_session_that_a_fault_ends(void **state)
     assert_true(w.broken[0].back_ns != 0 && watch_is_whole(&w));
 }
 
-/* The fault is over with the next session: what ends that one is another matter. */
+/* The fault is over with the next session. If that session ends, it ends for another reason. */
 static void test_a_client_that_goes_by_itself(void **state)
 {
     (void)state;
@@ -92,7 +92,7 @@ static void test_whom_a_fault_concerns(void **state)
     assert_int_equal(w.injected, 2);
 }
 
-/* A client may end a connection that is silent, and has to come back then; one that waits need not. */
+/* A client may end a connection that is silent, and then has to come back. A client that keeps it need not. */
 static void test_silence(void **state)
 {
     (void)state;
@@ -108,7 +108,7 @@ static void test_silence(void **state)
     assert_true(watch_is_whole(&w));
 }
 
-/* A client that goes by itself, long after a stall, was not sent away by it. Times are made so, nothing waits. */
+/* A client that goes by itself, long after a stall, was not sent away by it. The test sets the times. */
 static void test_an_end_long_after_a_silence(void **state)
 {
     (void)state;
@@ -131,7 +131,7 @@ static void test_an_end_long_after_a_silence(void **state)
     assert_int_equal(w.n_broken, 2);
 }
 
-/* A device that sends only what was asked for. */
+/* The device sends only what was asked for, so a client is back once it has asked. */
 static void test_a_link_on_which_clients_must_ask(void **state)
 {
     (void)state;

@@ -99,7 +99,7 @@ static void obj_of_two_ranges(void **state)
     check(s, 0, 1, 0, 51, 0);
     check(s, 0, 2, 0, 0, 153);
     scene_free(s);
-    s = take("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nf 1 2 3\nv 0 1 0 0 0 153\n", 1); /* which the last one says */
+    s = take("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nf 1 2 3\nv 0 1 0 0 0 153\n", 1); /* 153 says so */
     check(s, 0, 0, 1, 0, 0);
     check(s, 0, 2, 0, 0, 153);
     scene_free(s);
@@ -306,7 +306,7 @@ static void hits_have_the_colour_between(void **state)
     scene_free(s);
 }
 
-/* If a rule has no reflectance it is the colour's luminance, 0.2126 of red and so on, in linear light. */
+/* Without a rule the reflectance is the colour's luminance, 0.2126 of red and so on, in linear light. */
 static void hits_reflect_as_their_colour(void **state)
 {
     (void)state;

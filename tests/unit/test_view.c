@@ -301,7 +301,8 @@ static double hue_deg(const uint8_t rgb[3])
 }
 
 /* Views have paler colours than recordings and maps, so that shading is seen. Low and high mean the same: the hue goes
- * from blue to red. Their hues are at most 60 degrees apart; the other way round the ends would be 240 apart. */
+ * from blue to red. Hues of view and map are at most 60 degrees apart. With one ramp reversed the ends would be 240
+ * apart. */
 static void low_and_high_mean_the_same_in_views(void **state)
 {
     (void)state;

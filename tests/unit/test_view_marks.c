@@ -56,7 +56,7 @@ static int has_text(const struct picture *p, const char *text, enum picture_anch
     return found;
 }
 
-/* Blue grows with the value from 0 to 20. Red and green are of no other thing. */
+/* Blue grows with the value from 0 to 20. No other thing has this red and green. */
 static void blues(const void *ctx, double value, uint8_t rgb[3])
 {
     (void)ctx;
@@ -165,7 +165,7 @@ static uint32_t swatches(const struct picture *p, const struct view_entry *entry
     return found;
 }
 
-/* Twelve names are shown where there is room. Of more, eleven and the number of the others; as many lines as that. */
+/* At most twelve lines are shown: twelve names, or eleven and the number of the others. Low pictures have fewer. */
 static void names_and_the_number_of_others(void **state)
 {
     (void)state;

@@ -88,8 +88,8 @@ static void holes_are_closed(void **state)
 
 /* ---- smoothing */
 
-/* Depths that go up and down by e from place to place: of weights 1, 2, 2, 2 the means are e, -e, e, -e. So each pass
- * takes a seventh, and turns the sign round. An even slope stays, and so does a step from one surface to another. */
+/* Depths go up and down by e from place to place. With weights 1, 2, 2, 2 the mean of e, -e, e, -e is -e / 7. So each
+ * pass leaves a seventh, with the other sign. An even slope stays, and so does a step from one surface to another. */
 static void surfaces_are_smoothed(void **state)
 {
     (void)state;
@@ -103,7 +103,7 @@ static void surfaces_are_smoothed(void **state)
             const int x = i % W, y = i / W, at = along ? y : x, n = along ? H : W;
             const int last = along ? (H - 1 - y) * W + x : y * W + W - 1 - x;
             const double off = (double)depth_m[i] - 10.0, want = (at % 2 ? -1.0 : 1.0) * (double)e / 49.0;
-            /* floats at 10 are good to 1e-6, some times; both ends are alike, but one is up where the other is down */
+            /* floats at 10 err by some 1e-6; both ends are alike, but one is up where the other is down */
             assert_true(fabs(off + (double)depth_m[last] - 10.0) < 5e-6);
             assert_true(at < 8 || at >= n - 8 || fabs(off - want) < 5e-6);
         }
@@ -128,8 +128,8 @@ static double plane_depth(const double n[3], double x, double y)
     return 10.0 * n[2] / (n[0] * right + n[1] * up + n[2]);
 }
 
-/* The sum over four distances, of weights times the mean of what eight neighbours are nearer, in logarithms. Slanted
- * ones are 0.7 of the distance away in both axes. */
+/* Returns a sum over four distances: a weight times the mean by which eight neighbours are nearer, in logarithms.
+ * Slanted neighbours are 0.7 of the distance away in both axes. */
 static double plane_dark(const double n[3], int x, int y)
 {
     static const int reach[4][3] = {{2, 1, 14}, {5, 4, 9}, {12, 8, 5}, {28, 20, 3}};

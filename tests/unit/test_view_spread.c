@@ -113,7 +113,7 @@ static void points_have_the_figures_of_their_mesh(void **state)
     v.points.rgb = rgb;
 }
 
-/* A factor that equals a triangle's keeps it. */
+/* A triangle stays if its factor of long edges equals the limit. */
 static void some_meshes_and_triangles(void **state)
 {
     static const struct {
@@ -142,7 +142,7 @@ static void expect_error(const char *path, const char *query, const char *want)
     view_serve_free(&serve);
 }
 
-/* All meshes count towards the limit, in their order: half a square metre, then 4.5. */
+/* All meshes count towards the limit, one after the other: after half a square metre the sum is 4.5. */
 static void too_many_are_refused(void **state)
 {
     struct viewed_mesh swapped[2] = {meshes[1], meshes[0]};
@@ -163,7 +163,7 @@ static void too_many_are_refused(void **state)
     expect_error("/mesh", "scan=3", "scan=3: allowed whole numbers from 1 to 2");
 }
 
-/* The same wish again is answered from the points that are there; another one has others. */
+/* The same request again is answered from the points that are there. Another request gets other points. */
 static void answers_are_parts_of_the_points(void **state)
 {
     (void)state;

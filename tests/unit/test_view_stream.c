@@ -62,7 +62,7 @@ static void begin_geo(uint32_t crs, uint32_t epsg, uint32_t station)
     rig_anchor(&anchor);
 }
 
-/* Two lines of three shots, 3 m and 1 m apart, with a second echo and a shot without one. The lines are 1 m apart. */
+/* Two lines of three shots, 3 m and 1 m apart, with a second echo, and an empty shot. The lines are 1 m apart. */
 static void write_two_lines(void)
 {
     static const struct rig_point first[] = {{0, 0, -2000, -150, 7, 1, 1},

@@ -259,7 +259,7 @@ static void a_plate_is_looked_at_from_its_side(void **state)
     assert_true(at.seen > 0.5);
 }
 
-/* Which side of a plate is its front decides, though it is as large from behind. */
+/* The front of a plate decides, though the plate is as large from behind. */
 static void a_plate_is_looked_at_from_its_front(void **state)
 {
     (void)state;

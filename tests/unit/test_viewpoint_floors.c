@@ -118,8 +118,8 @@ static void land_has_a_height(void **state)
     }
 }
 
-/* A surface that has another one far below is a roof: more than a metre, or a 20th of the scene's radius. Walls around
- * it keep the scene from being land. */
+/* A surface is a roof if another one lies more than a metre below it, and more than a 20th of the scene's radius. Walls
+ * around it keep the scene from being land. */
 static void a_roof_is_no_ground(void **state)
 {
     (void)state;

@@ -121,8 +121,8 @@ static void the_view_limits_the_elevation(void **state)
     }
 }
 
-/* A prism of eight sides looks the same from all: its front is taken. Where the front is turned inside out, a side is
- * taken from where it is not seen, and where three of them are, the next place behind. */
+/* A prism of eight sides looks the same from all: its front is taken. If the front is turned inside out, a place beside
+ * is taken, which does not see it. If three sides are, the next place behind is taken. */
 static void the_front_is_liked_best(void **state)
 {
     (void)state;
@@ -163,8 +163,8 @@ static void a_part_is_looked_at_from_its_fronts(void **state)
     }
 }
 
-/* The sphere around the scene fills 47 degrees, 1 / 2.5 = sin 23.6 deg. It lies beyond the least range, by 0.3 of it.
- * Before what is larger than the head's range, the head stands 0.3 of the range from its side. */
+/* The sphere around the scene fills 47 degrees, 1 / 2.5 = sin 23.6 deg. Its near side lies at 1.3 times the least range
+ * or farther. If that is too far for the head, it stands 0.3 of the range plus the least range from the box. */
 static void the_distance_fits_scene_and_head(void **state)
 {
     (void)state;

@@ -93,8 +93,8 @@ static void there_is_room_above(void **state)
     assert_true(is_near(place[0].floor_m, 1.699) && is_near(place[0].position_m[2], 3.199));
 }
 
-/* Of eight legs at 0.3 m, a strip 0.25 m wide on either side leaves out two, which is allowed; one that ends 0.1 m to
- * the side leaves out three. */
+/* A strip 0.25 m wide on either side leaves out two of the eight legs at 0.3 m, which is allowed. A strip that ends 0.1
+ * m to the side leaves out three. */
 static void most_legs_stand(void **state)
 {
     (void)state;
@@ -199,7 +199,7 @@ static int stop(void *ctx)
     return n_asked++ >= stop_at;
 }
 
-/* However late it is asked, nothing comes out. */
+/* Wherever the search is stopped, it has no places. */
 static void the_search_can_be_stopped(void **state)
 {
     (void)state;

@@ -222,9 +222,9 @@ static void wait_held_back(const struct loop *loop)
         poll(NULL, 0, 100);
 }
 
-/* The client reads nothing until the head waits for it. By then half of the session's queue and more is full. The queue
- * goes out at once: no link tells that there is room for further ticks. 100 s of sentences are far more than
- * queue and socket hold. */
+/* The client reads nothing until the head waits for it. By then more than half of the session's queue is full. Then all
+ * of it goes out at once, and no link reports room for further ticks. 100 s of sentences are far more than queue and
+ * socket hold. */
 static void a_protocol_goes_on_once_its_client_reads(void **state)
 {
     (void)state;

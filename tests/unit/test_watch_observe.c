@@ -201,8 +201,8 @@ static void expect_counts(const char *json, const char *begin, double points, do
 
 /* ---- tests */
 
-/* A thread that nobody waits for is the last to get a processor. Its share of one is so large here that it looks at all
- * points, however slow the machine is. */
+/* A thread that nobody waits for is the last to get a processor. Where its share of a processor is limited here, the
+ * share lets it look at all points on any machine. */
 static void a_scan_is_judged_as_by_the_report(void **state)
 {
     (void)state;
@@ -339,8 +339,8 @@ static void another_head_s_stations_are_passed_over(void **state)
     close_watch();
 }
 
-/* Of a long scan one in four pulses is looked at, which are spread over all lines. The number of those has a standard
- * deviation of sqrt(289 * 3 / 16) = 7.4 where pulses are chosen by chance; six of them are allowed. */
+/* In a long scan one in four pulses is looked at, spread over all lines. The number of these points has a standard
+ * deviation of sqrt(289 * 3 / 16) = 7.4 where pulses are chosen by chance; six deviations are allowed. */
 static void one_in_four_pulses_is_looked_at(void **state)
 {
     (void)state;

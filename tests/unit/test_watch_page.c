@@ -128,7 +128,7 @@ static void paths_lead_to_their_answers(void **state)
     open_page(0);
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct web_body b = need_body(rows[i].at, "");
-        while (b.len == 0) { /* the preview's thread is at it */
+        while (b.len == 0) { /* the preview's thread is still making it */
             give_back(b.bytes);
             b = need_body(rows[i].at, "");
         }

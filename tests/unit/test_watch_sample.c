@@ -75,7 +75,7 @@ static void half_of_the_pulses_stay(void **state)
         add(pulse);
     expect_pulses(WATCH_MOST_POINTS, 1); /* this many fit */
     w.sample.done = 1001;
-    add(WATCH_MOST_POINTS + 1); /* its pulse is odd, so it makes room for none of its own */
+    add(WATCH_MOST_POINTS + 1); /* it halves the sample, and is left out itself, since its pulse is odd */
     expect_pulses(WATCH_MOST_POINTS / 2, 2);
     assert_int_equal(w.sample.done, 501); /* pulses 0, 2 ... 1000 */
     add(WATCH_MOST_POINTS + 3);
@@ -89,7 +89,7 @@ static void half_of_the_pulses_stay(void **state)
     close_sample();
 }
 
-/* Beyond the largest share points are passed over. */
+/* At the least share a full sample passes further points over. */
 static void a_full_sample_takes_no_more(void **state)
 {
     (void)state;

@@ -145,8 +145,8 @@ static double float_at(const char *at)
     return (double)f;
 }
 
-/* All vertices come before all triangles, whose corners count through. Vertices are relative to the middle of the
- * floor. */
+/* All vertices come before all triangles, whose corners are numbers among all vertices. Vertices are relative to the
+ * middle of the floor. */
 static void the_scene_is_in_bytes(void **state)
 {
     (void)state;

@@ -146,7 +146,7 @@ static void the_centroid_is_the_range(void **state)
     }
 }
 
-/* The marginal of the irradiance in the disc, as a sum of 20,000 strips, each of which is a sum along it. */
+/* The marginal of the irradiance in the disc, as 4,000 strips, each of which is a sum along the strip. */
 enum { STRIPS = 4000 };
 static double strip[STRIPS];
 static void cut_the_disc(void)
@@ -243,8 +243,8 @@ static void no_extent_is_a_point(void **state)
     waveform_free(w);
 }
 
-/* A measured pulse counts by its shape, in any scale, wherever its largest value stands: that of the signal is the
- * return's amplitude. */
+/* A measured pulse counts by its shape, in any scale, wherever its largest value stands. The signal's largest value is
+ * the return's amplitude. */
 static void a_table_has_any_scale(void **state)
 {
     (void)state;

@@ -16,8 +16,8 @@ static double sample_m(const struct wave_echoes *w)
     return 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(w->waveform)->sample_s;
 }
 
-/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Half of one below the level, where a
- * Gaussian of 50 has a slope of 0.6 a sample at 0.35, is 0.005 samples. */
+/* Without noise the digits alone are in the way: steps of 0.006 thresholds. At 0.35, below the level, a Gaussian of 50
+ * has a slope of 0.6 a sample, so half a step is 0.005 samples. */
 static void a_plain_echo_is_where_it_is(void **state)
 {
     (void)state;
@@ -318,7 +318,7 @@ static void the_deviation_shows_mixed_echoes(void **state)
         const struct waveform_return r[2] = {{20.0, 40.0, 0.0, WAVEFORM_POINT},
                                              {20.0 + 0.8 * width_m, 25.0, 0.0, WAVEFORM_POINT}};
         assert_int_equal(wave_shoot(&w, all[d], 1, r, 1), 1);
-        /* Noise of 1/8 in 40. A wrong place adds the slope of h times that, at most 1.4 / width. */
+        /* The noise is 1/8 in an echo of 40. A wrong place adds the slope of h times that, at most 1.4 / width. */
         const double off = fabs(w.echo[0].range_m - r[0].range_m) / width_m;
         assert_true(w.echo[0].deviation < 2.0 * 0.125 / 40.0 + 1.4 * off);
         if (all[d] == WAVEFORM_GAUSSIANS) continue; /* separates them */
@@ -328,9 +328,9 @@ static void the_deviation_shows_mixed_echoes(void **state)
     wave_close(&w);
 }
 
-/* Limited by the digits, by the receiver, and by a receiver that is then blind. The echo says so, and its range
- * holds. Two samples of one flank may be all that there is. For an amplitude of 120 both are well above the noise of
- * 1/8; for 1,000 the weaker is not, so the range holds to a sample of 1 ns. */
+/* Echoes are limited by the digits, by the receiver, or by a receiver that is then blind. They are flagged, and their
+ * ranges hold. Two samples of one flank may be all that there is. For an amplitude of 120 both are well above the noise
+ * of 1/8; for 1,000 the weaker is not, so the range holds to a sample of 1 ns. */
 static void a_saturated_echo_is_flagged_and_ranged(void **state)
 {
     (void)state;

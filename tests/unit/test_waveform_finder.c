@@ -145,8 +145,8 @@ static void values_of_a_term(void **state)
     }
 }
 
-/* Each tilt has the width and the rise of its echo. The term that it names differs from the echo as it says: by the RMS
- * within 2.5 sigmas, and by the most beyond. Grids differ, so these two agree to a tenth, or to 3e-4 of the peak. */
+/* Each tilt has the width and the rise of its echo. Its misfit is the RMS difference of term and echo within 2.5
+ * sigmas, and its tail the largest one beyond. Grids differ, so these two agree to a tenth, or to 3e-4 of the peak. */
 static void echoes_of_planes(void **state)
 {
     (void)state;
@@ -192,7 +192,7 @@ static void expect_spread(const struct finder_spread *got, const struct finder_s
     assert_true(got->misfit == fmax(a->misfit, b->misfit) && got->tail == fmax(a->tail, b->tail));
 }
 
-/* Between two tilts figures go straight; the larger misfit and tail hold. Beyond the ends widths keep their ratios. */
+/* Between tilts figures are interpolated; the larger misfit and tail hold. Beyond the ends widths keep their ratios. */
 static void echoes_between_tilts(void **state)
 {
     (void)state;

@@ -68,7 +68,7 @@ static void a_sum_is_fitted(void **state)
         finder_mix_fit(&task, &mix);
         expect_terms(&mix, want, 3, 1e-3);
         assert_true(mix.chi2 < 1e-4);
-        /* What one term leaves are the other two. */
+        /* One term leaves the other two. */
         mix = (struct finder_mix){.n = 1, .g = {want[0]}};
         finder_mix_rest(&task, &mix, rest);
         for (uint32_t i = lo; i <= 95; i++) {
@@ -193,8 +193,8 @@ static void a_flank_gives_the_whole_pulse(void **state)
     }
 }
 
-/* No pulse is so steep that it rises from nothing to the limit within a sample. Then a height of e^9 times the limit,
- * 39 dB above it, is the most that is believed. */
+/* This signal rises from nothing to the limit within a sample, more steeply than any pulse. The height is then e^9
+ * times the limit: more than 39 dB above it is not believed. */
 static void a_height_is_believed_up_to_39_db(void **state)
 {
     (void)state;

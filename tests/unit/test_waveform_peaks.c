@@ -71,9 +71,9 @@ static void the_top_of_a_gaussian(void **state)
     assert_true(finder_top(&run, N - 1, &place) == 1.5 && place == N - 1);
 }
 
-/* Half maxima of a Gaussian are 1.1774 sigmas from its middle. A straight line between two samples has an error of
- * 0.08 / sigma; its bend is taken into account. Where one side is not seen, it mirrors the other, and the
- * signal's bend is taken for up to four times as much. Where none is seen, the peak's ends stand for them. */
+/* Half maxima of a Gaussian are 1.1774 sigmas from its middle. A straight line between two samples has an error of 0.08
+ * / sigma; its bend is taken into account. If one side is not seen, the other one is mirrored, and the signal's bend is
+ * taken for up to four times its size. If neither is seen, the ends of the peak are taken. */
 static void half_maxima(void **state)
 {
     (void)state;
@@ -160,7 +160,7 @@ static void maxima_stand_out(void **state)
             assert_int_equal(finder_peaks(&run, 0.1, peak, 4), 1 + more);
         }
     }
-    /* From within a sigma of zero any signal of `least` is another echo. */
+    /* After a signal within a sigma of zero, any maximum of `least` is another echo. */
     memset(y, 0, sizeof y);
     add(20.0, 1.5, 8.0);
     y[40] = 0.11;

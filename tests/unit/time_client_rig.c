@@ -24,7 +24,7 @@ int is_interrupted; /* its next wait is */
 int has_no_way, has_no_descriptors;
 static _Thread_local int is_client;
 
-/* They take the places of the C library's. ISO C has no cast from void * to a function. */
+/* These functions take the places of the C library's. ISO C has no cast from void * to a function. */
 #define NEXT(name, next)                          \
     void *found_##name = dlsym(RTLD_NEXT, #name); \
     memcpy(&(next), &found_##name, sizeof(next))

@@ -13,7 +13,7 @@ extern const char *fails, *fails_too; /* the calls that fail, as they are noted;
 void say(const char *format, ...);
 /* Returns SH_EIO with "NAME failed" where it is one of those that fail. */
 int attempt(struct sh_err *err, const char *name);
-/* Both: notes the call, with a blank after it. */
+/* Does both: notes the call, with a blank after it, and returns what attempt does. */
 int call(struct sh_err *err, const char *format, ...);
 
 #endif

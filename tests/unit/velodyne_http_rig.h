@@ -31,7 +31,7 @@ void http_get(const char *path);
 const char *http_answer(void);
 int http_status(void);
 const char *http_body(void);
-/* Asserts the only command since that changes something; NULL: there is none. */
+/* Asserts that one command since http_send changes something, this one; NULL: none does. */
 void http_assert_command(const char *line);
 
 #endif

@@ -16,7 +16,7 @@
 
 enum { NOT_EVER = 1000000000 };
 
-/* What happens when, ms after the start: NOT_EVER where a test does not say otherwise. */
+/* The times at which things happen, in ms after the start: NOT_EVER where a test does not say otherwise. */
 struct plan_of_run {
     int up, connects, first_points, last_points; /* points come evenly with device time */
     int ends;                                    /* the client ends by itself */
@@ -33,7 +33,7 @@ extern char warned[512];
 extern const char *protocol; /* of the client's link */
 extern struct checks seen;   /* as the checks got it */
 extern uint32_t must_ask;
-extern double match_m;            /* as points are compared with */
+extern double match_m;            /* the limit with which points are compared */
 extern void (*client_does)(void); /* once it was started */
 extern const char *short_of;
 extern int is_short;

@@ -10,8 +10,8 @@ enum { WEB_SESSIONS = 2 };
 
 extern int web_n_released; /* bodies of /scene that the link gave back */
 
-/* place: "127.0.0.1:40123". The link's owner answers /scene: 5 bytes, or 3 million with ?n=big; and /echo, with any
- * end, by what was asked for. */
+/* place: "127.0.0.1:40123". The link's owner answers /scene with 5 bytes, or 3 million for ?n=big. A path that begins
+ * with /echo gets itself and its query. */
 struct bench web_open(char place[64]);
 int web_dial(const char *place);
 /* Does the same from 127.0.0.LAST. */

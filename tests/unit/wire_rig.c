@@ -172,11 +172,11 @@ void rig_expect(const int *items)
     assert_int_equal(at, rig.n_out);
 }
 
-/* ---- the expected output, by the notes: each item has its place in the input, and a held one has the place of the
- * frame that it comes after. Sorted by that, it is the output. */
+/* ---- the expected output, by the notes. Each item has its place in the input; a held item has the place of the frame
+ * that it comes after. The items sorted by place are the output. */
 
 struct chunk {
-    uint64_t place; /* of an item, from 0; after the last ones: those in the order of their countings */
+    uint64_t place; /* of an item, from 0; frames that did not come have places after all items */
     uint32_t rank;  /* its order at that place: pieces before the item, the item, pieces that were held until it */
     uint32_t order;
     int is_garbage;
@@ -195,7 +195,7 @@ static int compare(const void *a, const void *b)
     return x->order < y->order ? -1 : x->order > y->order;
 }
 
-/* Returns the place of frame `number` of a counting. */
+/* Returns the place of item `number` among those that are counted as `of`. */
 static uint64_t place_of(int of, uint64_t number)
 {
     for (uint32_t i = 0; i < rig.n_items; i++)

@@ -25,7 +25,7 @@ enum { RIG_ITEMS = 400, RIG_NOTES = 4000, RIG_WRITES = 20000, RIG_UNIT = 200, RI
 
 struct rig_item {
     int of;
-    uint64_t number; /* in its counting, from 1 */
+    uint64_t number; /* among the items of the same `of`, from 1 */
     size_t len;
     uint8_t bytes[RIG_UNIT];
     uint32_t notes_from; /* the notes of the last put begin here */
@@ -81,8 +81,8 @@ struct rig_item *rig_unit(size_t len, int is_reply);
 
 /* Takes the pieces that may go out now. Returns how many writes there were. last: there is no more input. */
 uint32_t rig_take(int last);
-/* The same, with the clock going to each time at which something may. The call fails when there is no end of such
- * times. */
+/* Does so until the end, with the clock going to each time at which a piece may go out. The call fails when such times
+ * do not end. */
 void rig_drain(void);
 
 /* The sent bytes are those of the items of these numbers (from 0), one after the other; ends with -1. */
