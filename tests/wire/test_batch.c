@@ -59,7 +59,7 @@ static void test_failing(void **state)
     batch_expect(wire, "none", WITH("--sweep", "head.lines_hz=50,1e9"), 2, "head.lines_hz");
     batch_expect(wire, "none", WITH("--stations", "3"), 2, "allowed 1 to 2");
     batch_expect(wire, "none", WITH("--set", "time.epoch=utc"), 2, "time.epoch");
-    /* names of files would be wrong here */
+    /* an option, or --set, sets these keys, too */
     batch_expect(wire, "none", WITH("--sweep", "head.frames=1,2", "--frames", "1"), 2, "--frames also sets it");
     batch_expect(wire, "none", WITH("--sweep", "output.crs=local,utm"), 2, "--crs also sets it");
     batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "--stations sets the station");

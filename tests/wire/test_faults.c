@@ -316,7 +316,7 @@ static void test_a_journal_brings_faults_back(void **state)
     scanhead_close(sh);
     head_end(&head, SIGTERM);
     read_truth(wire, &first);
-    char *text = wire_read(journal, NULL); /* each of them is a remark there */
+    char *text = wire_read(journal, NULL); /* each fault is a remark in it */
     assert_non_null(strstr(text, "\n# fault 1 drop: t_ns "));
     free(text);
     const char *const replay[] = {"--pace", "fast", "--replay-journal", journal, NULL};
