@@ -197,7 +197,7 @@ static void read_both(struct scanhead *a, struct scanhead *b)
     }
 }
 
-/* One frame in ten is hit, each by one fault, so that the notices can be told apart. */
+/* One frame in six is hit, each by one fault beside jitter, so that the notices can be told apart. */
 static const char APART[] = "faults:\n"
                             "  - {kind: drop, link: 1, from: 2, every: 60}\n"
                             "  - {kind: duplicate, link: 1, from: 12, every: 60, n: 2}\n"
