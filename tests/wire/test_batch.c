@@ -167,7 +167,7 @@ static void test_scenario(void **state)
     batch_change(config, "heading_deg: 30,", "heading_deg: 30, scanner: {noise: {seed: 7}},");
     wire_write_text(wire, "dark.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
-    /* The other pulses are blind: all 10,000 pulses of a job have 3,900 points where none is dark. */
+    /* Without the fault 3,900 of a job's 10,000 pulses have points. The others are blind. */
     assert_in_range(points_of(wire, "dark", "0001_station-1.ply"), 1000, 3000);
     assert_in_range(points_of(wire, "dark", "0002_station-2.ply"), 1000, 3000);
     wire_write_text(wire, "other.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
