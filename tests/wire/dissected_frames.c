@@ -72,8 +72,8 @@ static void expect_anchor(const struct scanhead_frame *f)
     REAL("anchor", frame);
 }
 
-/* Angles and figures that are computed from them. Sine and cosine come from another library here. The angle is below 7
- * rad and was rounded three times or less: 3 x 7 x 2^-53 < 3e-15. libscanhead's are as exact. In degrees that is 2e-13.
+/* The sine and cosine of angles come from another library here. The angle is below 7 rad and was rounded three times or
+ * less: 3 x 7 x 2^-53 < 3e-15, or 2e-13 in degrees. libscanhead's sine and cosine are as exact.
  * In geodetic coordinates a range is a difference of numbers of 6.4e6 m, which have steps of 1e-9 m. */
 static void expect_point(const struct scanhead_info *info, const struct scanhead_point *p)
 {

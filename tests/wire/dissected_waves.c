@@ -4,7 +4,7 @@
 #include "drivers/protocol/native_waves.h"
 #include "tests/wire/wireshark_rig.h"
 
-/* Compares the window's direction, by its angles: sine and cosine are of another library (expect_point). */
+/* Compares the window's direction: its slopes in geo, else its angles with the tolerance of expect_point. */
 static void expect_beam(const struct scanhead_wave *w, int is_geo)
 {
     static const char *const slope[] = {S "wave.dx", S "wave.dy", S "wave.dz"};
@@ -14,7 +14,7 @@ static void expect_beam(const struct scanhead_wave *w, int is_geo)
     const double rad = 3.14159265358979323846 / 180;
     const double line = rad * atof(take_text(S "wave.line_deg")), pan = rad * atof(take_text(S "wave.pan_deg"));
     const double d[] = {sin(pan) * cos(line), cos(pan) * cos(line), sin(line)};
-    assert_true(line >= -180 * rad && line <= 180 * rad); /* as of points: the middle of these lines is 0 */
+    assert_true(line >= -180 * rad && line <= 180 * rad); /* within half a turn of the lines' middle, 0 */
     for (int i = 0; i < 3; i++)
         assert_true(fabs(d[i] - w->direction[i]) < 1e-14);
 }

@@ -89,7 +89,7 @@ static void take_frame(struct client *c, const uint8_t *frame, size_t len)
     if (frame[1] == POINTS) take_points(c, frame + HEADER, len);
 }
 
-/* Replies are printable; another byte belongs to nothing. */
+/* Replies are printable. Any other byte is skipped. */
 static size_t take_line(struct client *c, const uint8_t *p, size_t n)
 {
     size_t len = 0;
@@ -161,7 +161,7 @@ static int client_connect(struct client *c)
 
 int faulty_client(int argc, char **argv)
 {
-    int pair[2]; /* as loops of events have, to wake themselves: no old connection */
+    int pair[2]; /* event loops wake themselves by such a pair: it is no old connection */
     if (argc != 6 || socketpair(AF_UNIX, SOCK_STREAM, 0, pair) != 0) return 2;
     struct client *c = calloc(1, sizeof *c);
     if (c == NULL) return 1;
@@ -169,7 +169,7 @@ int faulty_client(int argc, char **argv)
     c->out = fopen(argv[4], "w");
     c->head = (struct sockaddr_in){.sin_family = AF_INET, .sin_port = htons((uint16_t)atoi(argv[3]))};
     if (c->out == NULL || inet_pton(AF_INET, argv[2], &c->head.sin_addr) != 1) return 1;
-    setvbuf(c->out, NULL, _IOLBF, ROOM); /* who kills it finds whole lines */
+    setvbuf(c->out, NULL, _IOLBF, ROOM); /* lines are whole even when it is killed */
     signal(SIGTERM, has_fault(c, 'k') ? SIG_IGN : end);
     signal(SIGPIPE, SIG_IGN);
     for (int met = 0; !is_over;) {

@@ -5,8 +5,8 @@
 #define TESTS_WIRE_FAULTY_CLIENT_H
 
 /* FAULTS has these letters, or is `none`: c takes frames with a wrong checksum; s stays away once its connection has
- * ended; t takes a frame that comes twice twice; h holds on to a connection that has ended; a asks for what there is
- * not; d dies once it has points; k goes on after SIGTERM; n never asks for a scan. Returns the exit status; SIGTERM
+ * ended; t takes a repeated frame again; h holds on to a connection that has ended; a asks for an unknown command;
+ * d dies once it has points; k goes on after SIGTERM; n never asks for a scan. Returns the exit status; SIGTERM
  * ends it. */
 int faulty_client(int argc, char **argv);
 

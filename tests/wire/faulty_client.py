@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # The same client as faulty_client.c, in Python's standard library alone: HOST PORT FILE FAULTS.
 # FAULTS has these letters, or is `none`: c takes frames with a wrong checksum; s stays away once its connection has
-# ended; t takes a frame that comes twice twice. Offsets are those of PROTOCOL.md, ANCHOR.md and POINTS.md.
+# ended; t takes a repeated frame again. Offsets are those of PROTOCOL.md, ANCHOR.md and POINTS.md.
 import socket
 import struct
 
@@ -56,7 +56,7 @@ class Client:
         if kind == POINTS:
             self.take_points(payload)
 
-    # Replies are printable; another byte belongs to nothing.
+    # Replies are printable. Any other byte is skipped.
     def take_line(self, data, at):
         end = at
         while end < len(data) and 0x20 <= data[end] <= 0x7E:

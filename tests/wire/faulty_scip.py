@@ -9,7 +9,7 @@ FIRST, LAST, FRONT, STEPS = 0, 1080, 540, 1440
 REQUEST = b"MD%04d%04d00000\n" % (FIRST, LAST)  # each scan, every step, without end
 
 
-# The sum doesn't show the upper two bits of a character. Without them it is none that the device sends.
+# The sum leaves out the upper two bits of each character. So each must be a character that the device sends.
 def has_sum(line):
     return len(line) > 1 and 0x30 + sum(line[:-1]) % 64 == line[-1] and all(0x30 <= c < 0x70 for c in line)
 

@@ -11,5 +11,5 @@ const char *write_room(const struct wire *wire, const char *links)
     config.more = "loop: {late_ms: 10000, queue_ms: 10000}\n" /* a machine may stand still for so long */
                   "time: {epoch: 2026-01-01T00:00:00Z}\n";
     room_write(wire);
-    return room_config_write(wire, &config); /* its station has no place on the earth yet: PLACE */
+    return room_config_write(wire, &config); /* the option PLACE gives the station its place on the earth */
 }

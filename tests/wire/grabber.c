@@ -100,7 +100,7 @@ void grabber_start_and_wait(struct wire *wire, const char *name, const char *sen
         snprintf(numbered, sizeof numbered, "%s%d", name, i);
         grabber_start(wire, numbered, sensor, grabber);
         if (grabber_wait(grabber, wanted)) return;
-        printf("rawlog-grabber complains:\n%s\n", grabber->said); /* print_message cuts it, and its last newline */
+        printf("rawlog-grabber complains:\n%s\n", grabber->said); /* print_message cuts long texts and their newline */
         fflush(stdout);
         grabber_end(grabber);
     }

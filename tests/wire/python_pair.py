@@ -86,7 +86,7 @@ def keeps_alive():
 
 
 def oldest_gap():
-    """A late frame cuts the oldest of 64 gaps in two: the next oldest makes room, and frames of both parts are late."""
+    """A late frame cuts the oldest of 64 gaps in two. Both parts stay gaps; the next oldest gap is given up."""
     sequence = scanhead._Sequence()
     assert sequence.take((0, 0, 0)) == ("", 0, 1)
     for i in range(1, 65):
@@ -129,7 +129,7 @@ def late_answer():
 
 
 def half_a_frame():
-    """The head was in the middle of a frame for the program before. The first answer is lost in the rest of it."""
+    """The terminal's last program left in the middle of a frame. The first answer is lost in the rest of that frame."""
     head, theirs = pair()
     head._unsettled = True  # as on a terminal
     frame = framed(scanhead.EVENT, 0, 128, bytes(128))
@@ -148,7 +148,7 @@ def half_a_frame():
 
 
 def whole_frame():
-    """A frame that needs two reads has come all the same."""
+    """A frame that needs two reads is returned even with no time to wait."""
     head, theirs = pair()
     theirs.sendall(framed(200, scanhead.LOCAL, 65536, bytes(65536)))
     assert len(head.next_frame(0).payload) == 65536
@@ -186,7 +186,7 @@ def dropped_frames():
 
 
 def alike():
-    """Another sequence begins with a frame of before, which is dropped as repeated. What was said there still holds."""
+    """A new sequence begins with a frame equal to the last one, dropped as repeated. The state from it still holds."""
     head, theirs = pair()
     first, other = (framed(kind, 0, 0, b"", seq) for kind, seq in ((200, 6), (201, 5)))
     theirs.sendall(first + first + other)
@@ -244,7 +244,7 @@ def notices():
 
 
 def chatter(data):
-    """The head sends without end, but never the awaited answer. Calls end with their time all the same."""
+    """The head sends without end, but never the awaited answer. Calls still end when their time is over."""
     head, theirs = pair()
 
     def send():

@@ -29,12 +29,12 @@ size_t compare(char *text, size_t first, const double tolerance_m[N_STATIONS]);
 
 struct misfit {
     double bounds_m, shift_m,
-        turn_rad;    /* of the bounding box; the rigid motion that fits best, which the pose is off */
+        turn_rad;    /* bounds: of the bounding box; shift and turn: the best rigid motion, the pose's error */
     double radius_m; /* of the scan about its middle */
 };
 
-/* Prints a row of the table. Single points are wrong by tolerance_m per axis at most. So is the box, and the pose by
- * far less, but for a shift that all have in common. */
+/* Prints a row of the table. Fails where the box is off by more than tolerance_m, or the pose moves a point by more
+ * than sqrt(3) of it. */
 void tell(const char *format, const char *reader, const double tolerance_m[N_STATIONS]);
 
 #endif

@@ -163,7 +163,7 @@ static uint64_t check_pcapng(const struct bytes *whole, const struct bytes *left
     }
     const struct bytes packets = {repaired->data, at};
     expect_begin(whole, &packets, 0, at);
-    /* A full disk has whole pages: the note has no more room than the part that is cut off. */
+    /* On a full disk the note has only the room of the part that is cut off, and may not fit. */
     const int is_full = left->len % 4096 == 0;
     if (is_full && repaired->len == at && left->len - at < 120) return n;
     const struct bytes note = {repaired->data + at, repaired->len - at}; /* a block of statistics with a comment */

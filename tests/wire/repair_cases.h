@@ -27,8 +27,8 @@ struct repair_row {
 
 extern const struct repair_row repair_cases[];
 
-/* Returns what follows FILE in the name of a second file, from which a repair makes the recording's rest. On a full
- * disk the repair needs more room. The second file is gone after the repair. NULL: there is none. */
+/* Returns what follows FILE in the name of a second file, from which a repair makes the recording's rest. So the
+ * repair needs free room on the disk. The second file is gone after the repair. NULL: there is none. */
 const char *repair_row_beside(const struct repair_row *row);
 extern struct bytes repair_beside; /* the second file as the killed recorder left it */
 extern const size_t n_repair_cases;

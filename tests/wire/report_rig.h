@@ -23,7 +23,7 @@ struct made {
 void report_make(struct made all[N_POINTS]);
 /* Writes made.yaml, its room and made.ply. */
 void report_write(const struct wire *wire, const struct made all[N_POINTS]);
-/* Runs `scanhead report` on them with these arguments, to the file "out". Points are beyond the tolerance. */
+/* Runs `scanhead report` on them with these arguments, to the file "out". Expects status 1: beyond the tolerance. */
 void report_run(struct wire *wire, const char *const *more);
 
 enum group { BY_NOTHING, BY_STATION, BY_LABEL, BY_RANGE, BY_INCIDENCE };
@@ -48,8 +48,8 @@ struct times {
 };
 struct times report_times(const struct made all[N_POINTS], int station);
 
-/* Returns the step of the bins of ranges: 1, 2 or 5 times a power of ten, so that 12 steps reach the farthest near
- * point, but not those of the next smaller step. */
+/* Returns the step of the bins of ranges, and writes how many bins there are. The step is 1, 2 or 5 times a power of
+ * ten: the smallest of which 12 steps reach the farthest near point. */
 double report_range_step(const struct made all[N_POINTS], int *n);
 
 #endif

@@ -71,8 +71,8 @@ static unsigned check_points(const char *text, const struct expected *e, unsigne
     return n;
 }
 
-/* Checks the files of all frames, in order. The combined one has their points one after the other. Returns how many
- * there are. */
+/* Checks the files of all frames, in order. The combined one has their points one after the other, and there is
+ * no further file. */
 static void check_files(struct wire *wire, const struct expected *e, unsigned n_files)
 {
     char *all = wire_read(wire_path(wire, "all.ply"), NULL), name[32];

@@ -59,7 +59,7 @@ static void test_failing(void **state)
     batch_expect(wire, "none", WITH("--sweep", "head.lines_hz=50,1e9"), 2, "head.lines_hz");
     batch_expect(wire, "none", WITH("--stations", "3"), 2, "allowed 1 to 2");
     batch_expect(wire, "none", WITH("--set", "time.epoch=utc"), 2, "time.epoch");
-    /* names of files would be wrong here */
+    /* an option, or --set, sets these keys, too */
     batch_expect(wire, "none", WITH("--sweep", "head.frames=1,2", "--frames", "1"), 2, "--frames also sets it");
     batch_expect(wire, "none", WITH("--sweep", "output.crs=local,utm"), 2, "--crs also sets it");
     batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "--stations sets the station");
@@ -167,7 +167,7 @@ static void test_scenario(void **state)
     batch_change(config, "heading_deg: 30,", "heading_deg: 30, scanner: {noise: {seed: 7}},");
     wire_write_text(wire, "dark.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");
     assert_int_equal(wire_wait(wire, wire_spawn(wire, job, "out", "err", -1)), 0);
-    /* The other pulses are blind: all 10,000 pulses of a job have 3,900 points where none is dark. */
+    /* Without the fault 3,900 of a job's 10,000 pulses have points. The others are blind. */
     assert_in_range(points_of(wire, "dark", "0001_station-1.ply"), 1000, 3000);
     assert_in_range(points_of(wire, "dark", "0002_station-2.ply"), 1000, 3000);
     wire_write_text(wire, "other.yaml", "faults: [{kind: laser_off, from_pulse: 3000}]\n");

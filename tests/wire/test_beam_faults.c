@@ -97,7 +97,7 @@ static void windows_in_time_are_exact_to_the_pulse(void **state)
     assert_int_equal(note->t_ns, run->start_ns + run->shot[from].t_ns);
 }
 
-/* The speed is half from pulse 1003 to 5008. Phases are whole 800ths of a line, and 400ths once it is over. */
+/* The speed is half from pulse 1003 to 5008. Then a pulse moves the phase by 1/800 of a line, else by 1/400. */
 static double slow_mirror_rad(uint64_t k)
 {
     const uint64_t before = k < 1003 ? k : 1003, after = k < 5009 ? 0 : k - 5009;
@@ -223,8 +223,8 @@ static void a_soiled_window_takes_its_decibels(void **state)
     }
 }
 
-/* Without a signal model the noise is 10^(4.25 / 10) times as large, and otherwise the same. Counts of the range add
- * half of one in each. */
+/* Without a signal model the noise is 10^(4.25 / 10) times as large, and otherwise the same. Each range is
+ * also rounded by up to half a count. */
 static void a_soiled_window_makes_ranges_noisy(void **state)
 {
     static const char *const off[] = {"noise.range=off", NULL}, *const on[] = {"noise.range=on", NULL};
@@ -237,7 +237,7 @@ static void a_soiled_window_makes_ranges_noisy(void **state)
     for (uint64_t k = 0; k < run->pulses; k++) {
         const double grows = k >= 1003 && k < 5009 ? pow(10.0, 0.425) : 1.0;
         const double was_m = clean->shot[k].range_m - true_m[k], is_m = run->shot[k].range_m - true_m[k];
-        /* Three ranges of 1e-4 m a step: the true one counts 1 + grows times. */
+        /* Three ranges have steps of 1e-4 m. The error of the true one counts |grows - 1| times. */
         if (!is_within(is_m, grows * was_m, 0.5e-4 * (1.0 + grows + fabs(grows - 1.0)) + 1e-9))
             fail_msg("pulse %" PRIu64 ": %g m, not %g * %g m", k, is_m, grows, was_m);
     }

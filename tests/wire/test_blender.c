@@ -241,7 +241,7 @@ static double opening_of(const struct station *s)
     return fmin(above_ground_m(s) / s->leg_m, cos(s->opening_min_deg * M_PI / 180));
 }
 
-/* Direction and height are no better in Blender than 13 e, and both go into the comparison. */
+/* In Blender direction and height are each good to 13 e only, and the comparison has both errors. */
 static int at_border(double cosine, double opening)
 {
     return fabs(cosine - opening) < 26 * 0x1p-23;

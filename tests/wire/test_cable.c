@@ -5,7 +5,7 @@
 #include "tests/wire/fault_head.h"
 #include "tests/wire/unit_faults.h"
 
-/* As FAULT_ROOM, for nine tenths of a second: some 1,000 ticks with frames. */
+/* As FAULT_ROOM, for nine tenths of a second: 90 lines, some 600 frames. */
 static struct head start(struct wire *wire, const char *fault, const char *loop)
 {
     char faults[200];
@@ -16,7 +16,7 @@ static struct head start(struct wire *wire, const char *fault, const char *loop)
     return fault_head_start(wire, &config, faults, NULL);
 }
 
-/* The truth has the cable at frame 60, and its end. text: of the first. */
+/* The truth has two notes: the cable was pulled at frame 60, with this text, and the pull's end. */
 static void check_truth(const struct wire *wire, int link, const char *text)
 {
     uint32_t n;
@@ -33,7 +33,7 @@ static void check_truth(const struct wire *wire, int link, const char *text)
     free(note);
 }
 
-/* The head's queue holds the frames of the time, and the client gets them all. */
+/* The head's queue holds the frames of the 200 ms, and the client gets them all. */
 static void goes_on(void **state)
 {
     struct wire *wire = *state;

@@ -64,7 +64,7 @@ static void check_memory(char *told)
     free(told);
 }
 
-/* The example passes `check`, and each of its keys has the help's name. */
+/* The example passes `check` without a message, so each of its keys is known. */
 static void test_example(void **state)
 {
     struct wire *wire = *state;

@@ -118,7 +118,7 @@ static void killed_client(struct wire *wire, const char *link)
         kill_hard(wire, start_reader(wire, head_endpoint(&head, link)));
         struct scanhead *sh = client_open(head_endpoint(&head, link));
         expect_error(sh, 101, NONE);
-        assert_string_equal(client_ask(sh, "SYST:CONT?"), "0"); /* control came back from the dead */
+        assert_string_equal(client_ask(sh, "SYST:CONT?"), "0"); /* the killed client has no control any more */
         pass_frames_before(sh, atoll(client_ask(sh, "TIME?")));
         expect_points(sh, 20);
         client_tell(sh, "SCAN:STOP");
@@ -330,7 +330,7 @@ static void test_many_short_clients(void **state)
     struct scanhead *last = client_open(endpoint);
     struct scanhead_frame frame;
     int64_t since_ns = 0;
-    while (scanhead_next(last, &frame, DEADLINE_MS) == SCANHEAD_ECLOSED) { /* those before are still being seen off */
+    while (scanhead_next(last, &frame, DEADLINE_MS) == SCANHEAD_ECLOSED) { /* the head still ends earlier sessions */
         wire_soon(&since_ns, client_time_ns(watch), "room for a client");
         scanhead_close(last);
         last = client_open(endpoint);
@@ -372,7 +372,7 @@ static void test_dead_weight_at_pace_fast(void **state)
         got += frame.type == SCANHEAD_POINTS ? frame.n_pulses : 0;
     } while (got < 5000000 && !is_event(&frame, SCANHEAD_EV_SCAN_END));
     client_tell(sh, "SCAN:STOP");
-    scanhead_close(sh); /* itself dead weight from here on, but gone */
+    scanhead_close(sh); /* unread, it would hold the run back from here on */
     head_end(&head, SIGTERM);
 }
 

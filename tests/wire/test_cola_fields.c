@@ -16,7 +16,7 @@ static const char *wait_for(struct cola_client *c, const char *begin)
     return text;
 }
 
-/* The results of LFErec as "210". Each of three records has 18 values in CoLa-A, where the time has 7. */
+/* The results of LFErec as "210". Each of three records has 19 values in CoLa-A, the last 7 of them the time. */
 static void read_results(const char *telegram, char results[4])
 {
     const char *at = telegram;
@@ -68,7 +68,7 @@ static void fields_and_the_window(void **state)
     read_results(wait_for(&c, "sSN LFErec 3 "), results);
     assert_string_equal(results, "210");
     assert_non_null(strstr(wait_for(&c, "sSN LIDoutputstate 0 "), " 1 1 0 0 0 0 0 0 0 0 0"));
-    static struct cola_client late; /* the first answer has what was seen before it came */
+    static struct cola_client late; /* its first answer has what was seen before this client came */
     late.fd = raw_connect(head_endpoint(&head, "tcp"));
     cola_client_send(&late, "sRN LFErec");
     read_results(wait_for(&late, "sRA LFErec 3 "), results);
@@ -91,7 +91,7 @@ static void fields_and_the_window(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A session looks at what was seen before its client came, which that client has not received. */
+/* A session also looks at what was seen before its client came, though the client never received that. */
 static void received_is_from_the_first_moment_on(void **state)
 {
     struct wire *wire = *state;

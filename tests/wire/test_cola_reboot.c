@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* CoLa: mSCreboot reboots the head. All sessions end, and its clock, counters and count of power-ups begin anew. */
+/* CoLa: mSCreboot reboots the head. All sessions end, its clock and counters begin anew, and it counts a power-up. */
 
 #include "tests/wire/cola_client.h"
 #include "tests/wire/room.h"

@@ -7,7 +7,7 @@
 
 static struct cola_client c;
 
-/* The path stays, other than those of wire_path. */
+/* The path stays good, unlike those of wire_path. */
 static const char *config_write(const struct wire *wire, const char *links)
 {
     static char path[400];

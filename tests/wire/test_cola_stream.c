@@ -127,7 +127,7 @@ static void test_clients(void **state)
             assert_int_equal(scan[k][n].count, scan[k][n - 1].count + 1);
             assert_int_equal(scan[k][n].start_us, scan[k][n - 1].start_us + PERIOD_US);
         }
-    for (int k = 1; k < CLIENTS; k++) { /* it began within the first scans of the first one */
+    for (int k = 1; k < CLIENTS; k++) { /* its first scan is one of the first client's */
         const uint32_t behind = scan[k][0].count - scan[0][0].count;
         assert_true(behind < SCANS);
         for (uint32_t n = 0; n + behind < SCANS; n++) {

@@ -174,14 +174,14 @@ static void test_texture(void **state)
         char hash[65];
         assert_int_equal(
             record("config.yaml", WORDS("--colour", "texture", "--threads", threads[i]), FILES("stats.json")),
-            2); /* no file has them */
+            2); /* no file can have colours */
         assert_int_equal(record("config.yaml", WORDS("--set", "output.colour=texture", "--threads", threads[i]),
                                 FILES("stats.json")),
                          0);
         stats_hash(wire, hash);
         assert_string_equal(hash, with);
     }
-    /* A recorded stream has them, and options come before them. */
+    /* A recorded stream has its colours, and an option overrides them. */
     assert_int_equal(record("t.shs", NULL, FILES("again.ply")), 0);
     char *again = wire_read(wire_path(wire, "again.ply"), NULL);
     assert_string_equal(strstr(again, "end_header"), strstr(text, "end_header"));
@@ -193,7 +193,7 @@ static void test_texture(void **state)
     check_other_formats();
 }
 
-/* The nearest point is red and the farthest blue, as the file says. The colours are so by --colour, by the
+/* The nearest point is blue and the farthest red, as the file says. The colours are so by --colour, by the
  * configuration, and again from the stream. */
 static void test_own_limits(void **state)
 {
@@ -229,8 +229,8 @@ static void test_own_limits(void **state)
     free(a);
 }
 
-/* In a stream limits are fixed. They are the head's ranges, which reach so far that all is red here; the scene's
- * bounds, from -2 to 2 m; or given ones, also in a recording. */
+/* In a stream limits are fixed: the head's ranges, which reach so far that all is blue here; the scene's bounds, from
+ * -2 to 2 m; or given ones. */
 static void test_stated_limits(void **state)
 {
     wire = *state;
@@ -328,8 +328,8 @@ static void test_refused(void **state)
     assert_int_equal(access(wire_path(wire, "x.ply"), F_OK), -1);
 }
 
-/* A part that can't be coloured is named as it would have been written. There is no room to keep frames of more than
- * 512 or 1024 bytes, which depends on the shell. */
+/* An error about a part has the name of that part. A file may have 512 or 1024 bytes here, by the shell, so that
+ * there is no room to keep its frames. */
 static void test_names_of_parts(void **state)
 {
     (void)state;

@@ -65,8 +65,8 @@ static void test_figures(void **state)
     assert_near("area", number_of(json, "area_m2"), L_M2, 1e-9);
     assert_near("cell", number_of(json, "cell_m"), 0.25, 0.0);
     assert_near("sum", number_of(json, "none_m2") + number_of(json, "one_m2"), L_M2, 1e-9);
-    /* 28.27 m2 lie behind the corner (tests/unit/test_coverage.c). A cone of 40 degrees up and down is not scanned on
-     * floor and ceiling: pi (1.2 / tan 50)^2 each, of which 0.2 m and more lie beyond the walls. */
+    /* 28.27 m2 lie behind the corner (tests/unit/test_coverage.c). The sweep of -40 to 60 deg leaves out the floor up
+     * to 1.43 m from the station, the ceiling to 0.69 m: 6.1 m2 within the walls. */
     assert_true(number_of(json, "none_m2") > 28.26 - 6.6 * 0.6 &&
                 number_of(json, "none_m2") < 28.27 + 2.0 * 3.2 + 6.6 * 0.6);
     assert_non_null(strstr(json, "\"name\": \"right\""));
@@ -180,7 +180,7 @@ static void test_next(void **state)
     const double gain_m2 = number_of(next, "gain_m2"), left_m2 = number_of(next, "none_m2");
     assert_near("gain", gain_m2, none_m2 - left_m2, 1e-9);
     /* Estimates are right but for the cells of 0.25 m at the outlines of the gain: the shadow's line, some 7 m, and the
-     * ends of the cones of 40 degrees on floor and ceiling, 2 pi 1.2 m / tan 50 = 6.3 m each. */
+     * sweep's ends on floor and ceiling, circles of 9.0 and 4.4 m that are partly beyond the walls: 12.6 m at most. */
     assert_near("estimate", number_of(next, "estimate_m2"), gain_m2, 0.25 * (7.0 + 2.0 * 6.3));
     snprintf(line, sizeof line, "stations.1.position_m=[%.17g, %.17g, %.17g]", p[0], p[1], p[2]);
     const char *const with[] = {"coverage", config, "--json", "--set", line, NULL};
@@ -197,9 +197,9 @@ static void test_next(void **state)
 }
 
 /* Heads whose beams lie in planes or on cones, in the upper leg. All 682 pulses of the planar one are tried, so the
- * estimate is the gain; the exception is two cells of 0.25 m, because a ray lies on the border of one. At 5 turns a
- * second the other one has 57 869 pulses, and every 1.4th of them is tried all around. Rays of a beam then are at most
- * 7 m * 0.3 deg = 37 mm apart, and miss a cell only where the beam's way through it is shorter: 37 / 250 of the cells.
+ * estimate is the gain but for two cells of 0.25 m, as a ray lies on the border of one. At 5 turns a second the other
+ * head has 57 869 pulses, and one in 1.4 is tried. Rays of a beam then are at most 7 m * 0.3 deg = 37 mm apart. They
+ * miss a cell only where the beam's way through it is shorter: 37 / 250 of the cells.
  */
 static void test_next_of_pulses(void **state)
 {
@@ -302,7 +302,7 @@ static void test_refused(void **state)
     assert_int_equal(usage_complaints, 0);
 }
 
-/* The table of the stations is printed; then it compares places for hours. */
+/* The program prints the table of the stations, and then compares places for hours. */
 static void test_interrupt(void **state)
 {
     struct wire *wire = *state;

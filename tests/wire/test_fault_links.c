@@ -340,8 +340,8 @@ static void test_wrong_link(void **state)
 
 /* ---- USB */
 
-/* Device-side errors of an enumeration hold for that one; connections are enumerations. When unplugged, the device is
- * gone for a while, and the same again after it. */
+/* Each connection is an enumeration. A fault of an enumeration strikes only the connection of its number. An unplugged
+ * device is gone for a while, and comes back as the same. */
 static void test_usb(void **state)
 {
     struct wire *wire = *state;

@@ -37,7 +37,7 @@ static void test_replies_that_go_wrong(void **state)
     assert_string_equal(client_ask(sh, "SYST:VERS?"), "1999.0");
     assert_int_equal(seen[SCANHEAD_NOTICE_ECHO], 1);
     fault_head_add(sh, "{kind: wrong_reply, at: 1}", "4");
-    assert_string_equal(client_ask(sh, "SYST:VERS?"), "4"); /* the one before: a client can't know */
+    assert_string_equal(client_ask(sh, "SYST:VERS?"), "4"); /* the reply of the command before: a client can't tell */
     assert_string_equal(client_ask(sh, "SYST:VERS?"), "1999.0");
     assert_string_equal(client_ask(sh, "FAUL:LIST?"), "1 no_reply, 2 late_reply, 3 echo, 4 wrong_reply");
     assert_string_equal(client_ask(sh, "FAUL:INJ?"), "4");
@@ -168,8 +168,8 @@ static void test_the_end_waits_for_what_is_on_its_way(void **state)
     }
 }
 
-/* A power cycle is the end of the bytes before it: a run that waits for its readers does not wait for frames that
- * others are to overtake, or to join. */
+/* Frames that a fault holds back, to reorder or merge them, go out at a power cycle at the latest. A run that waits for
+ * its readers does not wait for them. */
 static void test_power_does_not_wait_for_what_is_held(void **state)
 {
     static const char *const held[] = {"{kind: reorder, at: 60, n: 1000}", "{kind: merge, at: 60, n: 64}"};

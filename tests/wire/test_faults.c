@@ -197,7 +197,7 @@ static void read_both(struct scanhead *a, struct scanhead *b)
     }
 }
 
-/* One frame in ten is hit, each by one fault, so that the notices can be told apart. */
+/* One frame in six is hit, each by one fault beside jitter, so that the notices can be told apart. */
 static const char APART[] = "faults:\n"
                             "  - {kind: drop, link: 1, from: 2, every: 60}\n"
                             "  - {kind: duplicate, link: 1, from: 12, every: 60, n: 2}\n"
@@ -316,7 +316,7 @@ static void test_a_journal_brings_faults_back(void **state)
     scanhead_close(sh);
     head_end(&head, SIGTERM);
     read_truth(wire, &first);
-    char *text = wire_read(journal, NULL); /* each of them is a remark there */
+    char *text = wire_read(journal, NULL); /* each fault is a remark in it */
     assert_non_null(strstr(text, "\n# fault 1 drop: t_ns "));
     free(text);
     const char *const replay[] = {"--pace", "fast", "--replay-journal", journal, NULL};

@@ -79,7 +79,7 @@ static void test_links(void **state)
     expect_unharmed(wire, "stream.shs");
 }
 
-/* Where all three standard streams are closed, no file of the run gets the number of one, and messages with it. */
+/* Where all standard streams are closed, no file of the run gets the number of one, and so no messages. */
 static void test_closed_streams(void **state)
 {
     struct wire *wire = *state;
@@ -138,7 +138,7 @@ static void test_map_on_a_fifo(void **state)
     assert_true(S_ISFIFO(st.st_mode));
 }
 
-/* Output that can't be written is a failure in both ways: all of it waits for the end, or some is written before. */
+/* Output that can't be written is a failure, with a full device and with a closed stream. */
 static void test_full_output(void **state)
 {
     struct wire *wire = *state;
@@ -171,7 +171,7 @@ static pid_t stream_to_file(struct wire *wire, const char *config, rlim_t bytes)
     return pid;
 }
 
-/* The last bytes of a stream have no room, and are written when the run is over. */
+/* The last bytes of a stream, which the run writes at its end, have no room. */
 static void test_no_room_for_the_end(void **state)
 {
     struct wire *wire = *state;

@@ -118,8 +118,8 @@ static void test_a_flood_of_errors(void **state)
         take(&told, &frame);
     }
     pthread_join(thread, NULL);
-    /* The head rests while it comes, so that it costs no processor time: it is no faster than this, less a clock's
-     * step. */
+    /* The head rests after each 128 errors, to save processor time. The flood takes these rests at least, less a
+     * clock's step. */
     assert_true(wire_now_ms() - start_ms >= (LINES / WRONG_AT_ONCE - 1) * REST_MS - 1);
     assert_int_equal(f.replies, LINES); /* a client with errors gets each of its replies */
     assert_int_equal(f.wrong, 0);

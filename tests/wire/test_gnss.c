@@ -89,7 +89,7 @@ static void check_recording(const char *path, int seconds)
     scanhead_close(sh);
 }
 
-/* Off the clock, into files, all of it comes, twice the same. The stream's hash is that of a head without a
+/* In the pace fast, all sentences come into a file, the same in two runs. The stream's hash is that of a head without a
  * receiver. */
 static void test_files(void **state)
 {

@@ -273,7 +273,7 @@ static uint32_t read_through(struct wire *wire, struct gpsd *gpsd, struct truth_
 }
 
 /* A sentence with a wrong checksum gives no position. A sentence whose checksum was made right is taken. gpsd reports
- * after a sentence at most, and a fix has five; the sentences of the next fix end the last. */
+ * at most once a sentence, and a fix has five. A wrong fix lasts until the sentences of the next one. */
 static void test_gpsd_hurt(void **state)
 {
     struct wire *wire = *state;

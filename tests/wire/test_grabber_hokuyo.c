@@ -6,7 +6,7 @@
 #include "tests/wire/house.h"
 
 struct model {
-    int first, last, front, steps; /* of the facts: AMIN, AMAX, AFRT, ARES */
+    int first, last, front, steps; /* as SCIP has them: AMIN, AMAX, AFRT, ARES */
     double min_m, max_m;
     int64_t period_100ns;
 };

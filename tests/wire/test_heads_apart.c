@@ -37,8 +37,8 @@ static struct head start(struct wire *wire, int i, const char *profile, const ch
     return head_start(wire, wire_write_text(wire, name, text), NULL);
 }
 
-/* Returns the nearest wall in m of the head with that source, in a stream of both. Every azimuth occurs to 0.1 degrees,
- * and two beams are 1 degree from the horizon: cos(1 deg) cos(0.1 deg) is 1 - 1.6e-4. The wire has steps of 2 mm. */
+/* Checks each head's nearest range, by the source of its packets. Every azimuth occurs to 0.1 degrees, and two beams
+ * are 1 degree from the horizon: cos(1 deg) cos(0.1 deg) is 1 - 1.6e-4. The wire has steps of 2 mm. */
 static void expect_velodynes(int fd, int port)
 {
     double nearest_m[N] = {INFINITY, INFINITY};
@@ -87,7 +87,7 @@ static void ask_last_scan(int i, int port, char *got, size_t cap)
     close(fd);
 }
 
-/* The nearest distance in mm, to a count of the wire. A beam every 0.25 or 0.5 degrees has one within 0.25 degrees of
+/* Checks the nearest distance, to a count of 1 mm. Beams are 0.25 or 0.5 degrees apart: one is within 0.25 degrees of
  * the wall's foot, 1e-5 farther. */
 static void expect_sick(int i, int port)
 {

@@ -9,8 +9,8 @@
 /* Above a million triangles the building of the BVH is announced. */
 enum { TRIANGLES = 1010000 };
 
-/* 0.5 s is promised, and 0.02 to 0.12 s was measured on two idle processors. The test takes processor time, so that a
- * busy machine changes nothing: both processors for half a second. */
+/* 0.5 s is promised, and 0.02 to 0.12 s was measured on two idle processors. The test counts processor time, so that
+ * a busy machine changes nothing: half a second of both processors. */
 enum { MOST_MS = 1000 };
 
 static void put(FILE *f, const void *data, size_t size)

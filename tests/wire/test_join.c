@@ -105,7 +105,7 @@ static void record(struct wire *wire, struct recording *r)
 }
 
 /* Parses the frames first .. last - 1 without the byte at `lost`. Every other frame must come unchanged. There is one
- * exception: a frame whose last byte looks like a sync byte is whole again with the next one's, and then the next one
+ * exception: a frame whose last byte looks like a sync byte is whole again with the next one's first, and then the next
  * is missing. */
 static void check_without(const struct recording *r, int first, int last, size_t lost)
 {

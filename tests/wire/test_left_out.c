@@ -129,7 +129,7 @@ static void record_it(struct wire *wire)
     assert_int_equal(wire_wait(wire, wire_spawn(wire, args, "head.out", "head.err", -1)), 0);
 }
 
-/* The head does it, then `record`. */
+/* The head scans, and then `record` does. */
 static void scan(struct wire *wire, const char *noise, const char *more, check_fn *check, struct sums *sums)
 {
     scan_live(wire, noise, more, check, sums);
@@ -280,7 +280,7 @@ static void expect_mostly_empty(struct wire *wire, const struct sums *sums)
     free(said);
 }
 
-/* One pulse in thirty has echoes, so they are more than one for twenty pulses. The warning is about pulses. */
+/* One pulse in thirty has two echoes: more than one echo for twenty pulses. The warning counts pulses. */
 static void test_a_pulse_with_two_echoes_is_one_pulse(void **state)
 {
     struct sums sums;

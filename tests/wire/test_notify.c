@@ -111,7 +111,7 @@ static void test_end_by_itself(void **state)
     manager_close(fd);
 }
 
-/* Checks the exit status, and that the only line has `says`. */
+/* Checks the exit status, and that the messages have `says`. */
 static void fails(struct wire *wire, int status, const char *says)
 {
     char config[352];

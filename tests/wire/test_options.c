@@ -70,7 +70,7 @@ static const struct {
     {{"run", "CONFIG", "--frames", "many"}, {"head.frames", "0 to 1000000"}},
     {{"run", "CONFIG", "--ready-fd", "zero"}, {"--ready-fd zero", "1 to 65535"}},
     {{"run", "CONFIG", "--journal", "DIR/journal", "--ready-fd", "77"}, {"--ready-fd 77: not open for writing"}},
-    /* Nothing runs before: otherwise there were more messages. */
+    /* Nothing runs before: else there would be more messages. */
     {{"run", "CONFIG", "--duration", "0.01", "--stats", "DIR/none/x"}, {"--stats ", "none/x: No such file"}},
     {{"run", "CONFIG", "--duration", "0.01", "--stats", "DIR"}, {"--stats ", ": is a directory; allowed is a file"}},
     {{"run", "CONFIG", "--duration", "0.01", "--stats", ""}, {"--stats : No such file"}},

@@ -191,8 +191,8 @@ static void check_overload(struct account *a, struct scanhead *sh)
     assert_true(a->missing > 0); /* two casters compute at most half of them in time, on fast machines */
     assert_int_equal(a->told_first, a->first_missing);
     /* Pulses that can be computed go on coming. The stream does not end with those computed ahead at the start. */
-    assert_true(a->in_second_half > 0);                       /* how much is the machine's affair */
-    assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 103); /* once per episode: the next one is another one */
+    assert_true(a->in_second_half > 0);                       /* how many, depends on the machine */
+    assert_int_equal(atoi(client_ask(sh, "SYST:ERR?")), 103); /* one error for each episode */
 }
 
 static struct head start_overload(struct wire *wire, const char *threads)
@@ -269,7 +269,7 @@ static void test_stall(void **state)
     check_balance(&a, wire);
 }
 
-/* Returns the rows of the histogram, summed up from a lateness on. A row counts those of the octave below its
+/* Returns how many ticks were late by from_ns or more, by the histogram. A row counts the ticks of the octave below its
  * number. */
 static uint64_t late_ticks(const struct wire *wire, uint64_t from_ns)
 {
@@ -313,7 +313,7 @@ static void test_stall_with_patience(void **state)
     scanhead_close(sh);
     head_end(&head, SIGTERM);
     check_balance(&a, wire);
-    assert_true(stats_uint(wire, "late_max_us") >= 300000); /* and it is no secret */
+    assert_true(stats_uint(wire, "late_max_us") >= 300000); /* the statistics show the stall */
     /* 400 ms without a tick: more than 100 of the 400 are late by 2^28 ns or more, which is 268 ms */
     assert_in_range(late_ticks(wire, UINT64_C(1) << 28), 100, late_ticks(wire, 0) - 1);
     assert_true(stats_uint(wire, "late_p50_us") <= stats_uint(wire, "late_p99_us") &&

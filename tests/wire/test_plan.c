@@ -347,8 +347,8 @@ static void test_forced(void **state)
 }
 
 /* The plan chooses single rays for the room with glass. Forced, they are tried on the same pulses and have the same
- * error. The plan also casts footprints, to compare with them. The memory that these need
- * changes nothing else. */
+ * error. The plan also casts footprints, to compare with them. The memory that these need changes nothing
+ * else. */
 static void test_forced_as_chosen(void **state)
 {
     static const char *const keys[] = {"\"error_m\": ", "\"echo_share\": "};
@@ -385,7 +385,7 @@ static double total_of(struct wire *wire, const char *config, const char *set, d
     return share;
 }
 
-/* 61 rays cost at least 5 times one, on any machine. The head fires half of its sweep at the ground. */
+/* 61 rays cost at least 5 times one, on any machine. The head fires two fifths of its sweep at the ground. */
 static void test_total(void **state)
 {
     struct wire *wire = *state;

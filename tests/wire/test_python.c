@@ -213,8 +213,8 @@ static void test_both_layouts(void **state)
         assert_true(n >= 1000);
         if (!(crs_m < 2.6e-6 && scene_m < 2.6e-6))
             fail_msg("%s: %g m in the CRS, %g m in the scene", places[i], crs_m, scene_m);
-        /* The map's tangent, 9 m away at most: 81 / 2R = 6.4e-6 m; R is good to half a percent, of 9 m h / R at the
-         * height of 2800 m 2.0e-5 m. */
+        /* The tangent is off by 81 / 2R = 6.4e-6 m, 9 m away. R is good to half a percent. At the height h of 2800 m
+         * that is half a percent of 9 m h / R: 2.0e-5 m. */
         if (!(page_m < 2.9e-5)) fail_msg("%s: the page's formula is %g m off", places[i], page_m);
     }
 }

@@ -136,7 +136,7 @@ static void test_velodyne(void **state)
         at += p->len;
     }
     assert_int_equal(at, len);
-    /* 0.3 s have 226 packets, one in 14 beside them; the mirror spins up first. */
+    /* 0.3 s have 226 data packets, less the spin-up, and a position packet for each 14. */
     assert_true(n[0] > 50 && n[1] > n[0] / 14);
     free(data);
     captured_free(&captured);
@@ -224,7 +224,7 @@ static void test_dropped(void **state)
     assert_int_equal(captured.n - 1 + dropped, n_sent);
     /* The times are the kernel's, not those of reading. */
     assert_true(captured.packet[captured.n - 2].t_ns < standing_ns);
-    /* The last packet has the number of those missing before it: 44 bytes, and the option with the code 4. */
+    /* Behind the last packet of 44 bytes the option with the code 4 has the number of missing ones. */
     const uint8_t *last = captured.packet[captured.n - 1].data;
     assert_int_equal(captured.packet[captured.n - 1].len, 2);
     assert_int_equal(le_get32(last + 2), 4 | 8 << 16);

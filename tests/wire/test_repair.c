@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Recorders are killed, and disks are full, at random moments. The repaired file has all that came to the disk, and
  * says that its end is missing. The recorder reads a stream through a pipe, so a moment is a byte of the stream, and a
- * little after it. FILE.part itself shows what was left. REPAIR_N is how many moments each format has. From 20 on other
+ * short wait. FILE.part itself shows what was left. REPAIR_N is how many moments each format has. From 20 on other
  * people's programs read some of them, too (make repair). */
 #include <limits.h>
 #include <sched.h>

@@ -331,7 +331,7 @@ static void test_a_loop_is_stopped(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A word that is none counts as if the recording did not have it. */
+/* A number of echoes that stands for no word counts as if the recording did not have it. */
 static void test_unknown_echoes(void **state)
 {
     const struct native_emitter e = {

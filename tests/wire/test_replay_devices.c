@@ -95,7 +95,7 @@ static void test_cola(void **state)
     const int fd = raw_connect(head_endpoint(&head, "tcp"));
     assert_non_null(strstr(ask(fd, "\x02sRN DeviceIdent\x03", "sRA DeviceIdent", "\x03"), "TiM571"));
     ask(fd, "\x02sMN SetAccessMode 03 F4724744\x03", "sAN SetAccessMode 1", "\x03");
-    /* Another rate: 2 is no such resolution or 1 no such frequency; and never 0. */
+    /* Another rate is refused with status 1: no such frequency. */
     const char *refused =
         ask(fd, "\x02sMN mLMPsetscancfg +2500 +1 +3333 -450000 +2250000\x03", "sAN mLMPsetscancfg ", "\x03");
     assert_int_equal(refused[strlen("sAN mLMPsetscancfg ")], '1');

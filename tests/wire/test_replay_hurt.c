@@ -31,7 +31,7 @@ static void test_cut_and_bad_bytes(void **state)
     replay_same_file(wire, "out.shs", "bad.shs");
 }
 
-/* There is one line, and an exit status for a file that is none, or for one that can't be had. */
+/* The error is one line. The status is 1 for a file that is no recording, 2 for one that can't be opened. */
 static void refused(struct wire *wire, const char *path, int status, const char *why)
 {
     char link[400];

@@ -26,7 +26,7 @@ static void same_ticks(struct wire *wire, const struct room_config *c, const str
     tape_free(&replay);
 }
 
-/* 100 of 360 degrees are cast, so a line's packets end before it does. Full-sweep's slowest lines last 250 ticks. */
+/* 32.5 of 100 degrees are cast, so a line's packets end before it does. */
 static void test_line_head_with_a_blind_part(void **state)
 {
     static const struct room_config config = {.prr_hz = 10000,

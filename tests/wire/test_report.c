@@ -228,8 +228,8 @@ static void stations_are_judged_by_their_scanners(void **state)
     free(json);
 }
 
-/* With a footprint only points on smooth faces are judged. A cloud of another place has none there, so it may not pass.
- * Such a cloud lies in the room's middle, or farther than everything. A place whose squares no double holds is far. */
+/* With a footprint only points on smooth faces are judged. A cloud of another place has none, so it must not pass.
+ * It lies in the room's middle, or farther than everything. A place whose square is infinite as a double is far. */
 static void another_place_does_not_pass(void **state)
 {
     struct wire *wire = *state;

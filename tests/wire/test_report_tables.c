@@ -86,7 +86,7 @@ static void has_echoes(const char *text, const struct made *all, const char *beg
     has_once(text, line);
 }
 
-/* Surfaces come with the most points first; of as many points, the first label. Unknown ones are the last label. */
+/* The surface with the most points comes first; of equal ones, the lower label. Unknown ones have the last label. */
 static void surfaces_are_in_order(const char *text, const struct made *all, const char *const name[5])
 {
     double left[5];

@@ -29,7 +29,7 @@ static void begin(struct wire *wire)
     wire_write_text(wire, "config.yaml", CONFIG);
 }
 
-/* Runs scanhead record config.yaml -o NAME --ascii --quiet and more. Returns the exit status. */
+/* Runs scanhead record config.yaml -o NAME --quiet and more. Returns the exit status. */
 static int record(struct wire *wire, const char *name, const char *const *more)
 {
     char config[352], out[352];

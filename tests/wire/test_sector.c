@@ -76,7 +76,7 @@ static void check_shot(const struct panorama *p, const struct scanhead_point *at
     assert_true(fabs(at->range_m - ray.range_m) < 0.6e-6);
 }
 
-/* Checks the emitter's own account: elevation of ring i, azimuth of step s. */
+/* Checks the emitter's own account: steps, rings, and the elevation of each ring. */
 static void check_emitter(const struct panorama *p, const struct scanhead_emitter *e)
 {
     assert_int_equal(e->kind, SCANHEAD_EMIT_SPHERE);

@@ -12,7 +12,7 @@ struct recipe {
     const char *sets[5]; /* short scans, of which a map shows all */
 };
 
-/* demo and foliage, with single rays and with beams, without the seconds of planning. If the pan of a recipe stands
+/* demo and foliage have single rays or beams as a key, which saves seconds of planning. If the pan of a recipe stands
  * still, there is also one that moves. The last three take half of the time, and show only what others show, so they
  * run with THOROUGH=1. */
 static const struct recipe RECIPES[] = {

@@ -33,8 +33,8 @@ static void convert(struct wire *wire, const char *in, const char *out)
     wire_run(wire, (const char *const[]){"record", from, "-o", to, "--quiet", NULL}, 0);
 }
 
-/* The raw streams one after the other are the whole stream, but for the times of frames between scans. Each has the
- * same contents as the files beside it. */
+/* The raw streams one after the other give the LAS of the whole recording. Each by itself gives the LAS file beside
+ * it. */
 static void test_split(void **state)
 {
     struct wire *wire = *state;

@@ -193,7 +193,7 @@ static struct reply after_t1(double t_s)
 
 /* ---- the tests */
 
-/* Requests of sick_scan_xd, with its interval; the scans' dates before and after the answer, and without a further one.
+/* The scanner is set up as sick_scan_xd does. Scans have dates before the answer, after it, and with no further answer.
  * The head's clock gains 500 us a second. */
 static void scans_have_the_servers_time(void **state)
 {
@@ -269,7 +269,7 @@ static void wrong_servers(void **state)
     const int64_t step_us = read_shift_us() - shift_us;
     assert_true(step_us <= 17999 * SECOND_US + 2 &&
                 step_us > 17998 * SECOND_US); /* less half of the delay, below 1 s */
-    /* The limit is for a clock that this role has set. The role is there again before anybody has looked. */
+    /* The limit is for a clock that this role has set. Switched off and at once on again, the role has set none. */
     static const char both[] = "\2sWN TSCRole 0\3\2sWN TSCRole 1\3";
     raw_send(scanner.fd, both, sizeof both - 1);
     for (int i = 0; i < 2; i++)
@@ -310,7 +310,7 @@ static void it_never_floods_a_server(void **state)
 {
     scanner_start(state, "");
     const double t1_s = ask_first();
-    assert_true(ask_again() - t1_s > 0.5); /* a second, less what the first one's T1 is read late */
+    assert_true(ask_again() - t1_s > 0.5); /* a second, less the delay of the first T1 */
     scanner_end();
 }
 

@@ -96,8 +96,8 @@ static void test_one_rate(void **state)
     free(err);
 }
 
-/* The allowed share of the speed has two digits, however small it is. 60 kHz are 1.2 MB/s, so 900 times that speed has
- * 0.0011 times the allowed one. */
+/* The allowed share of the speed has two digits, however small it is. 60 kHz are 1.2 MB/s, so 0.0011 of 900 times
+ * that speed are allowed. */
 static void test_fast_recording(void **state)
 {
     struct wire *wire = *state;

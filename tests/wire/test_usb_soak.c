@@ -16,8 +16,8 @@ enum { PENDING = 8, BULK = 16384, STREAM_IN = 0x83, STREAM_INTERFACE = 2, SESSIO
 
 enum { UNPLUG, RESET, REOPEN, CANCEL, UNPLUG_IN_A_PACKET, N_KINDS };
 
-/* An event may leave so much behind before it shows: with 1000 events a single transfer of 16 KiB each would be 16 MB.
- * The allocator keeps the rest for itself. */
+/* The memory may grow by this much, which the allocator keeps for itself. With 1000 events a leak of one transfer of
+ * 16 KiB each would be 16 MB. */
 enum { RSS_SLACK_KIB = 4096 };
 
 struct soak {

@@ -99,8 +99,8 @@ static void check_figures(const char *quality, const char *report)
 }
 
 /* A point is half a count from where its pulse met the surface, so it may lie in the next cell. The error shows only
- * where no other pulse meets one of the two. The difference is one cell, and rare; the cell's area is at most
- * (2.5 cells)^2. */
+ * where no other pulse meets one of the two. It is one cell at most, and rare; the cell's area is at most
+ * (2.5 cell_m)^2. */
 static void check_coverage(struct wire *wire, const char *config, const char *quality)
 {
     const char *const args[] = {"coverage", config, "--json", "--quiet", NULL};

@@ -147,7 +147,7 @@ static void check_line(const char *line, size_t i, size_t *w, double tolerance_m
     fail_msg("point %zu has no window of its pulse %llu: %.200s", i, (unsigned long long)echo[i].pulse, line);
 }
 
-/* A count on three axes, as the first sample's place is computed from the point's. */
+/* Checks all lines of the reader. The first sample's place has the error of the point that it is computed from. */
 static void check_las(const char *name, double tolerance_m)
 {
     char *text = read_las(name), *at = text, *end;

@@ -227,10 +227,10 @@ static void test_echoes(void **state)
     }
 }
 
-/* A pulse of 10 ns has a tail of 1,400 ns 30 dB below its peak. A usual return of 20 dB does not show it above keep_db
- * of
- * -6, those of the near walls do. So their windows are longer than a block has room for. The lost samples are reported by the
- * frames, by the statistics and in a warning, and all agree. */
+/* A pulse of 10 ns has a tail of 1,400 ns 30 dB below its peak. A usual return of 20 dB has that tail below keep_db,
+ * near walls have it above. So their windows are longer than a block has room for. The lost samples are reported by
+ * the frames, by the statistics and in a warning. The first two agree.
+ */
 static void test_lost(void **state)
 {
     struct wire *wire = *state;

@@ -57,9 +57,9 @@ static void expect_usb_lines(void)
     expect_text(S "reply", "123456");
 }
 
-/* Nothing is malformed. Whole scans miss nothing, and the line of the samples has 3 of its 400 pulses. There are two
- * warnings: the LOCAL event of the samples, once on each carrier, and the jumps from one stream to the next in packets
- * of their own. */
+/* Nothing is malformed. Whole scans miss nothing, and the line of the samples has 3 of its 400 pulses. Warnings are
+ * of two kinds: the LOCAL event of the samples, once on each carrier, and the jumps from one stream to the next in
+ * packets of their own. */
 static void expect_marks(void)
 {
     int n_lost = 0;

@@ -241,7 +241,7 @@ static uint32_t n_bits_changed(const uint8_t *a, const uint8_t *b, size_t len)
     return n;
 }
 
-/* A checksum has at most two characters of a unit's line. */
+/* A checksum is at most two characters, so a right one changes up to 16 bits more. */
 static void check_flips(const struct unit_kind *kind, const struct piece *p, const uint8_t *got)
 {
     const uint32_t n = n_bits_changed(p->bytes, got, p->len);
