@@ -65,7 +65,7 @@ licences_are_named() {
         grep -q '^Copyright (c) .* the scanhead authors$' LICENSE
 }
 
-# systemd rates the unit's exposure 1.5 now. The rest is needed by the head: the network, and real time.
+# systemd rates the unit's exposure 1.5 now. That remains because the head needs the network and real time.
 unit_is_sound() {
     sed "s|@PREFIX@|$work/root/usr|" $packaging/scanhead@.service.in >"$work/scanhead@.service"
     systemd-analyze verify --man=no "$work/scanhead@example.service" 2>&1 | grep "$work" && return 1

@@ -33,8 +33,8 @@ static void amplitudes_follow_the_range_equation(void **state)
     }
 }
 
-/* Thresholds of a data sheet with two reaches, in another air, with light lost at short range. At a reach the sheet's
- * own target is at the threshold, but for those losses. */
+/* A data sheet gives two reaches, but the air is clearer, and at short range light is lost. At a reach the sheet's own
+ * target is at the threshold, apart from what the air changes. */
 static void amplitudes_in_fog_and_at_short_range(void **state)
 {
     (void)state;
@@ -67,7 +67,7 @@ static void amplitudes_in_fog_and_at_short_range(void **state)
     assert_true(fabs(cdb[2] - 1000.0 * log10(a)) < 0.51);
 }
 
-/* With a noisy detector amplitude and reflectance carry the same noise, and echoes that are sent are above the
+/* If the detector has noise, amplitude and reflectance carry the same noise. Echoes that are sent are above the
  * threshold. */
 static void amplitude_and_reflectance_agree(void **state)
 {

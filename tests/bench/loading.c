@@ -6,8 +6,8 @@
  *
  * Each round runs `check`, and then Embree's build of the triangles, which lie in memory. Each runs in a process of its
  * own. Processor time is that of all threads, kernel included. For Embree it is the time of its build alone. For
- * `check` it is all there is, from reading the file on. Peaks of memory are those of whole processes, for the same
- * reason. */
+ * `check` it is that of the whole process, reading the file included. Peaks of memory are those of both whole
+ * processes. */
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>

@@ -154,8 +154,8 @@ static struct scene *all_of(const struct stage *stage)
     return scene;
 }
 
-/* The bound is half a count; 16 roundings of what a range is made of, at an incidence of a thousandth; and coordinates
- * at UTM, which are good to 1e-9 m, at an incidence of a twentieth. */
+/* The bound is half a count, 16 roundings of the range over a cosine of incidence of 0.001, and the error of
+ * coordinates at UTM, 1e-9 m, over a cosine of 0.05. */
 static double bound_m(long double range_m)
 {
     return 0.5 * COUNT_M + 16.0 * 0x1p-53 * 1e3 * (double)range_m + 20.0 * 1e-9;
