@@ -153,8 +153,8 @@ static struct scene *slanted_front(void)
     return made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, label, surface, 2});
 }
 
-/* Echoes are chosen, crowded out, folded in front of each other, moved by noise, or too far for the integers. Echoes
- * that stay keep their own attributes. */
+/* Echoes are chosen, crowded out, folded in front of each other, or too far for the integers. Echoes that stay keep
+ * their own attributes. */
 static void attributes_stay_with_their_echo(void **state)
 {
     (void)state;

@@ -226,7 +226,7 @@ static void test_door_edge(void **state)
     }
 }
 
-/* The echo mode chooses: first, last and strongest are those of all. */
+/* The echo mode chooses: first and last are those of all, and the strongest is one of these. */
 static void test_selection(void **state)
 {
     (void)state;

@@ -35,7 +35,7 @@ static void each_echo_has_its_own_reflectance(void **state)
                     near_energy(linear(b, first + k), e.back[k], l.rho[k], slack[m]);
                     assert_true(fabs(1e-6 * b->a[first + k] - e.range_m[k]) < 1e-3 * 0.01 * e.range_m[k]);
                 }
-                if (fabs(e.back[FRONT] / e.back[BACK] - 1.0) < 0.1) continue; /* R^2 as well: 23 m */
+                if (fabs(e.back[FRONT] / e.back[BACK] - 1.0) < 0.1) continue; /* nearly equal; below also with R^2 */
                 double signal[2] = {e.back[FRONT] / pow(e.range_m[FRONT], 2), e.back[BACK] / pow(e.range_m[BACK], 2)};
                 if (fabs(signal[FRONT] / signal[BACK] - 1.0) < 0.1) continue;
                 assert_int_equal(strongest[p], signal[BACK] > signal[FRONT] ? BACK : FRONT);
@@ -113,8 +113,8 @@ static void a_mixed_pixel_leans_to_what_is_bright(void **state)
     close_lit(&l);
 }
 
-/* An echo is missing when its returned light is below the threshold: A = back / (least R^2) < 1. The other echo stays,
- * with its own random numbers. */
+/* An echo is missing when its returned light is below the threshold: A = back / (least R^2) < 1. The other echo
+ * stays. */
 static void an_echo_drops_out_by_itself(void **state)
 {
     (void)state;

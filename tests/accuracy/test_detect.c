@@ -173,7 +173,7 @@ static double correlation(const double *x, const double *y, uint32_t n)
     return sum / n;
 }
 
-/* There is no correlation between pulses at any distance, echoes of a pulse, purposes and seeds, neither of the numbers
+/* There is no correlation between pulses at 13 distances, echoes of a pulse, purposes and seeds, neither of the numbers
  * nor of their squares. */
 static void noise_hangs_on_nothing(void **state)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Plans against the reference. A configuration's run, with the methods that the plan chose, keeps the plan's figures,
  * on pulses that the plan has not looked at. Footprints are compared with 1,000 sub-rays on a spiral, each cast by
- * itself. All else is compared with a run with exact planes, the deepest way through glass, and georeferencing point by
+ * itself. All else is compared with a run that takes the deepest way through glass and georeferences point by
  * point. */
 #include <math.h>
 #include <stdio.h>
@@ -160,7 +160,7 @@ static void check_beam(const char *file, struct side *side)
 /* Footprints and detection work together, so the reference has 1,027 sub-rays, too. */
 enum { JOINED = 1 };
 
-/* Casts echoes with the deepest way through glass. */
+/* Compares echoes with those of the deepest way through glass. */
 static void check_optics(const char *file, struct side *side, struct side *reference)
 {
     struct tally t = {0};

@@ -377,7 +377,7 @@ static void cut_footprints_have_two_echoes(void **state)
 }
 
 /* Noise of three times the level makes echoes all over a window of 40 m. Echoes within the head's ranges are sent, at
- * most max_echoes a pulse, the strongest. Echoes outside are counted. */
+ * most max_echoes a pulse. Echoes outside are counted. */
 static void check_echoes_of_noise(const struct cast_disturbance *disturbance)
 {
     static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 1, PULSES};

@@ -62,8 +62,8 @@ static uint64_t count_through(const struct rig *rig)
     return through;
 }
 
-/* Two screens have exactly the border of the other's cells, so `inner` leaves out rays at the screen's own border. The
- * screens are larger than the part that is aimed at. */
+/* Casts the rays with Embree, robust and not, and with ours. Prints a row of those that pass the screen. The naive
+ * figure is that of the robust cast, unless this has no leak. */
 static void leak_row(struct rig *rig, const char *regime)
 {
     rig_cast_naive(rig, rig->station_m, 1, 16);
@@ -279,8 +279,8 @@ static void label_row(struct rig *rig, const char *regime)
     free(naive.label);
 }
 
-/* A sphere of 1280 triangles stands twice (labels 0 and 1). A screen has two different tessellations in one plane (2
- * and 3). The same ray has to give the same label in any packet, cut and BVH. */
+/* A sphere of 1280 triangles stands twice (labels 0 and 1). In test_coplanar a screen has two tessellations in one
+ * plane (2 and 3). The same ray has to give the same label in any packet, cut and BVH. */
 static void add_sphere_twice(struct mesh *mesh, int swapped)
 {
     const double centre[3] = {0.1, 0.2, 0.3};

@@ -214,7 +214,7 @@ static void judge_run(const struct stage *stage, const struct schedule_segment *
 
 static void one_stage(uint64_t number, struct caster *caster, struct line_block *block, struct odd_tally *tally)
 {
-    /* A line of 1,024 pulses a microsecond apart, all around. It is cast in 8 runs, each with other poses of the
+    /* A line of 1,024 pulses, 5 microseconds apart, all around. It is cast in 8 runs, each with other poses of the
      * bodies. */
     static const struct schedule_spec spec = {.prr_uhz = 200000000000,
                                               .lines_uhz = 195312500,

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Whole configurations in which the head moves or may go far, a station is far away, or a body moves. Each costs no
- * more than a head that stands nearby. Cost is counted in leaves that a packet is tested against. No clock is read.
+/* Whole configurations in which the head moves or may go far, a station is far away, or a body moves. Each costs at
+ * most half as much again as a head that stands nearby. Cost is counted in leaves that a packet is
+ * tested against. No clock is read.
  *
  * A cast whose exactness holds about one origin only has a cliff in each of them. In a house within 1.2 km of ground, a
  * second station 400 m away took 200,000 times as long for a ray. A ball of 960 triangles that moves took 15,000 times
