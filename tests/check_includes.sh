@@ -16,7 +16,7 @@ core_order='core texture georef scene import schedule pose surface instrument de
     studio/picture studio/mesh studio/analysis studio/viewpoint studio/coverage'
 firmware_order='base command fault config site device loop replay app app/help app/run app/studio app/studio/record app/studio/report
     app/studio/map app/studio/coverage app/studio/init app/studio/batch app/studio/verdict app/studio/soak app/studio/view app/studio/preview app/studio/watch'
-# The folders of core/import are one room: it calls them, and they fill what it hands out. So are those of firmware_sim/config.
+# The folders of core/import are one room, as they and its own files call each other. So is firmware_sim/config.
 # Headers in core/ and core/studio/ that belong to a room with another name, as HEADER:ROOM.
 core_headers='distance:bvh geoframe:georef locate:georef crs:georef scene_copies:scene scene_objects:scene body:scene embree:bvh
     ifc_site:import geotiff:import ply:import studio/scan_mesh:studio/mesh studio/decimate:studio/mesh studio/cloud:studio/analysis

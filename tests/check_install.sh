@@ -16,7 +16,7 @@ install_it() {
         PREFIX="$2"
 }
 
-# All files are where they belong, and there are no others.
+# All is below DESTDIR and PREFIX, and pkg-config escapes the blank.
 blanks_stay() {
     mkdir "$work/none" && install_it "$work/none/a root" "/opt/scan head" && test "$(ls "$work/none")" = "a root" &&
         test "$(ls "$work/none/a root")" = opt && "$work/none/a root/opt/scan head/bin/scanhead" --version &&

@@ -29,7 +29,7 @@ lacks() {
     for word; do ! grep -e "$word" "$file" || return 1; done
 }
 
-# ---- one name, one default: the files of make are read as one, so the second default would be the first one's
+# ---- one name, one default: make reads all its files as one, so a second default would have no effect
 one_default_each() {
     twice=$(grep -hoE '^[A-Z_]+ *\?=' Makefile tests/*/*.mk config/*/*.mk | sed 's/[ ?=]*$//' | sort | uniq -d)
     [ "$twice" = CROSS_COMPILE ] || { echo "defaults at two places:" $twice; return 1; } # its two stand in branches of an if

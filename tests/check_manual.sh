@@ -106,7 +106,7 @@ completions() {
         completes "scanhead help --completion" "" bash
 }
 
-# The program takes every word that is offered for an option. Where it fails, it has another reason.
+# The program takes every word that is offered for an option. If it fails, it fails for another reason.
 words_are_known() {
     ! "$program" record none.yaml -o x.ply --colour nothing 2>&1 | grep -qv -e "--colour nothing: allowed are" || return
     for pair in run:--pace record:--colour record:--crs record:--ply-names; do

@@ -38,7 +38,7 @@ files_agree() {
     done
 }
 
-# A release has the files that the Makefile reads, and no others at its top.
+# A release has all that git tracks at the top, but files with a dot, and nothing else there.
 sources_are_all() {
     listed=$(sed -n 's/^DEB_SOURCES = //p' $packaging/packaging.mk)
     for top in $listed; do [ -e "$top" ] || { echo "no $top"; return 1; }; done
@@ -65,7 +65,7 @@ licences_are_named() {
         grep -q '^Copyright (c) .* the scanhead authors$' LICENSE
 }
 
-# systemd rates the unit's exposure 1.5 now. The rest is needed by the head: the network, and real time.
+# systemd rates the unit's exposure 1.5 now. That remains because the head needs the network and real time.
 unit_is_sound() {
     sed "s|@PREFIX@|$work/root/usr|" $packaging/scanhead@.service.in >"$work/scanhead@.service"
     systemd-analyze verify --man=no "$work/scanhead@example.service" 2>&1 | grep "$work" && return 1

@@ -17,9 +17,9 @@
 # block without a language, or an indented one that begins with a command. Other languages (text, csv) are free.
 # The blocks of a document share a folder that looks like the checkout after `make`; each document has a new one. In
 # that folder the ready configurations have fewer pulses, and turn faster: the same recipe in a fraction of the time.
-# The heads of demo.yaml and glass.yaml have single rays, which is what they choose (wire/test_plan): to choose takes up
-# to 1 s of processor time a run. The recipes of core/plan choose. Outside of the first page Assimp reads the house: its
-# other readers take 3 s of processor time. With THOROUGH=1 configurations stay as they are.
+# The heads of demo.yaml and glass.yaml have single rays, as the plan would choose (wire/test_plan): the choice takes up
+# to 1 s of processor time a run. Only recipes of core/plan make it. Except in the top README.md Assimp reads the house:
+# others take 3 s of processor time. With THOROUGH=1 configurations stay as they are.
 # First the script is tried on planted documents, whose failures are known.
 set -u
 
@@ -56,7 +56,7 @@ split='
     { blank = /^[ \t]*$/ }
     END { if (open) print "- " open " a block without an end" }'
 
-# lighten DOCUMENT: its configurations cost less. Each change is made, or it is an error: a key may have another value now.
+# lighten DOCUMENT: its configurations cost less. A change that finds no line is an error: the key has a new value.
 lighten() {
     replace demo 'prr_hz: 600000' 'prr_hz: 100000'
     replace demo 'pan_deg_s: 80' 'pan_deg_s: 150'

@@ -58,7 +58,7 @@ name() {
     grep -q '^complete -F _scanheadd scanheadd$' "$work/completion" && ! grep '_scanhead\>\|_scanhead_' "$work/completion"
 }
 
-# With a page, too: it is served without the studio's resources on the scan.
+# Both run with a page (--view), which scanheadd serves without the studio's resources.
 same_stream() {
     sed 's|^links:.*||' tests/guest/head.yaml >"$work/config.yaml"
     cp tests/guest/room.obj "$work/"

@@ -1,8 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # Joins test programs: twenty of a folder become one file, and test_NAME a link to it, which runs the one of its name.
-# Linking some 500 one by one takes as much processor time as compiling them. (More than twenty cost again: at the end
-# of a program the sanitizer of leaks looks through the variables of all of them.)
+# Linking some 500 one by one takes as much processor time as compiling them. (More than twenty take longer to run: at
+# the end of a program the sanitizer of leaks looks through the variables of all of them.)
 #   LINK='cc ...' LIBS='-l...' LD=ld OBJCOPY=objcopy JOBS=2 join.sh BUILD PROGRAM...     PROGRAM: BUILD/tests/FOLDER/test_NAME
 #
 # Only a program's main is visible from outside, under the program's name. So programs and their rigs may use the same
@@ -30,8 +30,8 @@ awk 'NR == FNR { own[$1] = 1; next } { for (i = 2; i <= NF; i++) if ($i in own) 
 grep -v -x -F -f "$work/apart" "$work/list" >"$work/together" || : # none
 
 # one FOLDER/NAME OBJECT...: makes an object in which main has the program's name. The object is kept until one of its
-# own objects, or this script, is newer. Groups of sections end here: of groups of one name in two programs the linker
-# would take one, and clang 19 makes a group of each variable.
+# own objects, or this script, is newer. Section groups (COMDAT) are dissolved here. If two programs had a group of the
+# same name, the linker would keep only one, and clang 19 makes a group of each variable.
 one() {
     local program=$1 name=${1##*/}
     local out=$work/${program%/*}-$name.o object

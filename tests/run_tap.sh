@@ -100,7 +100,7 @@ end_overdue() {
     done
 }
 
-# Waits until one has ended, and reports those of which all before have been reported.
+# Waits until one program has ended. Reports are in order, so it reports programs until one that still runs.
 wait_one() {
     local process status number
     while :; do

@@ -3,8 +3,8 @@
 
 const double STATION[3] = {0.0, 0.0, 0.0};
 
-/* Returns the energy beyond a line at h of the unit disc. The Gaussian's strips across are each an error function long.
- * The strips are summed by Simpson's rule over x = -cos a, which has no corner at the disc's border. */
+/* Returns the energy beyond a line at h of the unit disc. The disc is cut into strips along the line, and the energy of
+ * each is an error function. Simpson's rule sums them over x = -cos a, which has no corner at the disc's border. */
 static double energy_beyond(double h)
 {
     enum { STEPS = 2000 };

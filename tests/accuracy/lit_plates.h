@@ -18,7 +18,7 @@ extern const double STATION[3];
 
 enum { FRONT, BACK };
 
-/* A plate at near_m is on the left of x = 0. Another one at far_m is behind all of it, or on the right only. */
+/* A plate at near_m is on the left of x = 0. Another one at far_m spans both sides, or with whole_back 0 the right. */
 struct scene *plates(double near_m, double far_m, int whole_back);
 
 /* A rig with a signal: reflectances of both plates, and rho_min at 1 m (0: everything is seen). */
@@ -47,9 +47,9 @@ struct edge at_edge(const struct lit *l, double dx, double dy);
 
 double linear(const struct line_block *b, uint32_t i);
 
-/* Reflectances are reported in 0.01 dB: 0.12 % of themselves. The edge lies beside its place in the footprint by a part
- * in 1,000 of the radius (the view's slopes). 18 rings have 1,027 sub-rays, of which 37 lie on one line through the
- * centre. An edge along it has half of them on the wrong side, 1.8 %. */
+/* Reflectances are reported in 0.01 dB: 0.12 % of themselves. In a footprint the edge is off by a part in 1,000 of the
+ * radius (the view's slopes). 18 rings have 1,027 sub-rays, of which 37 lie on one line through the centre. An edge
+ * along it has half of them on the wrong side, 1.8 %. */
 #define PARTS_OFF 1e-3
 #define RINGS_OFF 0.02
 void near_energy(double told, double want, double rho, double slack);

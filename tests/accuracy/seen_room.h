@@ -33,8 +33,9 @@ struct seen_room {
 void seen_room_open(struct seen_room *room, uint64_t seed, const double at_m[3]);
 void seen_room_close(struct seen_room *room);
 
-/* Casts all lines with and without hits that were found ahead, some lines at a time, which begin and end anywhere, and
- * compares the blocks as below. Returns whether this setup can look ahead; else nothing is cast. */
+/* Casts all lines with and without hits that were found ahead. Hits are found for some lines at a time. Their pulses
+ * are cast in pieces that begin and end anywhere. Compares the blocks as below. Returns whether this setup can look
+ * ahead; else nothing is cast. */
 int seen_room_compare_ahead(struct seen_room *room, const struct cast_setup *setup);
 
 /* Casts all lines both ways and compares the blocks: each bit must be the same. Returns the number of echoes. */

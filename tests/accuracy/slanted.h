@@ -27,14 +27,14 @@ double spread(const struct beam *beam, const double dir[3], const struct face *f
 double width_of(double pulse_m, double variance);
 
 /* Makes a quad on the plane through (0, range, 0). The plane is slanted by i, about an axis that is turned by `about`
- * from vertical. u and v are the corners along the plane's axes, the second one along the slant. */
+ * from vertical. u and v are where the corners lie along the plane's axes, v along the slant. */
 struct scene *slanted(double range_m, double i, double about, const double u[2], const double v[2], struct face *face);
 
 void open_attributes(struct beam_rig *rig, struct scene *scene, const struct beam_view *view, double pulse_s);
 
-/* The bound is half a count, and 0.02 % of 40,000 rays' spread. Beyond that the closed form is first order in b = s tan
- * i, and short by b^2 / 2: E sin^2 rho^2 = 0.1715, so the series of 1 / (1 - b rho sin phi) has (3 * 0.0701 - 0.1715^2)
- * / 0.1715 / 2 = 0.53 b^2 of the standard deviation. */
+/* The bound is half a count, 0.02 % for the scatter of 40,000 rays, and 0.7 b^2. The closed form is of first order in
+ * b = s tan i, so it lacks about b^2 / 2 of the width. With E sin^2 rho^2 = 0.1715 the series of 1 / (1 - b rho sin
+ * phi) gives (3 * 0.0701 - 0.1715^2) / 0.1715 / 2 = 0.53 b^2 of the standard deviation. */
 void check_width(double told_cns, double want_cns, double b, double slack);
 
 /* Returns the error beyond the wire's rounding, as a share of the width. */

@@ -33,8 +33,8 @@ static void amplitudes_follow_the_range_equation(void **state)
     }
 }
 
-/* Thresholds of a data sheet with two reaches, in another air, with light lost at short range. At a reach the sheet's
- * own target is at the threshold, but for those losses. */
+/* A data sheet gives two reaches, but the air is clearer, and at short range light is lost. At a reach the sheet's own
+ * target is at the threshold, apart from what the air changes. */
 static void amplitudes_in_fog_and_at_short_range(void **state)
 {
     (void)state;
@@ -67,7 +67,7 @@ static void amplitudes_in_fog_and_at_short_range(void **state)
     assert_true(fabs(cdb[2] - 1000.0 * log10(a)) < 0.51);
 }
 
-/* With a noisy detector amplitude and reflectance carry the same noise, and echoes that are sent are above the
+/* If the detector has noise, amplitude and reflectance carry the same noise. Echoes that are sent are above the
  * threshold. */
 static void amplitude_and_reflectance_agree(void **state)
 {
@@ -153,8 +153,8 @@ static struct scene *slanted_front(void)
     return made_scene(&(struct scene_arrays){vertex, 8, triangle, 4, label, surface, 2});
 }
 
-/* Echoes are chosen, crowded out, folded in front of each other, moved by noise, or too far for the integers. Echoes
- * that stay keep their own attributes. */
+/* Echoes are chosen, crowded out, folded in front of each other, or too far for the integers. Echoes that stay keep
+ * their own attributes. */
 static void attributes_stay_with_their_echo(void **state)
 {
     (void)state;

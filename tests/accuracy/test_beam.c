@@ -148,14 +148,14 @@ static void test_wall(void **state)
     assert_true(plain > 1e-4);
 }
 
-/* A wall at 89 deg of incidence goes on beyond the largest range, within footprints: at 1 deg of pan it is 10 m away. A
- * pulse has the same echo whichever pulses are cast with it: parts of its footprint beyond that range are not seen. */
+/* A wall at 89 deg of incidence reaches the largest range, 10 m, at 1 deg of pan. Footprints there lie across that
+ * limit. A pulse has the same echo whichever pulses are cast with it: the part of a footprint beyond it is not seen. */
 static void test_end_of_range(void **state)
 {
     (void)state;
     enum { PULSES = 64 };
     const struct beam_view view = {-0.02, 0.02, 0.98, 1.02, 16, PULSES};
-    /* The wall, and another one behind all: a box around one alone is not tested. */
+    /* A second wall stands behind, because the BVH does not test the box around a single one. */
     static const double corner_m[8][3] = {{0.17452, 0, -1}, {0.17452, 20, -1}, {0.17452, 20, 1}, {0.17452, 0, 1},
                                           {-1, 50, -1},     {1, 50, -1},       {1, 50, 1},       {-1, 50, 1}};
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
@@ -187,9 +187,9 @@ static void test_end_of_range(void **state)
 
 /* ---- a door edge */
 
-/* Steps go from less than a millimetre to more than the resolution. Up to it there is one echo at the energy-weighted
- * mean of both surfaces, beyond it two, for each pulse across the edge. The outlines take up to half a millimetre for
- * no step, and the mean there is wrong by at most half of the step. */
+/* Steps go from less than a millimetre to more than the resolution. For each pulse across the edge there is one echo up
+ * to the resolution, at the energy-weighted mean of both surfaces, and beyond there are two. The outlines ignore steps
+ * up to half a millimetre, and the mean there is wrong by at most half of the step. */
 static void test_door_edge(void **state)
 {
     (void)state;
@@ -226,7 +226,7 @@ static void test_door_edge(void **state)
     }
 }
 
-/* The echo mode chooses: first, last and strongest are those of all. */
+/* The echo mode chooses: first and last are those of all, and the strongest is one of these. */
 static void test_selection(void **state)
 {
     (void)state;

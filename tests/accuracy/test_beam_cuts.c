@@ -122,8 +122,8 @@ static void with_glass(void **state)
     surface_table_free(&table);
 }
 
-/* A plate at 54 m reaches up to an edge, with a wall behind it. Pulses pass within 3 um of the edge, where the outline,
- * in float, and the central ray may disagree on the centre's side. Each footprint lies half on either. */
+/* A plate at 54 m reaches up to an edge, with a wall behind it. Pulses pass within 3 um of the edge. There the outline,
+ * in float, and the central ray may disagree on which side the centre is. Half of each footprint lies on the plate. */
 static void within_floats_of_an_edge(void **state)
 {
     (void)state;

@@ -35,7 +35,7 @@ static void each_echo_has_its_own_reflectance(void **state)
                     near_energy(linear(b, first + k), e.back[k], l.rho[k], slack[m]);
                     assert_true(fabs(1e-6 * b->a[first + k] - e.range_m[k]) < 1e-3 * 0.01 * e.range_m[k]);
                 }
-                if (fabs(e.back[FRONT] / e.back[BACK] - 1.0) < 0.1) continue; /* R^2 as well: 23 m */
+                if (fabs(e.back[FRONT] / e.back[BACK] - 1.0) < 0.1) continue; /* nearly equal; below also with R^2 */
                 double signal[2] = {e.back[FRONT] / pow(e.range_m[FRONT], 2), e.back[BACK] / pow(e.range_m[BACK], 2)};
                 if (fabs(signal[FRONT] / signal[BACK] - 1.0) < 0.1) continue;
                 assert_int_equal(strongest[p], signal[BACK] > signal[FRONT] ? BACK : FRONT);
@@ -47,8 +47,8 @@ static void each_echo_has_its_own_reflectance(void **state)
     close_lit(&l);
 }
 
-/* A pulse that may send one echo sends the one with more signal. The other one, three times as far, returns more of the
- * light. An echo below the threshold takes no room: there the other one is sent. */
+/* A pulse that may send one echo sends the one with more signal. The plate behind, three times as far, may return more
+ * light and still have less signal. An echo below the threshold takes no room, so the other one is sent. */
 static void of_a_crowd_the_strongest_signal_is_sent(void **state)
 {
     (void)state;
@@ -102,7 +102,7 @@ static void a_mixed_pixel_leans_to_what_is_bright(void **state)
             struct edge e = at_edge(&l, l.d[0][p], l.d[1][p]);
             double sum = e.back[FRONT] + e.back[BACK], want = e.range_m[FRONT] + 0.3 / l.d[1][p] * e.back[BACK] / sum;
             near_energy(linear(b, p), sum, 0.8, PARTS_OFF);
-            /* the weights are off by a part in 1,000 of the footprint, eight times as bright as the darker plate */
+            /* weights are off by a part in 1,000 of the footprint, times 8: the plates' ratio of brightness */
             assert_true(fabs(1e-6 * b->a[p] - want) < 0.3 * 8e-3 + 1e-5);
             if (fabs(e.back[FRONT] / sum - 0.5) < 0.1) continue;
             assert_int_equal(b->label[p], e.back[BACK] > e.back[FRONT] ? BACK : FRONT);
@@ -113,8 +113,8 @@ static void a_mixed_pixel_leans_to_what_is_bright(void **state)
     close_lit(&l);
 }
 
-/* An echo is missing when its returned light is below the threshold: A = back / (least R^2) < 1. The other echo stays,
- * with its own random numbers. */
+/* An echo is missing when its returned light is below the threshold: A = back / (least R^2) < 1. The other echo
+ * stays. */
 static void an_echo_drops_out_by_itself(void **state)
 {
     (void)state;

@@ -3,7 +3,7 @@
 #include "tests/accuracy/lit_plates.h"
 
 /* A pane with a free border is on the left, and a wall lies behind all of it. A part of the wall's echo has passed the
- * pane there and back. Without a signal there are the same echoes. */
+ * pane there and back. Without a signal (m >= 2) there are as many echoes. */
 static void a_footprint_on_the_border_of_glass(void **state)
 {
     (void)state;
@@ -81,8 +81,8 @@ static void surfaces_mix_within_a_plane(void **state)
         }
 }
 
-/* This is the same with a mirror in place of the pane. In it the wall behind the head is seen, 40 m and 12 m away, as a
- * ghost. */
+/* This is the same with a mirror in place of the pane. It shows the wall that is 12 m behind the head as a ghost, at
+ * 40 m + 12 m. */
 static struct scene *mirror_and_two_walls(void)
 {
     double vertex[12][3];

@@ -48,9 +48,9 @@ static int may_reach_some(const struct beam *beam, const struct bars *bars, cons
     return near;
 }
 
-/* Compares every `step`th line of the view, with adaptive and with rings of 61 sub-rays, with the reference. Pulses
- * that reach none of the bars, and see but a smooth surface with 128 sub-rays, get no more of them. With bars NULL all
- * get 1,000. */
+/* Compares adaptive pulses, and rings of 61 sub-rays, with the reference on every `step`th line of the view. The
+ * reference of a pulse that reaches no bar has 128 sub-rays if these see only one smooth surface, else 1,000. With bars
+ * NULL all have 1,000. */
 static void against_reference(struct beam_rig *rig, const struct beam_view *view, uint32_t step,
                               const struct bars *bars, struct beam_tally *adaptive, struct beam_tally *rings)
 {
@@ -142,8 +142,8 @@ static void count_labels(const struct line_block *b, uint32_t at, uint64_t *seen
         if (b->label[at + k] >= 1 && b->label[at + k] <= WIRES) seen[b->label[at + k] - 1]++;
 }
 
-/* The number of pulses that see each wire is the reference's within 2 %. Two in a hundred of them lie within a quarter
- * of the threshold at its edge, where 1,000 sub-rays themselves are wrong by one part in ten. */
+/* The number of pulses that see each wire is the reference's within 2 %. For two in a hundred, at the wire's edge, its
+ * energy is within a quarter of the threshold. There 1,000 sub-rays themselves are wrong by one part in ten. */
 static void test_wires_are_seen(void **state)
 {
     (void)state;

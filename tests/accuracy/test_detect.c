@@ -71,8 +71,8 @@ static struct detect_echoes shoot(uint32_t n, uint64_t pulse0, uint32_t number, 
                                   .refl_cdb = pulses->refl_cdb};
 }
 
-/* The two ranges of `head` give the extinction of the data sheet's air. rho_min falls with R^2 and exp(2 a R), so 2 a
- * 400 m = log(0.9 / 0.2) - 2 log 2. The figure at 100 m then holds at R by the ratio of the signals. */
+/* The two ranges of `head` give the extinction of the data sheet's air. rho_min grows as R^2 exp(2 a R), so 2 a 400 m
+ * = log(0.9 / 0.2) - 2 log 2. The figure at 100 m then holds at R by the ratio of the signals. */
 static double sigma_of(double range_m, double rho)
 {
     double a2 = (log(0.9 / 0.2) - 2.0 * log(2.0)) / 400.0;
@@ -173,7 +173,7 @@ static double correlation(const double *x, const double *y, uint32_t n)
     return sum / n;
 }
 
-/* There is no correlation between pulses at any distance, echoes of a pulse, purposes and seeds, neither of the numbers
+/* There is no correlation between pulses at 13 distances, echoes of a pulse, purposes and seeds, neither of the numbers
  * nor of their squares. */
 static void noise_hangs_on_nothing(void **state)
 {
@@ -217,7 +217,7 @@ static double share_seen(const struct detect_signal *signal, uint32_t n, uint64_
     return (double)seen / n;
 }
 
-/* Returns where half of the pulses still see a target, by bisection. */
+/* Bisection finds the range where half of the pulses still see a target: the data sheet's, to 2 %. */
 static void targets_vanish_where_the_data_sheet_says(void **state)
 {
     (void)state;

@@ -76,8 +76,8 @@ static void a_part_has_its_own_width(void **state)
                 if (share > 0.015) {
                     double want = width_of(rig.beam.beam.resolution_m, variance);
                     assert_int_equal(rig.block.echo[0], 0x11);
-                    /* Where lines cross, 469 places stand for the disc: an edge along a part of n places may take half
-                     * a row, of the root of n, to either side. */
+                    /* Where lines cross, 469 places stand for the disc. An edge along a part of n places may count half
+                     * a row on the wrong side, and a row has about sqrt(n). */
                     check_width(rig.block.width_cns[0], want, 0.0, k < 12 ? 0.003 : 0.4 / sqrt(469.0 * share));
                     worst = fmax(worst, excess(rig.block.width_cns[0], want));
                     cut += share < 0.985;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Georeferencing at 200 places all over the Earth. Exact figures are compared with definitions in long double
- * (tests/common/geodesy.h), and every order's error with its bound. */
+ * (tests/common/geodesy.h), and the errors of orders 1 to 3 with their bounds. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,8 +55,9 @@ static void test_exact_against_definitions(void **state)
     print_message("# exact: ecef %.2g m, utm and ups %.2g m, geodetic %.2g m\n", worst_m[0], worst_m[1], worst_m[2]);
 }
 
-/* Each order is within its bound, and the bound is tight: where errors are above rounding it is at most ten times the
- * largest error found. Degrees within ten radii of a pole may be looser: no point has all largest terms there. */
+/* Orders 1 to 3 are within their bounds, and these are tight: where errors are above rounding, a bound is at most ten
+ * times the largest error found. Degrees within ten radii of a pole may be looser: no point has all largest terms
+ * there. */
 static void test_bounds(void **state)
 {
     (void)state;

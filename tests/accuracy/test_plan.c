@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Plans against the reference. A configuration's run, with the methods that the plan chose, keeps the plan's figures,
  * on pulses that the plan has not looked at. Footprints are compared with 1,000 sub-rays on a spiral, each cast by
- * itself. All else is compared with a run with exact planes, the deepest way through glass, and georeferencing point by
+ * itself. All else is compared with a run that takes the deepest way through glass and georeferences point by
  * point. */
 #include <math.h>
 #include <stdio.h>
@@ -57,7 +57,7 @@ static void close_side(struct side *side)
     free(side->cfg);
 }
 
-/* Pulses are spread evenly over the frame, by the golden ratio. 0 is outside of the field of view. */
+/* Pulses are spread evenly over the frame, by the golden ratio. Returns 0 for one outside of the field of view. */
 static int get_run(const struct side *side, uint32_t j, struct schedule_run *run)
 {
     double share = fmod((j + 0.5) * 0.6180339887498949, 1.0);
@@ -104,8 +104,8 @@ static void add(struct tally *t, double off)
     t->sum4 += off * off * off * off;
 }
 
-/* A sample shows a bound of p as up to p + 3 sqrt(p / n) (exceeded one time in a thousand), and a mean square up to two
- * standard errors larger. */
+/* If the true share is p, a sample of n may have up to p + 3 sqrt(p / n), which is exceeded one time in a thousand. Its
+ * mean square may be up to two standard errors larger. */
 static void expect_within(const char *what, const struct tally *t, const struct plan_row *row, const struct config *cfg)
 {
     double n = (double)t->pulses, wrong = (double)t->wrong / n, rms = sqrt(t->sum2 / t->echoes);
@@ -160,7 +160,7 @@ static void check_beam(const char *file, struct side *side)
 /* Footprints and detection work together, so the reference has 1,027 sub-rays, too. */
 enum { JOINED = 1 };
 
-/* Casts echoes with the deepest way through glass. */
+/* Compares echoes with those of the deepest way through glass. */
 static void check_optics(const char *file, struct side *side, struct side *reference)
 {
     struct tally t = {0};
@@ -274,8 +274,8 @@ static double threshold(const struct beam *beam)
 
 /* A step of more than the resolution gives two echoes where both sides have 1 %: a strip of known width, in a view of
  * known width. A single ray is wrong in the whole strip. The plan's figure is the strip's share plus 1.645 standard
- * errors, an upper limit, and the sample scatters by one standard error. From 3 below the mean to 3 above that is -1.4
- * to 4.7 standard errors. The adaptive beam finds the strip. */
+ * errors, an upper limit, and the sample scatters by one standard error. With three to either side the figure is -1.4
+ * to 4.7 standard errors from the share. The adaptive beam finds the strip. */
 static void test_figures(void **state)
 {
     (void)state;

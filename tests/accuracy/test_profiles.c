@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* From a configuration to points. With each shipped head, a wall of 20 or 90 % head on vanishes where the profile says.
- * The range noise is the profile's where it gives one. */
+/* From a configuration to points. With shipped heads, a wall that is hit at a right angle vanishes where the profile
+ * says. The range noise is the profile's where it gives one. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -57,8 +57,8 @@ struct scan {
     double share, sigma_m, refl_db; /* of the pulses that found the wall; means over these */
 };
 
-/* Casts `lines` of 1666 pulses within half a degree of the wall's normal: its cosine is 1 to 4e-5. Ranges are those
- * less the wall's own. */
+/* Casts `lines` of 1666 pulses within half a degree of the wall's normal: cos i is 1 to 4e-5. The sigma is that of
+ * ranges less the wall's own. */
 static void scan_wall(const char *profile, int prr_hz, double range_m, double reflectance, uint64_t lines,
                       struct scan *scan)
 {
@@ -138,8 +138,8 @@ static void walls_vanish_where_the_profiles_say(void **state)
     }
 }
 
-/* 333,200 pulses: 4.75 standard errors of a sigma are 0.58 %. Counts of 1 um, and the wall's own plane, whose error is
- * at most 1e-7 of it, add nothing. The bound of the reflectance's mean in dB is 0.01 dB and its noise. */
+/* 333,200 pulses: 4.75 standard errors of a sigma are 0.58 %. Counts of 1 um add nothing, and neither does the wall's
+ * plane, which is off by at most 1e-7 of its range. The mean reflectance is right to 0.01 dB. */
 static void noise_is_the_profiles(void **state)
 {
     (void)state;

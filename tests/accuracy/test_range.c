@@ -28,8 +28,8 @@ enum { BATCH = 1024, THREADS = 2 };
 
 /* The promise is 1 um from 0.5 m to 2 km and to 89.9 degrees anywhere on the UTM grid. Derived: n . dir and n . v as
  * sums of three products in double have errors of 8 x 2^-53 of range x |n|, with v counted from the BVH's origin. With
- * planes up to 2 km from there it is 16 x 2^-53 x 4 km / cos 89.9 = 4e-9 m. Edges are rounded to 2^-53 of them, so a
- * normal is tilted by that over the sine of the triangle's smallest angle. */
+ * planes up to 2 km from there it is 16 x 2^-53 x 4 km / cos 89.9 = 4e-9 m. Edges are rounded to 2^-53 of their length,
+ * so a normal is tilted by 2^-53 over the sine of the triangle's smallest angle. */
 static const double BOUND_M = 1e-6;
 static const double RANGE_MAX_M = 1e4;
 
@@ -46,7 +46,7 @@ struct place {
 };
 
 /* Easting and northing of ordinary and of extreme points of the grid: Berlin; the equator at a zone's edge; 84 degrees
- * north, high up; just south of the equator on the southern grid. The coordinates are multiples of nothing. */
+ * north, high up; just south of the equator on the southern grid. No coordinate is a round number. */
 static const struct place PLACE[] = {
     {"E 391431 N 5819712", {391431.123, 5819712.456, 34.567}},
     {"E 833978 N 12", {833978.557, 12.345, -3.2}},

@@ -48,7 +48,7 @@ static void ranges_are_as_good_as_noise_allows(void **state)
             wave_measure(&w, (enum waveform_detector)d, pulses(), &r, &f[d]);
             assert_true(f[d].single >= pulses() - 2);
         }
-        /* digits: steps of 100 / 3895 thresholds */
+        /* counts are steps of 100 / 3895 thresholds */
         const double noise = sqrt(spec.noise * spec.noise + pow(100.0 / 3895.0, 2.0) / 12.0);
         const double least = wave_least_sigma_m(amplitude[k], noise, s, spec.sample_s);
         printf("# %9.0f: %8.2f | %8.2f | %8.2f | %8.2f\n", amplitude[k], 1e3 * least, 1e3 * f[2].sigma_m,
@@ -63,7 +63,7 @@ static void ranges_are_as_good_as_noise_allows(void **state)
     wave_close(&w);
 }
 
-/* detect.h: the jitter falls as 1 / A. So the deviation that a data sheet states at one amplitude is that of all. */
+/* detect.h: the jitter falls as 1 / A. So a data sheet's deviation at one amplitude gives those at all others. */
 static void the_jitter_is_that_of_the_closed_form(void **state)
 {
     (void)state;
@@ -194,8 +194,8 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
         printf("# %4.0f: %8.2f | %8.2f | %8.2f; %6.2f | %6.2f | %6.2f; %.4f\n", incidence_deg[k], 1e3 * f[0].bias_m,
                1e3 * f[1].bias_m, 1e3 * f[2].bias_m, 1e9 * width_m / C_2, 1e9 * f[1].width_s, 1e9 * f[2].width_s,
                f[2].deviation);
-        /* The closed form takes the footprint's spread as Gaussian, of sigma 0.414 w tan i: 0.975 w tan i full at half
-         * maximum. The width of the disc's marginal exp(-2 x^2) erf(sqrt(2 - 2 x^2)) is 1.130. */
+        /* The closed form takes the footprint's spread as Gaussian, with sigma 0.414 w tan i and a width of 0.975 w tan
+         * i (full at half maximum). That of the disc's marginal exp(-2 x^2) erf(sqrt(2 - 2 x^2)) is 1.130 w tan i. */
         if (spec->shape == WAVEFORM_GAUSSIAN)
             for (int d = 1; d < WAVE_DETECTORS; d++)
                 wave_between(f[d].width_s * C_2 / width_m, 0.99, 1.130 / 0.975 + 0.01);
@@ -306,8 +306,8 @@ static uint32_t others_echoes(const struct wave_echoes *w, struct other_echo *ec
     return other_decompose(y, window->n, 1.0, 4, 12, echo, WAVE_MOST);
 }
 
-/* The other decomposition's ranges are samples with the largest count. Noise may make a neighbour larger where the top
- * lies between both: by the peak's curvature, 8 sigma of noise in a peak of 30 reach 0.1 samples beyond half of one.
+/* The other decomposition's ranges are samples with the largest count. If the top lies between two samples, noise may
+ * make the farther one larger. By the peak's curvature, 8 sigma of noise in a peak of 30 do so up to 0.6 samples away.
  * Centres and widths of its fits differ from ours by the noise of the offset that it fits too. */
 static void another_decomposition_agrees(void **state)
 {

@@ -6,13 +6,13 @@
 
 enum { PULSES = 16, ACROSS_LINES = 60, ROOM = 16384 };
 
-/* Two plates with waveforms. Signals are about 1,000 thresholds, so that a count is a tenth of one. */
+/* Two plates with waveforms. Signals are about 1,000 thresholds, and a count is a tenth of a threshold. */
 struct waves {
     struct lit lit;
     struct cast_waves cast;
     double gain; /* of all signals; 0: 1 */
     double count_signal;
-    const struct waveform_spec *spec; /* NULL: SPEC, which all that follows has */
+    const struct waveform_spec *spec; /* NULL: SPEC below */
 };
 
 static const struct waveform_spec SPEC = {.shape = WAVEFORM_GAUSSIAN,
@@ -98,7 +98,7 @@ static void check_energies(enum beam_mode mode, const struct beam_view *view, co
     close_waves(&w);
 }
 
-/* The energy agrees to 0.1 %: digits at 10,000 counts, and the light outside of the windows, are less. Plates are
+/* The energy agrees to 0.1 %: rounding at 10,000 counts, and the light outside of the windows, are less. Plates are
  * hit at up to 44 deg. */
 static void energy_is_the_link_budget(void **state)
 {
@@ -208,7 +208,7 @@ static void windows_belong_to_points(void **state)
 }
 
 /* In UTM the height is that above the ellipsoid. Its slope along a level beam is the range over the Earth's radius,
- * which is 6,371 km to 0.7 %: at the first sample, 800 m away, 1.26e-4 to 0.9e-6. Floats add 1e-9. */
+ * which is 6,371 km to 0.7 %: at the first sample, 800 m away, 1.26e-4 +- 0.9e-6. Floats add 1e-9. */
 static void beams_bend_with_the_earth(void **state)
 {
     (void)state;
@@ -282,10 +282,10 @@ static void lost_samples_are_counted(void **state)
 
 /* ---- echoes */
 
-/* Without noise, echoes of one plate are where the closed form has them, but for digits. Half a count is 0.06
- * thresholds. From the sample below the threshold to the one above it the signal rises by 1 or more, so half a count
- * is 9 mm there at most. A detector that takes a straight line at half of the peak, between samples 1 ns apart, has
- * an error of P'' / 8, 3.6 mm. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
+/* Without noise, echoes of one plate are where the closed form has them, to the rounding of counts. Half a count is
+ * 0.06 thresholds. From the sample below the threshold to the one above it the signal rises by 1 or more, so half a
+ * count is 9 mm there at most. A detector that takes a straight line at half of the peak, between samples 1 ns apart,
+ * has an error of P'' / 8, 3.6 mm. The amplitude is the link budget's to 0.02 dB: 0.5 %. */
 static void echoes_are_found_in_samples(void **state)
 {
     (void)state;
@@ -316,7 +316,7 @@ static void echoes_are_found_in_samples(void **state)
                 assert_true(abs(b->amplitude_cdb[p] - amplitude_cdb[p]) <= 2);
                 assert_true(abs(b->refl_cdb[p] - refl_cdb[p]) <= 2);
                 assert_true(abs(b->width_cns[p] - 400) <= 8); /* 4 ns, to 2 % */
-                /* digits: 1 in 10,000, and rounding; 4 mm of range are 0.016 of a pulse's sigma */
+                /* rounding: counts are 1 in 10,000; 4 mm of range are 0.016 of a pulse's sigma */
                 assert_true(b->deviation[p] <= (detector == WAVEFORM_THRESHOLD ? 20 : 3));
             }
             close_waves(&w);
@@ -377,7 +377,7 @@ static void cut_footprints_have_two_echoes(void **state)
 }
 
 /* Noise of three times the level makes echoes all over a window of 40 m. Echoes within the head's ranges are sent, at
- * most max_echoes a pulse, the strongest. Echoes outside are counted. */
+ * most max_echoes a pulse. Echoes outside are counted. */
 static void check_echoes_of_noise(const struct cast_disturbance *disturbance)
 {
     static const struct beam_view SIDE = {0.0, 1.0, -40.0, -30.0, 1, PULSES};

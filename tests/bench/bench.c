@@ -43,7 +43,7 @@ static int measure_stages(const struct bench_options *o, const struct bench_case
     return rc;
 }
 
-/* The smallest scene shows nothing that the next one doesn't. The largest takes too long to look at 15 times. */
+/* By default whole scans leave out small scenes, which show nothing new, and the largest, whose 15 rounds take long. */
 static const char *scans_of(const struct bench_options *o, const struct bench_target *target)
 {
     const uint32_t triangles = target->scene->n_triangles;

@@ -30,7 +30,7 @@ int bench_is_house(const char *name); /* whether it is house or garden, which ne
 int bench_is_made(const char *name);  /* whether it is foliage or huge, which are generated */
 /* "house" reads the IFC file and is seen from its living room, "garden" from outside. A number makes closed terrain,
  * 200 m wide and 3 m rough, seen from 4.7 m above its middle. "foliage" is three crowns of 20,000 leaves in a box.
- * "huge" is a triangle of 1,000 km below 4,000 triangles of some centimetres. */
+ * "huge" is a triangle of 2,000 km below 4,000 triangles of some centimetres. */
 int bench_target_load(const char *name, const char *house, const struct sh_report *report, struct bench_target *out,
                       struct sh_err *err);
 void bench_target_free(struct bench_target *target);

@@ -20,7 +20,7 @@
 
 enum { LINES = 104 /* cast, of a whole scan's */, ROUNDS = 9, CHUNK = 256, WIDTHS = 4, METHODS = 21 };
 enum kind { FLOAT, REFINED, DECIDED, SIGHT }; /* the last two are the program's own */
-#define WHOLE_SCAN 22.5e6 /* pulses of a turn at 0.04 degrees: what a sight is made for, and shared by */
+#define WHOLE_SCAN 22.5e6                     /* pulses of a turn at 0.04 degrees, which share the cost of a sight */
 
 static const uint32_t WIDTH[WIDTHS] = {1, 4, 8, 16};
 

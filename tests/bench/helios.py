@@ -50,7 +50,7 @@ class Window:
 ALL_ROUND = Window(-40, 60, 0, 0.36, 36, 144, 1000, "lines_hz: 41.666667, pan_deg_s: 15")
 CROWNS = Window(-12, 16, -30, 0.12, 6, 24, 200, "lines_hz: 11.666667, pan_deg_s: 1.4, line_start_deg: -12, "
                 "line_stop_deg: 16, pan_start_deg: 0, pan_stop_deg: 24")
-# HELIOS++'s beamSampleQuality, the rays of a pulse that both cast, and ours as options
+# Each row has HELIOS++'s beamSampleQuality, the rays a pulse that both cast, and our options for as many.
 BEAMS = [(1, 1, ["beam.mode=single"]), (3, 19, ["beam.mode=rings", "beam.rings=2"])]
 
 

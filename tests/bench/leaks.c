@@ -74,8 +74,8 @@ static void origin_of(const struct job *job, uint64_t i, double from[3])
         from[j] = job->mesh->station_m[j] + (is_moving(i) ? job->room_m * sin(turn[j] * (double)i) / sqrt(3.0) : 0.0);
 }
 
-/* Aims ray number i at a corner, or at a point of an edge. Four rays go to each triangle of a row of neighbours that
- * begins anywhere. So rays of a packet are near each other, as in a scan. One ray of four goes on to a border of the
+/* Aims ray number i at a corner, or at a point of an edge. Four rays go to each of some neighbouring triangles, from
+ * a random one on. So rays of a packet are near each other, as in a scan. One ray of four goes on to a border of the
  * sight's cells. */
 static void aim(const struct job *job, uint64_t i, struct batch *b, uint32_t k)
 {

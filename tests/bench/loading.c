@@ -6,8 +6,8 @@
  *
  * Each round runs `check`, and then Embree's build of the triangles, which lie in memory. Each runs in a process of its
  * own. Processor time is that of all threads, kernel included. For Embree it is the time of its build alone. For
- * `check` it is all there is, from reading the file on. Peaks of memory are those of whole processes, for the same
- * reason. */
+ * `check` it is that of the whole process, reading the file included. The peak of memory is that of `check`, as a
+ * whole process. */
 #include <errno.h>
 #include <getopt.h>
 #include <stdio.h>
@@ -146,7 +146,7 @@ static double seconds_of(const struct timeval *t)
     return (double)t->tv_sec + 1e-6 * (double)t->tv_usec;
 }
 
-/* Waits for the child and returns 0 if it ended well. usage and wall_s are the child's own. */
+/* Waits for the child and returns 0 if it ended well. *out gets the child's time, processor time and peak. */
 static int wait_for(pid_t pid, const char *what, struct figures *out, struct sh_err *err)
 {
     struct rusage usage;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* This measures the cost of effects that a configuration names but the scene doesn't need. It compares the cast as the
  * program sets it up with the plain cast of the same rays, which has none of the effects. Both casts run in turns, line
- * by line, in processor time of the thread. The median of the rounds' ratios must lie within 5 %.
+ * by line, in processor time of the thread. The median of the rounds' ratios must be within 5 % of 1.
  *
  *   build/tests/bench/plain */
 #include <math.h>

@@ -11,7 +11,7 @@ enum { BUNDLE = 8, MOST_OF_A_ROUND = 5000000 };
 void bench_scan_of(double pulses, uint32_t every, struct bench_scan *out)
 {
     const double fov_deg = BENCH_HIGHEST_DEG - BENCH_LOWEST_DEG;
-    /* The pulses of BUNDLE lines are a multiple of the widest packet then. */
+    /* In steps of 4 pulses, BUNDLE lines have a multiple of the widest packet. */
     double of_line = 4.0 * round(sqrt(pulses * fov_deg / 360.0) / 4.0);
     out->line_pulses = (uint32_t)fmin(fmax(of_line, 4.0), BENCH_MAX_LINE);
     out->lines = BUNDLE * (uint32_t)fmax(round(pulses / out->line_pulses / BUNDLE), 1.0);

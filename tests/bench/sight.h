@@ -39,7 +39,7 @@ struct bench_sight {
     double cast_ratio_without, pipeline_ratio_without;
     double gain;               /* of the cast: its time without by that with, building included */
     int planned;               /* the plan takes a map for so many pulses */
-    double plan_s, plan_ratio; /* time of the choice; the better of both by what the plan takes */
+    double plan_s, plan_ratio; /* time of the choice; the faster way's time by that of the plan's choice */
     uint64_t different;        /* pulses of a round that hit another triangle or range than without */
     struct sight_info info;
 };

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* This is for clang-tidy's analyzer alone, which reads one file at a time. The analyzer believes that a function of
- * another file may return anything, so that each failure might be none. In this header it sees that these functions
+ * another file may return anything, so each failure might return SH_OK. In this header it sees that these functions
  * always return the code of a failure.
  *
  * DEFINES_... says that the file that is looked at is the one that defines the function. IN_SCENE says that the file is

@@ -31,8 +31,8 @@ double beam_ref_plane_mean(const struct beam *beam, const double dir[3], const d
 /* Counts of echoes that were compared with the reference's. */
 struct beam_tally {
     uint64_t pulses, mixed, wrong, wrong_mixed, echoes; /* wrong: pulses with another number of echoes */
-    uint64_t off;                                       /* echoes of the others, more than the resolution off */
-    double range2, near2;                               /* squares of differences: of the echoes; of those not off */
+    uint64_t off;                                       /* of `echoes`: those off by more than the resolution */
+    double range2, near2;                               /* sums of squared differences: of `echoes`; of those not off */
 };
 /* Compares the pulse whose entries begin at *at, and moves *at to the next pulse. */
 void beam_compare(struct beam_tally *tally, const struct line_block *block, uint32_t *at, const struct beam_ref *ref);
@@ -49,8 +49,8 @@ struct beam_rig {
     struct schedule_segment segment;
     struct line_block block;
 };
-/* The rig takes the scene over. The beam has 0.35 mrad, 7 mm and 4 ns. The view has lines of `pulses`, from line_start
- * to line_stop, and spreads them over the pan's range in `lines`. */
+/* The rig takes the scene over. The beam has a divergence of 0.35 mrad, 7 mm at the exit, and pulses of 4 ns. The view
+ * has lines of `pulses`, from line_start to line_stop, and spreads them over the pan's range in `lines`. */
 struct beam_view {
     double line_start_deg, line_stop_deg, pan_start_deg, pan_stop_deg;
     uint32_t lines, pulses;

@@ -98,7 +98,7 @@ static void add_fan(struct odd_maker *m)
     }
 }
 
-/* Triangles side by side. Each fold is an angle between next to nothing and right back. */
+/* Triangles side by side. All folds have one angle: nearly none, nearly half a turn, or between. */
 static void add_strip(struct odd_maker *m)
 {
     double p[3][3], along[2] = {1.0, 0.0}, at[2] = {0.0, 0.0}, step = 0.5 * m->size_m;

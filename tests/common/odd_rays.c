@@ -107,7 +107,7 @@ static void inside(struct odd_rays *r, double d[3])
 
 /* ---- the cube */
 
-/* Gives a direction on a border between cells, or of the face. */
+/* Gives a coordinate on a border between cells, or of the face, or a few units in the last place beside it. */
 static double border(struct odd_rays *r)
 {
     double x = 2.0 * (double)pick(r, r->cells + 1) / (double)r->cells - 1.0;
@@ -162,7 +162,7 @@ static void at_axis(struct odd_rays *r, double d[3])
 
 /* ---- planes */
 
-/* Gives a direction in the plane through the station and an edge. */
+/* Gives the normal of the plane through the station and an edge. */
 static void edge_plane(struct odd_rays *r, double n[3])
 {
     uint32_t t = any_triangle(r), i = pick(r, 3);

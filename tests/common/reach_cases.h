@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Cases with moving heads and bodies, far stations, and heads with long ways. Each may cost no more than a head that
- * stands near the scene. Each is a whole configuration, loaded as for a run, so that it includes all that loading sets
- * up. Units are metres and seconds. */
+/* Cases with moving heads and bodies, far stations, and heads with long ways. Each may cost hardly more than a head
+ * that stands near the scene. Each is a whole configuration, loaded as for a run, so that it includes all that loading
+ * sets up. Units are metres and seconds. */
 #ifndef TESTS_COMMON_REACH_CASES_H
 #define TESTS_COMMON_REACH_CASES_H
 

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The reference of the casting tests. All of it is in long double, independent of core/cast and of Embree.
+/* The reference of the casting tests. All that decides is in long double, independent of core/cast and of Embree.
  *
  * Corners relative to the ray's origin are formed in long double, where the difference of two doubles of a scene is
  * exact or good to 2^-64. Edge functions and the plane's range follow from them. The side of an edge is good to about
  * 2^-61 of the corner's distance, 500 times finer than double precision can tell.
  *
- * A uniform grid finds the triangles near the ray. Cells hold every triangle whose bounds, widened by a millionth of a
- * cell, touch them. The widening covers the rounding of the walk through the cells. reference_brute tries all
+ * A uniform grid finds the triangles near the ray. A cell holds each triangle that touches it, with a margin of at
+ * least a millionth of a cell. The margin covers the rounding of the walk through the cells. reference_brute tries all
  * triangles, for small scenes and to check the grid. */
 #ifndef TESTS_COMMON_REFERENCE_H
 #define TESTS_COMMON_REFERENCE_H

@@ -21,7 +21,7 @@ struct waveref_window {
     uint32_t n;
     double p[WAVEREF_SAMPLES];
 };
-/* Returns of these ranges, and the pulse around them. */
+/* Empties a window that has room for returns from from_m to to_m, and for the pulse around them. */
 void waveref_open(struct waveref_window *window, double from_m, double to_m);
 void waveref_add(struct waveref_window *window, double range_m, double weight);
 /* Sets place i of n in the unit disc, on a spiral of equal energies (Vogel 1979). */

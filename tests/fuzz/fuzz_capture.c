@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* This fuzzes captures and recordings that are replayed: .pcapng by its reader, in pieces, and then as a recording,
- * frame by frame with its times; captures also as what answers, whose client says again what its clients said. The
- * input is a byte (how it is cut, which ending), then the file. The reader must give the same packets in pieces as at
- * once, and must refuse in one line. */
+ * frame by frame with its times. Captures are replayed as answers, too, to a client that repeats what their clients
+ * said. The input is a byte (how it is cut, which ending), then the file. The reader must give the same packets in
+ * pieces as at once, and must refuse in one line. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -7,7 +7,7 @@ fuzz_one() {
     fuzz_name=$1 fuzz_to=$2
     shift 2
     mkdir -p "$fuzz_to/corpus" "$fuzz_to/crash"
-    # Files lie in memory, which gives half as many executions again for streams.
+    # Files lie in memory, so targets of streams run 1.5 times as many inputs.
     fuzz_tmp=$(mktemp -d /dev/shm/scanhead-fuzz.XXXXXX 2>/dev/null) || { fuzz_tmp=$fuzz_to/tmp && mkdir -p "$fuzz_tmp"; }
     for fuzz_dir in tests/fuzz/seeds/$fuzz_name tests/fuzz/found/$fuzz_name; do
         [ ! -d "$fuzz_dir" ] || set -- "$@" "$fuzz_dir"

@@ -53,8 +53,8 @@ run_target() {
     done
 }
 
-# edges FOLDER NAME: prints the edges and functions that the corpus covers, and how many the files that it reaches have.
-# Each check of the undefined behaviour sanitizer is an edge, too, and sound code never takes that.
+# edges FOLDER NAME: prints how many edges and functions the corpus covers, of all in the source files that it reaches.
+# Each check of the undefined behaviour sanitizer is an edge, too, which sound code never takes.
 edges() {
     local dirs="$1/corpus" d
     for d in tests/fuzz/seeds/$2 tests/fuzz/found/$2; do [ ! -d "$d" ] || dirs="$dirs $d"; done

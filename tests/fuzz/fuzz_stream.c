@@ -17,8 +17,8 @@ static const char *const names[] = {"out.ply", "out.las", "out.ptx",  "out.e57",
                                     "out.shs", "out.obj", "out.gltf", "out.glb", "out.fbx",       "out.waves.csv"};
 enum { N_NAMES = sizeof names / sizeof names[0] };
 
-/* A piece of work between two checks may be long: --sparse makes millions of points of a damaged grid that is
- * kilometres wide. A user who records such a stream ends it, too. */
+/* After MAX_CHECKS the recorder is told to stop, as by a user who gives up. From a damaged grid that is kilometres wide
+ * --sparse makes millions of points. */
 static int n_checks;
 
 static int is_enough(void *ctx)

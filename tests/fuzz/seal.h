@@ -6,9 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Each byte that begins a frame begins a header, which is taken as it stands. A length that reaches beyond the end is
- * cut to the bytes that are there. A frame with the flag 0x80 stays as it is, without that flag, so that hurt frames
- * come, too. The search goes on after the frame. */
+/* Each sync byte outside of a frame is taken to begin one, whatever follows. A length that reaches beyond the end is
+ * cut to the bytes that are there. A frame with the flag 0x80 loses the flag and keeps its checksums, so that hurt
+ * frames come, too. The search goes on after the frame. */
 void fuzz_seal(uint8_t *stream, size_t len);
 
 #endif

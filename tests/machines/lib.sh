@@ -89,7 +89,7 @@ emulated_programs() {
 }
 
 # test_emulated BUILD: runs its programs of unit, accuracy and stability, for $LIMIT_S seconds of processor time each.
-# Beside other work these may take twenty times as long.
+# Beside other work that may take twenty times as long by the clock.
 test_emulated() {
     rm -rf "$at/run"
     from=$1/tests

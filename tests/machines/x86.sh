@@ -9,6 +9,6 @@ need qemu-x86_64-static qemu-user-static
 build_here test-programs "$at/build.txt" || exit 1
 built "the same binaries" "$at/build.txt"
 emulate="qemu-x86_64-static -cpu $3"
-# Embree and the head must have chosen the instructions that this processor has.
+# If Embree or the head had chosen instructions that this processor lacks, the record would fail.
 $nicely $emulate "$build/test/scanhead" $RECORD -o "$at/record.ply" 2>"$at/record.log" && compare_record "$at/record.ply"
 test_emulated "$build/test"

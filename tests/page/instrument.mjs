@@ -292,7 +292,7 @@ export async function testInstrument(browser) {
     })()`);
     equal(got.before, undefined, 'nothing is asked of a stream without waveforms');
     equal(JSON.stringify([got.asked, got.other]), '[true,0]', 'asked for, and that of another pulse is not drawn');
-    // 272 px for 0.3 m and 0.6 m, with 8 px between them; a height of 58 px for 4 thresholds, from 62 up.
+    // The two windows, 0.3 m and 0.6 m, share 272 px, with 8 px between. 4 thresholds are 58 px high, up from y = 62.
     equal(got.paths.join(' '), 'M0.0 62.0L45.3 33.0L90.7 62.0 M98.7 62.0L144.0 62.0L189.3 4.0L234.7 47.5L280.0 62.0', 'samples');
     near(got.echoes.at(-1), 280, 0.01, 'the mark of the point itself');
     is(/2 parts; echoes at .* m; highest 4/.test(got.name), `its name: ${got.name}`);

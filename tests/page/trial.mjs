@@ -193,7 +193,7 @@ export async function trialTests(page, other, SIZE) {
       return [left + p.x, top + p.y];
     })()`));
     await page.until(`scanhead.trial.stations.length === 3 && ${RESTS}`);
-    // The added station's cells are looked for by finer pulses than those of the suggestion, so no more are left.
+    // The added station's cells are looked for by finer pulses than the suggestion's, so no more floor is left unseen.
     is(await page.eval('scanhead.trial.sum.none_m2') <= next.none_m2 + M2, 'no more is left than was said');
     await page.eval(`document.querySelector('#trial .as-text').open = true`);
     is(/^stations:\n(  - \{name: "[^"]+", position_m: \[[^\]]+\], heading_deg: [-\d.]+\}\n){3}$/.test(await page.until(`document.querySelector('#trial-text').value`)),

@@ -115,7 +115,7 @@ void rig_look(struct rig *rig)
     }
 }
 
-/* A quick scan has as many rays. */
+/* The sight is made for 10^6 rays, as many as a quick scan has. */
 static void check_sight(struct rig *rig)
 {
     struct sight_beside beside;

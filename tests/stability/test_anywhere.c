@@ -98,8 +98,8 @@ static void cast(const struct bvh *bvh, struct bvh_work *work, int way)
     }
 }
 
-/* The bound is half of the wire's finest count. Over a long range it is 16 roundings of the range, at an incidence of a
- * thousandth. */
+/* The bound is half of the wire's finest count, and 16 roundings of the range over a cosine of incidence of
+ * 0.001. */
 static double bound_m(long double range_m)
 {
     return 5e-7 + 16.0 * 0x1p-53 * 1e3 * (double)range_m;

@@ -92,8 +92,8 @@ static double turns_apart(double a, double b)
     return 360.0 * fabs(d - floor(d + 0.5));
 }
 
-/* Angles on the wire of such heads have 0.01 degree. Ours: the place in the turn is a ratio of whole numbers, rounded
- * once, times a reciprocal that is rounded: 2^-52 of a turn. */
+/* Angles on the wire of such heads are counts of 0.01 degree. Ours: the place in the turn is a ratio of whole numbers,
+ * rounded once, times a reciprocal that is rounded: 2^-52 of a turn. */
 static void test_azimuths(void **state)
 {
     (void)state;

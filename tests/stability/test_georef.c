@@ -20,9 +20,9 @@ struct row {
     const char *regime, *naive_method;
     struct georef_spec spec;
     double height_m; /* of points, up and down */
-    /* difference from the anchor, or its position where that is what goes wrong */
+    /* writes the difference from the anchor; a position that goes wrong is given less the anchor */
     void (*naive)(const struct georef_spec *spec, const struct georef *georef, const double d[3], double out[3]);
-    int epsg; /* that it has to be in */
+    int epsg; /* of the system that ours has to use */
 };
 
 /* ---- the shortcuts */
@@ -158,7 +158,7 @@ static struct georef *plan(const struct row *row, struct plan_row *planned)
     return georef;
 }
 
-/* Prints the errors of ours and of the naive method, both against the exact one. */
+/* Prints the errors of ours and of the naive method, both against tests/common/geodesy.h. */
 static void show(const struct row *row, double bound_m)
 {
     struct plan_row planned;
@@ -227,7 +227,7 @@ static double rounding_m(const struct georef *georef, const double scale[3], dou
     return most_m;
 }
 
-/* If all points are near the pole, only degrees of longitude need longer counts. The others have half a
+/* If all points are near the pole, only longitude needs longer counts. Latitude and height are rounded by half a
  * micrometre. */
 static void test_counts_at_the_pole(void **state)
 {
@@ -239,7 +239,7 @@ static void test_counts_at_the_pole(void **state)
     double scale[3], shared[3];
     assert_int_equal(georef_create(&spec, &georef, &err), SH_OK);
     if (georef_scale(georef, 1e-6, reach_m, scale, &err) != SH_OK) fail_msg("%s", err.text);
-    assert_int_equal(georef_scale(georef, 1e-5, reach_m, shared, &err), SH_OK); /* the next that holds them as it is */
+    assert_int_equal(georef_scale(georef, 1e-5, reach_m, shared, &err), SH_OK); /* the next that holds all axes */
     /* 2 pi 2020 m / 2^31 are 5.9 um */
     assert_true(georef_count_m(georef, reach_m, scale) < 6e-6 && shared[1] > scale[1]);
     table_row("geodetic, at the pole: counts, 2 km", "one scale for all axes", rounding_m(georef, shared, reach_m),
@@ -349,7 +349,7 @@ static void test_far_from_anchor(void **state)
     assert_int_equal(geoframe_set_tangent(&frame, origin, &ANCHOR, 0.0, &err), SH_OK);
     assert_int_equal(geoframe_fill(&frame, origin, &spec, &err), SH_OK);
     assert_int_equal(georef_create(&spec, &at_anchor, &err), SH_OK);
-    /* From there no polynomial is taken. A polynomial that is asked for is refused, and so are counts of 1 um. */
+    /* So far away no polynomial is planned. One that is asked for is refused, and so are counts of 1 um. */
     assert_int_equal(plan_georef(at_anchor, &need, &method, &planned, &err), SH_OK);
     assert_int_equal(method, GEOREF_EXACT);
     double naive_m = far_error_m(at_anchor, origin, &row, 1);

@@ -31,7 +31,7 @@ enum { BATCH = 4096, THREADS = 2 };
 
 /* A closed inner mesh with the station inside. Rays are aimed at its edges or vertices. A ray that leaks through it
  * meets nothing, or the outer mesh around it. The hits of the inner mesh lie within a ball, or a box, each widened by a
- * part in 10^9. A hit beyond it is a leak, which is exact and costs nothing. */
+ * part in 10^9. A hit beyond it is a leak. This test is exact and costs nothing. */
 struct cage {
     struct mesh mesh;
     uint32_t n_inner; /* triangles of the inner mesh: the first */

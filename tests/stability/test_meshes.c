@@ -62,8 +62,8 @@ static uint64_t count_through(const struct rig *rig)
     return through;
 }
 
-/* Two screens have exactly the border of the other's cells, so `inner` leaves out rays at the screen's own border. The
- * screens are larger than the part that is aimed at. */
+/* Casts the rays with Embree, robust and not, and with ours. Prints a row of those that pass the screen. The naive
+ * figure is that of the robust cast, unless this has no leak. */
 static void leak_row(struct rig *rig, const char *regime)
 {
     rig_cast_naive(rig, rig->station_m, 1, 16);
@@ -97,9 +97,8 @@ static void add_needles(struct mesh *mesh)
 }
 
 /* Rounding of the corners, 2^-53 x 65 m, over the height of a needle turns its plane by 1e-10 rad about its long side,
- * and about its short side by the same over 100 m. Normals are wrong by 2^-53 x |e1
- *
- * e2|, which over 100 m displaces the plane by 2^-53 x 100 m x 10^6 = 1e-8 m. A micrometre holds. */
+ * and about its short side by the same over 100 m. Normals are wrong by 2^-53 x |e1| |e2|.
+ * Over 100 m that displaces the plane by 2^-53 x 100 m x 10^6 = 1e-8 m, so a micrometre holds. */
 static void test_needles(void **state)
 {
     (void)state;
@@ -280,8 +279,8 @@ static void label_row(struct rig *rig, const char *regime)
     free(naive.label);
 }
 
-/* A sphere of 1280 triangles stands twice (labels 0 and 1). A screen has two different tessellations in one plane (2
- * and 3). The same ray has to give the same label in any packet, cut and BVH. */
+/* A sphere of 1280 triangles stands twice (labels 0 and 1). In test_coplanar a screen has two tessellations in one
+ * plane (2 and 3). The same ray has to give the same label in any packet, cut and BVH. */
 static void add_sphere_twice(struct mesh *mesh, int swapped)
 {
     const double centre[3] = {0.1, 0.2, 0.3};

@@ -125,7 +125,7 @@ static void test_pose_of_each_pulse(void **state)
 }
 
 /* A trajectory of 10 Hz, as a navigation filter gives it. Between its samples the way goes by chords, or by the cubic.
- * The bound is that of tests/unit/test_pose.c, R (rate step)^3 / 62 in the level, and as much again for the climb. */
+ * The bound is that of tests/unit/test_pose.c, R (rate step)^3 / 62 horizontally, and as much again for the climb. */
 static void test_between_samples(void **state)
 {
     (void)state;

@@ -154,8 +154,8 @@ static struct scene *all_of(const struct stage *stage)
     return scene;
 }
 
-/* The bound is half a count; 16 roundings of what a range is made of, at an incidence of a thousandth; and coordinates
- * at UTM, which are good to 1e-9 m, at an incidence of a twentieth. */
+/* The bound is half a count, 16 roundings of the range over a cosine of incidence of 0.001, and the error of
+ * coordinates at UTM, 1e-9 m, over a cosine of 0.05. */
 static double bound_m(long double range_m)
 {
     return 0.5 * COUNT_M + 16.0 * 0x1p-53 * 1e3 * (double)range_m + 20.0 * 1e-9;
@@ -214,7 +214,7 @@ static void judge_run(const struct stage *stage, const struct schedule_segment *
 
 static void one_stage(uint64_t number, struct caster *caster, struct line_block *block, struct odd_tally *tally)
 {
-    /* A line of 1,024 pulses a microsecond apart, all around. It is cast in 8 runs, each with other poses of the
+    /* A line of 1,024 pulses, 5 microseconds apart, all around. It is cast in 8 runs, each with other poses of the
      * bodies. */
     static const struct schedule_spec spec = {.prr_uhz = 200000000000,
                                               .lines_uhz = 195312500,

@@ -90,7 +90,7 @@ static void test_inside_solid(void **state)
 
 /* ---- rays within the plane of faces: the head is at the height of a table's top, and looks level. The ray may meet
  * the top anywhere between its near and its far edge, as double precision can't tell the edge-on plane from the ray. Or
- * it may pass over it to the wall. Nothing else is right. `turned` turns all about an arbitrary axis, so that only
+ * it may pass over the top to the wall. Nothing else is right. `turned` turns all about an arbitrary axis, so that only
  * rounding separates the plane from the ray. */
 struct level {
     double near_m, end_m, wall_m; /* along the ray */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The cost of a ray does not depend on where it begins, nor on how large the scene around a body is. Cost is counted in
+/* The cost of a ray hardly depends on where it begins, or on how large the scene around a body is. Cost is counted in
  * leaves that a packet is tested against, and in triangles that are decided one by one. No clock is read.
  *
  * Some casts widen their float triangles for the head's place: by a margin over the cosine of incidence from there. At

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Whole configurations in which the head moves or may go far, a station is far away, or a body moves. Each costs no
- * more than a head that stands nearby. Cost is counted in leaves that a packet is tested against. No clock is read.
+/* Whole configurations in which the head moves or may go far, a station is far away, or a body moves. Each costs at
+ * most half as much again as a head that stands nearby. Cost is counted in leaves that a packet is
+ * tested against. No clock is read.
  *
  * A cast whose exactness holds about one origin only has a cliff in each of them. In a house within 1.2 km of ground, a
  * second station 400 m away took 200,000 times as long for a ray. A ball of 960 triangles that moves took 15,000 times
@@ -11,7 +12,7 @@
 
 enum {
     MOST_TRIANGLES = 100000, /* of a ball; a larger one takes too long to be made */
-    MOST_LEAVES = 10 /* a packet of a head that stands has 16 rays, at triangles wider than two rays' distance */
+    MOST_LEAVES = 10 /* for a standing head: a packet has 16 rays, and triangles are wider than two of their gaps */
 };
 
 static void count(const struct reach_folder *folder, const struct reach_case *of, struct reach_run *run)
@@ -24,10 +25,10 @@ static void count(const struct reach_folder *folder, const struct reach_case *of
                   reach_decided(run), 1e-6 * (double)run->bytes);
 }
 
-/* Leaves of the room are 0.25 m large, those of a ball 7 mm or more; rays of a packet are 1 mm apart there. With 1.2 km
- * of ground boxes are larger than them by 0.8 mm (bvh_inside.h). A body's own BVH has no ground, and so may only have
- * fewer. But a packet that passes the ball goes through two BVHs, and lines of a head that moves lie elsewhere. Half as
- * much again is left for that. */
+/* Leaves of the room are 0.25 m large, those of a ball 7 mm or more; rays of a packet are 1 mm apart there. On 1.2 km
+ * of ground the boxes of leaves are larger by 0.8 mm (bvh_inside.h). A body's own BVH has no ground, and so may only
+ * have fewer. But a packet that passes the ball goes through two BVHs, and lines of a head that moves lie elsewhere.
+ * Half as much again is left for that. */
 static void costs_as_nearby(void **state)
 {
     (void)state;

@@ -65,7 +65,7 @@ static void test_shortcut(void **state)
     }
 }
 
-/* Pulse n of each second fires at that second exactly, and any pulse at the floor of its own time in whole nanoseconds.
+/* The first pulse of each second fires at that second exactly, and any pulse at the floor of its time in nanoseconds.
  * The truth follows from the quotient by seconds, and not from the program's formula. */
 static double worst_time_ns(const struct schedule_segment *seg, uint64_t prr_hz)
 {

@@ -123,10 +123,10 @@ static void add_spread(void *ctx, const struct shot *shot)
     s->n += RIG_LINE_PULSES;
 }
 
-/* This gives range, reflectance and range noise of a foil of 300. Naive ways: time taken where the leading edge crosses
- * the threshold, with the offset that is right for white paper; reflectance as a fraction of a white target; noise as
- * the inverse of the signal, without a lower limit. The spread of 20,000 pulses has an error of 0.5 %, and four times
- * that is allowed. */
+/* This gives range, reflectance and range noise of a foil of reflectance 300. Naive ways: time taken where the leading
+ * edge crosses the threshold, with the offset that is right for white paper; reflectance as a fraction of a white
+ * target; noise as the inverse of the signal, without a lower limit. The spread of 20,000 pulses has an error of 0.5 %,
+ * and four times that is allowed. */
 static void a_foil_is_where_it_is(void **state)
 {
     (void)state;

@@ -15,7 +15,7 @@ enum { RAYS = 30000 };
 #endif
 
 /* Adds rays to places between `from` and `to`, beside them by up to 1e-7 of the distance, across the ray. Half of the
- * offsets are even, half by powers of ten down to 1e-17, where double precision ends. */
+ * offsets are uniform, half by powers of ten down to 1e-17, where double precision ends. */
 static void aim_beside_edge(struct rig *rig, const double from[3], const double to[3], uint32_t n, uint64_t seed)
 {
     for (uint32_t i = 0; i < n; i++) {
@@ -103,8 +103,8 @@ static void test_solids(void **state)
     table_check();
 }
 
-/* The head sees the top of a table from hardly above it. The table's far edge stands at 89 degrees to the ray, and the
- * wall is 20 m behind. */
+/* The head sees the top of a table from hardly above it. Its far edge is met at 89 and at 89.9 degrees, and the wall is
+ * 20 m behind. */
 static void test_grazed_edge(void **state)
 {
     (void)state;
@@ -127,7 +127,7 @@ static void test_grazed_edge(void **state)
     table_check();
 }
 
-/* Edges without a neighbour: a sheet with a hole cut out, and fins that get thinner. */
+/* Edges without a neighbour, in a sheet with holes, and edges of boxes that are ever thinner fins. */
 static void test_open_edges(void **state)
 {
     (void)state;
