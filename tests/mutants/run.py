@@ -29,7 +29,6 @@ from build import Build
 from reach import Reach
 
 LEAST = 0.9
-AHEAD = 16  # draws for each worker, as one that survives takes as long as fifty that are found
 LIMIT_S, LIMIT_TIMES = 30, 10  # for a test, beside and times its usual time, as only an endless one must reach that
 JUDGED = ("found", "survived", "unreached")
 
@@ -147,20 +146,25 @@ class Judge:
 
 
 def judged(judge, mutants, n):
-    """Returns the first n of the draws that count, and those before them that don't, in the order of the draws."""
-    counted, todo = 0, collections.deque()
+    """Returns the first n of the draws that count, and those before them that don't, in the order of the draws. One that survives
+    takes as long as fifty that are found, so draws after it are judged meanwhile."""
+    returned, known, todo, running = 0, 0, collections.deque(), set()
     with concurrent.futures.ThreadPoolExecutor(judge.tree.jobs) as pool:
         try:
-            while counted < n:
-                todo.extend(pool.submit(judge, mutant) for mutant in itertools.islice(mutants, AHEAD * judge.tree.jobs - len(todo)))
+            while returned < n:
+                more = judge.tree.jobs - len(running) if known < n else 0
+                new = [pool.submit(judge, mutant) for mutant in itertools.islice(mutants, more)]
+                todo.extend(new)
+                running.update(new)
                 if not todo:
                     return
-                mutant = todo.popleft().result()
-                counted += mutant["is"] in JUDGED
-                yield mutant
+                ended, running = concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED)
+                known += sum(future.result()["is"] in JUDGED for future in ended)
+                while todo and todo[0].done() and returned < n:
+                    mutant = todo.popleft().result()
+                    returned += mutant["is"] in JUDGED
+                    yield mutant
         finally:
-            for future in todo:
-                future.cancel()
             judge.tree.children.end_all()
 
 
