@@ -1,7 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # This tests another x86 processor, by QEMU's name of it, with the programs of this machine: sh x86.sh BUILD FOLDER CPU
-# ISA
 here=$(dirname "$0") build=$1 at=$2
 . "$here/lib.sh"
 [ "$(uname -m)" = x86_64 ] || leave "this machine is no x86_64, so its programs are others"
