@@ -240,7 +240,7 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     free(file);
 }
 
-/* Files are cut at the ends of pages, since only there the result changes, and a byte before. */
+/* Files are cut at each page's end, since the result changes only there, and one byte before it. */
 static void test_cuts(void **state)
 {
     (void)state;
@@ -266,8 +266,8 @@ static char *xml_of(const char *path)
     return xml;
 }
 
-/* A file that was being completed, or a whole one whose end is missing. Once all points are there, the same file comes
- * out, with the note that its end is missing. */
+/* The file is a whole one whose end is missing, or one that was being completed. Once all points are there, the same
+ * file comes out, with the note that its end is missing. */
 static void test_end(void **state)
 {
     (void)state;

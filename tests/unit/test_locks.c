@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Threads of links, casters and the player call these at any time, so each of them works on the shared state with its
- * lock held. Two threads that meet without it rarely show that. So the test counts: how often a call takes a lock, and
- * that it has none left at its end. */
+/* Threads of links, casters and the player call these functions at any time, so each of them locks the shared state.
+ * Two threads that meet without the lock rarely show it. So the test counts how often a call takes a lock, and that it
+ * holds none at its end. */
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/device/settings_file.h"
