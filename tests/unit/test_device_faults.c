@@ -180,7 +180,7 @@ static void loses_power(void **state)
 }
 
 /* The fault strikes at a pulse, once: the scan that --start begins again is not cut. A slow boot that power cuts short
- * is over. */
+ * adds nothing to the next boot. */
 static void loses_power_at_a_pulse(void **state)
 {
     (void)state;

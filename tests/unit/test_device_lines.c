@@ -274,7 +274,7 @@ static void a_jump_of_the_rates_fits_into_a_tick(void **state)
     rig_close(rig);
 }
 
-/* The lines of one tick at the slowest loop and the fastest mirror of a profile: 100 a tick. */
+/* The slowest loop and the fastest mirror of a profile give 100 lines a tick. */
 static void many_lines_fit_into_a_tick(void **state)
 {
     (void)state;

@@ -55,7 +55,7 @@ static void expect_control(struct rig *rig, uint64_t session, const char *text)
     assert_string_equal(event->text, text);
 }
 
-/* An event says which session has control now, with its client's name where that is known; 0: none has. */
+/* An event says which session has control now, or 0 for none. Its text is the client's name, or else the change. */
 static void control_is_announced(void **state)
 {
     (void)state;

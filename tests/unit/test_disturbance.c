@@ -175,7 +175,8 @@ static void a_soiled_window_is_a_weaker_signal(void **state)
 }
 
 /* Without a model of the signal the fixed part of the noise grows by 1 / share. The same numbers are drawn, four times
- * as large through a window that transmits a quarter. Counts of 1e-5 m are rounded five times. */
+ * as large through a window that transmits a quarter. Counts of 1e-5 m are rounded by a half; their weights are 1, 4
+ * and 3. */
 static void a_soiled_window_makes_ranges_noisy(void **state)
 {
     (void)state;

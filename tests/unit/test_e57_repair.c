@@ -200,7 +200,7 @@ static size_t cut_of(const uint8_t *from, size_t len, int scans, int packets)
     return *at_logical(from, end) == '<' ? 0 : len - (size_t)(at_logical(from, end) - from);
 }
 
-/* If the same packets are left, the same file comes out, so it is read once. */
+/* Cuts that leave the same packets give the same file, so it is read once. */
 static void check_cut(const char *path, const uint8_t *from, size_t len)
 {
     struct repair repair;

@@ -267,7 +267,7 @@ static void a_dash_is_standard_output(void **state)
     assert_int_not_equal(access("-", F_OK), 0);
 }
 
-/* The longest note still fits as a command line into the journal, which has them as remarks. */
+/* The longest note is not cut. It fits into a line of the journal, which has notes as remarks. */
 static void the_longest_note_is_not_cut(void **state)
 {
     (void)state;

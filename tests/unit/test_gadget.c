@@ -292,7 +292,7 @@ static void test_missing_modules(void **state)
     }
 }
 
-/* f_acm has the first interfaces, so a port comes first, and there is one. */
+/* f_acm has the first interfaces, so a port comes first, and only one is allowed. */
 static void test_where_a_port_is(void **state)
 {
     (void)state;

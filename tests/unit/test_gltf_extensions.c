@@ -44,7 +44,7 @@ static void required_and_harmless(void **state)
     scene_free(s);
 }
 
-/* The share of light that goes through is kept, and not used. */
+/* The share of light that goes through is kept. A value that the format doesn't allow is left out, with a warning. */
 static void transparency_is_kept(void **state)
 {
     (void)state;

@@ -303,7 +303,7 @@ static void next(const char **at, const char *want)
     *at += n;
 }
 
-/* Each key of both tables in its order, with what it takes and its help. */
+/* Expects each key of a table in its order, with what it takes and its help. */
 static void next_keys(const char **at, enum config_keys keys, const char *title)
 {
     static struct config_key_text key;

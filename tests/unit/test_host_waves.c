@@ -177,8 +177,7 @@ static void test_lost(void **state)
     scanhead_close(sh);
 }
 
-/* A client that knows nothing of waveforms passes over them: its points and line ends are there. Damaged contents
- * with a good checksum are refused, and the next frame comes. */
+/* Damaged contents of a frame of waveforms, with a good checksum, are refused, and the next frame comes. */
 static void test_wrong(void **state)
 {
     (void)state;

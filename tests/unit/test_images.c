@@ -159,7 +159,7 @@ static void each_format_has_the_same_picture(void **state)
     check_file(write_file("h.jpg", JPEG, sizeof JPEG), 0, 3);
 }
 
-/* Assimp passes these on unpacked, as it has them within a file. */
+/* Assimp passes texels of a file's own images on unpacked. */
 static void unpacked_texels_have_the_same_picture(void **state)
 {
     (void)state;
@@ -176,7 +176,7 @@ static void unpacked_texels_have_the_same_picture(void **state)
     check_source(&source, 0, 3);
 }
 
-/* A JPEG that lacks its quantisation tables has tables of zeros: each coefficient is 0, so the image is even grey. */
+/* A JPEG that lacks its quantisation tables is read with tables of zeros: each coefficient is 0, so it is even grey. */
 static void a_jpeg_without_tables_is_grey(void **state)
 {
     (void)state;
