@@ -12,7 +12,7 @@
 extern const struct app_command app_coverage;
 
 static struct coverage_next_options got;
-static char candidates[64]; /* those of the options; the words of a command end with it */
+static char candidates[64]; /* a copy: the option's text ends with the command */
 static int n_opened;
 
 int coverage_next_open(const struct coverage_next_options *options, const struct coverage_result *result,

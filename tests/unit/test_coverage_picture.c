@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The coloured mesh of a coverage: each of its numbers beside the cell that it is of. */
+/* The coloured mesh of a coverage: each vertex has the numbers of its own cell. */
 #include "core/bytes.h"
 #include "core/colour.h"
 #include "core/studio/coverage/inside.h"
@@ -74,7 +74,7 @@ static void check_figures(const struct cover *c, const struct file *f, size_t se
     }
 }
 
-/* The triangles of a cell have its area together, and are of one cell each. */
+/* The triangles of a cell add up to its area, and no triangle belongs to two cells. */
 static void check_faces(const struct cover *c, const struct file *f)
 {
     double *area_m2 = calloc(coverage_cells(c->coverage), sizeof *area_m2);
@@ -156,7 +156,7 @@ static void numbers_and_colours_of_cells(void **state)
     cover_close(c);
 }
 
-/* Without a station all cells have the colours of what nobody sees, and the least of the ramp. */
+/* Without a station no cell is seen: counts have the ramp's lowest colour, and densities and angles are grey. */
 static void nothing_is_seen(void **state)
 {
     (void)state;
@@ -178,8 +178,8 @@ static void nothing_is_seen(void **state)
     cover_close(c);
 }
 
-/* The corners and the triangles of a mesh are in memory before they are written, with the bytes of the file but for the
- * number of corners of each face. That must be within what is allowed. */
+/* The corners and triangles of a mesh are in memory before they are written, as in the file but without each face's
+ * count of corners. They must fit into the allowed memory. */
 static void a_mesh_is_within_the_memory(void **state)
 {
     (void)state;
@@ -194,7 +194,7 @@ static void a_mesh_is_within_the_memory(void **state)
     free(write_and_read(c, COVERAGE_SEEN).bytes);
     c->coverage->spec.memory_mib = mib * 0.999999;
     assert_int_equal(coverage_write_mesh(c->coverage, path_in("none.ply"), COVERAGE_SEEN, NULL, &err), SH_EINPUT);
-    /* 1.5: half as many cells, and a little fewer */
+    /* cells of 1.5 m are a little fewer than half as many */
     if (strstr(err.text, corners) == NULL || strstr(err.text, "use a cell of at least 1.5 m") == NULL)
         fail_msg("%s", err.text);
     cover_close(c);

@@ -32,7 +32,7 @@ static const struct sh_report report;
 
 static struct viewpoint_grid asked;
 static uint32_t n_found;
-static double least_z; /* the head looks from there on upwards */
+static double least_z; /* the head sees directions from this z upwards */
 static struct schedule_spec spec;
 
 const struct config_profile *site_profile(const struct site *of)

@@ -66,13 +66,13 @@ static void the_swiss_grid(void **state)
     const struct crs_place place = located("EPSG:2056", 2600000.0, 1200000.0);
     assert_near(place.at.lat_deg, 46.0 + 57.0 / 60 + 3.9 / 3600, 2e-5);
     assert_near(place.at.lon_deg, 7.0 + 26.0 / 60 + 19.1 / 3600, 3e-5);
-    assert_near(place.convergence_rad, 0.0, 1e-4); /* the datums' own turn, and the point's by their shift */
-    assert_near(place.scale, 1.0, 2e-4);           /* the datums' ellipsoids */
+    assert_near(place.convergence_rad, 0.0, 1e-4); /* the datums are turned and shifted a little */
+    assert_near(place.scale, 1.0, 2e-4);           /* their ellipsoids differ */
     assert_true(place.accuracy_m > 0.0 && place.accuracy_m <= 5.0);
 }
 
-/* New York's grid of Long Island is in US survey feet: 980,000 200,000 ft, by NOAA's formula of that zone (a Lambert
- * cone) in Battery Park, 40.7156 N, 74.0153 W. NAD83 and WGS 84 differ by a metre or two, 2e-5 degrees. */
+/* New York's grid of Long Island is in US survey feet. By NOAA's formula of that zone (a Lambert cone), 980,000 200,000
+ * ft is in Battery Park, 40.7156 N, 74.0153 W. NAD83 and WGS 84 differ by a metre or two, 2e-5 degrees. */
 static void a_grid_in_feet(void **state)
 {
     (void)state;

@@ -11,7 +11,7 @@ static void expect(int epsg, int geoid, const char *part)
     if (strstr(text, part) == NULL) fail_msg("EPSG %d: no %s in %s", epsg, part, text);
 }
 
-/* The axes are in that order. */
+/* The text must name the first axis before the second one. */
 static void expect_order(int epsg, const char *first, const char *second)
 {
     char text[CRS_WKT_MAX];
@@ -31,7 +31,7 @@ static void test_wkt(void **state)
     expect(32733, 0, "PARAMETER[\"false_easting\",500000],PARAMETER[\"false_northing\",10000000]");
     expect(32733, 0, "AUTHORITY[\"EPSG\",\"32733\"]");
     expect(32733, 0, "zone 33S");
-    /* UPS: on both sides all axes point away from the pole: to the south in the north */
+    /* UPS: all axes point away from the pole, so in the northern grid both point south */
     expect(32661, 0, "PARAMETER[\"latitude_of_origin\",90]");
     expect(32661, 0, "AXIS[\"Easting\",SOUTH],AXIS[\"Northing\",SOUTH],AUTHORITY[\"EPSG\",\"5041\"]");
     expect(32761, 0, "PARAMETER[\"latitude_of_origin\",-90]");

@@ -150,14 +150,14 @@ static void cast_all(const struct scene *scene, uint32_t packet)
     bvh_free(bvh);
 }
 
-/* This is a layer of the truth. */
+/* This is one layer of the expected scene. */
 struct layer {
     double y, half, shift_u;
     int cut, label;
 };
 
-/* Rays nearer than this to a texel's border or an edge are skipped. Coordinates of textures are floats, good to 6e-8 of
- * 1 + shift, in squares 8 times that. */
+/* Rays nearer than this to a texel's border or an edge are skipped. Texture coordinates are floats, so they round by
+ * 6e-8 of 1 + shift. Counted in squares that is 8 times as much. */
 static const double NEAR = 4e-6;
 
 /* Returns 1 where ray i meets the layer, 0 where it does not, -1 where it is too near to a border. */
@@ -242,7 +242,7 @@ static void a_stack_of_any_number_is_seen_through(void **state)
     scene_free(scene);
 }
 
-/* A board is glued to a wall, in one plane. Another one's back is a face with the same corners. */
+/* A board is glued to a wall, in one plane. In a second scene board and wall are faces with the same corners. */
 static void what_lies_in_the_same_plane_stops_the_ray(void **state)
 {
     (void)state;
@@ -358,7 +358,7 @@ static void scale_and_offset_of_obj_count(void **state)
     scene_free(scene);
 }
 
-/* The path is one on the machine that the mesh comes from. */
+/* The mesh names its image by a path of another machine. */
 static void an_image_beside_the_mesh_is_found(void **state)
 {
     (void)state;

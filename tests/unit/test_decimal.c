@@ -125,7 +125,7 @@ static void test_ties(void **state)
         }
 }
 
-/* Random bits have all exponents; coordinates have those of files. */
+/* Random bits give all exponents; coordinates have the sizes that files hold. */
 static void test_random(void **state)
 {
     (void)state;

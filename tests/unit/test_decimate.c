@@ -133,8 +133,8 @@ static void plane_has_counts_by_hand(void **state)
     free_sheet(&s);
 }
 
-/* 100 triangles, each of three corners in a row and as far apart as no cell is wide, and one that is there twice: the
- * number that was asked for is reached exactly. The first of the two stays as it was. */
+/* Each of 100 triangles has three corners nearly in a row, farther apart than a cell is wide. One more is the first one
+ * turned over. The number that was asked for is reached exactly, and the first one stays as it was. */
 static void as_many_as_allowed(void **state)
 {
     (void)state;
@@ -185,8 +185,8 @@ static void limit_holds(void **state)
 }
 
 /* Two sheets nearer than a cell become one: of two triangles between the same cells one is left, whichever way they
- * face. A triangle up to z = 1 makes cells that high. The first guess has too few triangles; the second one is of 7
- * steps. */
+ * face. A triangle up to z = 1 makes the mesh as high as it is wide. The first guess has too few triangles; the second
+ * one is of 7 steps. */
 static void doubles_become_one(void **state)
 {
     (void)state;

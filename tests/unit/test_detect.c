@@ -74,7 +74,7 @@ static void what_surfaces_send_back(void **state)
     surface_table_free(&table);
 }
 
-/* IEC 61966-2-1: straight up to 0.04045, where both pieces meet to the digits that the standard gives. */
+/* IEC 61966-2-1: the curve is straight up to 0.04045. Both pieces meet there, to the digits that the standard gives. */
 static void dark_colours_are_straight(void **state)
 {
     (void)state;
@@ -83,7 +83,7 @@ static void dark_colours_are_straight(void **state)
     assert_true(fabs(colour_srgb_decode(0.5) - 0.21404114) < 1e-8 && colour_srgb_decode(1.0) == 1.0);
 }
 
-/* The widest lobe, of gloss 0, ends 90 degrees beside the mirror direction, too: it is met at 45 degrees. */
+/* The widest lobe, of gloss 0, ends 90 degrees beside the mirror direction, too. 45 degrees of incidence reach it. */
 static void a_lobe_ends_beside_the_surface(void **state)
 {
     (void)state;
@@ -184,7 +184,7 @@ static void amplitude_follows_the_range_equation(void **state)
         double expected = 0.3 / 0.9 * pow(900.0 / r, 2.0) * exp(-0.002 * r) * -expm1(-r * r / 16.0);
         double a = detect_amplitude(&signal, r, 0.3);
         assert_true(fabs(a / expected - 1.0) < 1e-5); /* the series for small R / R_o */
-        /* A (1/R^2) seen: just so, and not */
+        /* a reflectance just above the one that A needs is seen, one just below is not */
         assert_int_equal(told(&signal, r, 0.3 / expected * 1.0001) == LINE_REFL_NONE, 0);
         assert_int_equal(told(&signal, r, 0.3 / expected * 0.9999) == LINE_REFL_NONE, 1);
     }
@@ -209,7 +209,8 @@ static void extinction_by_visibility(void **state)
     assert_true(fabs(detect_extinction_1_m(23000.0, 905e-9) - 3.912 / 23000.0 * pow(905.0 / 550.0, -1.3)) < 1e-12);
 }
 
-/* Returns log g of three reaches: linear between them, and beyond them as in the nearest piece. */
+/* Returns the logarithm of the least reflectance that is seen. Less 2 log R, it is linear between the three reaches;
+ * beyond them the nearest piece goes on. */
 static double log_least_of(const struct detect_reach reach[3], double range_m)
 {
     const struct detect_reach *a = range_m < reach[1].range_m ? &reach[0] : &reach[1], *b = a + 1;
@@ -358,8 +359,8 @@ static void the_ball_is_full(void **state)
     }
 }
 
-/* The same key gives the same place: from the same point, however often. A missing echo stays missing. Other seeds give
- * other places. */
+/* Two points with the same key that start at the same place are moved alike. A missing echo stays missing. Other seeds
+ * give other places. */
 static void the_ball_does_not_accumulate(void **state)
 {
     (void)state;
@@ -395,7 +396,7 @@ static void range_noise_has_a_floor(void **state)
         detect_range_noise(&signal, &echoes);
         if (k == 0) drawn = (range_m[0] - 100.0) / 0.003;
         const double floor_m = k == 0 ? 3e-9 : 0.002, ppm = 1e-6 * spec.sigma_ppm;
-        /* 1e-14 of 100 m is lost; the floor is reached to 1e-12 of it */
+        /* doubles near 100 m step by 1.4e-14 m; the noise reaches the floor within 1e-12 of it */
         assert_true(fabs(range_m[0] - 100.0 - (0.003 + 100.0 * ppm) * drawn) < 1e-13);
         assert_true(fabs(range_m[1] - 50.0 - (0.003 + 50.0 * ppm) * drawn) < 1e-13);
         assert_true(fabs(range_m[2] - 100.0 - (floor_m + 100.0 * ppm) * drawn) < 1e-13);
@@ -403,8 +404,8 @@ static void range_noise_has_a_floor(void **state)
     assert_true(fabs(drawn) > 0.01);
 }
 
-/* Echoes of noise alone have a signal of nearly 0. Their ranges stay within 7 sigmas (no number drawn is larger) of the
- * noise at the least signal, which is Y's divided by DETECT_LEAST_AMPLITUDE. */
+/* Echoes of noise alone have a signal of nearly 0. Their ranges stay within 7 sigmas, since no larger number is drawn.
+ * Sigma is that of the least signal: the data sheet's, times its amplitude / DETECT_LEAST_AMPLITUDE. */
 static void noise_alone_has_a_range(void **state)
 {
     (void)state;

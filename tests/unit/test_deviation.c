@@ -85,7 +85,7 @@ static void sigma_of_a_ball(void **state)
     near_to(sigma(&head, &HEAD_ON), 0.02 / sqrt(5.0)); /* twice as large at 100 m */
     near_to(sigma(&head, &LEANING), 0.04 / sqrt(5.0));
     near_to(deviation_bound_m(&head, 100.0), 0.02);
-    ball.factor[1] = 3.0; /* of the scene: y */
+    ball.factor[1] = 3.0; /* the factors are along the scene's axes: the 3 is along y */
     near_to(sigma(&head, &HEAD_ON), 0.06 / sqrt(5.0));
     ball.local = 1; /* factors are along the beam, to the right, up: the 3 is to the right */
     near_to(sigma(&head, &HEAD_ON), 0.02 / sqrt(5.0));
@@ -114,7 +114,7 @@ static void counts_and_bounds(void **state)
     near_to(deviation_bound_m(&head, 100.0), 1e-6 + 0.5e-3 * sqrt(3.0));
     deviation_sigma_m(&head, &TURNED, &counts_m); /* the pan's counts show, times tan 60 degrees; the mirror's don't */
     near_to(counts_m, sqrt((1.0 + 3.0) / 12.0) * 1e-3);
-    head.setup.layout = LINE_GEO; /* encoders are read there, too */
+    head.setup.layout = LINE_GEO; /* positions follow the encoders in this layout, too */
     near_to(deviation_bound_m(&head, 100.0), 1e-6 + 0.5e-3 * sqrt(2.0));
     head.setup.noise_on = 1;
     assert_true(isinf(deviation_bound_m(&head, 100.0)));

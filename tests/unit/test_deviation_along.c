@@ -64,8 +64,8 @@ static void follow(void)
 static const char WALL[] = "v -50 10 -50\nv 50 10 -50\nv 50 10 50\nv -50 10 50\nf 1 2 3\nf 1 3 4\n";
 
 /* Twelve rays run around a footprint at 1.1 of its radius, 30 degrees apart. The farthest one towards a straight edge
- * is at most 15 degrees aside, so it reaches 1.1 cos 15 = 1.0625 radii or more, and 1.1 at most. The wall of 10 m ends
- * at an edge of any direction, so far from the point. */
+ * is at most 15 degrees aside, so it reaches 1.1 cos 15 = 1.0625 radii or more, and 1.1 at most. The wall 10 m ahead
+ * has an edge in each direction, nearer than that or farther. */
 static void footprints_beside_an_edge(void **state)
 {
     (void)state;
@@ -157,7 +157,8 @@ static void distances_that_fit(void **state)
     close_scene();
 }
 
-/* Points at the station, of bodies, far ones, shots without echo, and points behind the scene. */
+/* A point at the station, one of a body, a far one and a shot without echo have no deviation. A point before the wall
+ * has one. */
 static void points_without_a_deviation(void **state)
 {
     (void)state;
@@ -207,7 +208,7 @@ static void stations_and_numbers(void **state)
             for (size_t i = 0; i < n[j]; i++) {
                 station[i] = (uint16_t)(together ? 1 + (i >= n[j] / 2) : 1 + i / 3 % 2);
                 const double *at = head[station[i] - 1].setup.station_m, along = 1e-3 * (1 + (double)(i % 7));
-                /* on the beam to the wall as far ahead as aside, that much beyond */
+                /* on the beam at 45 degrees, `along` beyond the wall */
                 const double far = 10 - at[1], share = 1 + along / (far * M_SQRT2);
                 add(at[0] + far * share, at[1] + far * share, 0);
             }
@@ -223,9 +224,9 @@ static void stations_and_numbers(void **state)
     close_scene();
 }
 
-/* A small wall is 30 um behind. With a noise of 4 um, 8 sigma are 32 um, and a ball of that radius would reach it. With
- * one of 2 um the ball would be 16 um, and surfaces nearer to each other than 20 um can't be told apart. Elsewhere
- * nothing is near. */
+/* A small wall is 30 um behind. The searched balls touch the face and have a radius of 8 sigma, so with a noise of 3 um
+ * they reach 48 um. Balls below 20 um are not searched, since surfaces so near can't be told apart. Elsewhere nothing
+ * is near. */
 static void surfaces_that_are_near(void **state)
 {
     (void)state;
@@ -318,7 +319,7 @@ static void sigma_by_the_signal(void **state)
     surface_table_free(&table);
 }
 
-/* Straight up the pan moves nothing, and the mirror moves the beam in a direction that is not known: at most by all. */
+/* Straight up the pan moves nothing. The mirror moves the beam in an unknown direction, so all of its motion counts. */
 static void sigma_straight_up(void **state)
 {
     (void)state;

@@ -66,7 +66,7 @@ static void a_command_reaches_the_beam_within_100_ms(void **state)
         rig_tell(rig, "SCAN:START", released);
         rig_wait(rig, NATIVE_EV_SCAN_START, 100);
         assert_true(rig->work.pulse_end > 0);
-        /* the tick is sent when its last pulse has fired: at the next one's time */
+        /* a tick is sent once its last pulse has fired: when the next tick begins */
         assert_true(rig->work.tick + 1 <= released + 100);
         released = rig->next - 65;
         rig_tell(rig, "HEAD:PRR 500000", released + 1);
@@ -105,7 +105,8 @@ static void a_stop_in_spin_up_never_scans(void **state)
         assert_false(rig->work.scanning);
     assert_string_equal(rig_state(rig, 500), "idle");
     assert_true(device_last_scan(rig->device, NULL) == 0);
-    /* Claimed ticks can't be changed. A command of 8 ticks ago turns the head down in 50 ms from the next tick on. */
+    /* Claimed ticks can't be changed. A stop from 8 ticks ago takes effect at the next tick, and turns the head down in
+     * 50 ms. */
     rig_tell(rig, "SCAN:START", 500);
     rig_go_to(rig, 510);
     rig_tell(rig, "SCAN:STOP", 502);
@@ -116,7 +117,7 @@ static void a_stop_in_spin_up_never_scans(void **state)
     rig_close(rig);
 }
 
-/* Granted time is no command of the session, and a journal has only commands. */
+/* A grant of time is no command of the session, and a journal has only commands. */
 static void a_journal_has_no_steps(void **state)
 {
     (void)state;
@@ -136,7 +137,8 @@ static void a_journal_has_no_steps(void **state)
     free(entry);
 }
 
-/* In the second frame, of 150,000 pulses each: as many frames as are done, that many with the running one, one more. */
+/* In the second frame SCAN:FRAMES asks for the frames that are done, for the running one too, or for one more. A frame
+ * has 150,000 pulses. */
 static void frames_are_counted_with_the_one_that_runs(void **state)
 {
     (void)state;
@@ -174,7 +176,8 @@ static void a_head_at_rest_describes_itself_each_second(void **state)
     rig_close(rig);
 }
 
-/* Every command with every kind of argument, thousands of times: only power and failures lead to off and fault. */
+/* Twenty command lines, right and wrong ones, are sent at random, thousands of times: only power and failures lead to
+ * off and fault. */
 static void no_command_leads_to_off_or_fault(void **state)
 {
     (void)state;
@@ -314,7 +317,7 @@ static struct device_work *run_session(const struct device_options *options, int
 
 static void check_same_segment(const struct schedule_segment *a, const struct schedule_segment *b)
 {
-    /* field by field: padding is anything */
+    /* field by field, since padding may hold any bytes */
     assert_memory_equal(&a->spec, &b->spec, offsetof(struct schedule_spec, frames) + sizeof a->spec.frames);
     assert_true(a->k0 == b->k0 && a->t0_ns == b->t0_ns && a->line0 == b->line0 && a->r0 == b->r0);
     assert_true(a->line0_begin == b->line0_begin && a->line0_cast == b->line0_cast && a->pan0_fine == b->pan0_fine);

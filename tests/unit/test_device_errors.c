@@ -28,8 +28,8 @@ static void the_last_events_are_said_however_many(void **state)
     rig_close(rig);
 }
 
-/* Each session has ten in a second of its own. A second later the held back ones are counted, and ten more have
- * room. */
+/* Each session has ten errors in a second of its own. A second later the held back ones are counted, and there is room
+ * for ten more. */
 static void errors_are_held_back_by_session(void **state)
 {
     (void)state;
@@ -60,8 +60,8 @@ static void keep_warning(void *ctx, const char *text)
     strcpy(ctx, text); /* sh_warn has 512 bytes */
 }
 
-/* A journal has commands that had an effect. Where the head refuses some, the session differs, and that is said
- * once, with the first of them. */
+/* A journal has only commands that had an effect. Where the head refuses some of them, the replay differs from the
+ * session. One warning says so, with the first of them. */
 static void a_replay_says_what_it_refused(void **state)
 {
     (void)state;
@@ -156,8 +156,8 @@ static void a_line_that_is_too_long_is_an_error_of_its_session(void **state)
     rig_close(rig);
 }
 
-/* Telemetry comes with each full second, and with the end of a scan. What the release completes (stream.c) is here the
- * number of pulses cast. */
+/* Telemetry comes with each full second. Its figures are filled in for the end of a scan, too. Nothing is released
+ * here, so all pulses that were cast count as lost. */
 static void telemetry_has_the_figures_of_its_tick(void **state)
 {
     (void)state;

@@ -127,7 +127,7 @@ static void a_second_ends_after_its_ticks(void **state)
     }
 }
 
-/* At the end of the run nothing waits. Where there is no room, it is said when there is. */
+/* At the end of the run no error stays held back. One that finds no room is reported once there is room. */
 static void held_errors_are_said_at_the_end(void **state)
 {
     (void)state;
@@ -161,7 +161,7 @@ static void lose(uint64_t tick, uint64_t cast0, uint64_t n_cast)
     device_count_lost(&overrun, &lost, 0);
 }
 
-/* The event each time; the error once, until a second has passed without a loss. */
+/* Each loss has an event. The error comes once, until a second has passed without a loss. */
 static void each_loss_has_an_event_and_each_episode_an_error(void **state)
 {
     (void)state;
@@ -169,7 +169,7 @@ static void each_loss_has_an_event_and_each_episode_an_error(void **state)
     assert_true(events.n == 0 && queue.count == 0);
     lose(8, 430, 30);
     lose(7, 400, 30);
-    lose(9, 0, 0); /* it has no pulse, and its first one is not looked at */
+    lose(9, 0, 0); /* it has no pulse, so its first pulse's number does not count */
     device_say_overrun(&overrun, 500, 10);
     assert_int_equal(events.n, 1);
     expect_event(&events.event[0], NATIVE_EV_OVERRUN, 400, 60, 3, "60 pulses in 3 ticks not computed in time");
@@ -210,7 +210,7 @@ static void a_lost_tick_gives_its_events_back(void **state)
     assert_int_equal(queue.count, 1);
 }
 
-/* Events of ticks before power went are forgotten; at that tick they are not. */
+/* Events of ticks before the power went are forgotten; those of the tick in which it went are not. */
 static void a_power_cycle_forgets_events_of_before(void **state)
 {
     (void)state;
@@ -238,13 +238,13 @@ static void events_that_come_back_may_have_no_room(void **state)
     expect_event(&events.event[DEVICE_MAX_PENDING - 1], NATIVE_EV_PPS, DEVICE_MAX_PENDING - 2, 0, 0, "");
 }
 
-/* At most once a second as an event; as an error once, until two seconds have passed without a loss. */
+/* Lost lines are an event at most once a second. They are an error once, until two seconds go by without one. */
 static void lost_lines_are_said_once_a_second(void **state)
 {
     (void)state;
     static const struct {
         uint64_t tick, journal, truth;
-        uint32_t events, errors; /* in all, then */
+        uint32_t events, errors; /* of all steps so far */
         const char *text;        /* of the last event */
     } steps[] = {{5, 0, 0, 0, 0, NULL},
                  {6, 2, 3, 1, 1, "so far of the journal 2, of the truth 3"},

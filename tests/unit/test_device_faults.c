@@ -69,14 +69,14 @@ static void fails_the_self_test(void **state)
     rig_tell(rig, "SCAN:START", rig->next);
     assert_int_equal(next_state(rig, "idle"), BOOT_TICKS + 1); /* of *RST */
     rig_close(rig);
-    /* The window has no end of a boot in it. */
+    /* No boot ends within these windows. */
     rig = open_with("  - {kind: self_test, from_s: 0.201}\n  - {kind: self_test, until_s: 0.2}\n", NULL, NULL, 0);
     next_state(rig, "boot");
     assert_int_equal(next_state(rig, "idle"), BOOT_TICKS);
     rig_close(rig);
 }
 
-/* The one scan can't be started, so the run is over. */
+/* The run's only scan can't be started, so the run is over. */
 static void ends_a_run_that_cannot_scan(void **state)
 {
     (void)state;
@@ -88,8 +88,8 @@ static void ends_a_run_that_cannot_scan(void **state)
     rig_close(rig);
 }
 
-/* Without a scan its duration counts from the first self-test that failed, also in the paces that wait. A scan that
- * begins all the same has its whole duration. */
+/* Without a scan the run's duration counts from the first self-test that failed, also in the paces that wait. A scan
+ * that begins after all has its whole duration. */
 static void ends_a_run_after_its_duration(void **state)
 {
     (void)state;
@@ -142,7 +142,7 @@ static void loses_power(void **state)
     assert_int_equal(rig->work.n_events, 1); /* no SCAN_END */
     assert_string_equal(rig_event(rig, NATIVE_EV_STATE)->text, "off");
     assert_false(device_is_idle(rig->device));
-    /* A client that sends before that is released gets no answer, and changes nothing. */
+    /* A client that sends before the power-off is released gets no answer, and changes nothing. */
     device_command(rig->device, 1, "HEAD:PRR 200000", 950, &result);
     assert_true(result.reply[0] == '\0' && result.error == 0 && result.effect == COMMAND_NONE);
     device_command(rig->device, 1, "FAULt:ADD {kind: laser_off}", 1001, &result);
@@ -180,7 +180,7 @@ static void loses_power(void **state)
 }
 
 /* The fault strikes at a pulse, once: the scan that --start begins again is not cut. A slow boot that power cuts short
- * is over. */
+ * adds nothing to the next boot. */
 static void loses_power_at_a_pulse(void **state)
 {
     (void)state;
@@ -211,8 +211,8 @@ static void loses_power_at_a_pulse(void **state)
     rig_close(rig);
 }
 
-/* The second one begins with the tick with which power would be back. Power stays away, since a reader counts on its
- * going and coming in turn. */
+/* The second power cycle begins with the tick in which power would come back. Power then stays away, since a reader
+ * counts on its going and coming in turn. */
 static void loses_power_as_it_comes(void **state)
 {
     (void)state;

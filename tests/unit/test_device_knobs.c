@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Commands that change the basis of a scan's plan. The scan is that of a head with the same keys, byte by byte. The one
- * before and the one after do not change. */
+/* Commands that change what a scan is planned by. The scan is that of a head with the same keys, byte by byte. The
+ * ranges of the scans before and after it stay as they were. */
 #include "tests/unit/device_rig.h"
 
 #include "drivers/protocol/crc32c.h"
@@ -11,7 +11,7 @@ struct scan {
     uint32_t crc;
     uint64_t bytes;
     struct native_descriptor descriptor;
-    uint32_t echoes; /* those that it was told to keep */
+    uint32_t echoes; /* which echoes it was told to keep */
 };
 
 /* Sends the commands and scans. Returns its ticks, from SCAN_START to SCAN_END. */
@@ -87,7 +87,7 @@ static void commands_are_keys(void **state)
         }
 }
 
-/* Scans in one run change back and forth. Each is that of its own settings, and the descriptor has the ranges. */
+/* Scans in one run change back and forth. Each has its own settings, and its descriptor has its ranges. */
 static void each_scan_has_its_own(void **state)
 {
     (void)state;
@@ -113,7 +113,7 @@ static void a_scan_keeps_the_echoes_that_were_told(void **state)
     rig_close(rig);
 }
 
-/* The tick in which a scan ends brings its counts, also where that is no tick of telemetry. */
+/* The tick in which a scan ends has the scan's counts, also where it is no tick of telemetry. */
 static void a_scan_ends_with_its_counts(void **state)
 {
     (void)state;
@@ -152,7 +152,7 @@ static void the_last_scan_is_described_as_it_was(void **state)
     rig_close(rig);
 }
 
-/* In a scan they are refused, and leave it alone. A scale that ranges would not fit into gives -221, too. */
+/* During a scan these commands are refused. A range that the scale has no room for gives -221, too. */
 static void what_can_not_be_is_refused(void **state)
 {
     (void)state;

@@ -30,8 +30,7 @@ static struct head_limits limits_with(const char *const *sets, int n)
     return limits_of(0);
 }
 
-/* The slowest program keeps 2 m free of echoes, so range_max_m is beyond that at all rates. The fastest reaches 250 m.
- */
+/* The slowest program keeps 2 m free of echoes, so range_max_m is above 2 m at all rates. The fastest reaches 250 m. */
 static void a_line_head_has_those_of_its_programs(void **state)
 {
     (void)state;
@@ -100,7 +99,7 @@ static void other_heads_have_what_they_can(void **state)
     }
 }
 
-/* A choice that was tried on the scene holds only within the ranges of power-up. */
+/* A method that was tried on the scene holds only within the ranges of power-up. */
 static void ranges_stay_where_methods_were_tried(void **state)
 {
     (void)state;
@@ -163,7 +162,7 @@ static void noise_is_what_the_configuration_can_make(void **state)
     }
 }
 
-/* Bits stand for stations with another scanner than that of head.station. */
+/* Bits mark the stations whose scanner is not that of head.station. */
 static void stations_of_other_scanners_are_elsewhere(void **state)
 {
     (void)state;

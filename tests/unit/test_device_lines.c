@@ -102,7 +102,7 @@ static uint64_t stopped_scan(struct rig *rig, const char *prr, uint64_t ticks, s
     return pulses;
 }
 
-/* This includes that the ticks before the stop took all pulses: 1.6 MHz is 100 whole packets a tick. */
+/* A stop ends the running line. At 1.6 MHz, 100 whole packets a tick, the ticks before it have taken all pulses. */
 static void a_stop_ends_the_line_at_hand_as_partial(void **state)
 {
     (void)state;
@@ -139,10 +139,10 @@ static int last_line_end(struct rig *rig, struct line_end *end)
     return found;
 }
 
-/* The encoders then have the axes' angles, though no pulse was fired at the new rate: 1.6 MHz is 100 whole packets a
- * tick, so none was left over. Three facets and a gain of two are 240 degrees a line of 10 ms, from -40 on. The pan
- * turns 180 degrees a second. The encoders may be read at the last pulse or at the next one: 0.015 degrees of the
- * mirror. */
+/* After such a stop the encoders have the axes' angles, though no pulse fired at the new rate: 1.6 MHz is 100 whole
+ * packets a tick, so none was left over. Three facets and a gain of two are 240 degrees a line of 10 ms, from -40 on.
+ * The pan turns 180 degrees a second. The encoders may be read at the last pulse or at the next one: 0.015 degrees of
+ * the mirror. */
 static void a_stop_right_after_a_change_has_its_angles(void **state)
 {
     (void)state;
@@ -210,8 +210,8 @@ static void settings_change_in_mid_scan(void **state)
     rig_close(rig);
 }
 
-/* Slots have room for a usual tick from the start. No tick with only points takes more, and the longest takes three
- * quarters of it. So the room fits the set rates, and not the profile's. */
+/* Slots have room for a usual tick from the start. No tick that has only points takes more, and the longest takes at
+ * least three quarters of it. So the room is for the rates that are set, not for the profile's. */
 static void a_usual_tick_is_what_a_slot_has_room_for(void **state)
 {
     (void)state;
@@ -274,7 +274,7 @@ static void a_jump_of_the_rates_fits_into_a_tick(void **state)
     rig_close(rig);
 }
 
-/* The lines of one tick at the slowest loop and the fastest mirror of a profile: 100 a tick. */
+/* The slowest loop and the fastest mirror of a profile give 100 lines a tick. */
 static void many_lines_fit_into_a_tick(void **state)
 {
     (void)state;

@@ -48,8 +48,8 @@ static void hear(struct rig *rig, struct heard *heard)
 }
 
 /* 70 names are two chunks: at the scan's start, and then one each quarter of a second. A reader that joins 10 ms after
- * the start has them all within half a second, each once. 64 pairs of 128 bytes are 8192, and a frame holds that less a
- * head. So a chunk of them takes two frames. */
+ * the start has them all within half a second, each once. A chunk of 64 pairs of 128 bytes has 8192 bytes. A frame
+ * holds less by its header, so a chunk takes two frames. */
 static void all_names_reach_who_joins_late(void **state)
 {
     (void)state;

@@ -40,7 +40,7 @@ static void control_is_given_back_at_once(void **state)
     assert_int_equal(once(rig, 2, "HEAD:LINES 22"), CMD_E_PROTECTED);
     assert_int_equal(once(rig, 2, "HEAD:LINES?"), 0); /* to ask is free */
     assert_int_equal(once(rig, 1, "HEAD:LINES 23"), 0);
-    assert_int_equal(once(rig, 2, "HEAD:LINES 24"), CMD_E_PROTECTED); /* it was not session 2's to give back */
+    assert_int_equal(once(rig, 2, "HEAD:LINES 24"), CMD_E_PROTECTED); /* session 2's command gave nothing back */
     assert_int_equal(lasting(rig, 1, "SYST:CONT:REL"), 0);
     assert_int_equal(once(rig, 2, "HEAD:LINES 25"), 0);
     rig_close(rig);
@@ -55,7 +55,7 @@ static void expect_control(struct rig *rig, uint64_t session, const char *text)
     assert_string_equal(event->text, text);
 }
 
-/* An event says which session has control now, with its client's name where that is known; 0: none has. */
+/* An event says which session has control now, or 0 for none. Its text is the client's name, or else the change. */
 static void control_is_announced(void **state)
 {
     (void)state;

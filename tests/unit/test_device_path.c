@@ -6,7 +6,8 @@
 #include "firmware_sim/device/device_state.h"
 #include "tests/unit/device_rig.h"
 
-/* A time far ahead is counted, and the right ones go on. In steps time is granted, so any is allowed. */
+/* A pose for a time far ahead counts as a bad one, and others still come in. In step pace the peer grants time, so any
+ * is allowed. */
 static void a_pose_far_ahead_keeps_no_other_out(void **state)
 {
     (void)state;
@@ -26,8 +27,8 @@ static void a_pose_far_ahead_keeps_no_other_out(void **state)
     rig_close(rig);
 }
 
-/* The first pulse of a tick may be 15 periods old, and a tick has up to 256 poses. The rate that is said to be allowed
- * is. */
+/* The first pulse of a tick may be 15 periods old, and a tick has up to 256 poses. The rate that the error names as
+ * allowed works. */
 static void a_live_head_is_not_too_slow(void **state)
 {
     (void)state;
@@ -114,8 +115,8 @@ static void a_path_ends_with_its_last_pose(void **state)
     unlink(path);
 }
 
-/* There is a pose each 10 ms, north at 2 m/s. Between two of them the head is on the straight way. After the last it
- * goes on so for extrapolate_ms, and then it stands. */
+/* There is a pose each 10 ms, north at 2 m/s. Between two of them the head is on the straight way. After the last one
+ * it goes on at that speed for extrapolate_ms, and then it stands. */
 static void a_live_platform_goes_on_for_a_while(void **state)
 {
     (void)state;
@@ -141,7 +142,7 @@ static void a_live_platform_goes_on_for_a_while(void **state)
     rig_close(rig);
 }
 
-/* A time has one pose. None comes before another known one, or from beyond the reach. */
+/* There is one pose for a time. A pose is refused where it is older than the newest one, or beyond platform.reach_m. */
 static void poses_come_in_order(void **state)
 {
     (void)state;

@@ -52,7 +52,7 @@ static void what_is_stored_is_that_of_power_up(void **state)
     rig_tell(rig, "HEAD:LINES 50", 290);
     rig_tell(rig, "*RST", 290);
     expect(rig, "HEAD:LINES?", "40");
-    expect(rig, "HEAD:STATION?", "1"); /* the place of the head is no setting of it */
+    expect(rig, "HEAD:STATION?", "1"); /* the station is no setting of the head */
     rig_tell(rig, "HEAD:LINES 50", 290);
     reboot(rig);
     expect(rig, "HEAD:LINES?", "40");
@@ -121,8 +121,8 @@ static void a_protocol_has_its_own(void **state)
     close_settings(file);
 }
 
-/* In the file's order some are beyond what the configured ones allow: 50 to 10 degrees is no line, and 1500 lines a
- * second need more than 1000 pulses. */
+/* Taken in the file's order, some settings contradict the configured ones: 50 to 10 degrees is no line, and 1500 lines
+ * a second need more than 1000 pulses. */
 static void limits_that_depend_on_each_other_are_no_matter(void **state)
 {
     (void)state;
@@ -175,7 +175,7 @@ static void what_the_head_does_not_take_is_refused(void **state)
 
 enum { TICKS = 700 };
 
-/* The works of a run whose scan begins by itself. */
+/* Returns the work of each tick of a run whose scan begins by itself; free() it. */
 static struct device_work *run(const struct device_options *options)
 {
     struct device_work *works = calloc(TICKS, sizeof *works);
@@ -217,7 +217,7 @@ static void a_replayed_journal_needs_no_file(void **state)
     free(again);
 }
 
-/* Before the first scan the descriptor has the settings of power-up, also where a command has just made these. A range
+/* Before the first scan the descriptor has the settings of power-up, also where a command has just stored them. A range
  * needs a site that is planned for it. */
 static void readers_before_a_scan_are_told_them(void **state)
 {

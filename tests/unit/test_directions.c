@@ -23,7 +23,7 @@ static int read_list(const char *text)
     assert_non_null(f);
     fputs(text, f);
     assert_int_equal(fclose(f), 0);
-    direction = (struct emitter_firing *)&err; /* what an error must replace */
+    direction = (struct emitter_firing *)&err; /* an error must replace this pointer */
     return emitter_read_directions(file_path, &direction, &n_directions, &err);
 }
 

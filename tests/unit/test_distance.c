@@ -230,8 +230,8 @@ static void points_on_the_surface(void **state)
                 p[k] = v[0][k] + (v[1][k] - v[0][k]) * a + (v[2][k] - v[0][k]) * b;
             struct distance_hit hit;
             assert_int_equal(distance_query(bvh, p, 1, &hit), 1);
-            /* Each of three axes has at most three roundings of half a unit of the largest coordinate, and as
-             * many of the differences (below 20). */
+            /* On each of three axes there are at most three roundings of half a unit of the largest coordinate, and
+             * three of the differences (below 20). */
             double largest = turn % 2 ? 5800010 : 10;
             double bound = sqrt(3) * (1.5 * largest * 0x1p-52 + 3 * 20 * 0x1p-53) + ROUNDING * 20;
             if (hit.distance_m > bound) fail_msg("%g m off the surface, bound %g", hit.distance_m, bound);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Casts of heads with a fault. A slipped pan is a head whose pan began elsewhere, but for its readings. A soiled window
- * is a weaker signal. */
+/* Casts of heads with a fault. A head whose pan slipped casts as one whose pan began elsewhere, but its encoders don't
+ * show it. A soiled window is a weaker signal. */
 #include "tests/unit/cast_rig.h"
 
 #include "core/angle.h"
@@ -45,7 +45,7 @@ static void free_three(struct three *t)
     line_block_free(&t->turned);
 }
 
-/* Ranges are counts of 1e-5 m. Directions that differ in their last bit may round to the next one. */
+/* Ranges are counts of 1e-5 m. Directions that differ in their last bit may round to the next count. */
 static void slip_is_what_nobody_reads(struct cast_rig *rig)
 {
     struct three t;
@@ -98,8 +98,8 @@ static void a_slipped_pan_of_any_head(void **state)
         }
 }
 
-/* Positions follow the encoders: range times direction, to a count of 1e-5 m and half a one of the range. 2^-32 of a
- * turn moves 9 m by 7e-9 m. */
+/* Positions follow the encoders: range times direction. Position and range are each rounded by half a count of 1e-5 m.
+ * 2^-32 of a turn moves 9 m by 7e-9 m. */
 static void positions_follow_the_encoders(void **state)
 {
     (void)state;
@@ -162,7 +162,7 @@ static void a_soiled_window_is_a_weaker_signal(void **state)
         assert_int_equal(clean.a[i] != 0, range_m < 6.0);
         gone += clean.a[i] != 0 && soiled.a[i] == 0;
         if (soiled.a[i] == 0) continue;
-        /* three counts of 1e-5 m are rounded: one once, one twice, one (2 - 1) times */
+        /* three counts of 1e-5 m are rounded by a half; their weights are 1, 2 and 2 - 1 */
         assert_true(fabs(1e-5 * ((double)soiled.a[i] - exact.a[i]) - 2.0 * noise_m) <= 2.01e-5);
         n += fabs(noise_m) > 1e-3;
     }
@@ -175,7 +175,8 @@ static void a_soiled_window_is_a_weaker_signal(void **state)
 }
 
 /* Without a model of the signal the fixed part of the noise grows by 1 / share. The same numbers are drawn, four times
- * as large through a window that transmits a quarter. Counts of 1e-5 m are rounded five times. */
+ * as large through a window that transmits a quarter. Counts of 1e-5 m are rounded by a half; their weights are 1, 4
+ * and 3. */
 static void a_soiled_window_makes_ranges_noisy(void **state)
 {
     (void)state;

@@ -31,7 +31,7 @@ static void faces_have_the_same_places(void **state)
     expect(&scene, 0);
 }
 
-/* With holes, faces are the same where the image and its place at each corner are. */
+/* Faces with holes are duplicates where they have the same image, at the same place on each corner. */
 static void faces_have_the_same_holes(void **state)
 {
     (void)state;

@@ -18,7 +18,8 @@ static const struct rig_point points[] = {
     {5, 0, 0, 0, 1, 1, 1},
 };
 
-/* On the central meridian the grid's axes are the scene's, so the head sees x = -y and y = x of the differences. */
+/* On the central meridian the grid's axes are the scene's. The head is turned by a quarter: its x is -b, and its y is
+ * a. */
 static void check_points(size_t first, int empty_shots, uint32_t column, uint32_t row)
 {
     for (int i = 0, pulse = -1; i < 5; i++) {
@@ -168,15 +169,15 @@ static void test_packets(void **state)
     }
 }
 
-/* A packet spans 0.1 s, up to the next multiple of 8 records. So little is missing at any moment, and a packet that
- * ended late does not shorten the next one. */
+/* A packet spans 0.1 s, up to the next multiple of 8 records. So the file never lacks much, and a packet that ended
+ * late does not shorten the next one. */
 static void test_span_of_packets(void **state)
 {
     (void)state;
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
     static const struct {
         uint32_t ms;
-        size_t n_packets; /* of 100 records: of 8, of 16 where 10 take 0.1 s, or of all within 0.1 s */
+        size_t n_packets; /* 100 records: packets of 8, of 16 (10 take 0.1 s), or one of all within 0.1 s */
     } cases[] = {{20, 13}, {50, 13}, {10, 7}, {1, 1}};
     for (size_t c = 0; c < sizeof cases / sizeof cases[0]; c++) {
         rig_begin();

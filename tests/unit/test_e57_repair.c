@@ -200,7 +200,7 @@ static size_t cut_of(const uint8_t *from, size_t len, int scans, int packets)
     return *at_logical(from, end) == '<' ? 0 : len - (size_t)(at_logical(from, end) - from);
 }
 
-/* If the same packets are left, the same file comes out, so it is read once. */
+/* Cuts that leave the same packets give the same file, so it is read once. */
 static void check_cut(const char *path, const uint8_t *from, size_t len)
 {
     struct repair repair;
@@ -240,7 +240,7 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
     free(file);
 }
 
-/* Files are cut at the ends of pages, since only there the result changes, and a byte before. */
+/* Files are cut at each page's end, since the result changes only there, and one byte before it. */
 static void test_cuts(void **state)
 {
     (void)state;
@@ -266,8 +266,8 @@ static char *xml_of(const char *path)
     return xml;
 }
 
-/* A file that was being completed, or a whole one whose end is missing. Once all points are there, the same file comes
- * out, with the note that its end is missing. */
+/* The file is a whole one whose end is missing, or one that was being completed. Once all points are there, the same
+ * file comes out, with the note that its end is missing. */
 static void test_end(void **state)
 {
     (void)state;

@@ -81,7 +81,7 @@ static void reports(void **state)
     assert_string_equal(seen.warned, "5?");
 }
 
-/* Towards the side that is allowed. Rounding of a figure that has few digits does not move it on. */
+/* Limits are rounded towards the side that is allowed. A figure that already has few digits stays as it is. */
 static void limits_in_messages(void **state)
 {
     (void)state;
@@ -99,7 +99,7 @@ static void limits_in_messages(void **state)
     }
 }
 
-/* An array keeps its elements. It has room to spare, so that it moves seldom; what is there suffices without a move. */
+/* An array keeps its elements. It has room to spare, so that it moves seldom. Asking for too much leaves it alone. */
 static void arrays_grow(void **state)
 {
     (void)state;

@@ -41,7 +41,7 @@ static uint32_t add_bytes(uint32_t sum, const uint8_t *at, size_t len)
     return sum;
 }
 
-/* Checks all but the transport's own fields, and returns where its header is. */
+/* Checks all fields but the transport's own, and returns where the transport header is. */
 static const uint8_t *check_front(size_t len, const struct ethernet_end *from, const struct ethernet_end *to,
                                   uint8_t protocol)
 {
@@ -129,7 +129,7 @@ static void test_hardware_addresses(void **state)
     check_hardware(&HERE, "\0\0\0\0\0\0");
     check_hardware(&SIX_HERE, "\0\0\0\0\0\0");
     check_hardware(&BROADCAST, "\xff\xff\xff\xff\xff\xff");
-    check_hardware(&GROUP, "\x01\x00\x5e\x48\x03\x04"); /* 23 bits of it */
+    check_hardware(&GROUP, "\x01\x00\x5e\x48\x03\x04"); /* the last 23 bits of the group */
     check_hardware(&SIX_GROUP, "\x33\x33\x00\x00\x00\x05");
     check_hardware(&SENSOR, "\x02\x00\xc0\xa8\x01\xc9");
 }
@@ -180,7 +180,7 @@ static void hold_talk(struct tcp_talk *talk)
     hear(&h, talk, 1, tcp_put_data(talk, 1, data + ETHERNET_MAX_SEGMENT, ETHERNET_MAX_SEGMENT, frame),
          TCP_PSH | TCP_ACK);
     hear(&h, talk, 0, tcp_put_data(talk, 0, data + 5, 1, frame), TCP_PSH | TCP_ACK);
-    assert_int_equal(tcp_put_ack(talk, 0, frame), 0); /* the data did */
+    assert_int_equal(tcp_put_ack(talk, 0, frame), 0); /* the data has acknowledged all */
     hear(&h, talk, 1, tcp_put_ack(talk, 1, frame), TCP_ACK);
     hear(&h, talk, 0, tcp_put_fin(talk, 0, frame), TCP_FIN | TCP_ACK);
     hear(&h, talk, 1, tcp_put_ack(talk, 1, frame), TCP_ACK);
@@ -190,7 +190,7 @@ static void hold_talk(struct tcp_talk *talk)
     assert_memory_equal(h.bytes[1], data, sizeof data);
 }
 
-/* This includes the wrap of the numbers. */
+/* The sequence numbers wrap within these talks. */
 static void test_talk(void **state)
 {
     (void)state;

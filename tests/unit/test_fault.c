@@ -267,7 +267,7 @@ static void a_dash_is_standard_output(void **state)
     assert_int_not_equal(access("-", F_OK), 0);
 }
 
-/* The longest note still fits as a command line into the journal, which has them as remarks. */
+/* The longest note is not cut. It fits into a line of the journal, which has notes as remarks. */
 static void the_longest_note_is_not_cut(void **state)
 {
     (void)state;
@@ -310,7 +310,7 @@ static void what_cannot_be_written_is_said(void **state)
     assert_int_equal(truth_close(truth, &err), SH_OK);
 }
 
-/* A client that adds and clears faults on and on takes no more memory than a count for each of so many. */
+/* A client may add and clear faults on and on. The memory is that of one count for each fault that a run may have. */
 static void a_run_has_a_bounded_number_of_faults(void **state)
 {
     (void)state;
@@ -360,7 +360,7 @@ static void a_tally_keeps_what_is_in_the_list(void **state)
     fault_tally_renew(&tally, entry, 2);
     assert_int_equal(*fault_tally_hits(&tally, 2), 20);
     assert_int_equal(*fault_tally_hits(&tally, 3), 30);
-    ++*fault_tally_hits(&tally, 4); /* in the place of 1, whose count is not its own */
+    ++*fault_tally_hits(&tally, 4); /* in the place of fault 1, but not with its count */
     assert_int_equal(*fault_tally_hits(&tally, 4), 1);
     assert_int_equal(*fault_tally_hits(&tally, 3), 30);
     fault_tally_renew(&tally, entry, 0);

@@ -18,7 +18,7 @@ static void load_base(void)
     assert_int_equal(load_text(base), SH_OK);
 }
 
-/* The scanner that has dates speaks cola; another head has none that a time server could set. */
+/* Only a scanner that speaks cola sends dates, which a time server could set. */
 static void a_time_server_needs_dates(void **state)
 {
     (void)state;
@@ -28,7 +28,7 @@ static void a_time_server_needs_dates(void **state)
     assert_says("ntp.role: client, but no link sends dates; allowed with a link of protocol: cola");
 }
 
-/* Nothing else asks a time server. The role may be set later, by telegram. */
+/* Only a scanner that speaks cola asks a time server. Its role may be set later, by telegram. */
 static void its_faults_need_somebody_who_asks(void **state)
 {
     (void)state;
@@ -58,7 +58,7 @@ static void an_unknown_kind_is_told_all_kinds(void **state)
         if (strstr(err.text, fault_names[k]) == NULL) fail_msg("%s is not in: %s", fault_names[k], err.text);
 }
 
-/* The keys that say when, of fault/README.md: each place has its own, and a refusal says which. */
+/* The keys that say when a fault strikes (fault/README.md): each place has its own, and a refusal says which. */
 static void a_place_has_its_keys_and_no_others(void **state)
 {
     (void)state;

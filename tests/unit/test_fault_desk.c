@@ -85,7 +85,7 @@ static void a_long_list_is_cut_between_faults(void **state)
     for (int i = 0; i < FAULT_MAX; i++)
         assert_int_equal(add("{kind: drop}", &number), 0);
     for (int n = 1; n <= 12; n++) {
-        room += n == 1 ? 6 : n < 10 ? 8 : 9; /* so that n fit */
+        room += n == 1 ? 6 : n < 10 ? 8 : 9; /* the length that n faults need */
         for (int short_by = 0; short_by < 2; short_by++) {
             size_t used = 0;
             for (int i = 1; i <= n - short_by; i++)

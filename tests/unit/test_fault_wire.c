@@ -152,7 +152,7 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
     rig_run(&f, 2);
     assert_int_equal(rig.n_notes, 0);
     rig_end(2);
-    struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* other flipped bits stay wrong, in any order */
+    struct fault both[2] = {fault_of_kind(FAULT_FLIP), f}; /* resealing does not right another fault's flip */
     both[1].byte = -1;
     rig_open(both, 2, 1);
     for (int i = 0; i < 20; i++)
@@ -172,7 +172,7 @@ static void resealed_flips_are_right_by_their_checksums(void **state)
     rig_end(1);
 }
 
-/* A datagram's system drops those that are damaged on their way, so a damaged one is not sent. A resealed one is
+/* A receiver's system drops datagrams that were damaged on their way, so a damaged one is not sent. A resealed one is
  * sent. */
 static void a_damaged_datagram_is_not_sent(void **state)
 {
@@ -341,8 +341,8 @@ static void what_was_begun_without_the_wire_goes_first_as_it_is(void **state)
     assert_memory_equal(rig.out + 4, rig.item[1].bytes, rig.item[1].len);
 }
 
-/* Two clients of a link come to the frame of an unplugging, which ends both sessions. The unplugging is carried out
- * once. */
+/* Two clients of a link each get the frame at which it is unplugged, and both sessions end. The unplugging is carried
+ * out once. */
 static void an_act_that_is_not_carried_out_does_not_count(void **state)
 {
     (void)state;

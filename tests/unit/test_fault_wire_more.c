@@ -94,7 +94,7 @@ static void a_fault_counts_from_when_it_was_added(void **state)
     f.from = 2;
     f.every = 3;
     assert_int_equal(add(&f, 50 * MS), 1);
-    for (int i = 0; i < 14; i++) /* those from before 50 ms are on their way already; and one that is late */
+    for (int i = 0; i < 14; i++) /* frames before 50 ms are not counted, nor is one that comes late */
         rig_frame_at(RIG_STREAM, 40, i == 8 ? 49 * MS : 10 * i * MS, 0);
     static const int hit[] = {7, 11, 14}; /* 5, 6, 7, 9, 10, ... count 1, 2, 3, 4, 5, ... */
     assert_int_equal(rig.n_notes, 3);
@@ -102,7 +102,7 @@ static void a_fault_counts_from_when_it_was_added(void **state)
         assert_int_equal(rig.note[i].number, 2 + 3 * i);
         assert_int_equal(rig.note[i].seq, le_get32(rig.item[hit[i]].bytes + 8));
     }
-    f.from_s = 0.02; /* and seconds count from there */
+    f.from_s = 0.02; /* seconds, too, count from when it was added */
     f.from = f.every = 1;
     f.kind = FAULT_STALL;
     assert_int_equal(add(&f, 1000 * MS), 2);
@@ -120,7 +120,7 @@ static void a_fault_counts_from_when_it_was_added(void **state)
     assert_int_equal(add(&f, 0), 3); /* and its number */
 }
 
-/* Each fault drops a frame of its own. The first 32 are taken out as of a later time, so they strike, too. */
+/* Each fault drops a frame of its own. The first 32 are cleared at a later time, so they strike, too. */
 static void as_many_faults_as_are_kept_strike(void **state)
 {
     (void)state;
@@ -200,7 +200,7 @@ static void an_item_longer_than_usual_is_taken(void **state)
 {
     (void)state;
     f = fault_of_kind(FAULT_DUPLICATE);
-    rig_open(&f, 1, 1); /* its wire has been told 64 bytes */
+    rig_open(&f, 1, 1); /* the wire was made for items of 64 bytes */
     uint8_t *big = calloc(1, 100000);
     const struct wire_item item = {FAULT_OF_REPLIES, big, 100000, 0};
     assert_int_equal(wire_put(rig.wire, &item, rig.now_ns), SH_OK);
@@ -305,7 +305,8 @@ static void mixtures_are_what_their_notes_say(void **state)
 
 /* ---- several at one frame */
 
-/* The order of the list counts only among those that strike last; a second split finds one. */
+/* The order of the list counts only among the faults that strike last. A frame that is split already is not split
+ * again. */
 static void faults_strike_in_their_order(void **state)
 {
     (void)state;

@@ -5,7 +5,7 @@
 
 static struct fault f;
 
-/* A reordered frame comes after the frame whose number is n higher, in its own counting. */
+/* A reordered frame comes after the frame whose number is n higher. Notices are not counted with stream frames. */
 static void a_reordered_frame_comes_behind_as_many_as_noted(void **state)
 {
     (void)state;
@@ -36,7 +36,7 @@ static void frames_that_are_all_reordered_all_come(void **state)
     f = fault_of_kind(FAULT_REORDER);
     f.n = 20;
     rig_run(&f, 300);
-    assert_true(rig_take(0) > 250); /* no one waits for ever: at most those of the last 20 */
+    assert_true(rig_take(0) > 250); /* only some of the last 20 still wait */
     rig_end(300);
     assert_int_equal(rig.n_notes, 300);
 }
@@ -160,7 +160,7 @@ static void a_split_frame_goes_out_in_so_many_writes(void **state)
 static void merged_frames_go_out_in_one_write(void **state)
 {
     (void)state;
-    f = fault_of_kind(FAULT_MERGE); /* at every frame, which is: at every one that is not in a write already */
+    f = fault_of_kind(FAULT_MERGE); /* at every frame that no write has taken already */
     f.n = 3;
     rig_open(&f, 1, 1);
     for (int i = 0; i < 8; i++) {
@@ -202,7 +202,7 @@ static void merged_frames_go_out_in_one_write(void **state)
     assert_int_equal(rig_take(0), 1);
 }
 
-/* However a piece goes through it, a queue that is empty has no bytes, and a full one gets room again. */
+/* However a piece goes through a queue, its bytes no longer count once it is out. */
 static void a_queue_gives_back_its_room(void **state)
 {
     (void)state;
@@ -215,7 +215,7 @@ static void a_queue_gives_back_its_room(void **state)
             wire_queue_hold(&queue, piece);
         else
             assert_int_equal(wire_queue_put(&queue, piece), 0);
-        assert_int_equal(queue.n_bytes != 0, way != 2); /* as the header has it */
+        assert_int_equal(queue.n_bytes != 0, way != 2); /* a piece that waits for a frame does not count yet */
         if (way == 3) {                                 /* into the write of one that is open */
             piece->open = 1;
             assert_int_equal(wire_queue_put(&queue, wire_piece_new(WIRE_FRAMES, "gh", 2)), 0);

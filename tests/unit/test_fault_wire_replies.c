@@ -4,7 +4,7 @@
 
 static struct fault f;
 
-/* The sent text is this. */
+/* The text that went out must be this. */
 static void expect_text(const char *text)
 {
     if (rig.n_out != strlen(text) || memcmp(rig.out, text, rig.n_out) != 0)
@@ -31,7 +31,7 @@ static void a_reply_that_is_dropped_is_missing(void **state)
     assert_true(rig.n_notes == 1 && rig.note[0].number == 2 && rig.note[0].of == FAULT_OF_REPLIES);
 }
 
-/* The fault's end is in device time that is still to come: the tick at which the command took effect. */
+/* The device time at which the fault ends is still to come: it is the tick in which the command took effect. */
 static void a_fault_that_was_taken_out_changes_no_reply(void **state)
 {
     (void)state;
@@ -81,7 +81,7 @@ static void a_wrong_reply_is_wrong(void **state)
     expect_text("OK\r\n42\r\nOK\r\n43\r\n0\r\n");
     assert_int_equal(rig.n_notes, 5);
     rig_close();
-    rig_open(&f, 1, 0); /* of another protocol only one that there was */
+    rig_open(&f, 1, 0); /* in another protocol the wrong reply is an earlier one */
     rig_unit(5, 1);
     rig_unit(6, 1);
     rig_drain();
@@ -116,7 +116,7 @@ static void an_echo_is_that_of_the_replys_own_line(void **state)
     assert_int_equal(rig.n_notes, 5);
     assert_true(rig.note[0].n == 5 && rig.note[2].n == 4);
     rig_close();
-    rig_open(&f, 1, 0); /* a protocol without lines: what came since the last answer, as it was */
+    rig_open(&f, 1, 0); /* in a protocol without lines the echo is all that came since the last answer */
     hear("\x02s\n");
     hear("\x03");
     rig_unit(7, 1);
@@ -145,7 +145,8 @@ static void blanks_are_a_line_where_they_are_too_long(void **state)
     expect_text(want);
 }
 
-/* 65536 bytes are kept until an answer. With one more, all of them get no echo, and what comes then does. */
+/* Up to 65536 bytes are kept until an answer. With one byte more all are forgotten, and only bytes after them are
+ * echoed. */
 static void so_much_is_heard_and_no_more(void **state)
 {
     (void)state;
@@ -205,7 +206,7 @@ static void replies_count_from_after_the_command(void **state)
     rig_open(NULL, 0, 1);
     rig_reply("1");
     assert_int_equal(fault_board_add(rig.board, &f, 500 * MS, &number, &err), SH_OK);
-    wire_renew(rig.wire, 2); /* one from before, and its own */
+    wire_renew(rig.wire, 2); /* two replies are owed: one from before, and the command's own */
     rig_reply("2");
     rig_reply("3");
     rig_reply("hit");

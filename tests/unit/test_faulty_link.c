@@ -283,7 +283,7 @@ static void an_act_that_fails_is_told(void **state)
     close_it(f);
 }
 
-/* The same fault in another session is the same pull of the one cable. The pull's begin and end are in the truth. */
+/* A fault that strikes in two sessions pulls the one cable once. The truth has the begin and the end of the pull. */
 static void a_cable_is_pulled_once(void **state)
 {
     (void)state;
@@ -343,7 +343,7 @@ static void acts_wait_for_the_cable(void **state)
     close_it(f);
 }
 
-/* A link that can't fall silent is unplugged instead, and one that can't do that either goes on. */
+/* A link that can't fall silent is unplugged instead. One that can't be unplugged either goes on. */
 static void a_cable_is_an_unplugging_where_need_be(void **state)
 {
     (void)state;

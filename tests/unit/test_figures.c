@@ -40,11 +40,12 @@ static void groups_have_their_own_figures(void **state)
     near_to(f[0].along_max_m, 0.003);
     near_to(f[0].judged_mean_m, -0.001);
     near_to(f[0].judged_rms_m, sqrt(5e-6));
-    near_to(f[0].expected_rms_m, sqrt(1.5e-6)); /* (1, 1) and (1, 0) mm */
+    near_to(f[0].expected_rms_m, sqrt(1.5e-6)); /* sigma and counts: (1, 0) and (1, 1) mm */
     near_to(f[0].z_mean, -1.0);
     near_to(f[0].z_rms, sqrt(5.0));
     near_to(f[0].z_counts, sqrt(0.5));
-    /* The second point, at an incidence of 84 degrees, has no deviation along the beam; one sigma is not known. */
+    /* The second point, at an incidence of 84 degrees, has no deviation along the beam. The first one's sigma is not
+     * known. */
     assert_true(f[1].points == 2 && f[1].along == 1 && f[1].judged == 0);
     assert_true(f[1].far == 0 && f[1].noisy == 0);
     near_to(f[1].mean_m, 0.006);
@@ -57,7 +58,7 @@ static void groups_have_their_own_figures(void **state)
 }
 
 /* Group 1 comes first in the file, and two of its points are far. The 95th percentile of 20 values is the 19th. Without
- * groups all points are one. */
+ * groups all points count together. */
 static void percentiles_by_group(void **state)
 {
     (void)state;
@@ -112,7 +113,7 @@ static void nice_numbers_are_1_2_5(void **state)
                              {70, 100},  {0.03, 0.05}, {1e-6, 1e-6}, {1.2e-5, 2e-5}, {0.001, 0.001}};
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++)
         near_to(figures_nice(row[i][0]), row[i][1]);
-    for (int power = -20; power <= 20; power++) /* those that are such numbers stay as they are, to the last bit */
+    for (int power = -20; power <= 20; power++) /* 1, 2 and 5 times a power of ten stay as they are, to the last bit */
         for (int k = 0; k < 3; k++) {
             char text[16];
             snprintf(text, sizeof text, "%de%d", k == 0 ? 1 : k == 1 ? 2 : 5, power);
@@ -153,7 +154,6 @@ static void histograms_count_each_value_once(void **state)
     assert_true(h.bins > 0 && h.count[0] == 1);
 }
 
-/* The size of values counts without their sign. What is beyond the axis is counted on its side, however large it is. */
 /* A bin begins at its lower edge: a value at the upper edge of the last one is above all. */
 static void edges_belong_to_the_bin_above(void **state)
 {
@@ -174,6 +174,7 @@ static void edges_belong_to_the_bin_above(void **state)
     assert_true(again.bins == h.bins && again.above == 1 && again.below == 1);
 }
 
+/* The size of values counts without their sign. What is beyond the axis is counted on its side, however large it is. */
 static void histograms_of_one_side(void **state)
 {
     (void)state;
@@ -238,7 +239,7 @@ static void density_is_points_by_area(void **state)
     near_to(row.p95, 1.0 / M_SQRT2);
     figures_density_within(&d, 2, 0.0, (double)INFINITY, &row);
     assert_true(row.cells == 0 && isnan(row.p50));
-    figures_density_within(&d, 1, 3.0, 5.0, &row); /* from the first one on, up to before the second */
+    figures_density_within(&d, 1, 3.0, 5.0, &row); /* 3.0 itself is within, 5.0 is not */
     assert_true(row.cells == 2 && row.points == 18);
     figures_density_free(&d);
     /* Two stations come in turns. If both have points there are two cells in one place. */

@@ -89,8 +89,9 @@ static void cells_of_few_points(void **state)
     scene_free(scene);
 }
 
-/* Three squares of 4 m face x, y and z; then two rectangles are turned about z by 3 to 4. The faces' common corner is
- * at 10.5, 20.25, 30.75 m, and cells begin there. A cell has a metre's square, or 1.25 of it on a turned face. */
+/* Three squares of 4 m face x, y and z. Then two rectangles are turned about z by the angle of 3, 4, 5. The faces'
+ * common corner is at 10.5, 20.25, 30.75 m, and cells begin there. A cell has a metre's square, or 1.25 of it on a
+ * turned face. */
 static void cells_begin_at_the_scene_s_corner(void **state)
 {
     (void)state;
@@ -107,7 +108,7 @@ static void cells_begin_at_the_scene_s_corner(void **state)
         for (int i = 0; i < 32 * (tilted ? 2 : 3); i++) {
             const double within = i % 2 ? 0.9 : 0.1, u = within + i / 2 % 4, v = within + (double)(i / 8 % 4);
             const uint32_t face = (uint32_t)(i / 32);
-            if (tilted) /* the first faces x more, the second y: their cells are even along y and along x */
+            if (tilted) /* the first faces x more, so its cells are even along y; the second y, so along x */
                 add(10.5 + (face == 0 ? 0.75 * u : u), 20.25 + (face == 0 ? u : 0.75 * u), 30.75 + v, 2 * face, 1);
             else
                 add(10.5 + (face == 0 ? 0 : u),
@@ -143,12 +144,13 @@ static void planes_have_their_own_cells(void **state)
     scene_free(scene);
 }
 
-/* A scene of 10 m, and points up to `max_m` beside it, at most as far as it is wide: cells have numbers of 15 bits. */
+/* A scene is 10 m wide. Points lie up to `max_m` beside it, but at most as far as its width. Cells have numbers of 15
+ * bits. */
 static void cells_are_not_too_many(void **state)
 {
     (void)state;
     static const struct {
-        double max_m, cell_m, want_m; /* (10 + 2 reach) / want is up to 32766, and half of want is too small */
+        double max_m, cell_m, want_m; /* (10 + 2 reach) / want is up to 32766; half of want would be too small */
     } row[] = {{10, 1e-4, 16e-4}, {1, 1e-4, 4e-4},  {1000, 1e-4, 16e-4},
                {10, 5e-4, 10e-4}, {5, 5e-4, 10e-4}, {2, 5e-4, 5e-4}};
     struct scene *scene = load_text("floor.obj", "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\n");

@@ -163,7 +163,7 @@ static void turn_rates_change_anywhere(void **state)
     vlp16(&e);
     struct schedule_spec spec = turning(&e, 10 * HZ);
     schedule_start(&seg, &spec);
-    /* Turns so far, in parts of a micro-hertz nanosecond, are a sum of whole numbers. */
+    /* Turns so far are a sum of whole numbers, of micro-hertz times nanoseconds. */
     u128 turned = 0;
     int64_t last_ns = 0;
     for (int i = 0; i < 3000; i++) {
@@ -179,7 +179,7 @@ static void turn_rates_change_anywhere(void **state)
         assert_int_equal(schedule_time_ns(&seg, k + 1000), vlp16_ns(k + 1000));
         assert_true(schedule_mirror_turn(&seg, k) ==
                     (k % 2 == 0 ? -15.0 + (double)(k % 16) : (double)(k % 16)) / 360.0);
-        /* Each change cuts the phase to 2^-40 of a turn, so i of them leave it less than i of that behind. */
+        /* Each change rounds the phase down to 2^-40 of a turn. After i changes it is less than i of these behind. */
         const double within = (double)(turned % 1000000000000000u) / 1e15;
         double behind = within - schedule_pan_turn(&seg, k);
         behind -= floor(behind + 0.5);
@@ -189,7 +189,7 @@ static void turn_rates_change_anywhere(void **state)
     assert_int_equal(cast, k);
 }
 
-/* A window is one of the turning azimuth. The direction of each beam from there does not matter. */
+/* A window is an interval of the head's azimuth. A beam's own azimuth does not matter. */
 static void a_window_cuts_turns(void **state)
 {
     (void)state;
@@ -261,7 +261,7 @@ static void runs_say_the_same(void **state)
     assert_int_equal(schedule_longest_run(&seg, 100), 1);
 }
 
-/* The time from one firing sequence to the next, as a fraction in lowest terms; without a table that of a pulse. */
+/* The time from one firing sequence to the next is a fraction in lowest terms. Without a table it is a pulse's. */
 static void sequences_last_a_ratio_of_nanoseconds(void **state)
 {
     (void)state;
@@ -320,8 +320,8 @@ static void tables_that_do_not_fit_are_refused(void **state)
     assert_int_equal(e.tick_den, 1000);
 }
 
-/* A run may begin at any row of its table, and be cast in parts. Its pulses take one row after the other, and each time
- * round the table the pan has turned by a sequence (struct schedule_run). */
+/* A run may begin at any row of its table, and be cast in parts. Its pulses take one row after the other. For each
+ * round of the table the pan turns by one sequence (struct schedule_run). */
 static void angles_follow_the_table(void **state)
 {
     (void)state;

@@ -137,7 +137,7 @@ static void test_deconfigured(void **state)
     event(&rig, FUNCTIONFS_DISABLE);
     settle(&rig);
     assert_int_equal(usb_device_configuration(rig.host->device), 0);
-    /* and brings it back: what rested goes round again, both ways */
+    /* The host brings it back: reads and writes go on. */
     host_sends(&rig, "abc");
     event(&rig, FUNCTIONFS_ENABLE);
     settle(&rig);
@@ -224,7 +224,7 @@ static void test_failures_long_past(void **state)
         slot->buffer = (uint8_t *)16; /* the kernel can't write there */
         if (usb_device_read(rig.host->device, EP_OUT, bytes, sizeof bytes) != sizeof bytes)
             fail_msg("after %d transfers the endpoint rests", i);
-        slot->buffer = buffer; /* that one has failed, and the next one of this slot does not */
+        slot->buffer = buffer; /* that transfer has failed; this slot's next one will not */
         settle(&rig);
         assert_int_equal(slot->failures, 0);
         assert_int_equal(slot->state, FFS_AT_CORE);

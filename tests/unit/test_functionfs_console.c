@@ -220,9 +220,9 @@ static void a_slow_client_keeps_its_session(void **state)
     assert_int_equal(client_reads(port, bytes, sizeof bytes), 3); /* nothing else goes before it */
 }
 
-/* A client stops reading while the head goes on writing. The client's port counts as closed all the same: what it takes
- * counts, and not what waits. TURNS: what it has already got may be acknowledged between two seconds here, which is no
- * more than once for each of its last two packets. */
+/* A client stops reading while the head goes on writing. Its port counts as closed all the same: only bytes that the
+ * client takes keep it open. TURNS: bytes that it has already got may be acknowledged late, at most once for each of
+ * its last two packets. */
 static void writing_is_not_taking(void **state)
 {
     enum { FULL = 65536, TURNS = 6 };
@@ -266,8 +266,8 @@ static void a_lead_in_goes_in_parts(void **state)
     assert_memory_equal(bytes + lead_len - PART, "new", 3);
 }
 
-/* The tty has 16 requests, and shows that nobody reads only when all are in use. So texts use them up, byte by byte if
- * they are short. A KiB and more go out at once. */
+/* The tty has 16 requests, and shows that nobody reads only when all are in use. So a short text is split to use all of
+ * them, if need be byte by byte. A text of a KiB or more goes out at once. */
 static void a_short_text_takes_all_requests(void **state)
 {
     struct port *port = *state;

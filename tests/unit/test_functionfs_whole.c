@@ -74,7 +74,7 @@ static void begin(enum usb_personality_id id)
     if (open_backend("udc.0") != SH_OK) fail_msg("%s", err.text);
 }
 
-/* Nothing of it is left, in the kernel and in this process. */
+/* Frees the head. Nothing of the gadget may be left in the kernel. */
 static void end_head(void)
 {
     assert_int_equal(configfs_count(), 0);
@@ -266,7 +266,8 @@ static void test_faults(void **state)
     end();
 }
 
-/* A port alone has no ep0: the state of the controller shows what the host does, and a hang-up what it did between. */
+/* A port alone has no ep0. The state of the controller shows what the host does. A hang-up shows that the device was
+ * not configured for a while. */
 static void test_port_alone(void **state)
 {
     (void)state;

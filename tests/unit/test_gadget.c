@@ -121,7 +121,7 @@ static void test_console_and_stream(void **state)
     expect_gone();
 }
 
-/* A port alone is no matter for FunctionFS. */
+/* A gadget with only a port needs no FunctionFS. */
 static void test_port_alone(void **state)
 {
     (void)state;
@@ -195,7 +195,7 @@ static void test_older_kernels(void **state)
         configfs.unmounted[0] = '\0';
     }
     configfs.no_file = NULL;
-    configfs.is_unmounted = 1; /* mounted here */
+    configfs.is_unmounted = 1; /* make() must mount configfs */
     assert_int_equal(make(&scanhead_usb_model), SH_OK);
     assert_int_equal(configfs.is_unmounted, 0);
     configfs.taken = 99; /* by other heads of this process */
@@ -292,7 +292,7 @@ static void test_missing_modules(void **state)
     }
 }
 
-/* f_acm has the first interfaces, so a port comes first, and there is one. */
+/* f_acm has the first interfaces, so a port comes first, and only one is allowed. */
 static void test_where_a_port_is(void **state)
 {
     (void)state;

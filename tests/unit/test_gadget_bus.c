@@ -62,7 +62,7 @@ static void test_plugging(void **state)
     assert_int_equal(configfs_count(), 0);
 }
 
-/* The states of the chapter 9 of USB 2.0, as the kernel calls them (usb_state_string). */
+/* The states are those of USB 2.0's chapter 9, as the kernel calls them (usb_state_string). */
 static void test_states(void **state)
 {
     (void)state;
@@ -167,8 +167,8 @@ static size_t put(uint8_t *to, size_t at, const void *bytes, size_t n)
     return at + n;
 }
 
-/* The bulk pair at two rates. Counts are of descriptors: an interface and two endpoints. WinUSB is announced by a
- * compatible id and by a property (OS descriptors 1.0). */
+/* The bulk pair is described at full and high speed. Counts are of descriptors: an interface and two endpoints. WinUSB
+ * is announced by a compatible id and by a property (OS descriptors 1.0). */
 static void test_description(void **state)
 {
     (void)state;
@@ -191,14 +191,14 @@ static void test_description(void **state)
     le_put32(want + 4, (uint32_t)at);
     describe(&pair_model, USB_RATE_HIGH);
     expect_write(want, at);
-    /* The interface's string alone: the function's is none. */
+    /* Only the interface has a string; the function has none. */
     static const uint8_t strings[] = {2, 0, 0, 0, 28,  0,    0,    0,   1,   0,    0,    0,    1,    0,
                                       0, 0, 9, 4, 'B', 0xc3, 0xa4, 'r', ' ', 0xf0, 0x9f, 0x90, 0xbb, 0};
     expect_write(strings, sizeof strings);
     end_description();
 }
 
-/* Functions may lack WinUSB, or have an id of their own and no property. The device has one rate here. */
+/* Functions may lack WinUSB, or have an id of their own and no property. The device has one speed here. */
 static void test_plain_descriptions(void **state)
 {
     (void)state;
@@ -226,7 +226,7 @@ static void test_plain_descriptions(void **state)
     end_description();
 }
 
-/* At super speed there are companions as well: five descriptors. Only the stream of the head is described. */
+/* At super speed endpoints have companions: five descriptors in all. Only the stream of the head is described. */
 static void test_super_speed(void **state)
 {
     (void)state;
@@ -246,7 +246,7 @@ static void test_super_speed(void **state)
     end_description();
 }
 
-/* The kernel takes neither, or only the descriptors. */
+/* The kernel refuses the descriptors, or takes them and refuses the strings. */
 static void test_refused_descriptions(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A journal and a file of the truth whose reader rests for a while: lines that are missing are said where they are
- * missing. A pipe takes the place of a slow disk. */
+/* A journal and a file of the truth whose reader rests for a while: each reports missing lines at their place. A pipe
+ * takes the place of a slow disk. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -54,7 +54,7 @@ static int teardown(void **state)
     return close(file.end[0]);
 }
 
-/* Its writer has a descriptor of its own. */
+/* Starts the reader. The file's writer has opened a descriptor of its own. */
 static void reader_start(void)
 {
     close(file.end[1]);

@@ -56,7 +56,7 @@ static int see(const struct geoframe *frame, enum georef_crs crs, int zone, cons
     }
     georef_reverse(georef, p, back);
     for (int i = 0; i < 3; i++)
-        assert_near(back[i], point_m[i], 3e-8); /* two ways of 5 nm and rounding at 5e6 m */
+        assert_near(back[i], point_m[i], 3e-8); /* there and back with 5 nm each, and rounding at 5e6 m */
     double anchor[3];
     georef_anchor(georef, anchor);
     for (int i = 0; i < 3; i++)
@@ -188,7 +188,7 @@ static void a_grid_is_turned_by_its_convergence(void **state)
         const double d[3] = {n[0] - s[0], n[1] - s[1], 0};
         ok(geoframe_to_enu(&frame, p, turn, &err));
         mat3_apply(turn, d, enu);
-        /* 10 nm in 22 m, and the meridian's curvature on the grid, which cancels between the two steps */
+        /* The projection is good to 10 nm in 22 m. The meridian's curvature cancels between the two steps. */
         assert_near(atan2(enu[0], enu[1]), 0, 3e-9);
     }
 }

@@ -229,7 +229,7 @@ static void test_borders(void **state)
     }
 }
 
-/* This includes blocks of any length, and values that are not in place. */
+/* A point with a NaN becomes NaN, and in the local frame only its coordinate, also where results replace the input. */
 static void check_nan(const struct georef *georef, int is_local)
 {
     enum { N = 300 };

@@ -7,7 +7,7 @@
 enum { POINTS = 48 };
 static const double RADIUS_M = 2000, HEIGHT_M = 20;
 
-/* The scene's x axis goes up by so much from the east, and y stays north. */
+/* The scene's x axis is tilted upward from east by so many degrees, and y stays north. */
 static struct georef *make_tilted(enum georef_crs crs, double lat_deg, double tilt_deg)
 {
     const double s = sin(angle_rad(tilt_deg)), c = cos(angle_rad(tilt_deg));
@@ -57,14 +57,14 @@ static void test_tilted(void **state)
             if (!(error_m <= bound_m))
                 fail_msg("latitude %g, tilted by %g, EPSG %d, order %d: off by %.3g m, bound %.3g m", lat, tilt,
                          georef_epsg(georef), 1 + (int)m - (int)GEOREF_ORDER1, error_m, bound_m);
-            /* The bound is not much too large: a turned cylinder counts as a ball, and orders add up their terms. */
+            /* The bound is not much too large. It takes a turned cylinder as a ball, and adds up terms of orders. */
             assert_true(m != GEOREF_ORDER1 || bound_m < 10 * error_m);
         }
         georef_free(georef);
     }
 }
 
-/* Scenes in a polar grid, whose points become degrees: at both poles, all around. */
+/* Scenes lie in a polar grid, at both poles and all around, and their points become degrees. */
 static void test_polar_grids(void **state)
 {
     (void)state;

@@ -54,8 +54,8 @@ static struct georef *make_on(const struct georef_geoid *geoid, enum georef_crs 
     return georef;
 }
 
-/* The station's height is 500 m less 40 m. 20 km to the north the geoid is 0.18 m higher, so heights there are that
- * much less than above the ellipsoid. Interpolation rounds in 1e-12 of some hundred metres. */
+/* The station is 500 m above the ellipsoid, and 460 m above the geoid. 20 km to the north the geoid is 0.18 m higher,
+ * so heights above it are that much less. Interpolation rounds in 1e-12 of some hundred metres. */
 static void test_heights(void **state)
 {
     (void)state;

@@ -63,7 +63,7 @@ static void specs(void **state)
     struct georef *georef = NULL;
     for (size_t i = 0; i < sizeof is / sizeof is[0]; i++)
         refused(georef_create(&is[i].spec, &georef, &err), is[i].says);
-    /* The highest zones are some. */
+    /* The highest zone is allowed. */
     const struct georef_spec last = {.crs = GEOREF_UTM, .lat_deg = 10, .lon_deg = 177, .utm_zone = 60};
     assert_int_equal(georef_create(&last, &georef, &err), SH_OK);
     assert_int_equal(georef_epsg(georef), 32660);
@@ -128,7 +128,7 @@ static void methods(void **state)
     georef_free(utm);
 }
 
-/* A scene in UPS, so far from the pole: metres of the grid over 0.994. */
+/* Makes a scene in UPS, away_m from the pole. Metres of its grid are 0.994 of those on the ground. */
 static struct georef *near_pole(double away_m)
 {
     struct georef_place at;

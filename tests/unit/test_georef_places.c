@@ -119,7 +119,7 @@ static void test_scale(void **state)
         if (lat_deg > 90) break;
         struct georef *georef = make(GEOREF_GEODETIC, lat_deg, 179.999, 50 * i, 0);
         assert_int_equal(georef_scale(georef, scale_m, reach_m, scale, &err), SH_OK);
-        /* a full turn of a circle of twice the reach in 2^32 counts, where that is longer */
+        /* near a pole counts may be longer: a full turn at up to twice the reach has 2^32 */
         double longest_m = fmax(scale_m, 2 * PI * reach_m / 2147483647.0) * 1.000001;
         for (int k = 0; k < 64; k++) {
             double angle = k * PI / 32, d[3], p_ecef[3];
@@ -142,12 +142,12 @@ static void test_scale(void **state)
     double scale[3];
     assert_int_equal(georef_scale(georef, 1e-6, 100e3, scale, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "do not fit into 31 bits"));
-    for (int i = 0; i < 40; i++) { /* the scale that the text names is taken */
+    for (int i = 0; i < 40; i++) { /* the scale that the error names is accepted */
         double reach_m = 3e3 * (1 + 0.137 * i), least_m = 0;
         assert_int_equal(georef_scale(georef, 1e-7, reach_m, scale, &err), SH_EINPUT);
         assert_int_equal(sscanf(strstr(err.text, "at least "), "at least %lg m", &least_m), 1);
         if (georef_scale(georef, least_m, reach_m, scale, &err) != SH_OK) fail_msg("%s", err.text);
-        /* A geoid's height may change by 1 % of the distance, and it is named to three digits. */
+        /* A geoid may change heights by 1 % of the distance. The scale is named to three digits. */
         assert_true(least_m * 2147483647.0 >= 1.01 * reach_m && least_m * 2147483647.0 < 1.04 * reach_m);
     }
     assert_int_equal(georef_scale(georef, 1e-4, 100e3, scale, &err), SH_OK);
@@ -155,7 +155,7 @@ static void test_scale(void **state)
     georef_free(georef);
 }
 
-/* The other hemisphere has its false northing and its code. A scene in a grid of the south keeps that. */
+/* A place may use the other hemisphere's grid, its false northing and code. A scene in a southern grid keeps that. */
 static void test_sides(void **state)
 {
     (void)state;
@@ -183,8 +183,8 @@ static void test_sides(void **state)
     georef_free(georef);
 }
 
-/* For degrees the difference is the short way, and the axes are east, north, up. The map bends by less than 1e-9 over
- * the steps that its axes are taken from. The ellipsoid's own 100 m / 6.4e6 m cancels on both sides. */
+/* A difference in degrees is the short way round, and the axes are east, north, up. The axes are taken from steps over
+ * which the map bends by less than 1e-9. The ellipsoid's own 100 m / 6.4e6 m cancels between two opposite steps. */
 static void test_degrees(void **state)
 {
     (void)state;

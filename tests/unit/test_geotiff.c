@@ -40,7 +40,7 @@ static void refuse_tif(const struct tif *t, const char *expected)
 static void assert_vertex(const struct scene *s, uint32_t i, double x, double y, double z)
 {
     const double *v = s->vertex_m[i];
-    /* The test's arithmetic is in another order: some units of the last place of 5.3e6, which is 9e-10. */
+    /* The test adds in another order: that may differ by some units of the last place of 5.3e6, 9e-10 each. */
     if (!(fabs(v[0] - x) <= 4e-9 && fabs(v[1] - y) <= 4e-9 && v[2] == z))
         fail_msg("vertex %u at %.10f %.10f %.10f instead of %.10f %.10f %.10f", i, v[0], v[1], v[2], x, y, z);
 }
@@ -169,7 +169,7 @@ static void a_transformation(void **state)
     }
 }
 
-/* Cell 1, 1 of 5 x 4 is a hole. Three triangles of its four quads stay by the other corners; 4 quads lose half. */
+/* Cell 1, 1 of 5 x 4 is a hole. Each of the four quads around it keeps the triangle of its other corners. */
 static void holes(void **state)
 {
     (void)state;
@@ -207,7 +207,7 @@ static void holes(void **state)
     refuse_tif(&t, "none of 5 x 4 cells has a height");
 }
 
-/* Feet come by the system, by keys, or by GDAL's word; scale and offset by GDAL. */
+/* Feet are given by the system, by keys, or by GDAL's metadata; scale and offset by GDAL's metadata alone. */
 static void units(void **state)
 {
     (void)state;
@@ -388,7 +388,7 @@ static void what_is_refused(void **state)
     WITH("its tag 42112 has 65536 bytes; allowed are up to 65535", t.metadata = many);
 }
 
-/* Another up or scale would turn the terrain over, or shrink it. A mask beside it marks the holes. */
+/* Another up would turn the terrain over, and another scale would shrink it. A mask file beside it would mark holes. */
 static void refuse_spec(const struct scene_mesh_spec *spec, const char *expected)
 {
     struct scene *scene;

@@ -104,7 +104,7 @@ static void heights_above_an_ellipsoid_are_not_doubted(void **state)
     }
 }
 
-/* The geoid's height is exact with an offset of the same height, else tangent. */
+/* The raster's height_m is exact where the mesh has an offset of the same height. Else the frame is tangent. */
 static void height_m_is_that_of_the_raster_s_zero(void **state)
 {
     (void)state;

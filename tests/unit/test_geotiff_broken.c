@@ -164,7 +164,7 @@ static void the_broken_block_is_named(void **state)
     }
 }
 
-/* Up to 9000 m and down to -11500 m heights may be of the Earth. -9999 is what many files have where there are none. */
+/* Heights from -11500 to 9000 m may be of the Earth. But -9999 is what many files have where there is no height. */
 static void heights_at_their_bounds(void **state)
 {
     (void)state;

@@ -138,7 +138,7 @@ static void sizes_in_all_forms(void **state)
         }
 }
 
-/* A tie point alone is no place. With more than one they are control points. */
+/* A tie point without a scale is no place. Several tie points are control points. */
 static void places_that_are_no_grid(void **state)
 {
     (void)state;
@@ -266,7 +266,7 @@ static void set_keys(struct made *m, uint16_t keys[8], unsigned id, unsigned val
     add(m, 34735, SHORT, 8, keys);
 }
 
-/* Codes of 5001 to 5033 count from an ellipsoid. A code whose value is in another tag is ignored. */
+/* Codes 5001 to 5033 mean heights above an ellipsoid. A code whose value is in another tag is ignored. */
 static void codes_of_heights(void **state)
 {
     (void)state;

@@ -121,7 +121,8 @@ static void quantized_positions(void **state)
     }
 }
 
-/* Two of four zeros are replaced; a sparse accessor is over a buffer view; one is all zeros, a corner at the origin. */
+/* Two of four values are replaced. One sparse accessor is over zeros, with a corner at the origin, one over a buffer
+ * view. */
 static void sparse_accessors(void **state)
 {
     (void)state;

@@ -44,7 +44,7 @@ static void required_and_harmless(void **state)
     scene_free(s);
 }
 
-/* The share of light that goes through is kept, and not used. */
+/* The share of light that goes through is kept. A value that the format doesn't allow is left out, with a warning. */
 static void transparency_is_kept(void **state)
 {
     (void)state;
@@ -209,9 +209,9 @@ static void meshopt_is_unpacked(void **state)
 
 /* ---- placement of textures */
 
-/* u' = offset + R * S * u, with v down. The set of the transform counts, and may stand before the first. A quarter
- * turn with the scale 1/2 and the offset (0, 1) is the example of the extension's text: the lower left quarter of the
- * image. */
+/* u' = offset + R * S * u, with v down. The transform's own set of coordinates counts, and may stand before the first
+ * set. A quarter turn with the scale 1/2 and the offset (0, 1) is the example of the extension's text: the lower left
+ * quarter of the image. */
 static void turned_textures(void **state)
 {
     (void)state;
@@ -239,7 +239,7 @@ static void turned_textures(void **state)
 
 /* ---- materials */
 
-/* The names that a second material and one without a name would get are names of other materials already. */
+/* A second material of a name, and one without a name, get made-up names. Other materials have these already. */
 static void made_names_are_no_others(void **state)
 {
     (void)state;

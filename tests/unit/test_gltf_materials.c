@@ -24,8 +24,8 @@ static double srgb(double v)
     return v <= 0.0031308 ? 12.92 * v : 1.055 * pow(v, 1 / 2.4) - 0.055;
 }
 
-/* A factor that is not given is white and opaque. Alpha is transparency of blended materials alone. What is transmitted
- * counts where it is more. */
+/* A factor that is not given is white and opaque. Alpha is transparency of blended materials alone. Of transparency and
+ * transmission the larger counts. */
 static void colours_and_transparency(void **state)
 {
     (void)state;
@@ -95,7 +95,7 @@ static void opacities_of_holes(void **state)
         if (s->surface[0].solid != row[i].solid) fail_msg("%zu: %g", i, (double)s->surface[0].solid);
         assert_int_equal(s->n_textures, 1);
         assert_true(s->texture[0].n_bytes == len && memcmp(s->texture[0].bytes, png, len) == 0);
-        assert_non_null(strstr(s->texture[0].file, "a.glb*0")); /* named as its file, and by its number */
+        assert_non_null(strstr(s->texture[0].file, "a.glb*0")); /* the file's name, and the image's number */
         assert_true(s->texture[0].wrap[0] == TEXTURE_REPEAT && s->texture[0].wrap[1] == TEXTURE_REPEAT);
         scene_free(s);
         free(png);

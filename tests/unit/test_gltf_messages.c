@@ -141,7 +141,7 @@ static void buffers_are_named(void **state)
                 "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
                 "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]}",
                 "accessors[0]: 3 elements from byte 0 on go beyond bufferViews[0], which has 0 bytes");
-    /* A buffer without a length may be of any; what the view says is looked at. */
+    /* The end of a view is compared with the buffer's data, also where the buffer gives no length. */
     refuse_text(BUFFERS("{\"uri\":\"data:;base64,\"}", "\"buffer\":0,"),
                 "bufferViews[0]: bytes 0 to 36 go beyond buffers[0], which has 0");
     refuse_text(BUFFERS("{\"byteLength\":3,\"uri\":\"data:;base64,AAAA\"}", "\"buffer\":0,"),

@@ -27,8 +27,8 @@ static void refuse_tree(const char *tree, const char *says)
     gltf_refuse(rest, says);
 }
 
-/* The order in JSON does not count: the buffer's views come before, the nodes after their references. Without a scene
- * all roots count. */
+/* The order in JSON does not count: views may come before what refers to them, nodes after it. Without a scene all
+ * roots count. */
 static void order_and_scenes(void **state)
 {
     (void)state;
@@ -56,7 +56,7 @@ static void matrices_and_their_parts(void **state)
     check_tree("\"nodes\":[{\"mesh\":0,\"matrix\":[0,0,-2,0, 0,2,0,0, 2,0,0,0, 3,1,0,1]}]", low, high, 0.0);
     check_tree("\"nodes\":[{\"mesh\":0,\"translation\":[3,1,0],\"rotation\":[0,0.7071067811865476,0,"
                "0.7071067811865476],\"scale\":[2,2,2]}]",
-               low, high, 1e-14); /* of 4: two roundings of 2^-52 */
+               low, high, 1e-14); /* two roundings of 2^-52, of values up to 4 */
     refuse_tree("\"nodes\":[{\"mesh\":0,\"matrix\":[1,0,0,0.5, 0,1,0,0, 0,0,1,0, 0,0,0,1]}]",
                 "nodes[0].matrix has the last row 0.5 0 0 1; allowed is 0 0 0 1");
     refuse_tree("\"nodes\":[{\"mesh\":0,\"rotation\":[0,0,0,0]}]", "nodes[0].rotation is 0 0 0 0");
@@ -281,7 +281,7 @@ static void morph_targets_by_default_weights(void **state)
     }
 }
 
-/* A target of bytes, at a weight of 0.01, is rounded by up to half of 0.01 m; at twice the size by 0.01 m. */
+/* A target of bytes, at a weight of 0.01, is rounded by up to half of 0.01 m. Scaled by two, that is 0.01 m. */
 static void morph_targets_may_be_whole_numbers(void **state)
 {
     (void)state;

@@ -40,14 +40,14 @@ static void apply(double m[3][4], const double p[3], double out[3])
         out[r] = m[r][0] * p[0] + m[r][1] * p[1] + m[r][2] * p[2] + m[r][3];
 }
 
-/* The same with absolute values: what rounding of numbers of a file is a share of. */
+/* The same with absolute values: rounding errors are a share of them. */
 static void reach(double m[3][4], const double p[3], double out[3])
 {
     for (int r = 0; r < 3; r++)
         out[r] = fabs(m[r][0]) * p[0] + fabs(m[r][1]) * p[1] + fabs(m[r][2]) * p[2] + fabs(m[r][3]);
 }
 
-/* Where a corner goes, and the most of its absolute terms. */
+/* Writes where a corner goes. Returns the largest sum of absolute values. */
 static double blend(int k, double out[3])
 {
     double sum = 0, far[3] = {0}, most = 0;
@@ -146,8 +146,8 @@ static void eight_joints_a_corner(void **state)
             if (!(fabs(s->vertex_m[k][r] - want[r]) < 1e-12))
                 fail_msg("corner %d: %g, %g", k, s->vertex_m[k][r], want[r]);
     }
-    /* Floats have errors up to 6e-8: those of the position, and of the inverse bind matrices. Two digits are rounded
-     * up. */
+    /* Floats of positions and of inverse bind matrices have errors up to 6e-8 each. The error is rounded up to two
+     * digits. */
     const double error_m = 2 * 6e-8 * most;
     if (!(s->error_m >= error_m && s->error_m < 1.1 * error_m)) fail_msg("%g m, not %g m", s->error_m, error_m);
     scene_free(s);

@@ -115,8 +115,8 @@ static void offset_enu(double lat_deg, double lon_deg, double height_m, const st
     d[2] = cos(lat) * cos(lon) * x + cos(lat) * sin(lon) * y + sin(lat) * z;
 }
 
-/* Half a step of the last digit. 0.5e-7' are 0.093 mm north (a minute is at most 1861.6 m), and as much east at the
- * equator. Two heights of 4 decimals have 0.05 mm each. The coordinates themselves are good to 1e-9 m. */
+/* The bound is half a step of the last digit. 0.5e-7' are 0.093 mm north (a minute is at most 1861.6 m), and as much
+ * east at the equator. Two heights of 4 decimals have 0.05 mm each. The coordinates themselves are good to 1e-9 m. */
 #define STEP_M 0.0001
 
 static void check_antenna(const char *lat, const char *lon, const char *heading, const char *arm, const double enu[3])
@@ -186,7 +186,7 @@ static void times_are_those_of_the_rate(void **state)
         assert_string_equal(get_fix(&r, 60, 0).time, rate[i].later);
         assert_true(gnss_time_ns(&r.gnss, 0) == rate[i].first_ns);
         assert_int_equal(gnss_count(&r.gnss, 0), 0);
-        for (uint64_t k = 0; k < 100; k++) { /* none before its moment, each from the nanosecond after it on */
+        for (uint64_t k = 0; k < 100; k++) { /* no fix counts before its time; each does from a nanosecond later */
             int64_t t_ns = rate[i].first_ns + (int64_t)k * rate[i].period_ns;
             assert_true(gnss_time_ns(&r.gnss, k) == t_ns);
             assert_int_equal(gnss_count(&r.gnss, t_ns), k);

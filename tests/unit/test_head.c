@@ -10,7 +10,7 @@
 
 #include "firmware_sim/command/head.h"
 
-/* All pairs, by name, as on paper; "-" is refused. */
+/* All pairs of a state and an event, by name; "-" is refused. */
 static const char *const event_order[HEAD_N_EVENTS] = {"power-on", "power-off", "booted",    "start", "spun-up",
                                                        "stop",     "done",      "spun-down", "fail",  "reset"};
 static const struct {

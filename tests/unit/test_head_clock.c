@@ -112,8 +112,8 @@ static void jumps(void **state)
     assert_true(e.at_ns[5] == 5250000000 && e.tai_s[5] == TAI0_S + 6);
 }
 
-/* The expected clock, in exact integers and in one sum. Each gain counts for the time that it overlaps with, without
- * the time in which the clock stands. Windows are in ns, gains in 1e-12. */
+/* The expected clock is one sum of exact integers. Each gain counts for the time of its window, without the time in
+ * which the clock stands. Windows are in ns, gains in 1e-12. */
 static const struct {
     int64_t from_ns, until_ns, ppt;
 } GAIN[] = {{0, INT64_MAX, -3000000}, {1234567891, 7777777777, 123456789}, {2000000000, 9100000001, -31000000000}};
@@ -143,7 +143,7 @@ static int64_t expected_ns(int64_t t_ns)
     }
     for (int j = 0; j < 3; j++)
         if (t_ns >= JUMP[j][0]) shown_ns += JUMP[j][1];
-    /* The floor, by adding whole hours. */
+    /* Whole hours are added, so that the division rounds down. */
     return shown_ns + (int64_t)((sum + ppt * INT64_C(3600000000000)) / ppt - INT64_C(3600000000000));
 }
 
@@ -193,7 +193,7 @@ static void changes(void **state)
     assert_true(n == e.n && n > 6);
 }
 
-/* The clock reaches a full second as it begins to stand. Later it would run backwards. */
+/* The clock reaches a full second as it begins to stand. Later a gain would make it run backwards, so it stands. */
 static void stands_on_a_second(void **state)
 {
     (void)state;
@@ -215,7 +215,7 @@ static void forgets_the_oldest(void **state)
     enum { N = 3 * HEAD_CLOCK_CHANGES };
     for (int64_t i = 1; i <= N; i++)
         head_clock_change(&clock, i * 1000000, &(struct head_clock_change){.jump_ns = 1, .gain_ppt = 1000000});
-    /* Gains i ppm in its i-th millisecond, i ns each: N (N - 1) / 2 up to change N; and N jumps of 1 ns. */
+    /* In its i-th millisecond it gains i ppm, that is i ns: N (N - 1) / 2 up to change N. N jumps add 1 ns each. */
     assert_true(head_clock_ns(&clock, N * 1000000) ==
                 head_clock_true_ns(&clock, N * 1000000) + (int64_t)N * (N - 1) / 2 + N);
 }
@@ -277,7 +277,7 @@ static void the_systems_clock(void **state)
     int64_t utc_ns = utc_posix_from_tai(&clock.table, head_clock_ns(&clock, 0));
     assert_true(utc_ns >= before.tv_sec * UTC_SECOND_NS + before.tv_nsec - 1000000);
     assert_true(utc_ns <=
-                after.tv_sec * UTC_SECOND_NS + after.tv_nsec + 1000000); /* slewing, never so much in a moment */
+                after.tv_sec * UTC_SECOND_NS + after.tv_nsec + 1000000); /* slewing moves it far less than 1 ms here */
 }
 
 /* CLOCK_TAI is taken where the system has set its offset, and refused where it equals UTC. */

@@ -303,7 +303,7 @@ static void next(const char **at, const char *want)
     *at += n;
 }
 
-/* Each key of both tables in its order, with what it takes and its help. */
+/* Expects each key of a table in its order, with what it takes and its help. */
 static void next_keys(const char **at, enum config_keys keys, const char *title)
 {
     static struct config_key_text key;
@@ -349,7 +349,7 @@ static void the_page_of_the_configuration(void **state)
 
 /* ---- for a shell */
 
-/* The number of an element that is typed is that of the first one. */
+/* Prints a key's path as it is typed: the number of each element is 0. */
 static void put_typed(FILE *out, const char *path)
 {
     for (; *path != '\0'; path++)
@@ -377,8 +377,8 @@ static void put_table(FILE *out)
     fputs("    esac\n}\n\n", out);
 }
 
-/* An option has the words of its row or of its key, or small words and numbers among its alternatives. Else its
- * argument says whether it is a file. */
+/* An option's words are those of its row or of its key, or the small words and numbers that its argument lists. Else
+ * its argument says whether it is a file. */
 static void the_tables_of_the_completion(void **state)
 {
     (void)state;

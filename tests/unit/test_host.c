@@ -196,7 +196,7 @@ static void test_file(void **state)
     put_descriptor(fd, 1, 1, 0);
     put_anchor(fd, 0);
     put_points(fd, 1, 0);
-    /* The stream has a frame cut at its end, and a whole one hidden in its length. */
+    /* One frame is cut at its end, and its length covers the whole frame after it. */
     struct line_block block = make_block(100, 1);
     native_encode_points(out, sizeof out, &block, 0);
     native_finish_frame(out, rig_next_seq());
@@ -221,7 +221,7 @@ static void test_file(void **state)
     unlink(path);
 }
 
-/* Compares times within a second, across its end, back and forth, and of a broken stream. */
+/* Times of an array equal those one by one: within a second, across its end, back and forth, at the ends of int64. */
 static void expect_same_times(const struct scanhead *sh)
 {
     static const int64_t from_step_ns[][2] = {

@@ -87,7 +87,7 @@ static void test_all_values(void **state)
     scanhead_close(sh);
 }
 
-/* Some are asked for, or none. */
+/* A client asks for some of the values, or for none. */
 static void test_parts(void **state)
 {
     (void)state;

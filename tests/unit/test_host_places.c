@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* libscanhead: a frame of points depends on other frames. Tested are its place and until when that holds, the frames
- * that follow it, its emitter, the head's clock, and the turn between two poses. */
+/* libscanhead: a frame of points depends on other frames. The tests cover its anchor and until when that holds, the
+ * frames that follow it, its emitter, the head's clock, and the turn between two poses. */
 #include <math.h>
 
 #include "tests/unit/host_rig.h"

@@ -92,7 +92,7 @@ static void test_restart(void **state)
     scanhead_close(sh);
 }
 
-/* Another sequence begins with the frames of before: its descriptor is dropped as repeated, and holds all the same. */
+/* Another sequence begins with a descriptor equal to the last one. It is dropped as repeated, and still holds. */
 static void test_alike(void **state)
 {
     (void)state;
@@ -123,8 +123,8 @@ static void test_alike(void **state)
     scanhead_close(sh);
 }
 
-/* A repeated frame, or a descriptor for this reader alone, holds for a sequence that begins right after it. Once a
- * frame has gone by, it doesn't. */
+/* A repeated frame, or a descriptor for this reader alone, holds for a sequence that begins right after it. Once
+ * another frame has come between, it doesn't hold. */
 static void test_alike_long_ago(void **state)
 {
     (void)state;

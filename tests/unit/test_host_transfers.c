@@ -104,7 +104,7 @@ static void test_unplug_at_once(void **state)
     expect_lost(sh);
 }
 
-/* The bus shows a device that goes by errors at first. */
+/* An unplugging shows as errors of the bus at first. */
 static void test_unplug_with_errors(void **state)
 {
     (void)state;
@@ -118,7 +118,7 @@ static void test_unplug_with_errors(void **state)
     expect_lost(sh);
 }
 
-/* The hub never reports it. After a while the head is lost all the same. */
+/* The hub never reports the unplugging. After a while the head is lost all the same. */
 static void test_errors_without_end(void **state)
 {
     (void)state;
@@ -153,7 +153,7 @@ static void bus_resets(enum libusb_transfer_status status)
     script_events(6, 9);
     expect_events(sh, 6, 9);
     unplug();
-    assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ELOST); /* and that is one */
+    assert_int_equal(scanhead_next(sh, &frame, TIMEOUT_MS), SCANHEAD_ELOST); /* this is an unplugging */
     close_head(sh);
 }
 
@@ -198,7 +198,7 @@ static void ask_after(struct scanhead *sh, const char *settling)
     if (scanhead_command(sh, "TIME?", reply, sizeof reply, TIMEOUT_MS) != 0) fail_msg("%s", scanhead_error(sh));
     assert_string_equal(reply, "12");
     snprintf(written, sizeof written, "%sTIME?\n", settling);
-    assert_string_equal(bus.written, written); /* it alone, and once */
+    assert_string_equal(bus.written, written); /* nothing else, and once */
 }
 
 static void ask(struct scanhead *sh)
@@ -218,7 +218,7 @@ static void test_write_fails(void **state)
         const int cleared = bus.n_clear_halts;
         fake_script(FAKE_OUT, failures[i], NULL, 0);
         assert_int_equal(scanhead_command(sh, "SCAN:STOP", reply, sizeof reply, 20), SCANHEAD_ETIMEOUT);
-        ask_after(sh, "\n*IDN?\n"); /* into step first */
+        ask_after(sh, "\n*IDN?\n"); /* it finds its place among the replies first */
         ask(sh);
         assert_int_equal(bus.n_clear_halts, cleared + 1);
     }

@@ -91,7 +91,7 @@ static int scripted_wait(struct host_source *source, short events, int64_t deadl
 {
     (void)source, (void)deadline_ns;
     *revents = events & POLLOUT;
-    return *revents != 0; /* nothing comes later than at once */
+    return *revents != 0; /* data that is not there at once never comes */
 }
 
 /* A command is sent whole, whatever pieces the system takes. After an error within it no other command may follow. */

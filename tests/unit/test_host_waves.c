@@ -100,7 +100,7 @@ static void test_values(void **state)
     assert_true(fabs(w[3].range_m - 300 * 0.299792458) < 1e-12);
     assert_true(fabs(w[3].step_m - 0.299792458) < 1e-15);
     assert_true(scanhead_wave_signal(&w[3], 1) == 145.75);
-    /* The angles are a count wrong at most, and the direction as many radians. */
+    /* Each angle is wrong by a count at most, 2 pi / counts in radians, and moves the direction by as much. */
     const double error = 7 / d.mirror_counts_per_turn + 7 / d.pan_counts_per_turn;
     assert_true(fabs(w[3].direction[0] - sqrt(0.75)) < error && fabs(w[3].direction[1]) < error);
     assert_true(fabs(w[3].direction[2] - 0.5) < error);
@@ -177,8 +177,7 @@ static void test_lost(void **state)
     scanhead_close(sh);
 }
 
-/* A client that knows nothing of waveforms passes over them: its points and line ends are there. Damaged contents
- * with a good checksum are refused, and the next frame comes. */
+/* Damaged contents of a frame of waveforms, with a good checksum, are refused, and the next frame comes. */
 static void test_wrong(void **state)
 {
     (void)state;

@@ -128,7 +128,6 @@ static void test_longest(void **state)
     }
 }
 
-/* HEAD answers as GET, without the body. */
 /* RFC 9110, section 5.6.1: elements may be empty, and have blanks around them. */
 static void test_lists(void **state)
 {
@@ -145,6 +144,7 @@ static void test_lists(void **state)
     }
 }
 
+/* HEAD answers as GET, without the body. */
 static void test_head_method(void **state)
 {
     (void)state;
@@ -201,7 +201,7 @@ static void test_pages_from_elsewhere(void **state)
         assert_int_equal(http_status(), cases[i].status);
         http_assert_command(cases[i].status == 200 ? "HEAD:LINES 10.000000" : NULL);
     }
-    /* HTTP/1.0 may come without a Host, which an origin could be that of. */
+    /* An HTTP/1.0 request may lack a Host. Then no origin equals it. */
     http_renew();
     http_send("POST /cgi/setting HTTP/1.0\r\nOrigin: http://\r\nContent-Length: 7\r\n\r\nrpm=600");
     assert_int_equal(http_status(), 403);

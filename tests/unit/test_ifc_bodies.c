@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A reader of IFC hands back products, parts and figures: tests byte by byte, and each thing that may be wrong. */
+/* Products, parts and figures that a reader of IFC hands back. The test writes them byte by byte, also wrong ones. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -39,7 +39,7 @@ static size_t put_product(uint32_t id, uint32_t n_parts, uint32_t n_failures, co
     return at;
 }
 
-/* Sizes, colour and largest coordinate; then the vertices and faces of the cube, the first ones of them. */
+/* Writes sizes, colour and largest coordinate, then the cube's vertices and first n_faces faces. Returns the begin. */
 static size_t put_part(uint32_t n_faces, const float colour[4], double largest_m)
 {
     uint8_t head[32];
@@ -111,8 +111,8 @@ static void products_by_number(void **state)
     assert_true(bodies.bytes == NULL && bodies.part == NULL && bodies.body == NULL);
 }
 
-/* A cube of 1 m has 6 m2 and 1 m3. Without a triangle of 0.5 m2 it is open, by an estimate that is
- * no more than that. */
+/* A cube of 1 m has 6 m2 and 1 m3. Without a triangle of 0.5 m2 it is open. The estimate of the open area is at most
+ * that. */
 static void figures_of_a_cube(void **state)
 {
     (void)state;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Damaged IFC files, each with one change drawn from a seed. Both readers answer or are ended, and an error is one
- * line. Each product that the file's own records still have is there, or is reported. BROKEN_FILES=84: so many (8). The
- * tests are skipped where npm has not installed the readers. */
+ * line. Each product that the file's own records still have is there, or is reported. BROKEN_FILES=84 tries so many
+ * files (default 8). The tests are skipped where npm has not installed the readers. */
 #include "core/import/ifc/ifc_read.h"
 #include "core/import/ifc/ifc_records.h"
 #include "tests/unit/ifc_files.h"

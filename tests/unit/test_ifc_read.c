@@ -62,9 +62,9 @@ static void measure(size_t product, double *area, double *volume)
     }
 }
 
-/* A regular polygon of n sides within a circle has sin(2 x) / (2 x) of its area, for x = pi / n: 2 x^2 / 3 less. A
- * sphere is divided in two directions. The sphere's meridian lies x^2 R / 3 outside of its chords on average, which is
- * x^2 of the volume. Together that is 2.5 times as much. */
+/* A regular polygon of n sides has sin(2 x) / (2 x) of the area of its circle, for x = pi / n: it lacks 2 x^2 / 3. A
+ * sphere is divided in two directions. Its meridian lies x^2 R / 3 outside of its chords on average, which is x^2 of
+ * the volume. Together that is 2.5 times as much as the polygon lacks. */
 static double facets_share(double circle_m, int sides)
 {
     if (circle_m == 0.0) return 1e-6;
@@ -113,7 +113,7 @@ static void facets_hold_the_tolerance(void **state)
     double area, volume;
     measure(0, &area, &volume);
     assert_true(fabs(volume / (2 * M_PI) - 1) <= facets_share(1, 70));
-    /* Chords of 71 sides are 0.089 m. The edges of a cap that leave out a corner are twice that. */
+    /* With 71 sides chords are 0.089 m long. Edges of a cap that leave out a corner are twice as long. */
     double least = 1.0; /* least distance of the middle of an edge along the circle from the axis */
     for (uint32_t i = 0; i < scene->n_triangles; i++)
         for (int c = 0; c < 3; c++) {

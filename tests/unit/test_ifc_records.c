@@ -49,7 +49,7 @@ static void texts_are_whole(void **state)
     decodes("'it''s \\\\ here'", "it's \\ here");
     decodes("''", "");
     decodes("$", "");
-    decodes("'\\X2\\00'", "00"); /* cut off: bytes that are no character of it stay */
+    decodes("'\\X2\\00'", "00"); /* cut off: its digits stay */
 }
 
 /* UTF-8 has one byte more from each of these codes on (RFC 3629). Surrogates alone and codes beyond U+10FFFF are no
@@ -68,7 +68,7 @@ static void texts_at_the_limits_of_codes(void **state)
     decodes("'\\X\\7F\\X\\80\\X\\ff'", "\x7f\xc2\x80\xc3\xbf");
 }
 
-/* What begins as an escape and is none stays as it is. */
+/* A text that begins as an escape and is none stays as it is. */
 static void texts_with_halves_of_escapes(void **state)
 {
     (void)state;
@@ -153,8 +153,8 @@ static void products_are_found(void **state)
     ifc_records_close(&records);
 }
 
-/* The ways to a style: IFC4 has the styles in the styled item, IFC2X3 has an assignment between. Transparency may be
- * missing. Values beyond 0 to 1 are limited, and the style is counted. What has no whole colour is no style. */
+/* Styles are reached in two ways: IFC4 has them in the styled item, IFC2X3 has an assignment between. Transparency may
+ * be missing. Values beyond 0 to 1 are limited, and the style is counted. A style without a whole colour is none. */
 static void styles_are_found(void **state)
 {
     (void)state;
@@ -187,7 +187,7 @@ static void styles_are_found(void **state)
     assert_int_equal(records.n_styles, N);
     assert_int_equal(records.n_limited, 1);
     size_t at[N] = {0, 1, 2, 3}, first;
-    if (strcmp(records.style[1].name, "second") == 0) at[1] = 2, at[2] = 1; /* those of one item have no order */
+    if (strcmp(records.style[1].name, "second") == 0) at[1] = 2, at[2] = 1; /* styles of one item have no order */
     for (size_t i = 0; i < N; i++) {
         const struct ifc_style *is = &records.style[at[i]];
         assert_int_equal(is->item, want[i].item);

@@ -153,13 +153,13 @@ static void each_format_has_the_same_picture(void **state)
     check_file(write_file("e.tga", bytes, write_tga(bytes, 3, 0)), 0, 0);
     check_file(write_file("f.tga", bytes, write_tga(bytes, 4, 1)), 1, 0);
     check_file(write_file("g.tga", bytes, write_packed_tga(bytes)), 0, 0);
-    /* Flat blocks have one coefficient a channel, 8 times its mean and a multiple of 2. Luma and chroma
-     * are whole numbers, so off by a half, and an eighth more: 0.7 (1 + 1.772) in blue (JFIF), and one by
+    /* A flat block has one coefficient a channel: 8 times its mean, rounded to a multiple of 2. Luma and chroma are
+     * whole numbers, so they are off by a half, and an eighth more. That is 0.7 (1 + 1.772) in blue (JFIF), and one by
      * rounding. */
     check_file(write_file("h.jpg", JPEG, sizeof JPEG), 0, 3);
 }
 
-/* Assimp passes these on unpacked, as it has them within a file. */
+/* Assimp passes texels of a file's own images on unpacked. */
 static void unpacked_texels_have_the_same_picture(void **state)
 {
     (void)state;
@@ -176,7 +176,7 @@ static void unpacked_texels_have_the_same_picture(void **state)
     check_source(&source, 0, 3);
 }
 
-/* A JPEG that lacks its quantisation tables has tables of zeros: each coefficient is 0, so the image is even grey. */
+/* A JPEG that lacks its quantisation tables is read with tables of zeros: each coefficient is 0, so it is even grey. */
 static void a_jpeg_without_tables_is_grey(void **state)
 {
     (void)state;
@@ -294,8 +294,8 @@ static void a_hole_is_what_is_below_the_half(void **state)
     assert_null(mask_of(cut, 1, 0.4, 0, TEXTURE_REPEAT));
 }
 
-/* Makes signature and header of a PNG with that size, and the name of its data's chunk, which newer decoders look for.
- * The checksums of a file that goes no further don't count. */
+/* Makes the signature and header of a PNG of that size, and the name of its data's chunk, which newer decoders look
+ * for. Decoding ends before the checksums. */
 static size_t png_of_size(uint8_t *png, uint32_t width, uint32_t height)
 {
     static const uint8_t start[16] = {0x89, 'P', 'N', 'G', 13, 10, 26, 10, 0, 0, 0, 13, 'I', 'H', 'D', 'R'};
@@ -321,7 +321,7 @@ static void fails(const char *file, const char *expected)
     unlink(file);
 }
 
-/* Each format has its size before any texel, so that too large ones are reported as such. */
+/* Each format gives its size before the first texel, so images that are too large are reported as such. */
 static void what_is_too_large_is_said_to_be(void **state)
 {
     (void)state;
@@ -398,7 +398,7 @@ static void hostile_files_take_no_gigabytes(void **state)
     memcpy(tga, JPEG, sizeof JPEG);
     table = memmem(tga, sizeof JPEG, "\xff\xc4\0\x14\x10", 5);
     assert_non_null(table);
-    table[4] = 0x12; /* the third table of its kind: the scan names the first, which the file lacks */
+    table[4] = 0x12; /* the table becomes the third of its kind, but the scan names the first */
     fails(write_file("lacks.jpg", tga, sizeof JPEG), "the image can't be read");
     snprintf(path, sizeof path, "%s/none.png", folder);
     fails(path, "No such file");

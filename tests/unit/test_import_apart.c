@@ -21,7 +21,7 @@
 
 #define HOUSE "/usr/share/assimp/models/IFC/AC14-FZK-Haus.ifc"
 
-/* ---- the process. Assimp hangs for a mesh of this name, as the loader of libraries is the test's own. */
+/* ---- the process. The test's own loader of libraries makes Assimp hang for a mesh of this name. */
 
 #define ENDLESS "endless.dae"
 
@@ -86,7 +86,7 @@ static void hang_ends_in_time(void **state)
     no_child_is_left();
 }
 
-/* glTF 1.0 is for Assimp, which only the reader of glTF finds out. The library is loaded here, not in a fork. */
+/* glTF 1.0 is for Assimp, which shows only when the reader of glTF looks. The library is loaded here, not in a fork. */
 static void gltf_of_old_gets_assimp_here(void **state)
 {
     (void)state;
@@ -182,7 +182,7 @@ static void no_descriptors_are_left(void **state)
     assert_non_null(strstr(err.text, "the descriptors of the process that reads can't be set: Too many open files"));
 }
 
-/* Assimp 5.2 goes on at the word that is no number, and keeps an index each time. */
+/* Assimp 5.2 does not get past a word that is no number, and keeps one index after the other. */
 static void memory_is_limited(void **state)
 {
     (void)state;

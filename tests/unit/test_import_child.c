@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the process that reads a mesh has of its parent: no descriptors but its own two, no output, no signals, no dump
- * of its memory, and the time at which the load began. */
+/* The process that reads a mesh has two descriptors of its own and the time at which the load began. It has no other
+ * descriptors of its parent, no output and no signals, and its memory is not dumped. */
 #include <fcntl.h>
 #include <signal.h>
 #include <stdio.h>

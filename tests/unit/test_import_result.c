@@ -9,7 +9,7 @@
 #include "tests/common/thorough.h"
 #include "tests/unit/scene_files.h"
 
-/* Calls of write write no more bytes at a time. */
+/* A call of write() writes at most so many bytes. */
 static size_t most_at_once = SIZE_MAX;
 
 ssize_t write(int fd, const void *bytes, size_t len)
@@ -159,15 +159,15 @@ static void try_result(const uint8_t *bytes, size_t n)
     build_release(&b);
 }
 
-/* Returns whether the byte is in the middle of a name's free bytes, of which any one is like the rest. */
+/* Returns whether the byte is in the middle of a name's unused bytes, which are all alike. */
 static int is_padding(const uint8_t *bytes, size_t at, size_t n)
 {
     static const uint8_t none[36];
     return at >= 16 && at + 20 <= n && memcmp(bytes + at - 16, none, sizeof none) == 0;
 }
 
-/* Every word of it gets every value with an effect: counts too large, indices out of range, NaN, infinite, names
- * without an end; and many lengths. */
+/* Every word of the result gets values that may do harm: counts too large, indices out of range, NaN, names without an
+ * end. Then it is cut at many lengths. */
 static void broken_result_is_refused(void **state)
 {
     (void)state;
@@ -362,8 +362,8 @@ static void wrong_values_are_named(void **state)
     }
 }
 
-/* Bytes are changed where they lie: 8 of the magic, counts from byte 8 on, and the texture's path with its length, 64
- * bits, before its own figures. */
+/* Bytes are changed where they lie. The magic has 8, and counts follow it. The length of the texture's path, 64 bits,
+ * comes first, then the texture's figures, then the path. */
 static void wrong_bytes_are_named(void **state)
 {
     (void)state;

@@ -36,7 +36,7 @@ static size_t make_png(uint8_t *png, size_t room)
     return size;
 }
 
-/* Writes a square of two triangles. The square's second set of coordinates has the image, the first is all in one
+/* Writes a square of two triangles. The image uses the second set of coordinates; those of the first set are all one
  * point. */
 static void write_gltf(const char *material, const char *lay)
 {

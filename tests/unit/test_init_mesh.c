@@ -61,8 +61,8 @@ static struct scene *load(const char *up, double scale)
     return scene;
 }
 
-/* More than 2 km in metres would be millimetres, but for a survey: up to 50 km, below 500 units high, and more than ten
- * times as wide. */
+/* A mesh of more than 2 km in metres is taken as millimetres. A survey is not: it has up to 50 km, is below 500 units
+ * high, and more than ten times as wide. */
 static void units_are_guessed(void **state)
 {
     static const char none[] = "assumed: the file doesn't say",
@@ -104,8 +104,8 @@ static void units_are_guessed(void **state)
     }
 }
 
-/* The larger coordinate of the middle is from 200 km on, the second one from 50 km on, and the larger is 20 times the
- * mesh's size. */
+/* The mesh's middle has projected coordinates where one is from 200 km on and the other from 50 km on. The larger one
+ * is also at least 20 times the mesh's size. */
 static void projected_coordinates_are_metres(void **state)
 {
     static const struct {

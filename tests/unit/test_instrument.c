@@ -75,10 +75,10 @@ static void each_error_alone_is_one(void **state)
     assert_true(instrument_is_ideal(&none));
 }
 
-/* Spherical triangles. Collimation c: the beam lies on a circle at c from the one across the mirror's axis: tan(pan
- * error) = tan c / cos m, sin(elevation) = cos c sin m. Trunnion t: the circle itself is tilted: tan(pan error) = sin t
- * tan m, sin(elevation) = cos t sin m. To first order they are Muralikrishnan's c / sin V and -t / tan V, V from the
- * zenith. */
+/* The closed forms are from spherical triangles. Collimation c puts the beam on a circle at c from the one across the
+ * mirror's axis: tan(pan error) = tan c / cos m, sin(elevation) = cos c sin m. Trunnion t tilts the circle itself:
+ * tan(pan error) = sin t tan m, sin(elevation) = cos t sin m. To first order they are Muralikrishnan's c / sin V and -t
+ * / tan V, V from the zenith. */
 static void tilts_follow_spherical_trigonometry(void **state)
 {
     (void)state;
@@ -172,7 +172,7 @@ static struct shot point_at(const struct instrument *k, double pan_to, double el
     return shoot(k, m, p, 0);
 }
 
-/* Returns the reading in face 1 less that in face 2, taken to face 1. */
+/* Writes the readings of face 1 less those of face 2, which are converted to face 1. */
 static void two_faces(const struct instrument *k, double elevation, double range_m, double *pan_rad, double *mirror_rad)
 {
     struct shot one = point_at(k, 0.2, elevation, range_m, 1), two = point_at(k, 0.2, elevation, range_m, 2);

@@ -55,8 +55,8 @@ static void test_link_types(void **state)
     assert_true(p.from.port == 5 && p.to.port == 6);
 }
 
-/* Other payloads of one packet. A packet is its bytes up to `have`; offsets are those of RFC 791, 768, 8200 and 9293.
- */
+/* Changes of one packet make its other forms. A packet ends after `have` bytes; offsets are those of RFC 791, 768, 8200
+ * and 9293. */
 struct change {
     int at, value;
 };
@@ -99,7 +99,7 @@ static void test_ipv4_lengths(void **state)
         {{{25, 15}}, 38, IP_PACKET_FOUND, 7, 0, 28}, /* UDP's length is less than the packet's */
         {{{25, 8}}, 38, IP_PACKET_FOUND, 0, 0, 28},
         {{{25, 7}}, 38, IP_PACKET_DAMAGED, 0, 0, 0},
-        {{{25, 19}}, 38, IP_PACKET_FOUND, 10, 0, 28}, /* more than the packet's: that of the packet holds */
+        {{{25, 19}}, 38, IP_PACKET_FOUND, 10, 0, 28}, /* more than the packet's length, which then counts */
         {{{25, 0}}, 38, IP_PACKET_FOUND, 10, 0, 28},
         {{{3, 0}}, 38, IP_PACKET_FOUND, 10, 0, 28}, /* a total of 0 is left to the network card */
         {{{3, 27}}, 38, IP_PACKET_DAMAGED, 0, 0, 0},

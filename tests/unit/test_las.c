@@ -119,7 +119,7 @@ static void test_records(void **state)
         assert_int_equal(rig_uint(p + 30, 2), want->label);
         p += POINT;
     }
-    /* steps of 0.006 degrees from straight down: 12 m up at 5 m aside, again 1 mm on; down; level */
+    /* Angles are steps of 0.006 degrees from straight down. Points: 12 m up at 5 m aside, 1 mm farther, down, level. */
     p = las + rig_uint(las + 96, 4);
     assert_int_equal(rig_uint(p + 18, 2), lrint((90 + atan2(12, 5) * 180 / M_PI) / 0.006));
     assert_int_equal(rig_uint(p + 2 * POINT + 18, 2), 0);

@@ -96,7 +96,7 @@ static void want_crs(void)
     memcpy(want_record("LASF_Projection", 2112, n, "OGC coordinate system WKT"), wkt, n);
 }
 
-/* A text in words is no table: what it says is checked where it is asked for. The other bytes have to be equal. */
+/* The text in words has no fixed bytes: other checks look at what it says. All other bytes have to be equal. */
 static const char *want_text(void)
 {
     const size_t at = n_want + 54, n = strlen((const char *)got + at) + 1;

@@ -201,7 +201,7 @@ static void test_8_bits(void **state)
     assert_int_equal(las_len, rig_uint(las + 227, 8) + EVLR + 8 + 12 + 7 + 8);
 }
 
-/* A stream without waveforms is as before, and says that there are none for a .wdp. */
+/* A stream without waveforms is recorded as ever. Where a .wdp was asked for, a note says that there are none. */
 static void test_none(void **state)
 {
     (void)state;
@@ -231,8 +231,8 @@ static void test_no_wdp(void **state)
     unlink(path);
 }
 
-/* A point lies 40 m along a beam of which a metre changes the coordinates by per_m. Half a count of the point on
- * each axis is its error, and that of its range; tolerance is a whole one. */
+/* A point lies 40 m along a beam, of which a metre changes the coordinates by per_m. The point and its range are each
+ * wrong by half a count on an axis. The tolerance is a whole one. */
 static void check_geo(const struct native_anchor *a, const double per_m[3], const double tolerance[3])
 {
     const double range_m = 40, first_m = 0.5e-9 * RIG_C_M_S * 250;
@@ -324,8 +324,8 @@ static void test_lengths(void **state)
     assert_true(rig_uint(las + 100, 4) <= 2 + 255);
 }
 
-/* Windows wait for those of their last point. Meanwhile so much comes that the client's memory of frames is used anew.
- */
+/* Windows wait until those of their last point have come. Meanwhile so much comes that the client's memory of frames is
+ * used anew. */
 static void test_long_wait(void **state)
 {
     (void)state;

@@ -68,7 +68,7 @@ static void test_kinds(void **state)
     assert_true(waves.n_fill == n_fill);
     assert_int_equal(waves.n_kindless, 0);
     wave.pulse = LARGE;
-    wave.n = LARGE; /* it is a step itself: it needs no fill */
+    wave.n = LARGE; /* this length is one of the rounded ones, so it needs no fill */
     assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
     assert_int_equal(packet.len, 2 * LARGE);
     assert_int_equal(is_new, 1);
@@ -123,7 +123,7 @@ static void test_no_kind_left(void **state)
     las_waves_close(&waves);
 }
 
-/* The file of packets has become shorter before it is copied, by no doing of ours. */
+/* Another program has made the file of packets shorter before it is copied. */
 static void test_cut_before_copy(void **state)
 {
     (void)state;

@@ -115,7 +115,7 @@ static void check_said(size_t n_points, size_t n_packets)
     if (n_packets >= n_points ? said[0] != '\0' : strstr(said, lost) == NULL) fail_msg("'%s', not '%s'", said, lost);
 }
 
-/* Points that are whole in the .las; of these, the last ones lack packets that are not whole in the .wdp. */
+/* n_points points are whole in the .las. Those after the first n_packets lack packets that are whole in the .wdp. */
 static void check(size_t n_points, size_t n_packets)
 {
     static const uint8_t none[29];
@@ -203,7 +203,7 @@ static void test_cut_copy(void **state)
     unlink(wdp);
 }
 
-/* A completed file that a copy has cut keeps the packets that are whole in it. */
+/* A completed file, cut in the packets by a copy, keeps the packets that are whole in it. */
 static void test_cut_inside(void **state)
 {
     (void)state;

@@ -48,7 +48,7 @@ static void percentiles_of_a_ramp(void **state)
     assert_true(lateness_us(&lateness, 0.001) < 1.04); /* the first alone */
 }
 
-/* 99 are in time and one is late by a second. The median does not show it, nor does p99, and the next share does. */
+/* 99 are in time and one is late by a second. The median and p99 don't show it, but a slightly larger share does. */
 static void one_in_a_hundred(void **state)
 {
     (void)state;
@@ -83,7 +83,7 @@ static void percentiles_beside_a_sorted_list(void **state)
     assert_int_equal(lateness_count(&lateness), MANY);
 }
 
-/* Values are at the borders of bins, up to the largest number: each is alone in its own row. */
+/* Values lie at the borders of bins, up to the largest number. Each comes alone, and must be in its own row. */
 static void rows_hold_what_is_below(void **state)
 {
     (void)state;

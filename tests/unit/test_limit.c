@@ -167,8 +167,8 @@ static void test_limit_refused(void **state)
     }
 }
 
-/* run_tap.sh ends a script that waits for ever, and its child that ignores SIGTERM. The program above has ended by
- * itself before. If the child went on, its end of the pipe would stay open, and run() would report it. */
+/* run_tap.sh ends a script that waits for ever, and its child that ignores SIGTERM. (The tests before end by
+ * themselves.) If the child went on, its end of the pipe would stay open, and run() would report it. */
 static void test_run_tap(void **state)
 {
     (void)state;

@@ -91,7 +91,7 @@ static void *read_thread(void *fd)
     return read_all(*(int *)fd);
 }
 
-/* Puts lines until neither pipe nor queue have room, from 0 on. Returns how many. */
+/* Puts lines, numbered from 0, until neither the pipe nor the queue has room. Returns how many. */
 static unsigned fill(struct line_writer *writer, int fd)
 {
     struct pollfd slot = {.fd = fd, .events = POLLOUT};
@@ -161,7 +161,7 @@ static void a_file_that_stands_still_holds_up_nobody(void **state)
     check_pipe_that_stands_still(0);
 }
 
-/* Standard error may be such a pipe: who made it may have made it so for itself. */
+/* Standard error may be such a pipe: another program that has it may have set O_NONBLOCK. */
 static void a_pipe_that_never_blocks_is_waited_for(void **state)
 {
     (void)state;

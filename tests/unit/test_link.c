@@ -83,7 +83,8 @@ static void *interrupt(void *waiter)
     return NULL;
 }
 
-/* A signal is no event and no error. What poll(2) refuses is one: here more descriptors than a process may have. */
+/* A signal is no event and no error. A refusal of poll(2) is an error: here more descriptors than a process may have.
+ */
 static void test_wait(void **state)
 {
     (void)state;

@@ -207,7 +207,7 @@ static void test_web(void **state)
     bench_close(&bench);
 }
 
-/* Datagrams of the time are gone, and counted; the session stays. What came for the head is gone, too. */
+/* Datagrams that are sent meanwhile are lost, and counted; the session stays. Datagrams for the head are lost, too. */
 static void test_udp(void **state)
 {
     (void)state;

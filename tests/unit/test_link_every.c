@@ -74,7 +74,7 @@ static int count_open(void)
     return n;
 }
 
-/* Fails where the link has kept a descriptor. before: how many were open, counted on for libwebsockets 4.3, which keeps
+/* Fails where the link has kept a descriptor. `before` is how many were open. libwebsockets 4.3 may add one: it keeps
  * the eventfd of each context that it ends (4.1 does not). */
 static void expect_open(const struct link_spec *spec, const char *what, int *before)
 {
@@ -115,7 +115,7 @@ static void use(const struct link_spec *spec, int with_client)
     for (int i = 0; i < 3; i++)
         bench_poll(&bench, 0, 1);
     wake_up(&bench);
-    if (fd >= 0) close(fd); /* else some would wait for it */
+    if (fd >= 0) close(fd); /* else some links would wait for the client */
     for (int i = 0; i < 3; i++)
         bench_poll(&bench, 0, 1);
     bench_close(&bench);

@@ -25,7 +25,7 @@ static void expect_reset(int fd)
     close(fd);
 }
 
-/* Each kind of link, and the faults that it can have. */
+/* These kinds of links have these faults. */
 static void test_table(void **state)
 {
     (void)state;

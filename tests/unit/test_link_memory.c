@@ -110,7 +110,7 @@ static void a_client_sends_until_there_is_no_room(void **state)
     bench_close(&bench);
 }
 
-/* The owner works, and must not wait: the client is gone. */
+/* The client is gone. The owner gets a turn, and must not wait. */
 static void note_turn(void *owner, int timeout_ms)
 {
     assert_int_equal(timeout_ms, 0);
@@ -390,7 +390,7 @@ static int64_t no_time(void *owner)
     return 0;
 }
 
-/* At the end of a run a reader has time for as long as it takes bytes: those that are lent count, too. */
+/* At the end of a run a reader has time while bytes move. Bytes that are lent count as moved, too. */
 static void bytes_that_are_lent_move(void **state)
 {
     (void)state;

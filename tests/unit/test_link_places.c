@@ -64,7 +64,7 @@ static struct sockaddr_in loopback(int port)
 
 /* ---- a name with two addresses */
 
-/* While it is unplugged, another program takes its port on the first address. The link does not come back on the
+/* While the link is unplugged, another program takes its port on the first address. The link does not come back on the
  * second one, where its clients don't look for it. */
 static void a_link_comes_back_where_it_was(void **state)
 {
@@ -94,7 +94,7 @@ static void a_link_comes_back_where_it_was(void **state)
     }
 }
 
-/* A name that has an IPv4 address, too, stands for that one where datagrams go: no answer shows a wrong choice. */
+/* Datagrams go to the IPv4 address of a name that has both kinds: no answer would show a wrong choice. */
 static void datagrams_go_by_ipv4(void **state)
 {
     (void)state;
@@ -145,7 +145,7 @@ int setsockopt(int fd, int level, int name, const void *value, socklen_t len)
     return (int)syscall(SYS_setsockopt, fd, level, name, value, len);
 }
 
-/* A receiver in either network, and the broadcasts of both: packets come from the address of the same network. */
+/* A datagram goes to a receiver in either network, or to a broadcast. It comes from the address in the same network. */
 static void packets_come_from_the_receivers_network(void **state)
 {
     (void)state;
@@ -183,7 +183,7 @@ static void packets_come_from_the_receivers_network(void **state)
 /* ---- connections that don't come about */
 
 static int own_port;                /* each socket gets this port; 0: the system's choice */
-static int is_interrupted, n_tries; /* connect() is; its calls */
+static int is_interrupted, n_tries; /* whether a signal interrupts connect(); its calls */
 static int last_socket;             /* the newest one */
 
 int socket(int family, int type, int protocol)

@@ -44,7 +44,7 @@ static void test_events(void **state)
     assert_string_equal(event[0].peer, "");
 }
 
-/* A signal is no failure: nothing has come yet, whatever stood there before. */
+/* A signal is no failure: nothing counts as come, whatever revents held before. */
 static void test_waiting(void **state)
 {
     (void)state;

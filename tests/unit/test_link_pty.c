@@ -320,8 +320,8 @@ static void test_no_new_symlink(void **state)
     assert_int_equal(rmdir(dir), 0);
 }
 
-/* A user has removed the symlink. The symlink does not come back with a new terminal, nor at the end. Its name is no
- * format. */
+/* A user has removed the symlink. The symlink does not come back with a new terminal, nor at the end. The % in its name
+ * is not taken as a format. */
 static void test_removed_symlink(void **state)
 {
     (void)state;

@@ -18,7 +18,7 @@ static int looks_for_bytes_first;    /* then poll has looked at the last one for
 static int comes_early; /* a client opens the terminal just before it is watched for the first time */
 static int is_full;     /* the system has no more watches */
 static int has_no_pair; /* nor terminals */
-static int is_no_tty;   /* what it takes for one has no settings */
+static int is_no_tty;   /* the terminal that the link opens has no settings */
 
 static void call_once(void (**what)(void))
 {
@@ -110,7 +110,7 @@ static void expect_served(int fd)
     assert_true(is_calm(&bench, 1));
 }
 
-/* A client leaves. While the terminal is not watched, another one does that. */
+/* A client leaves. While the terminal is not watched, another one does what `next` says. */
 static void begin_with(void (*next)(void))
 {
     begin();
@@ -131,7 +131,7 @@ static void test_written_and_gone_unwatched(void **state)
     bench_close(&bench);
 }
 
-/* The next client comes before the link has read those bytes: it has a session of its own. */
+/* The next client comes before the link has read the bytes of the one before. It has a session of its own. */
 static void test_next_after_written_and_gone(void **state)
 {
     (void)state;
@@ -165,7 +165,7 @@ static void say_and_leave(void)
     leave();
 }
 
-/* A client writes and leaves after the look for bytes, and before that for a hang-up. What it wrote is of its session.
+/* A client writes and leaves after the look for bytes, but before the look for a hang-up. Its bytes are in its session.
  */
 static void test_wrote_between_looks(void **state)
 {
@@ -223,7 +223,7 @@ static void test_no_terminal(void **state)
     assert_int_equal(count_open(), n_open);
 }
 
-/* The symlink is there before the watch: so may be a client that waits for it. */
+/* The symlink is there before the watch, so a client that waits for it may have come already. */
 static void test_came_with_the_symlink(void **state)
 {
     (void)state;

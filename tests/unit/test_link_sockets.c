@@ -28,7 +28,7 @@ static int connect_to(const struct bench *bench, const char *path)
     return fd;
 }
 
-/* -1: not accepted yet */
+/* Returns the link's end of the connection; -1: it is not accepted yet. */
 static int other_end(int fd)
 {
     struct sockaddr_in mine, peer;
@@ -51,7 +51,8 @@ static int option(int fd, int level, int name)
     return value;
 }
 
-/* impatient: it is noticed with bytes under way, too; otherwise a peer that only rests for long is not cut off. */
+/* impatient: a peer that vanishes is noticed with bytes under way, too. Otherwise a peer that only rests is not cut
+ * off. */
 static void check(const struct link_spec *spec, int impatient)
 {
     struct bench bench = bench_open(spec);
@@ -206,7 +207,7 @@ static void starve_two_doors(void)
     }
 }
 
-/* Without turns one round in three fails on an idle machine of two processors. */
+/* If the threads took no turns, one round in three would fail on an idle machine of two processors. */
 static void test_two_doors(void **state)
 {
     (void)state;

@@ -98,7 +98,7 @@ static void a_receiver_that_is_not_there(void **state)
     end_with_receiver(&bench, &at);
 }
 
-/* The same, where a write meets the refusal, and not poll. No later datagram is lost by it. */
+/* Here a write meets the refusal, and not poll. No later datagram is lost by it. */
 static void a_refusal_costs_no_later_datagram(void **state)
 {
     (void)state;
@@ -227,8 +227,8 @@ static void sources_share_their_port(void **state)
     close(fd);
 }
 
-/* Another program has the port for itself. The taken port is reported once where it was not asked for; else the link is
- * refused. The receiver's own place is no source. */
+/* Another program has the port for itself. If the port is only the usual one, that is reported once. If it was asked
+ * for, the link is refused. The receiver's own place is no source. */
 static void a_source_port_that_is_taken(void **state)
 {
     (void)state;

@@ -77,7 +77,7 @@ static void test_requests(void **state)
     assert_int_equal(web_n_released, 2); /* one each; errors and the page's own files are not the owner's */
 }
 
-/* Whether a request is answered within far fewer turns than the seconds have that a client may take. */
+/* Returns whether a request is answered long before the time is over that a client may take. */
 static int is_answered_soon(struct bench *bench, const char *place)
 {
     char request[200], answer[4096];

@@ -31,7 +31,7 @@ static struct loop *open_links(const struct config *cfg, struct sh_err *err)
 }
 
 /* A head has no password. An address is judged as it is written: the loopback's in another form counts as one that
- * others may reach. The receiver's sentences command nothing. */
+ * others may reach. A link of NMEA sentences takes no commands. */
 static void a_link_that_others_reach_is_warned_of(void **state)
 {
     (void)state;

@@ -58,7 +58,7 @@ static void without_usb_the_reason_is_there(void **state)
     expect_end("heads on USB: cannot list USB devices: Access denied (insufficient permissions)\n");
 }
 
-/* Each kind of link, protocol and scenario is there, with a comma between two. */
+/* All protocols are there, with a comma between two, and a scenario. */
 static void the_rest_of_the_list(void **state)
 {
     (void)state;

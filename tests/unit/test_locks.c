@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Threads of links, casters and the player call these at any time, so each of them works on the shared state with its
- * lock held. Two threads that meet without it rarely show that. So the test counts: how often a call takes a lock, and
- * that it has none left at its end. */
+/* Threads of links, casters and the player call these functions at any time, so each of them locks the shared state.
+ * Two threads that meet without the lock rarely show it. So the test counts how often a call takes a lock, and that it
+ * holds none at its end. */
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
 #include "firmware_sim/device/settings_file.h"
@@ -116,7 +116,7 @@ static void the_faults_are_locked(void **state)
     fault_board_free(board);
 }
 
-/* With a file of the truth a note takes three: the board's, the file's, and that of its queue. */
+/* With a file of the truth a note takes three locks: the board's, the file's, and that of its queue. */
 static void notes_of_faults_are_locked(void **state)
 {
     (void)state;
@@ -148,7 +148,8 @@ static void stored_settings_are_locked(void **state)
     unlink(journal_path);
 }
 
-/* After the end a move is carried out by who asks: the box, the two of the device, and the reply. */
+/* After the end a move is carried out by the thread that asks. It takes the box's lock, two of the device, and the
+ * reply's. */
 static void replies_of_moves_are_locked(void **state)
 {
     (void)state;
