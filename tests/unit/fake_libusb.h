@@ -60,7 +60,7 @@ struct fake_bus {
     int submit_room;                        /* how many reads may be under way; 0: any number */
     int events_rc, events_in;               /* the result of handling events, once, after that many calls */
     int will_not_cancel, hold_writes;
-    int was_reset, no_question; /* sessions are over; the head stalls the question whether they are */
+    int was_reset, no_question; /* all sessions are over; the head stalls the request that asks whether they are */
     int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */
     int n_lists, n_clear_halts, n_waits, last_wait_ms;
     const uint8_t *(*feed)(

@@ -81,7 +81,7 @@ test('far from the origin: floats of coordinates jump, the cloud\'s do not', () 
     ours = Math.max(ours, Math.abs(cloud.blocks[0].position[3 * i + 1] + cloud.origin[1] - y));
     naive = Math.max(naive, Math.abs(Math.fround(y) - y));
   }
-  near(ours, 0, 2 ** -24, 'ours'); // it is half an ulp of a float below 1 m
+  near(ours, 0, 2 ** -24, 'ours'); // it is an ulp of a float below 1 m
   same(naive > 0.2, true, `naive: ${naive}`); // half an ulp of 5.6e6 is 0.25 m
 });
 

@@ -53,7 +53,7 @@ static void test_surface_of_many_returns(void **state)
 }
 
 /* Returns of one surface have different texels. The echo has the colour of the strongest one, also where the nearest is
- * another. With two surfaces it is the first return of the one that returns most, or else the strongest of all. */
+ * another. With two surfaces it is that of the first return of the stronger surface, or of the strongest return. */
 static void test_colour_of_the_strongest(void **state)
 {
     (void)state;

@@ -143,7 +143,7 @@ static uint64_t sum_block(const struct line_block *b, uint32_t from, uint32_t n,
     return sum;
 }
 
-/* near_m is that of the straight way up. */
+/* A line has the same bytes with each width of packets and each cut into runs. */
 static void expect_same_bytes(struct cast_rig *rig)
 {
     static const uint32_t widths[] = {0, 16, 8, 4, 1}; /* 0: the native one */
@@ -212,7 +212,7 @@ static void test_geo(void **state)
     cast_rig_close(rig);
 }
 
-/* A wall moves away from a head that moves along. The wall's range is worked out by hand. */
+/* A body that was shifted by 2 m stands ahead of a head that moves towards it. Its range is worked out by hand. */
 static void test_moving_body(void **state)
 {
     (void)state;

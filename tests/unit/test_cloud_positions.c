@@ -294,7 +294,7 @@ static void test_pcd_precision(void **state)
     }
 }
 
-/* Without POINTS the sides of the grid count. What follows the points is left out with a word, but blank lines. */
+/* Without POINTS the sides of the grid count. More after the points is left out with a warning, blank lines without. */
 static void test_pcd_counts(void **state)
 {
     (void)state;

@@ -297,8 +297,8 @@ static void test_sides_are_cells(void **state)
     cover_close(c);
 }
 
-/* Cells are much smaller than a ray. The gain is the sum of the rays' areas, and that is the area. Lines of rays end
- * within a ray's width of the edges, 12 edges of a box; by chance half of that, in either direction. */
+/* Cells are much smaller than a ray. The gain is the sum of the rays' areas, which is the area of the box. Lines of
+ * rays end within a ray's width of its 12 edges; by chance half of that, in either direction. */
 static void test_coarse_rays(void **state)
 {
     (void)state;
