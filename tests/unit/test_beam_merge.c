@@ -167,8 +167,8 @@ static void test_rings(void **state)
     }
 }
 
-/* Axes across a beam are unit vectors, at right angles, and right-handed with the beam, also just above and below
- * level. */
+/* Axes across a beam are unit vectors, at right angles, and right-handed with the beam, also when it is level or just
+ * below that. */
 static void test_axes(void **state)
 {
     (void)state;

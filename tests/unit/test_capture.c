@@ -223,7 +223,7 @@ static void test_asked_datagrams(void **state)
     client_close(&c);
 }
 
-/* Each beginning of a file, and files with a byte changed: they load, or are refused in one line. */
+/* Every third beginning of a file, and files with a byte changed: they load, or are refused in one line. */
 static void test_hostile(void **state)
 {
     (void)state;

@@ -369,7 +369,7 @@ static double opposite_range(const double vertex[4][3], const double d[3])
 }
 
 /* A head is on a corner of a mesh. The corner is no echo, the face across is seen, and in other directions nothing is.
- * The corner is also far from the BVH's origin. */
+ * The BVH's origin, the middle of the mesh, is elsewhere. */
 static void what_a_ray_begins_on_is_no_hit(void **state)
 {
     (void)state;

@@ -108,8 +108,8 @@ static void points_have_the_encoders_counts(void **state)
         if (i % 7 == 0) mirror -= mirror % (90 * DEG);
         if (i % 11 == 0) pan -= pan % (90 * DEG);
         fire(rig, mirror, pan, 0.0);
-        /* The count is the nearest whole one, in exact integers. Angles about halfway between two counts are left out: 2
-         * turns in a double are good to 1e-6 counts of 2^32. */
+        /* The count is the nearest whole one, in exact integers. Angles about halfway between two counts are left out:
+         * 2 turns in a double are good to 1e-6 counts of 2^32. */
         for (int axis = 0; axis < 2; axis++) {
             int64_t udeg = axis ? pan : mirror, n = (int64_t)(axis ? rig->setup.pan_counts : rig->setup.mirror_counts);
             int64_t within = (udeg % (360 * DEG) + 360 * DEG) % (360 * DEG);

@@ -332,7 +332,7 @@ static void names_say_which_copy(void **state)
 }
 
 /* Parts left out of a mesh that has copies are counted once, and added to the others' counts. Each copy counts as a
- * mesh. A copy's error grows with its scale. */
+ * mesh. */
 static void counts_of_copied_meshes(void **state)
 {
     (void)state;

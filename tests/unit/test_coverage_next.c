@@ -197,7 +197,7 @@ static void test_brute_force(void **state)
     cover_close(c);
 }
 
-/* The cell that a ray from the middle meets, and how far away. */
+/* Returns the cell that a ray meets, and writes its area. */
 static uint32_t cell_towards(const struct cover *c, const double from_m[3], const double dir[3], double *area_m2)
 {
     struct search s = {from_m, dir, INFINITY, 0};
