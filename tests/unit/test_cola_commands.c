@@ -35,7 +35,7 @@ static void a_reboot_that_is_refused_ends_the_session(void **state)
     assert_int_equal(cola.hung_up, 1);
 }
 
-/* The clock, hours and count of power-ups count since power-up. */
+/* The clock and the hours count from power-up. Power-ups are counted, too. */
 static void clocks_begin_at_power_up(void **state)
 {
     (void)state;

@@ -204,7 +204,7 @@ static void a_spheres_step_divides_half_a_turn(void **ctx)
     expect_error(&dev, 1, "SCAN:STEP 2", CMD_E_SETTINGS, "allowed 1: the platform moves");
 }
 
-/* A step is the part of a turn to the nearest micro-degree, and gives the number of steps back. */
+/* A step is the part of a turn to the nearest micro-degree, and gives an even number of steps back. */
 static void a_step_is_the_nearest_to_its_part_of_a_turn(void **ctx)
 {
     (void)ctx;

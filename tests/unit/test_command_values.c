@@ -70,7 +70,7 @@ static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
         snprintf(line, sizeof line, "HEAD:PRR %s", numbers[i]);
         expect_error(&dev, 1, line, CMD_E_RANGE, ", allowed 1000 to 1200000\"");
     }
-    /* The largest number of 64 bits is like any other, and the next one is refused. */
+    /* The largest number of 64 bits is out of range like others. The next one is quoted as it was sent. */
     dev.step_allowed = 1;
     expect_error(&dev, 1, "TIME:STEP 9223372036854775807", CMD_E_RANGE, " 9223372036854775807 ns, allowed");
     expect_error(&dev, 1, "TIME:STEP 9223372036854775808", CMD_E_RANGE, " 9223372036854775808, allowed");
