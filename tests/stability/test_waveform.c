@@ -111,8 +111,8 @@ static double centre_m(const struct waveform *w, double range_m, int as_float)
     return moment / sum;
 }
 
-/* Naive: ranges as floats, which are 7.8 mm apart at 100 km. Ours: 1e5 m has 1.5e-11 m in double. The rest is the
- * error of the pulse's table: 1e-6 of the peak at up to 2 m from the centre, against an area of 2 samples. */
+/* Naive: ranges as floats, which are 7.8 mm apart at 100 km. Ours: doubles, which are 1.5e-11 m apart there. The rest
+ * is the error of the pulse's table: 1e-6 of the peak at up to 2 m from the centre, against an area of 2 samples. */
 static void far_ranges_keep_their_millimetres(void **state)
 {
     (void)state;
@@ -134,8 +134,8 @@ static void far_ranges_keep_their_millimetres(void **state)
     table_check();
 }
 
-/* Naive: a plane's signal as a difference of two primitives, over the extent; with little extent nothing of them is
- * left. (A uniform strip in place of the disc: both tend to the pulse itself.) */
+/* Naive: a plane's signal as a difference of two primitives, over the extent. With little extent the difference is
+ * lost. A uniform strip stands for the disc, since both tend to the pulse itself. */
 static void no_extent_is_a_point(void **state)
 {
     (void)state;

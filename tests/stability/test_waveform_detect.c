@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Plain detectors of echoes break here: at tops that the digits make flat, at echoes of any strength at one level,
+/* Plain detectors of echoes break here: at tops that rounding makes flat, where strong and weak echoes cross one level,
  * at pulses that the receiver limits or the window cuts, and where a parabola goes through logarithms of samples
  * that are not positive. */
 #include <math.h>
@@ -138,8 +138,8 @@ static void walk(void **state)
             compare(&w, by_level, WAVEFORM_THRESHOLD, &r, p, &worst);
         }
         snprintf(regime, sizeof regime, "a level 1, an echo %d dB above it", db);
-        /* A digit is 0.0074 thresholds. The sample below the level is at least 0.1, and the slope at least 0.2 a
-         * sample, so half a digit is 0.02 samples. */
+        /* A count is 0.0074 thresholds. The sample before the crossing has at least 0.1 thresholds, and the slope is
+         * at least 0.2 a sample. So half a count is 0.02 samples. */
         table_row(regime, "crossing, half a pulse later", worst.naive_m, worst.ours_m, 3e-3, "m");
     }
     wave_close(&w);

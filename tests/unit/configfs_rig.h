@@ -2,8 +2,8 @@
 /* A kernel's configfs and its device controllers, in a folder. Calls of the C library with paths below
  * /sys/kernel/config and /sys/class/udc, and with /proc/self/mounts, go there. As configfs does, it makes the
  * attributes of a new directory, and refuses to remove a directory that has parts, or that a configuration is linked
- * to: Documentation/usb/gadget_configfs.rst of the kernel. A mounted FunctionFS has the FIFOs ep1 and ep2. The kernel's
- * own is in tests/guest. */
+ * to: Documentation/usb/gadget_configfs.rst of the kernel. A mounted FunctionFS has the FIFOs ep1 and ep2. Tests with
+ * the kernel's own configfs are in tests/guest. */
 #ifndef TESTS_UNIT_CONFIGFS_RIG_H
 #define TESTS_UNIT_CONFIGFS_RIG_H
 

@@ -24,7 +24,7 @@ struct cover {
     struct coverage *coverage;
 };
 
-/* Takes the scene over. The BVH reaches 10 m from the middle of its bounds. */
+/* Takes the scene over, and makes its BVH. Fails the test where that is not possible. */
 struct cover *cover_open(struct scene *scene, double cell_m, unsigned threads);
 void cover_close(struct cover *cover);
 
@@ -40,7 +40,7 @@ struct scene *cover_l_room(void);
 struct cover_sweep {
     double step_deg, low_deg, high_deg, pan0_deg, pan1_deg, range_max_m;
 };
-extern const struct cover_sweep cover_everywhere; /* half a degree, up to 1000 m */
+extern const struct cover_sweep cover_everywhere; /* half a degree, with sanitizers 3; up to 1000 m */
 void cover_scan(const struct cover *cover, const double station_m[3], const struct cover_sweep *sweep,
                 struct coverage_scan *scan);
 

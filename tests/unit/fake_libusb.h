@@ -57,11 +57,11 @@ struct fake_bus {
     int clear_halt_rc, submit_rc;           /* the results of these while not 0 */
     int claim_rc, session_rc;               /* the results of claiming the interface, and of opening the stream */
     int submit_fails;                       /* for so many times; < 0: always */
-    int submit_room;                        /* how many reads may be under way; 0: any number */
+    int submit_room;                        /* how many transfers may be under way; 0: any number */
     int events_rc, events_in;               /* the result of handling events, once, after that many calls */
     int will_not_cancel, hold_writes;
-    int was_reset, no_question; /* sessions are over; the head stalls the question whether they are */
-    int contexts, handles, transfers, claimed, sessions, lists, configs; /* to be 0 at the end */
+    int was_reset, no_question; /* all sessions are over; the head stalls the request that asks whether they are */
+    int contexts, handles, transfers, claimed, sessions, lists, configs; /* 0 at the end but for sessions */
     int n_lists, n_clear_halts, n_waits, last_wait_ms;
     const uint8_t *(*feed)(
         size_t *len);   /* the bytes of a read that nothing is scripted for, at most len of them; NULL: none come */

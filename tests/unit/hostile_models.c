@@ -8,7 +8,7 @@
 #define MODELS "/usr/share/assimp/models/"
 
 /* The model has a wall with an opening, a body of faces, and the records that an IFC needs around them. The only IFC of
- * the package is a house of 4 MB, too large to be read hundreds of times. */
+ * Assimp's models is a house of 4 MB, too large to be read hundreds of times. */
 static const char IFC[] =
     "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\n"
     "FILE_SCHEMA(('IFC2X3'));\nENDSEC;\nDATA;\n"
@@ -48,7 +48,7 @@ static const char STL[] = "solid hall\nfacet normal 0 0 1\nouter loop\nvertex 0 
                           "endloop\nendfacet\nfacet normal 0 0 1\nouter loop\nvertex 1 0 0.5\nvertex 1 1 0\n"
                           "vertex 0 1 0\nendloop\nendfacet\nendsolid hall\n";
 
-/* text: of a model that stands here. */
+/* text: the model itself, where it is in this file; file: where it is in the package. */
 static const struct {
     const char *format, *ending, *file, *text;
 } SOURCES[] = {

@@ -14,7 +14,7 @@ struct hostile_model {
     size_t n;
 };
 
-/* Returns 0 where the package with some of them is missing. */
+/* Returns 0 where the package that has some of the models is missing. */
 int hostile_models_open(void);
 void hostile_models_close(void);
 

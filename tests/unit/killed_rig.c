@@ -4,7 +4,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-/* This function replaces the system's, as thousands of repairs would wait for the disk, and power never fails here. */
+/* These functions replace the system's, as thousands of repairs would wait for the disk, and power never fails here. */
 int fdatasync(int fd)
 {
     return fd >= 0 ? 0 : -1;

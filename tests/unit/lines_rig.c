@@ -24,7 +24,7 @@ static int lines_rig_run(int argc, char **argv)
     return 0;
 }
 
-/* The line with $ filled in, and with what each error of a command has around it. */
+/* Writes the whole line: $ is filled in, and a command's error gets its name and the reference to the help. */
 static void fill(const char *says, char *const *argv, char *out, size_t len)
 {
     const int is_whole = strncmp(says, "scanhead: ", 10) == 0;

@@ -6,10 +6,10 @@
 #include <stddef.h>
 
 struct lines_row {
-    /* The whole line without the command's name before it, and where the help is after it. With "scanhead: " it is the
-     * whole line as it stands. $ stands for the first word after the command. */
+    /* The whole line, but for the command's name before it and the reference to the help after it. If it begins with
+     * "scanhead: ", it is the line as it stands. $ stands for the first word after the command. */
     const char *says;
-    const char *words[9]; /* command lines that it is said of: a command, its words, apart by blanks */
+    const char *words[9]; /* command lines that give it: a command and its words, apart by blanks */
 };
 
 /* Each has exit status 2. */

@@ -59,7 +59,7 @@ struct native_descriptor make_descriptor(void)
     d.frames = UINT32_MAX;
     d.scan = 7;
     d.seed = 0x0123456789abcdefu;
-    d.content = d.reserved = 0; /* not sent then; test_native_attributes */
+    d.content = d.reserved = 0; /* these are not sent; test_native_attributes has them */
     return d;
 }
 

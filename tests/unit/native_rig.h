@@ -42,7 +42,7 @@ extern uint8_t block_echo[BLOCK_MAX];
 
 struct line_block make_block(uint32_t n_points);
 /* A block of line 77, from pulse 0x123456789a and 1000 ns on. The block's pulses are 500 ns apart, with so many echoes
- * each; a names the entry. */
+ * each. Column a has the number of the entry. */
 struct line_block make_pulses(uint32_t n_points, uint32_t echoes);
 
 #endif

@@ -18,7 +18,7 @@ extern size_t stream_len;
 extern struct piece piece[ITEMS_MAX];
 extern int n_pieces;
 
-/* 13 frames of all types, some LOCAL, with reply lines between, and seq running over 2^32. */
+/* Makes 13 frames of seven types, one of them LOCAL, with reply lines between. Their seq runs over 2^32. */
 void make_stream(void);
 
 extern struct native_parser parser;

@@ -15,7 +15,7 @@ struct optics {
     struct cast_detect detect;
 };
 
-/* Takes the scene over. Surfaces have a reflectance of 0.5, and rays may begin within 50 m of the station. */
+/* Takes the scene over. Its surfaces have a reflectance of 0.5. */
 void open_optics(struct optics *o, struct scene *scene);
 void close_optics(struct optics *o);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Finds forbidden calls of the pacing thread. Functions that allocate, lock or print are replaced by ones that note
- * their caller. A filter of the kernel's (seccomp) shows every system call of the thread but those that it needs: to
- * sleep by the clock, to read it, the futexes of semaphores, and wake-ups, which are 8 bytes to an eventfd.
+/* Finds forbidden calls of the pacing thread. Functions that allocate, lock or print are replaced by ones that note the
+ * calls of this thread. A filter of the kernel's (seccomp) shows every system call of the thread but those that it
+ * needs: to sleep by the clock, to read it, the futexes of semaphores, and wake-ups, which are 8 bytes to an eventfd.
  *
  * The thread is armed by its first sleep by the clock, as no other thread sleeps so. The armed thread stays so until it
  * ends. */
@@ -17,11 +17,11 @@
 /* Call it before a loop starts: it forgets all findings. planted: called by the pacing thread before each of its
  * sleeps, with their number from 0; NULL: nothing is planted. */
 void pacing_watch(void (*planted)(int sleep));
-/* Call it after loop_join. Returns how many forbidden calls there were, and prints each kind. */
+/* Call it after loop_join. Returns how many forbidden calls there were, and prints the first 20. */
 int pacing_found(void);
 /* Returns whether a call of that name, or with `system call N` that system call, is among them. */
 int pacing_has(const char *name);
-/* From now on other threads hold each mutex for so long; 0: no longer than usual. Any thread may call it. */
+/* From now on other threads wait for so long before they lock a mutex; 0: not at all. Any thread may call it. */
 void pacing_slow_locks(int64_t ns);
 /* Returns the number of sleeps so far. */
 int pacing_sleeps(void);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-// What the page keeps of the stream for a recording (drivers/link/web/keeper.js). page_picture.mjs runs these tests with
-// its own.
+// This tests the part of the stream that the page keeps for a recording (drivers/link/web/keeper.js). page_picture.mjs
+// runs these tests with its own.
 import {Keeper} from '../../drivers/link/web/keeper.js';
 import {Wire} from '../../drivers/link/web/wire.js';
 import {Parser} from '../../drivers/link/web/native_parser.js';

@@ -41,7 +41,7 @@ const bytesOf = (frames) => frames.map((f) => Buffer.from(f.payload).toString('h
 
 // ---- samples
 
-// `name value value`: the numbers as they stand; a text, or an array, or one value.
+// Compares a value with the words of a line `name value value`: a text, a number, or an array of numbers.
 function sameField(value, name, words) {
   if (typeof value === 'string') return equal(value, words, name);
   const theirs = words.split(' '), ours = Array.isArray(value) ? value : [value];
@@ -319,8 +319,8 @@ test('another sequence: its points have no place before its own descriptor and a
 
 // ---- recordings beside the client in Python
 
-// Relative to the length of the place. Polar: the same operations, sine and cosine from another library. The Earth: the
-// rounding of 6e6 m, and the series' 0.1 um, beside some metres.
+// Tolerances are relative to the length of the place. Polar has the same operations, but sine and cosine of another
+// library. On the Earth, places of some metres have the rounding of 6e6 m and the series' 0.1 um.
 const TOLERANCES = {polar: 1e-13, moving: 1e-13, beams: 1e-13, ecef: 1e-8, utm: 1e-8, geodetic: 1e-8};
 const folder = process.argv[2];
 for (const name of Object.keys(TOLERANCES)) {

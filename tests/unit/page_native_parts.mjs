@@ -106,7 +106,7 @@ test('the time of a command counts once it is the next to be answered', async ()
 
 // ---- losses
 
-// What Losses says of these; shots: 100 come with the points.
+// Returns what Losses says of these. Each points frame has 100 shots.
 function lossesOf(...things) {
   const said = [], losses = new Losses((name, d) => said.push(name === 'scan'
     ? `scan ${d.scan} ${d.fired} ${d.cast} ${d.lost} ${d.received} ${d.missing}` : `${d.by} ${d.frames} ${d.pulses}`));

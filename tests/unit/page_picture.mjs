@@ -81,7 +81,7 @@ test('far from the origin: floats of coordinates jump, the cloud\'s do not', () 
     ours = Math.max(ours, Math.abs(cloud.blocks[0].position[3 * i + 1] + cloud.origin[1] - y));
     naive = Math.max(naive, Math.abs(Math.fround(y) - y));
   }
-  near(ours, 0, 2 ** -24, 'ours'); // it is half an ulp of a float below 1 m
+  near(ours, 0, 2 ** -24, 'ours'); // it is an ulp of a float below 1 m
   same(naive > 0.2, true, `naive: ${naive}`); // half an ulp of 5.6e6 is 0.25 m
 });
 
@@ -286,8 +286,8 @@ function lab(rgb) {
     (0.0193339 * r + 0.119192 * g + 0.9503041 * b) / 1.08883].map(f);
   return [116 * y - 16, 500 * (x - y), 200 * (y - z)];
 }
-// Matrices give the colours that people see who lack a kind of cones (Machado, Oliveira and Fernandes 2009, severity 1,
-// in linear light).
+// Matrices give the colours as people see them who lack a kind of cones (Machado, Oliveira and Fernandes 2009, severity
+// 1, in linear light).
 const SIGHTS = {
   all: [1, 0, 0, 0, 1, 0, 0, 0, 1],
   protan: [0.152286, 1.052583, -0.204868, 0.114503, 0.786281, 0.099216, -0.003882, -0.048116, 1.051998],

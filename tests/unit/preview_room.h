@@ -18,7 +18,7 @@ struct room {
     struct preview *preview;
 };
 
-/* The head scans everything but cones of 50 degrees below and 30 degrees above. tripod: more of the first station. */
+/* The head scans all but cones of 50 degrees below and 30 degrees above. tripod: more keys of the first station. */
 struct room room_open(const char *tripod);
 struct room room_open_with(const char *tripod, const char *body);
 void room_close(struct room *r);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Casters are ahead exactly as far as loop.ahead_ms allows. A command waits for the ticks that are claimed already, and
- * the ring has slots for so many. */
+/* Casters are ahead exactly as far as loop.ahead_ms allows: a command would have to wait for more, and the ring has no
+ * slots for more. */
 #include "tests/unit/device_rig.h"
 
 #include <poll.h>

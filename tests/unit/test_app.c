@@ -42,7 +42,7 @@ static void the_status_follows_from_the_error(void **state)
     expect_said("scanhead: x.yaml: no\nscanhead: disk?full\nscanhead: a?b 7\n");
 }
 
-/* With more errors than are kept, the number of the others stands at the end. The last error's status counts. */
+/* With more errors than are kept, the number of the others stands at the end. */
 static void all_errors_of_a_configuration_are_printed(void **state)
 {
     (void)state;

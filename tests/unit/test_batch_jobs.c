@@ -232,8 +232,8 @@ static void other_formats_are_other_jobs(void **state)
         "such jobs, another -o begins another campaign\n");
 }
 
-/* A file that is too short is found by its size, a changed file by its checksum, and a missing one as well. Only the
- * jobs of such files are done again. */
+/* A file that is too short is found by its size, and a changed file by its checksum. A missing file is found, too. Only
+ * the jobs of such files are done again. */
 static void a_changed_file_is_made_again(void **state)
 {
     (void)state;
@@ -283,7 +283,7 @@ static void another_campaign_is_refused(void **state)
         "--sweep noise.seed=1,3 " REST, 1, "",
         "scanhead: d: its job 3 was made with another station, other values of keys or other options; --force repeats "
         "such jobs, another -o begins another campaign\n");
-    /* Values of speed are no part of the bytes, but of names. */
+    /* A setting of speed changes no bytes, but where it is swept it is in the job's name. */
     batch("--stations 1 --sweep loop.threads=1,2 -o e", 0, "", NULL);
     batch(
         "--stations 1 --sweep loop.threads=1,3 -o e", 1, "",

@@ -275,7 +275,7 @@ static void test_job_texts(void **state)
     assert_string_equal(one.job, other.job);
 }
 
-/* Each input counts by its contents: the mesh, the file that it names, and the files that that one names. */
+/* Each input counts by its contents: the mesh, the file that it names, and the files that this file names. */
 static void test_inputs(void **state)
 {
     static const char *const inputs[] = {"m.obj",     "first.mtl", "a.png",    "faults.yaml",

@@ -95,7 +95,7 @@ static void widths_by_definition(void **state)
     assert_true(fabs(beam.resolution_m - 0.599584916) < 1e-12);
     assert_true(beam_echo_width(0.6, 0.0) == 0.6);
     assert_true(fabs(beam_echo_width(0.6, 0.09) - sqrt(0.36 + 2.354820045 * 2.354820045 * 0.09)) < 1e-9);
-    /* 3 m, 60 degrees: the tangent is the root of 3 */
+    /* at 60 degrees the tangent is the root of 3 */
     assert_true(fabs((double)beam_round_sigma(&beam, 10.0, 0.5, 0.04) - 0.005 * 0.2 * sqrt(3.0)) < 1e-9);
     assert_true(beam_round_sigma(&beam, 10.0, 1.0, 0.04) == 0.0F);
 }
@@ -131,7 +131,7 @@ static void means_on_a_plane(void **state)
     assert_true(ray_m == 100.0);
 }
 
-/* The variance of rho cos phi is half the mean of rho^2. Floats have 24 bits, and a few operations. */
+/* The variance of rho cos phi is half the mean of rho^2. Floats have 24 bits, and a few operations round. */
 static void widths_on_a_plane(void **state)
 {
     (void)state;
@@ -163,7 +163,7 @@ static double range_of(const struct beam *beam, const struct beam_sight *s, cons
     return (d - from) / along * sqrt(length2);
 }
 
-/* Ranges change linearly over the part, to a share of slope times the tangent: 1e-4 * 6. */
+/* Over the part ranges change linearly, but for a share of the slope times the tangent: 1e-4 times up to 3.1. */
 static void ranges_within_a_part(void **state)
 {
     (void)state;
@@ -275,8 +275,8 @@ static int is_like(const struct beam_part *a, const struct beam_part *b, double 
 }
 
 /* Each part is one of those that the lines make, and the parts together are the whole footprint. Lines that don't cross
- * in the disc cut it in closed form. Where they do, 469 places stand for it: an edge takes up to half a row of places
- * to either side, of 0.09 radii. */
+ * in the disc cut it in closed form. Where they do, 469 places stand for the footprint: an edge is wrong by up to half
+ * a row of places, which is 0.09 radii wide. */
 static void parts_of_a_footprint(void **state)
 {
     (void)state;

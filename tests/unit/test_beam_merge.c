@@ -53,7 +53,7 @@ static void test_surface_of_many_returns(void **state)
 }
 
 /* Returns of one surface have different texels. The echo has the colour of the strongest one, also where the nearest is
- * another. With two surfaces it is the first return of the one that returns most, or else the strongest of all. */
+ * another. With two surfaces it is that of the first return of the stronger surface, or of the strongest return. */
 static void test_colour_of_the_strongest(void **state)
 {
     (void)state;
@@ -167,8 +167,8 @@ static void test_rings(void **state)
     }
 }
 
-/* Axes across a beam are unit vectors, at right angles, and right-handed with the beam, also just above and below
- * level. */
+/* Axes across a beam are unit vectors, at right angles, and right-handed with the beam, also when it is level or just
+ * below that. */
 static void test_axes(void **state)
 {
     (void)state;

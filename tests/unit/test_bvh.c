@@ -107,9 +107,9 @@ static struct scene *small_and_large(const struct sheets *s, double gap_m, int l
     return scene_of((const double(*)[3])v, 6, order[large_first], 2, label[large_first]);
 }
 
-/* A small sheet is just before a large one, or behind it. Float would misjudge the large one. The large one's corners,
- * hundreds of kilometres away, are rounded by millimetres. Seen at a slant, that sheet is off by micrometres here, and
- * so by more than the small one. All rays meet the nearer one, whichever stands first in the mesh. */
+/* A small sheet is just before a large one, or behind it. Float would misjudge the large one, as it rounds
+ * the far corners by millimetres or more. At a slant this moves the large sheet here by more than the gap between the
+ * sheets. All rays meet the nearer one, whichever stands first in the mesh. */
 static void a_small_sheet_at_a_large_one(void **state)
 {
     (void)state;
@@ -283,7 +283,7 @@ static void both_triangles_of_an_edge_agree(void **state)
     }
 }
 
-/* Plates stand one behind the other. The plates pass the ray at 1.4 cm while their boxes hold it. A wall is behind. */
+/* Plates stand one behind the other. The ray goes through their boxes, 1.4 cm beside the plates. A wall is behind. */
 enum { PLATES = 100 };
 
 static struct scene *plates(void)
@@ -303,7 +303,7 @@ static struct scene *plates(void)
                                              NULL, NULL, 0});
 }
 
-/* Rays come from the scene, and from far away. 1e-9 m: 2^-53 of 30 km is 3e-12 m. */
+/* Rays come from the scene, and from far away. A bound of 1e-9 m is ample: 2^-53 of 30 km is 3e-12 m. */
 static void no_number_of_plates_hides_a_wall(void **state)
 {
     (void)state;

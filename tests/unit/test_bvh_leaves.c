@@ -69,7 +69,7 @@ static void check_corners(const struct bvh *bvh, const struct bvh_leaf *leaf, in
 }
 
 /* The size is at least each edge and each distance from the base. The size is larger by at most 1/64, by the rounding
- * to float, and by 2^-16 of the distance from the origin. */
+ * to float, and by 2^-15 of the distance from the origin. */
 static void check_size(const struct bvh *bvh, const struct bvh_leaf *leaf)
 {
     double v[5][3], far_m, edge_m = 0.0, least_m = 0.0;
@@ -109,7 +109,7 @@ static uint32_t check_leaves(const struct scene *scene)
     return n;
 }
 
-/* Shuffles triangles among 40, so that neighbours are up to 15 further in the list, and beyond. */
+/* Shuffles triangles among 40. A leaf takes neighbours that are up to 15 apart in the list; some are farther now. */
 static void shuffle(struct scene *scene)
 {
     for (uint32_t i = 0; i + 1 < scene->n_triangles; i++) {

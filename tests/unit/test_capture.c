@@ -35,7 +35,7 @@ static void test_answers_and_streams(void **state)
     (void)state;
     make_cola();
     client_open(&c, &m, 0, NULL);
-    c.ops->open(c.protocol, 0); /* as once more for the same client; the connection does not begin anew */
+    c.ops->open(c.protocol, 0); /* opened again for the same client; the connection does not begin anew */
     assert_int_equal(capture_n(c.capture), 1);
     const struct capture_place *place = capture_place(c.capture, 0);
     assert_true(fabs(capture_duration_s(c.capture) - 0.061) < 1e-12); /* from 1000 to 1061 ms */
@@ -223,7 +223,7 @@ static void test_asked_datagrams(void **state)
     client_close(&c);
 }
 
-/* Each beginning of a file, and files with a byte changed: they load, or are refused in one line. */
+/* Every third beginning of a file, and files with a byte changed: they load, or are refused in one line. */
 static void test_hostile(void **state)
 {
     (void)state;

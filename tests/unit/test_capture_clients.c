@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Clients of a capture that asks more at once than its device did, or longer things (talk_rig.h). */
+/* Captures whose clients ask for more at once than the device was asked, or for longer things (talk_rig.h). */
 #include <string.h>
 
 #include "tests/unit/talk_rig.h"

@@ -125,7 +125,7 @@ static void test_without_times(void **state)
     client_close(&c);
 }
 
-/* Times of two interfaces are compared, whatever seconds each one's times leave out (if_tsoffset, code 14). */
+/* Times of two interfaces are compared with the offset that each interface adds (if_tsoffset, code 14). */
 static void test_time_offsets(void **state)
 {
     (void)state;
@@ -245,8 +245,8 @@ static void test_swapped_beginning(void **state)
     client_close(&c);
 }
 
-/* Packets were cut off as they were captured, the first and the last one of the answer, one down to its headers, after
- * one that was lost. One of the cut packets came again as a whole. Each byte that is missing counts once. */
+/* The capture has cut off the first and the last packet of the answer, and one down to its headers. Before that one a
+ * packet was lost. Another cut packet came again as a whole. Each byte that is missing counts once. */
 static void test_cut_packets(void **state)
 {
     (void)state;

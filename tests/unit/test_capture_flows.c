@@ -109,7 +109,7 @@ static void a_repeated_syn_is_the_same_one(void **state)
     assert_int_equal(capture_is("/nowhere/a.pcap"), 0);
 }
 
-/* The longer one is played of two connections in which the device speaks unasked. */
+/* Where the device speaks unasked in two connections, the longer one is played. */
 static void the_longest_unasked_stream_is_played(void **state)
 {
     (void)state;

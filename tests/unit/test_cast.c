@@ -26,8 +26,8 @@ static void any_direction(uint64_t *seed, double d[3])
 }
 
 /* Rooms of up to 200 m and a head anywhere in them, as near to a wall as 1 % of the room. Rounding: coordinates are
- * within 400 m, so n.p is good to about 4 * 2^-53 * 400 m = 2e-13 m. The wall is seen at an incidence with a cosine of
- * at least 1/300 (a room's diagonal from 1 % beside a wall): 5e-11 m. The promise is 1 nm. */
+ * within 400 m, so n.p is good to about 4 * 2^-53 * 400 m = 2e-13 m. For these rays the cosine of incidence is at least
+ * 1/300, so this grows to 5e-11 m at most. The promise is 1 nm. */
 static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
 {
     (void)state;
@@ -56,8 +56,8 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
             int wall = -1;
             const long double d[3] = {dx[i], dy[i], dz[i]};
             long double error = fabsl((long double)range[i] - box_range(lo, hi, station, d, &wall));
-            /* Both terms of a plane's range have errors of 8 units of 2^-53 of up to 4.3 km. The incidence's cosine is
-             * at least 0.05: 16 * 2^-53 * 4300 / 0.05 = 1.5e-10 m. Corners, normal and direction leave as much again,
+            /* Both terms of a plane's range have errors of 8 units of 2^-53 of up to 400 m. The incidence's cosine is
+             * at least 1/300: 16 * 2^-53 * 400 * 300 = 2.1e-10 m. Corners, normal and direction leave as much again,
              * and more. */
             if (!(error < 1e-9L)) fail_msg("room %d, ray %d: range %.12g, %.3Lg m off", r, i, range[i], error);
             assert_int_equal(rig->scene->label[triangle[i]], wall);
@@ -369,7 +369,7 @@ static double opposite_range(const double vertex[4][3], const double d[3])
 }
 
 /* A head is on a corner of a mesh. The corner is no echo, the face across is seen, and in other directions nothing is.
- * The corner is also far from the BVH's origin. */
+ * The BVH's origin, the middle of the mesh, is elsewhere. */
 static void what_a_ray_begins_on_is_no_hit(void **state)
 {
     (void)state;

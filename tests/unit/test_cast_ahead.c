@@ -54,8 +54,8 @@ static void look_ahead(const struct two_boxes *b, const struct schedule_run *run
     caster_look_ahead(b->far->caster, &b->near->setup, run, n);
 }
 
-/* Casts in the far box. Returns the longest range: that of walls at 2 m is 2 sqrt(3) m at most, that of walls at 9 m is
- * 9 m at least. All of a piece of a line is of one kind. */
+/* Casts in the far box. Returns whether hits were found ahead, as ranges tell: up to 2 sqrt(3) m to walls at 2 m, and
+ * from 9 m on to walls at 9 m. All pulses of a piece of a line are of one kind. */
 static int is_ahead(const struct two_boxes *b, uint64_t line, uint64_t first, uint64_t end)
 {
     const struct schedule_run run = run_of(b, line, first, end);

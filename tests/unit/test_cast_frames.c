@@ -108,12 +108,12 @@ static void points_have_the_encoders_counts(void **state)
         if (i % 7 == 0) mirror -= mirror % (90 * DEG);
         if (i % 11 == 0) pan -= pan % (90 * DEG);
         fire(rig, mirror, pan, 0.0);
-        /* nearest whole count in exact integers, unless two are as near: 2 turns in a
-         * double are good to 1e-6 of 2^32 counts */
+        /* The count is the nearest whole one, in exact integers. Angles about halfway between two counts are left out:
+         * 2 turns in a double are good to 1e-6 counts of 2^32. */
         for (int axis = 0; axis < 2; axis++) {
             int64_t udeg = axis ? pan : mirror, n = (int64_t)(axis ? rig->setup.pan_counts : rig->setup.mirror_counts);
             int64_t within = (udeg % (360 * DEG) + 360 * DEG) % (360 * DEG);
-            int64_t twice = 2 * within * (n / 4), rest; /* n / 4 keeps 64 bits; n = 7 has its own way */
+            int64_t twice = 2 * within * (n / 4), rest; /* n / 4 fits 64 bits; 7 is not a multiple of 4 */
             if (n == 7) continue;
             rest = twice % (180 * DEG);
             int64_t count = (twice / (180 * DEG) + (rest > 90 * DEG)) % n;
@@ -193,8 +193,8 @@ static void check_geo_point(const struct cast_rig *rig, uint64_t k, uint32_t i, 
     for (int axis = 0; axis < 3; axis++)
         d_crs[axis] = (int32_t)counts[axis][i] * rig->setup.xyz_scale[axis];
     georef_reverse(rig->georef, d_crs, p);
-    /* half a count on each axis, turned into the scene: sqrt(3)/2 counts, each at most scale_m, or as much larger as a
-     * grid is smaller than the ground: 0.04 %; GeographicLib's own 5 nm both ways and the method's bound */
+    /* Half a count on each axis is sqrt(3)/2 counts. A count is at most scale_m, and 0.04 % more where the grid is
+     * smaller than the ground. The method's bound is added, and GeographicLib's own 5 nm both ways. */
     long double rounding = 0.8664L * (long double)rig->setup.xyz_scale[2] +
                            (long double)georef_bound_m(rig->georef, georef_method(rig->georef), 20.0, 20.0) + 2e-8L;
     long double off_read = 0.0L, off_true = 0.0L;
@@ -369,8 +369,8 @@ static void a_station_far_from_the_bvh_s_origin_is_as_exact(void **state)
     scene_free(scene);
 }
 
-/* Counts on the wire have 31 bits and a sign. What is beyond them has none, and is counted; a shot without echo is
- * not. */
+/* Counts on the wire have 31 bits and a sign. A point beyond them has no place, and is counted as left out. A shot
+ * without echo is not counted. */
 static void coordinates_fit_31_bits(void **state)
 {
     (void)state;
@@ -394,7 +394,7 @@ static void coordinates_fit_31_bits(void **state)
     }
 }
 
-/* The same for a direction and a range: a point has all three coordinates or none. Nothing is written beyond it. */
+/* The same for a direction and a range: a point has all three coordinates or none. The next entry is not written. */
 static void points_fit_31_bits(void **state)
 {
     (void)state;

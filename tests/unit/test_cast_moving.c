@@ -84,7 +84,7 @@ static void go_straight_from(struct pose_knot knot[KNOTS], int from)
 }
 
 /* Six lines of 10 ms, which the knots cover. The range is exact to a rounding of 1e-5 m counts; 1e-9 m is for the
- * encoders' arithmetic. If a ray passes within 1e-9 of an edge of the room, the wall may be either. */
+ * encoders' arithmetic. If a ray passes within 10 um of an edge of the room, the wall may be either. */
 static void expect_room(struct cast_rig *rig, const struct pose_knot knot[KNOTS])
 {
     double worst = 0, naive = 0;
@@ -143,7 +143,7 @@ static uint64_t sum_block(const struct line_block *b, uint32_t from, uint32_t n,
     return sum;
 }
 
-/* near_m is that of the straight way up. */
+/* A line has the same bytes with each width of packets and each cut into runs. */
 static void expect_same_bytes(struct cast_rig *rig)
 {
     static const uint32_t widths[] = {0, 16, 8, 4, 1}; /* 0: the native one */
@@ -212,7 +212,7 @@ static void test_geo(void **state)
     cast_rig_close(rig);
 }
 
-/* A wall moves away from a head that moves along. The wall's range is worked out by hand. */
+/* A body that was shifted by 2 m stands ahead of a head that moves towards it. Its range is worked out by hand. */
 static void test_moving_body(void **state)
 {
     (void)state;
@@ -320,7 +320,7 @@ static void test_nearer_of_wall_and_body(void **state)
         rig->setup.mover[0] = (struct cast_mover){.bvh = bvh, .centre_m = {-40.0, 3.25, 0.0}, .radius_m = 1.2};
         pose_heading(0.0, rig->setup.mover[0].rotation);
         rig->spec.pan_udeg_s = 0;
-        rig->spec.sweep_udeg = 40 * DEG; /* -20 to 20 degrees in 10 ms; level and ahead after 5 ms */
+        rig->spec.sweep_udeg = 40 * DEG; /* -11 to 29 degrees in 10 ms; level and ahead after 2.75 ms */
         rig->spec.fov_min_udeg = rig->spec.line_start_udeg = -11 * DEG;
         rig->spec.line_stop_udeg = 29 * DEG;
         schedule_start(&rig->segment, &rig->spec);

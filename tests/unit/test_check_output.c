@@ -114,8 +114,8 @@ static void waveforms(void **state)
     free(text);
 }
 
-/* Each scanner has its stations, and the limits that the configuration sets. The second is without pulses between 0.5
- * and 1000 m that the profile has. */
+/* Each scanner has its stations, and the limits that the configuration sets. The second sets only the end of
+ * its range, and begins at the 0.5 m of the profile. */
 static void two_scanners(void **state)
 {
     (void)state;
@@ -203,7 +203,7 @@ static void anchors(void **state)
     free(text);
 }
 
-/* The false origin of UPS is 2000 km for both, at the pole, and its scale there is 0.994. */
+/* At the pole UPS has 2000 km as easting and as northing, and a scale of 0.994. */
 static void anchors_at_a_pole_and_in_ecef(void **state)
 {
     (void)state;

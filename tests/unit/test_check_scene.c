@@ -101,7 +101,7 @@ static void all_kinds_of_objects(void **state)
     assert_non_null(strstr(on_out, "\nscene     19 triangles, 5 surfaces, x "));
 }
 
-/* 50 of each kind are printed, the largest first, and of as large ones the first of the file. */
+/* Up to 50 of each kind are printed. Equally large ones come in the order of the file. */
 static void fifty_of_each_kind(void **state)
 {
     static const int counts[] = {50, 51, 53};

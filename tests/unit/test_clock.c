@@ -34,8 +34,8 @@ static void readings_lie_between_others(void **state)
     assert_true(1e-9 * (double)from <= cpu_s && cpu_s <= 1e-9 * to);
 }
 
-/* Expects `is` to be the clock's time at a monotonic time that was `after` later than a reading between from and to.
- * The reading is known to half the span of two readings of the monotonic clock, which is at most to - from. */
+/* from and to are times of a clock before and after the monotonic clock was read. Expects `is` to be the clock's time
+ * `after` later than that reading, which is known to half the span of two readings: at most to - from. */
 static void expect_between(int64_t from, int64_t is, int64_t to, int64_t after)
 {
     assert_true(is - after >= from - (to - from) && is - after <= to + (to - from));

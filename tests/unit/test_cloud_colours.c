@@ -60,7 +60,7 @@ static void put(uint8_t *at, uint64_t v, int bytes)
         at[i] = (uint8_t)(v >> 8 * i);
 }
 
-/* LAS 1.2 and 1.4, each format that has colours: offsets as in tables of the ASPRS specification. */
+/* LAS 1.4, formats with colours and two without: offsets as in tables of the ASPRS specification. */
 static void test_las(void **state)
 {
     (void)state;

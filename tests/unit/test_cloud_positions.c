@@ -73,7 +73,7 @@ static void test_text(void **state)
     assert_non_null(strstr(err.text, "PTX is not read"));
 }
 
-/* The third column of 64 is read, and the last one; a line of names may have 64, too. The names begin with a # or
+/* The last three of 64 columns are read, and a line of names may have 64, too. The names begin with a # or
  * don't, and a column may be called #. */
 static void test_many_columns(void **state)
 {
@@ -181,7 +181,7 @@ static void test_pcd_compressed(void **state)
 }
 
 /* The longest run of literals has 32 bytes, and a control of 32 is the shortest copy, of three. The three points of
- * this test have 36 bytes: 32 literals, one more, and the three before the last. Copies begin up to 8192 bytes back. */
+ * this test have 36 bytes: 32 literals, one more, and a copy of the last three. */
 static void test_pcd_runs(void **state)
 {
     (void)state;
@@ -197,7 +197,7 @@ static void test_pcd_runs(void **state)
     n += 32;
     packed[n++] = 0; /* one literal */
     packed[n++] = 0x40;
-    packed[n++] = 32; /* three bytes, from 4 back: the last three of the 32 */
+    packed[n++] = 32; /* three bytes, from 3 back */
     packed[n++] = 3 - 1;
     le_put32(packed, (uint32_t)n - 8);
     le_put32(packed + 4, 36);
@@ -228,7 +228,7 @@ static void test_pcd_runs(void **state)
     expect(big, n, 80, same, 0);
 }
 
-/* A position is three finite numbers, or NaN three times. Each point of each form is looked at. */
+/* An infinite number makes no position, whichever of a point's it is, as text and in binary. */
 static void test_pcd_that_is_no_position(void **state)
 {
     (void)state;
@@ -294,7 +294,7 @@ static void test_pcd_precision(void **state)
     }
 }
 
-/* Without POINTS the sides of the grid count. What follows the points is left out with a word, but blank lines. */
+/* Without POINTS the sides of the grid count. More after the points is left out with a warning, blank lines without. */
 static void test_pcd_counts(void **state)
 {
     (void)state;

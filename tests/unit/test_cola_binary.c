@@ -16,7 +16,7 @@ static size_t to_b(uint8_t *to, const char *a, const char *widths)
     const char *at = strchr(strchr(a, ' ') + 1, ' ');
     size_t n = at == NULL ? strlen(a) : (size_t)(at - a);
     memcpy(to, a, n);
-    if (at != NULL || a[1] != 'R') to[n++] = ' '; /* a name is always followed by one, but in a question */
+    if (at != NULL || a[1] != 'R') to[n++] = ' '; /* a blank follows each name, but not in a question */
     for (; *widths != '\0'; widths++) {
         char *end;
         assert_non_null(at);

@@ -59,7 +59,7 @@ static void check(const char *cfg, int is_b, uint32_t n_bits)
     seal_check(cola.ops, unit, len, read_scan);
 }
 
-/* Channels, RSSI, 16 bit, unit, encoder, position, name, comment, time, every. */
+/* The numbers are channels (2), RSSI, 16 bit, unit, encoder (2), position, name, comment, time, and each n-th scan. */
 static void values_of_all_kinds(void **state)
 {
     (void)state;

@@ -35,7 +35,7 @@ static void a_reboot_that_is_refused_ends_the_session(void **state)
     assert_int_equal(cola.hung_up, 1);
 }
 
-/* The clock, hours and count of power-ups count since power-up. */
+/* The clock and the hours count from power-up. Power-ups are counted, too. */
 static void clocks_begin_at_power_up(void **state)
 {
     (void)state;
@@ -153,7 +153,7 @@ static void mrpt_starts(void **state)
     cola_expect("sWN LMDscandatacfg 01 00 0 1 0 00 00 0 0 0 0 +1", "sWA LMDscandatacfg");
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
     cola_expect("sRN STlms", "sRA STlms 7 0 8 00:00:00 A 01.01.1970 0 0 0");
-    assert_int_equal(cola.bytes[11], '7'); /* the byte that it looks at */
+    assert_int_equal(cola.bytes[11], '7'); /* the byte that this client looks at */
 }
 
 /* ---- states and the head */
@@ -188,7 +188,7 @@ static void a_resting_head_is_started(void **state)
     assert_string_equal(cola.line[1], "SCAN:START");
     cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
     assert_string_equal(cola.line[1], "SCAN:START");
-    cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0"); /* who wants no scans starts none */
+    cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0"); /* a client that wants no scans starts none */
     assert_int_equal(cola.n_lines, 0);
     cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0"); /* of this session alone */
     assert_int_equal(cola.n_lines, 0);
@@ -198,7 +198,7 @@ static void a_resting_head_is_started(void **state)
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
     cola_head_state("scanning");
     assert_int_equal(cola_ask("sRN STlms")[10], '6'); /* the session is stopped, as before */
-    cola_head_state("spin-down");                     /* it stops as soon as it can */
+    cola_head_state("spin-down");                     /* the scan starts as soon as it can */
     cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
     cola_head_state("idle");
     cola.ops->time(cola.protocol, 200000000);
@@ -208,7 +208,7 @@ static void a_resting_head_is_started(void **state)
     cola_head_state("idle");
     cola.ops->time(cola.protocol, 400000000);
     assert_string_equal(cola.line[cola.n_lines - 1], "SCAN:START");
-    cola_turn(10, 1.0); /* the scan has come: who stops the head now means it */
+    cola_turn(10, 1.0); /* after a scan, a head that was stopped stays so */
     protocol_rig_clear(&cola);
     cola.ops->time(cola.protocol, 9000000000);
     assert_int_equal(cola.n_lines, 0);

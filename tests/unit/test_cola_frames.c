@@ -41,7 +41,7 @@ static void garbage_is_skipped_and_counted(void **state)
         {6, 6, "\2sRN \1"},                           /* a character that no telegram has */
         {5, 5, "\2sRN "},                             /* half a telegram: the next one begins */
         {1, 1, "\2"},                                 /* the mark twice */
-        {3, 3, "\2\2x"},                              /* and thrice */
+        {3, 3, "\2\2x"},                              /* twice before another byte */
         {12, 12, "\2\2\2\2\xff\xff\xff\xff\1\1\1\1"}, /* a length that can't be */
         {9, 9, "\2\2\2\2\0\0\0\0\0"},                 /* of nothing */
         {19, 19, "\2\2\2\2\0\0\0\x0asRN ODpwrc\1"},   /* a wrong check byte */
@@ -89,7 +89,7 @@ static void an_overlong_telegram_is_refused_once(void **state)
     cola_expect("sRN LCMstate", "sRA LCMstate 0");
 }
 
-/* The longest names and values that fit. */
+/* Requests of up to 1024 bytes are answered. */
 static void long_requests_are_answered(void **state)
 {
     (void)state;
@@ -112,8 +112,8 @@ static uint32_t draw(uint32_t below)
     return (random_state >> 8) % below;
 }
 
-/* Telegrams are broken at random, in random pieces, among scans. The head goes on, every byte is counted, and a good
- * request is answered after it. */
+/* Telegrams are broken at random, in random pieces, among scans. Lost bytes and wrong requests are counted, and a good
+ * request is answered after them. */
 static void broken_telegrams_do_no_harm(void **state)
 {
     (void)state;

@@ -25,7 +25,7 @@ static void a_narrowed_range_is_narrower(void **state)
     assert_int_equal(lmd.channel[0].value[0], 1000 + 10 * 405);
 }
 
-/* The range that is read back, the one in telegrams' headers and their actual one agree. Ends off the grid move to the
+/* The range that is read back agrees with the header of a telegram, and with its values. Ends off the grid move to the
  * nearest beams. */
 static void expect_range(uint32_t line, const char *step, int32_t start_e4, int32_t stop_e4, uint32_t first, uint32_t n)
 {

@@ -300,7 +300,7 @@ static void expect_way(const struct cola_way *way, uint32_t scan, int64_t t_ns, 
         fail_msg("at %lld ns %d mm, %d mm/s", (long long)t_ns, at.path_mm, at.speed_mm_s);
 }
 
-/* A way is known from a frame's first pose to its last one. Before and after that the encoder stands at its ends. */
+/* A way is known from a frame's first pose to its last one. Beyond them it is that of the nearer pose. */
 static void a_way_ends_with_its_poses(void **state)
 {
     (void)state;
@@ -328,7 +328,7 @@ static void a_way_ends_with_its_poses(void **state)
     expect_way(&way, 4, S, 13000, 13000);
 }
 
-/* Between these ends the speed is one: of all the frame's poses, and of the way since the frame before. */
+/* A frame of poses has one speed: its way, from the end of the frame before it, over its time. */
 static void a_way_has_one_speed_a_frame(void **state)
 {
     (void)state;

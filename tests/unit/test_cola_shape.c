@@ -81,7 +81,7 @@ static void random_polygons_agree(void **state)
     assert_true(inside > on_corner + 1000); /* more than the corners alone */
 }
 
-/* The middle of an edge is on it; one micrometre to a side is not both inside and outside. */
+/* Edges and corners belong to the field. A point one micrometre beyond an edge does not. */
 static void edges_belong_to_the_field(void **state)
 {
     (void)state;
@@ -203,7 +203,7 @@ static void chains_join_their_links(void **state)
     assert_false(in_sector(&s, 270, 1080, 1000001) || in_sector(&s, 271, 1080, 1000000));
     assert_true(in_sector(&s, 135, 1080, 1931850) && in_sector(&s, 135, 1080, 1000));
     assert_false(in_sector(&s, 135, 1080, 1931854));
-    /* beyond the line from the head to the near end of the second link: the triangle before it is in the field */
+    /* A line goes from the head to the second link's near end. The triangle before it is in the field. */
     assert_true(in_sector(&s, 179, 1080, 500000));
     assert_false(in_sector(&s, 181, 1080, 990000));
 }

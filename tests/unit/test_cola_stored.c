@@ -5,7 +5,7 @@
 #include "drivers/protocol/cola_field.h"
 #include "tests/unit/cola_rig.h"
 
-/* Another session of the same head, after what the rig's spec says now. Returns what create does. */
+/* Opens another session of the same head, with the rig's spec as it is now. Returns the result of create. */
 static int open_again(struct sh_err *err)
 {
     cola.ops->destroy(cola.protocol);
@@ -185,7 +185,7 @@ static void one_dialect_at_a_time(void **state)
     assert_int_equal(open_again(&err), 0);
     expect_silence(frame, len);
     cola_expect("sRN EIHstCola", "sRA EIHstCola 0");
-    cola.spec.stored = "EIHstCola 1\n"; /* with it, it is the one of power-up */
+    cola.spec.stored = "EIHstCola 1\n"; /* a stored dialect is the one of power-up */
     assert_int_equal(open_again(&err), 0);
     EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
     open_strict(PROTOCOL_COLA_B);
@@ -193,7 +193,7 @@ static void one_dialect_at_a_time(void **state)
     EXPECT_B("sRN EIHstCola", "sRA EIHstCola \1");
 }
 
-/* mEEwriteall and mSCloadappdef leave a link its dialect, and others theirs. */
+/* mEEwriteall stores no dialect that nobody has set. mSCloadappdef leaves a link its dialect. */
 static void storing_keeps_the_dialect(void **state)
 {
     (void)state;

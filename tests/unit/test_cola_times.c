@@ -259,8 +259,8 @@ static void a_poll_gets_the_last_scan(void **state)
 static const struct protocol_rig_reply refused[] = {
     {"HEAD:STATE?", "idle", 0}, {"SCAN:START", "ERR", -203}, {NULL, NULL, 0}};
 
-/* Somebody stops the head before the first scan has come: it is started again, since a poll waits. After that scan a
- * stop is meant. Where the start is refused, it is tried once. */
+/* Somebody stops the head before the first scan has come: it is started again, since a poll waits. After that scan
+ * it is not. Where the start is refused, it is tried once. */
 static void a_waiting_poll_starts_the_head_again(void **state)
 {
     (void)state;
@@ -280,7 +280,7 @@ static void a_waiting_poll_starts_the_head_again(void **state)
     protocol_rig_clear(&cola);
     cola.ops->time(cola.protocol, 9000000000);
     assert_int_equal(cola.n_lines, 0);
-    cola_open_lms(); /* the poll waits, too, of a session that has stopped its measurement meanwhile */
+    cola_open_lms(); /* a poll also waits if its session has then stopped measuring */
     cola_head_state("boot");
     cola_authorise();
     protocol_rig_input(&cola, "\2sRN LMDscandata\3");
@@ -298,8 +298,8 @@ static void a_waiting_poll_starts_the_head_again(void **state)
     assert_int_equal(cola.n_lines, 0);
 }
 
-/* The head fails while a poll waits, or may not be started any more: the poll is refused, once. The answer to the
- * request in which this shows comes after it. */
+/* The head fails while a poll waits, or may not be started any more: the poll is refused, once. A request may show
+ * this; its own answer comes after the refusal. */
 static void a_waiting_poll_is_refused(void **state)
 {
     (void)state;

@@ -43,8 +43,8 @@ static double height_seen(enum georef_crs crs, uint32_t native_crs, double lon_d
     return colour_figure(COLOUR_HEIGHT, &t, 0);
 }
 
-/* 2 km away the Earth's surface is 0.31 m below the level of the station. Radii differ by 0.6 % from the mean one: 2
- * mm. ECEF has no curvature. */
+/* 2 km away the Earth's surface is 0.31 m below the level of the station. Its radii differ by 0.6 % from the mean one,
+ * which is 2 mm. Heights in ECEF need no radius. */
 static void test_heights(void **state)
 {
     (void)state;

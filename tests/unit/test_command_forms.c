@@ -84,7 +84,7 @@ static void try_forms(size_t i, const char *header, int good)
     static const char *const lead[] = {"", ":", "  ", "\t :"};
     char line[COMMAND_MAX_LINE];
     for (size_t k = 0; k < N_OF(lead); k++) {
-        const int colon = strchr(lead[k], ':') != NULL && header[0] == '*'; /* no tree, no root */
+        const int colon = strchr(lead[k], ':') != NULL && header[0] == '*'; /* common commands have no root */
         for (int query = 0; query < 2; query++) {
             struct command_device dev = device_for(commands[i].full);
             const char *asks = strcmp(commands[i].full, "SITE:POSE") == 0 ? " 1" : "";

@@ -18,7 +18,7 @@ static void ranges_keep_apart(void **ctx)
     expect(&dev, "HEAD:RANG:MAX? MAX", "800");
     expect_error(&dev, 1, "HEAD:RANG:MIN 100", CMD_E_SETTINGS, "allowed 0.5 to 99.999999999 as HEAD:RANGe:MAX is 100");
     expect_error(&dev, 1, "HEAD:RANG:MIN 0.4", CMD_E_RANGE, "HEAD:RANGe:MIN 0.4 m, allowed 0.5 to 250");
-    expect_error(&dev, 1, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* no program would be left */
+    expect_error(&dev, 1, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* a pulse rate would have no range */
     expect_error(&dev, 1, "HEAD:RANG:MAX 900", CMD_E_RANGE, "allowed 2 to 800");
     expect_error(&dev, 1, "HEAD:RANG:MAX 5 DEG", CMD_E_SUFFIX, "takes M, MM or KM");
     expect(&dev, "*RST", "OK");
@@ -204,7 +204,7 @@ static void a_spheres_step_divides_half_a_turn(void **ctx)
     expect_error(&dev, 1, "SCAN:STEP 2", CMD_E_SETTINGS, "allowed 1: the platform moves");
 }
 
-/* A step is the part of a turn to the nearest micro-degree, and gives the number of steps back. */
+/* A step is the part of a turn to the nearest micro-degree, and gives an even number of steps back. */
 static void a_step_is_the_nearest_to_its_part_of_a_turn(void **ctx)
 {
     (void)ctx;

@@ -240,7 +240,7 @@ static void devices_refuse_word_by_word(void **state)
                    5);
 }
 
-/* Ranges and noise are planned, so they rest in a scan, as the station does. HELP? says so, too. */
+/* Ranges and noise are planned, so they can't change in a scan, and neither can the station. HELP? says so, too. */
 static void settings_rest_in_a_scan_or_do_not(void **state)
 {
     (void)state;

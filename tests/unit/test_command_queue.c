@@ -75,7 +75,7 @@ static void two_overflows_count_apart(void **ctx)
     push_numbered(&queue, 1, COMMAND_QUEUE_LEN + 5);
     command_queue_pop(&queue, buf, sizeof buf);
     command_queue_pop(&queue, buf, sizeof buf);
-    push_numbered(&queue, 101, 103); /* two fit, the second of them goes again */
+    push_numbered(&queue, 101, 103); /* two fit; then the second is replaced */
     for (int i = 3; i < COMMAND_QUEUE_LEN; i++)
         command_queue_pop(&queue, buf, sizeof buf);
     assert_string_equal(buf, "-222,\"Data out of range; n31\"");

@@ -70,7 +70,7 @@ static void numbers_beyond_64_bits_are_out_of_range(void **ctx)
         snprintf(line, sizeof line, "HEAD:PRR %s", numbers[i]);
         expect_error(&dev, 1, line, CMD_E_RANGE, ", allowed 1000 to 1200000\"");
     }
-    /* The largest number of 64 bits is like any other, and the next one is refused. */
+    /* The largest number of 64 bits is out of range like others. The next one is quoted as it was sent. */
     dev.step_allowed = 1;
     expect_error(&dev, 1, "TIME:STEP 9223372036854775807", CMD_E_RANGE, " 9223372036854775807 ns, allowed");
     expect_error(&dev, 1, "TIME:STEP 9223372036854775808", CMD_E_RANGE, " 9223372036854775808, allowed");
@@ -217,7 +217,7 @@ static void effects_follow_the_state_machine(void **ctx)
             expect(&dev, lines[i], "OK");
             assert_int_equal(result.effect, effects[i]);
             assert_true(result.changes);
-            assert_int_equal(dev.state, state); /* the loop's to change */
+            assert_int_equal(dev.state, state); /* the loop changes it, not the command */
             assert_int_equal(dev.settings.frames, effects[i] == COMMAND_RESET ? 1 : 9);
         }
 }
@@ -278,7 +278,7 @@ static void numbers_may_have_blanks_in_their_exponents(void **ctx)
     assert_true(dev.settings.prr_uhz == 200000 * MICRO);
 }
 
-/* A client that goes to the end sends the length as it was told it, to 1e-6 s. */
+/* A client that goes to the end sends the length that SCAN:REPLay? gave, cut to 1e-6 s. */
 static void the_length_that_is_said_is_allowed(void **ctx)
 {
     (void)ctx;

@@ -30,7 +30,7 @@ static void malformed_configurations_are_refused(void **state)
             fail_msg("case %zu (%s): \"%s\", expected \"%s...%s\"", i, bad[i].with, err.text, start, bad[i].fragment);
         for (uint32_t k = 0; k < diagnostics.n; k++)
             if (strpbrk(diagnostics.err[k].text, "\n\r") != NULL) fail_msg("case %zu: more than one line", i);
-        /* There are no consequential errors. A file of its own has more of them, as much is missing. */
+        /* An edit of base gives no other errors. A whole file has more of them, as much is missing. */
         if (bad[i].old != NULL && diagnostics.n != 1)
             fail_msg("case %zu (%s): %u faults: %s, %s", i, bad[i].with, diagnostics.n, diagnostics.err[0].text,
                      diagnostics.err[1].text);
@@ -223,7 +223,7 @@ static void places_are_taken_in_each_form(void **state)
     assert_true(cfg->station[0].north && !cfg->station[0].has_position);
     assert_loads(load_edited(old, "  anchor: {source: ecef}\nstations:\n  - {ecef_m: [6378137, 0, 0]}"));
     assert_int_equal(cfg->station[0].place, PLACE_ECEF);
-    /* With an anchor, one of both is given. */
+    /* With an anchor, either position_m or a place on the Earth is given. */
     assert_int_equal(load_edited(old, "  anchor: {source: ecef}\nstations:\n"
                                       "  - {position_m: [1, 2, 3], ecef_m: [6378137, 0, 0]}"),
                      SH_EINPUT);

@@ -251,7 +251,7 @@ static void stops_go_through_the_stations(void **state)
         cfg->platform.kind = PLATFORM_STOPS;
         assert_int_equal(cfg_station_at(cfg, number), (number - 1) % 3);
     }
-    cfg->n_stations = 1; /* it has all stops of a trajectory */
+    cfg->n_stations = 1; /* a single station has all stops */
     assert_int_equal(cfg_station_at(cfg, 5), 0);
     /* A head that is at none of the stations serves all of them. */
     cfg->n_stations = 2;

@@ -233,7 +233,7 @@ static void the_step_of_a_sphere_is_a_setting(void **state)
     assert_int_equal(cfg->profile.emitter.rings, 83);
 }
 
-/* Nothing else follows from it, also where it is not the list's first item. */
+/* A bad value gives no other fault, also where it is not in the first item of its list. */
 static void a_bad_value_in_a_list_is_one_fault(void **state)
 {
     (void)state;

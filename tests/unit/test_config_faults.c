@@ -56,13 +56,13 @@ static void what_follows_from_a_fault_is_not_told(void **state)
         {"stations:", "station:", "10: station: unknown key, did you mean stations?"},
         {"position_m", "positon_m", "11: stations[0].positon_m: unknown key"},
         {"  - position_m: [1, 2, 3]\n    heading_deg: 90\n", "  gate\n", "11: stations: here stands a single value"},
-        {"type: tcp", "type: tpc", "14: links[0].type: "}, /* what has a port? */
+        {"type: tcp", "type: tpc", "14: links[0].type: "}, /* an unknown type may have a port */
         {"    port: 0\n", "    port: 0\n  - {type: tcp, port: 0, protocol: colla}\nntp: {role: client}\n",
-         "16: links[1].protocol: "}, /* it may send dates */
+         "16: links[1].protocol: "}, /* an unknown protocol may send dates */
         {"    port: 0\n", "    port: 0\n  - {type: tcp, port: 0, protocol: colla}\nfaults: [{kind: window_soiled}]\n",
          "16: links[1].protocol: "},
-        {"any-rate", "riegl", "2: head.profile: "},                           /* what are its limits? */
-        {LINES, "  lines_hz: 1e6\n", "4: head.lines_hz: 1000000 is outside"}, /* more than pulses */
+        {"any-rate", "riegl", "2: head.profile: "},                           /* its limits are not known */
+        {LINES, "  lines_hz: 1e6\n", "4: head.lines_hz: 1000000 is outside"}, /* more than prr_hz */
         {LINES, "  line_start_deg: 99\n  line_stop_deg: 5\n", "4: head.line_start_deg: 99 is outside"},
         {"output:", "noise: {range: signal}\nsignal: {model: loud}\noutput:", "17: signal.model: "},
         {"output:", "platform: {kind: car, file: a}\noutput:", "16: platform.kind: "},
@@ -125,7 +125,7 @@ static void many_faults_end(void **state)
     free(text);
 }
 
-/* ---- files that are none are refused at once: opening one could wait, or reading it never end */
+/* ---- a FIFO or a device is refused at once: opening it could wait, or reading it never end */
 
 static void a_fifo_or_a_device_is_refused(void **state)
 {

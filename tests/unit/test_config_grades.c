@@ -21,8 +21,8 @@ static void note_grade(const char *path, const char *from)
         if (strncmp(from, grades[g], strlen(grades[g])) == 0) found[key - cfg_profile_table.keys][g] = 1;
 }
 
-/* Notes the grades of a file. A figure of a program has a path of its own; the other lists have one grade for each of
- * their elements. */
+/* Notes the grades of a file. A figure of a program has a path of its own. In other lists the grades of all elements
+ * are noted for the list. */
 static void read_grades(char *text)
 {
     char section[CFG_PATH_MAX] = "", path[CFG_PATH_MAX] = "", word[64];

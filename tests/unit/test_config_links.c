@@ -89,7 +89,7 @@ static void a_serial_is_told_from_others(void **state)
     assert_string_equal(cfg->link[1].whose, want);
 }
 
-/* Long paths differ mostly at their ends: 287 bytes of those are used. */
+/* Long paths differ mostly at their ends: the last 287 bytes are used. */
 static void a_long_path_is_cut_at_its_beginning(void **state)
 {
     (void)state;

@@ -157,7 +157,7 @@ static void the_file_names_the_profile(void **state)
     free(text);
 }
 
-/* The path of a profile is as long as that of another file, with the folder of the configuration. */
+/* The path of a profile has the same limit as other paths, and the configuration's folder counts. */
 static void the_longest_path_of_a_profile(void **state)
 {
     (void)state;
@@ -187,7 +187,7 @@ static void the_longest_path_of_a_profile(void **state)
     remove(path);
 }
 
-/* ---- keys of --set: the place of another key is its line, or that it is set, too */
+/* ---- keys of --set: an error names the line of another key, or that this key comes from --set, too */
 
 static void sets_are_refused_word_by_word(void **state)
 {

@@ -250,7 +250,7 @@ static void profiles_are_listed(void **state)
     assert_says("/nonexistent");
 }
 
-/* Rays of a footprint need one, and a pulse of 0.1 ns or more: 15 mm of range. A single ray always goes. */
+/* Sub-rays need a footprint, and a pulse of 0.1 ns or more: 15 mm of range. A single ray is always allowed. */
 static void a_footprint_needs_a_head_that_has_one(void **state)
 {
     (void)state;

@@ -26,7 +26,7 @@ static void set_changes_values(void **state)
     assert_int_equal(cfg->head.settings.line_stop_udeg, 65000000); /* defaults follow the profile */
 }
 
-/* The longest names: of a scanner's keys. */
+/* The longest names are those of a scanner's keys. */
 static void set_takes_long_names(void **state)
 {
     (void)state;
@@ -240,7 +240,7 @@ static void a_full_list_takes_no_more(void **state)
 }
 
 /* When not given, the tolerance of positions is a thousandth of the plan's, at least 1e-7 m. The tolerance of meshes is
- * a tenth of it, or 1 m where the plan's is not given either. */
+ * a tenth of the plan's, or 1 m where the plan's is not given either. */
 static void tolerances_follow_the_plan(void **state)
 {
     (void)state;
@@ -339,8 +339,8 @@ static void stations_take_the_grid_of_the_anchor(void **state)
     write_file(config_path, base, strlen(base));
 }
 
-/* With the last station that there is room for, the first and the last one are checked as all others are, and nothing
- * beyond it. */
+/* There are as many stations as there is room for. Among them the first and the last one are checked as all others
+ * are. */
 static void all_stations_are_checked(void **state)
 {
     (void)state;

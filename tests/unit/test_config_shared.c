@@ -12,7 +12,7 @@
 
 static char top[512]; /* where the test began */
 
-/* Makes ./config/faults with two scenarios, a hidden file and one that is none, and goes there. */
+/* Makes ./config/faults with two scenarios, a hidden one and a file that is no scenario, and goes there. */
 static int go_there(void **state)
 {
     if (getcwd(top, sizeof top) == NULL || set_up(state) != 0 || chdir(dir) != 0) return -1;

@@ -113,8 +113,8 @@ static void cast(const struct pair *p, const double middle_m[3], int from_own, u
     bvh_work_free(work);
 }
 
-/* Corners are written out with an error of 2^-53 of the coordinates. A plane's tilt is that over the least edge, 0.07
- * m, over at most 100 m. A ray at a smaller sine than 0.01 is left out. */
+/* Corners are written out with an error of 2^-53 of the coordinates. A plane tilts by that error over its least edge,
+ * 0.07 m, and rays are up to 100 m long. A ray at a smaller sine than 0.01 is left out. */
 static void compare(const double middle_m[3], uint32_t least_hits)
 {
     const double rounding_m = 0x1p-53 * (fabs(middle_m[0]) + fabs(middle_m[1]) + fabs(middle_m[2]) + 200.0);
@@ -179,7 +179,7 @@ static void incidence_is_the_same(void **state)
     close_pair(&p);
 }
 
-/* Two copies are at one place, and one of them again. The first is the hit, in whatever order Embree finds them. */
+/* Three copies are at one place. The first is the hit, in whatever order Embree finds them. */
 static void the_first_of_equal_copies_is_hit(void **state)
 {
     (void)state;
@@ -332,7 +332,7 @@ static void names_say_which_copy(void **state)
 }
 
 /* Parts left out of a mesh that has copies are counted once, and added to the others' counts. Each copy counts as a
- * mesh. A copy's error grows with its scale. */
+ * mesh. */
 static void counts_of_copied_meshes(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A run that takes more than ten times its planned cost gives a warning. The figures are the test's, and once those of
- * a loop whose plan has next to nothing for a pulse. */
+/* A run that takes more than ten times its planned cost gives a warning. The test makes up the figures. A loop then
+ * has its own, and a plan of next to no time for a pulse. */
 #include "tests/unit/device_rig.h"
 
 #include <poll.h>
@@ -42,7 +42,7 @@ static void what_was_claimed_before_counts(void **state)
     assert_true(add(&f, 10 * SECOND, 0, 0) > 9999.0); /* a tick that never ends: nothing is claimed, nothing released */
 }
 
-/* There are ticks without pulses, however long; and the ticks' own cost beside their pulses. */
+/* Ticks without pulses give no warning, however long they take. Ticks have a cost of their own beside their pulses. */
 static void a_head_that_rests_is_not_dear(void **state)
 {
     (void)state;

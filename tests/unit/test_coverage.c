@@ -68,8 +68,8 @@ static void test_area_is_kept(void **state)
     }
 }
 
-/* All of a box is seen from inside where each cell holds a circle that no gap between the points does. Much smaller
- * cells are not. */
+/* All of a box is seen from inside if each cell holds a circle larger than any gap between the points. Much smaller
+ * cells are not all seen. */
 static void test_box(void **state)
 {
     (void)state;
@@ -206,7 +206,7 @@ static void check_l(const double station_m[3], const struct cover_sweep *far, in
     const struct view view = check_cells(c, station_m, sees);
     sums_of(c, &sums);
     assert_near("area", sums.area_m2, L_M2, 1e-11);
-    /* More or less of the cut cells is visible. The cut cells lie within a cell's width, 2.5 cell_m across, of the
+    /* A cell that the line cuts is seen or not. Such cells lie within a cell's width, 2.5 cell_m across, of the
      * line. */
     print_message("%.3f m2 seen, %.3f m2 visible, %.3f m2 in cells that the shadow's line cuts, %.3f m2 perhaps "
                   "between the points\n",
@@ -314,7 +314,7 @@ static void test_too_small(void **state)
     struct sh_err err;
     double allowed_m;
     assert_int_equal(bvh_create(scene, 1, NULL, &bvh, &err), 0);
-    /* The limit in the text is allowed, though it has two digits: with 1.14 MiB 0.1922 m is, and 0.19 m is not. */
+    /* The limit in the text is rounded up, so that it is allowed. With 1.14 MiB 0.1922 m is allowed, 0.19 m is not. */
     for (double memory_mib = 1.10; memory_mib < 1.18; memory_mib += 0.01) {
         struct coverage_spec spec = {bvh, NULL, 0.001, memory_mib, 1};
         assert_int_equal(coverage_create(&spec, NULL, &coverage, &err), SH_EINPUT);
@@ -326,7 +326,7 @@ static void test_too_small(void **state)
         if (coverage_create(&spec, NULL, &coverage, &err) != 0) fail_msg("%g MiB: %s", memory_mib, err.text);
         coverage_free(coverage);
     }
-    /* Numbers of cells have 30 bits: 1e9 along a side, of which the longest is the scene's. */
+    /* Numbers of cells along a side have 30 bits, so the scene's longest side may have 1e9 cells. */
     const double span_m = fmax(fmax(HI[0] - LO[0], HI[1] - LO[1]), HI[2] - LO[2]);
     char says[160];
     struct coverage_spec fine = {bvh, NULL, 0.99e-9 * span_m, 1e9, 1};

@@ -197,7 +197,7 @@ static void test_brute_force(void **state)
     cover_close(c);
 }
 
-/* The cell that a ray from the middle meets, and how far away. */
+/* Returns the cell that a ray meets, and writes its area. */
 static uint32_t cell_towards(const struct cover *c, const double from_m[3], const double dir[3], double *area_m2)
 {
     struct search s = {from_m, dir, INFINITY, 0};
@@ -297,8 +297,8 @@ static void test_sides_are_cells(void **state)
     cover_close(c);
 }
 
-/* Cells are much smaller than a ray. The gain is the sum of the rays' areas, and that is the area. Lines of rays end
- * within a ray's width of the edges, 12 edges of a box; by chance half of that, in either direction. */
+/* Cells are much smaller than a ray. The gain is the sum of the rays' areas, which is the area of the box. Lines of
+ * rays end within a ray's width of its 12 edges; by chance half of that, in either direction. */
 static void test_coarse_rays(void **state)
 {
     (void)state;
