@@ -5,8 +5,8 @@
 # line of counts.
 #
 # As many at a time as there are processors, those that take longest first in each folder:
-#   1. accuracy, stability, unit: they compute; beside them the guests, which take longest and so begin first, and the
-#      recipes, which mostly wait
+#   1. accuracy, stability, unit: they compute; beside them those that take longest and so begin first: the guests, the
+#      recipes, the page and the heads with sanitizers
 #   2. wire, which mostly waits; beside it two tests that wait for other people's clients
 #   3. those that drive a head at its limits, or that spin: each has the machine to itself
 set -eu
@@ -49,14 +49,15 @@ if wanted unit; then set -- "$@" +tests/check_recipes.sh; fi
 if wanted accuracy; then set -- "$@" $(programs accuracy); fi
 if wanted stability; then set -- "$@" $(programs stability); fi
 if wanted unit; then set -- "$@" tests/check_includes.sh tests/check_format.sh tests/check_make.sh tests/check_mutants.sh tests/check_security.sh tests/check_manual.sh $(ls tests/check_page_*.sh) $(programs unit); fi
+if wanted wire; then set -- "$@" +tests/page/page.sh; fi # a browser
 if [ -z "$part" ]; then
     export FUZZ_BUILD="$build/asan" JOBS=1
     export TSAN_HEAD="$build/tsan_short/tsan_head"
     export SANITIZED_HEAD="$build/asan/scanhead"
-    set -- "$@" +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan") tests/check/tsan_short.sh +tests/check_sanitized.sh
+    set -- "$@" +tests/check_sanitized.sh +tests/fuzz/fuzz_short.sh $(programs unit "$build/asan") tests/check/tsan_short.sh
 fi
 if wanted wire; then for name in $beside; do set -- "$@" "+$build/test/tests/wire/test_$name"; done; fi
-if wanted wire; then set -- "$@" +tests/page/page.sh $(programs wire) tests/check_install.sh tests/check_lockstep.sh tests/check_scanheadd.sh tests/check_package.sh; fi # a browser beside them
+if wanted wire; then set -- "$@" $(programs wire) tests/check_install.sh tests/check_lockstep.sh tests/check_scanheadd.sh tests/check_package.sh; fi
 
 # apart NAME...: prints those programs of the wanted folders, and those of unit with sanitizers.
 apart() {

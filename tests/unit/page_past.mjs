@@ -74,6 +74,7 @@ class Stream {
 }
 
 // A page as wire.js makes one. Live frames go through `takes`.
+const pages = [];
 class Page {
   pulses = []; // shown, in the order in which they came
   live = 0;
@@ -81,6 +82,7 @@ class Page {
   constructor(stream) {
     this.past = new Past({give: ({pulse0, n}) => { for (let i = 0; i < n; i++) this.pulses.push(pulse0 + i); }, get: (url) => this.stream.get(url)});
     this.stream = stream;
+    pages.push(this);
     this.connect();
   }
   connect(stream = this.stream) {
@@ -134,6 +136,17 @@ test('the keeper may be slower than the connection', async () => {
   const page = new Page(stream);
   page.take(stream.telemetry());
   await page.shows(0, 5, 'what is kept so far'); // attributes of the last may follow
+  stream.keeps = undefined;
+  await page.shows(0, 20, 'all');
+});
+
+test('the keeper may be slower than a page whose head is at rest, and sends nothing', async () => {
+  const stream = new Stream();
+  stream.places();
+  stream.shots(0, 20);
+  stream.keeps = 8;
+  const page = new Page(stream);
+  await page.shows(0, 6, 'what is kept so far');
   stream.keeps = undefined;
   await page.shows(0, 20, 'all');
 });
@@ -319,4 +332,5 @@ test('commands that wait fail when the worker does, since the replies of the nex
   head.close();
 });
 
-runTests();
+await runTests();
+for (const {past} of pages) past.stop(); // a page without a live frame asks on and on

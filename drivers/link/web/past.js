@@ -120,7 +120,8 @@ export class Past {
     if (this.#takesPast || !BESIDE_POINTS.includes(frame.type)) this.decoder.take(frame);
   }
 
-  // Reads /past up to the live frames that were left to it.
+  // Reads /past up to the live frames that were left to it. Before the first live frame nothing says how much there is,
+  // and a head at rest at the pace `fast` sends none. Then the page goes on asking, since the head's observer may be late.
   async #read() {
     if (this.#isReading || this.#url === null) return;
     this.#isReading = true;
@@ -162,11 +163,11 @@ export class Past {
         }
       }
       this.#push(bytes, head);
-      const isAtEnd = head.next === head.end, misses = this.#need !== null && !isBefore(this.#need, head.next_seq);
+      const isAtEnd = head.next === head.end, isQuiet = this.#need === null;
       if (!isAtEnd) this.#until_ms = performance.now() + PATIENCE_MS;
-      else if (!misses) return this.decoder.flush(true);
-      const isLate = performance.now() > this.#until_ms;
-      if (isLate) this.decoder.flush(true);
+      else if (!isQuiet && isBefore(this.#need, head.next_seq)) return this.decoder.flush(true);
+      const isLate = performance.now() > this.#until_ms, hasNoNews = bytes.byteLength === HEAD;
+      if (isLate || (isQuiet && hasNoNews)) this.decoder.flush(true);
       await sleep(!isAtEnd ? REST_MS : isLate ? SELDOM_MS : AGAIN_MS);
       while (goesOn() && !this.#hasRoom()) await sleep(REST_MS);
       if (!goesOn()) return;
