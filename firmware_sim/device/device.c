@@ -341,16 +341,29 @@ void device_lost(struct device *device, const struct device_work *work)
     pthread_mutex_unlock(&device->lock);
 }
 
+/* Whether only events that wait for a tick can happen without a command. */
+static int is_still(const struct device *device)
+{
+    const int still =
+        device->machine.state == HEAD_IDLE || device->machine.state == HEAD_FAULT || device->machine.state == HEAD_OFF;
+    return still && device->machine.due_tick == UINT64_MAX && !device->ending && !device->over &&
+           device->journal.at == device->journal.n_replay && device->end_tick == UINT64_MAX;
+}
+
 int device_is_idle(struct device *device)
 {
     pthread_mutex_lock(&device->lock);
-    int still =
-        device->machine.state == HEAD_IDLE || device->machine.state == HEAD_FAULT || device->machine.state == HEAD_OFF;
-    int idle = still && device->machine.due_tick == UINT64_MAX && device->events.n == 0 && device->events.held == 0 &&
-               !device->ending && !device->over && device->journal.at == device->journal.n_replay &&
-               device->end_tick == UINT64_MAX;
+    const int idle = is_still(device) && device->events.n == 0 && device->events.held == 0;
     pthread_mutex_unlock(&device->lock);
     return idle;
+}
+
+int device_settles(struct device *device)
+{
+    pthread_mutex_lock(&device->lock);
+    const int settles = is_still(device) && (device->events.n != 0 || device->events.held != 0);
+    pthread_mutex_unlock(&device->lock);
+    return settles;
 }
 
 void device_end(void *self)

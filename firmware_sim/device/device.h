@@ -155,6 +155,8 @@ const struct site *device_hold_scan(struct device *device, uint32_t number, stru
 void device_let_go(struct device_held *held); /* afterwards it holds nothing: all members are 0 */
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
+/* True where the same will be so after the next ticks, which bring events that wait. */
+int device_settles(struct device *device);
 /* Ends the run: stops a running scan first. Not for signal handlers. */
 void device_end(void *self);
 

@@ -21,6 +21,16 @@ static int may_claim(struct loop *loop)
     return pace != PACE_FAST || !device_is_idle(loop->device);
 }
 
+int loop_settles(struct loop *loop)
+{
+    struct casters *casters = &loop->casters;
+    pthread_mutex_lock(&casters->claim_lock);
+    const int is_released = stream_released(&loop->stream) >= casters->next_tick;
+    const int settles = device_settles(loop->device) || (device_is_idle(loop->device) && !is_released);
+    pthread_mutex_unlock(&casters->claim_lock);
+    return settles;
+}
+
 /* Whether as many ticks as the caster wants may be claimed now. They are at most half of the ticks ahead, so there
  * is room for them once the ticks on their way are released. With claim_lock held. */
 static int has_room(const struct loop_caster *caster)

@@ -65,6 +65,9 @@ int loop_get_counts(const struct loop *loop, uint32_t i, struct link_counts *cou
 int loop_start(struct loop *loop, struct sh_err *err);
 /* True once the run is over and its readers have what they can take. */
 int loop_is_over(const struct loop *loop);
+/* For a head that computes, at the pace `fast`: true where the head will be at rest once the next ticks are released. A
+ * command that waits until then has the same effect in each run. Any thread. */
+int loop_settles(struct loop *loop);
 /* Ends the run early. Any thread. */
 void loop_end(struct loop *loop);
 /* Waits for the end, stops the threads, fills stats. loop_free closes the links. */

@@ -181,6 +181,24 @@ static void what_can_not_be_is_refused(void **state)
     rig_close(rig);
 }
 
+/* The first command takes control, and a tick has to bring the event of that. */
+static void a_head_settles_after_a_command(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    assert_false(device_settles(rig->device)); /* it boots */
+    rig_go_to(rig, BOOTED);
+    assert_true(device_is_idle(rig->device) && !device_settles(rig->device));
+    rig_tell(rig, "HEAD:RANG:MAX 4.5", rig->next - 1);
+    assert_true(!device_is_idle(rig->device) && device_settles(rig->device));
+    assert_true(rig_claim(rig));
+    assert_non_null(rig_event(rig, NATIVE_EV_CONTROL));
+    assert_true(device_is_idle(rig->device) && !device_settles(rig->device));
+    rig_tell(rig, "SCAN:START", rig->next - 1);
+    assert_false(device_settles(rig->device)); /* it spins up */
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -191,6 +209,7 @@ int main(void)
         cmocka_unit_test(ranges_widen_up_to_the_profile),
         cmocka_unit_test(the_last_scan_is_described_as_it_was),
         cmocka_unit_test(what_can_not_be_is_refused),
+        cmocka_unit_test(a_head_settles_after_a_command),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

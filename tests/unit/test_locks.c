@@ -42,6 +42,7 @@ static void the_device_is_locked(void **state)
     TAKES(1, (device_lost(d, &work), 0));
     device_done(&work);
     TAKES(1, device_is_idle(d));
+    TAKES(1, device_settles(d));
     TAKES(1, device_last_scan(d, &station));
     TAKES(1, device_scan_ns(d));
     TAKES(1, device_rests_from(d));

@@ -174,6 +174,33 @@ static void test_duration_of_each(void **state)
     assert_int_equal(stats_uint(wire, "scans"), 2);
 }
 
+/* Off line nothing but the configuration decides when a scan begins, however long the threads take. Where a command's
+ * time depended on them, half of the runs differed. */
+static void test_same_time_in_each_run(void **state)
+{
+    struct wire *wire = *state;
+    char config[352], path[352], *first = NULL;
+    size_t first_len = 0, len;
+    begin(wire, config);
+    for (int i = 0; i < 8; i++) {
+        snprintf(path, sizeof path, "%s", wire_path(wire, "a.shs"));
+        const char *const args[] = {"record",  config,       "-o",   path,    "--station",
+                                    "all",     "--duration", "0.01", "--set", "stations.1.position_m=[1, 0, 0]",
+                                    "--quiet", NULL};
+        wire_run(wire, args, 0);
+        char *bytes = wire_read(path, &len);
+        if (first == NULL) {
+            first = bytes;
+            first_len = len;
+            continue;
+        }
+        assert_int_equal(len, first_len);
+        assert_memory_equal(bytes, first, len);
+        free(bytes);
+    }
+    free(first);
+}
+
 /* ---- completing a file */
 
 static void put_shot(FILE *out, uint32_t line, uint64_t pulse0)
@@ -368,6 +395,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_degrees, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_crs, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_duration_of_each, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_same_time_in_each_run, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_percent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_lines_far_apart, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_end_within_scan, wire_setup, wire_teardown),

@@ -17,6 +17,7 @@
 
 /* The longer this time, the slower lines can be that are cast together (firmware_sim/loop/casters.c). */
 static const double AHEAD_MS = 256.0;
+enum { SETTLE_MS = 5 }; /* between two looks at a head that comes to rest */
 
 int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err)
 {
@@ -48,19 +49,31 @@ int offline_load(struct config *cfg, const struct site *beside, const struct sh_
 
 /* ---- the client's end of a memory link, as a source of the library */
 
+static struct link_memory *memory_of(const struct host_source *source)
+{
+    return ((const struct offline *)source->ctx)->memory;
+}
+
 static ssize_t offline_lend(struct host_source *source, const uint8_t **bytes)
 {
-    struct link_memory *memory = source->ctx;
+    struct link_memory *memory = memory_of(source);
     const size_t n = memory_take(memory, bytes);
     if (n != 0 || memory->over) return (ssize_t)n;
     errno = EAGAIN;
     return -1;
 }
 
+/* A head that comes to rest has time pass, tick by tick. A command before its last tick would find another device time
+ * in each run, and so would the scan that it starts. */
+static int takes_commands(const struct offline *off)
+{
+    return off->memory->over || off->loop == NULL || !loop_settles(off->loop);
+}
+
 static ssize_t offline_write(struct host_source *source, const void *data, size_t len)
 {
-    struct link_memory *memory = source->ctx;
-    const size_t n = memory->over ? 0 : memory_send(memory, data, len);
+    struct link_memory *memory = memory_of(source);
+    const size_t n = memory->over || !takes_commands(source->ctx) ? 0 : memory_send(memory, data, len);
     if (n != 0) return (ssize_t)n;
     errno = memory->over ? EPIPE : EAGAIN;
     return -1;
@@ -69,20 +82,22 @@ static ssize_t offline_write(struct host_source *source, const void *data, size_
 /* A signal ends no wait: the caller looks for signals between two waits. */
 static int offline_wait(struct host_source *source, short events, int64_t deadline_ns, short *revents)
 {
-    struct link_memory *memory = source->ctx;
+    struct link_memory *memory = memory_of(source);
     for (int is_late = 0;; is_late = host_deadline_ns(0) >= deadline_ns) {
         const int64_t left_ms = (deadline_ns - host_deadline_ns(0) + 999999) / 1000000;
+        const int64_t most_ms =
+            (events & POLLOUT) != 0 ? SETTLE_MS : INT32_MAX; /* a tick without frames wakes nobody */
         *revents = memory->n_taken != memory->n_pieces || memory->over ? POLLIN : 0;
-        if (memory->sent_len < sizeof memory->sent) *revents |= POLLOUT;
+        if (memory->sent_len < sizeof memory->sent && takes_commands(source->ctx)) *revents |= POLLOUT;
         *revents &= events;
         if (*revents != 0 || is_late) return *revents != 0;
-        memory_turn(memory, deadline_ns == INT64_MAX ? -1 : left_ms < 0 ? 0 : (int)left_ms);
+        memory_turn(memory, (int)(left_ms < 0 ? 0 : left_ms < most_ms ? left_ms : most_ms));
     }
 }
 
 static void offline_leave(struct host_source *source)
 {
-    memory_leave(source->ctx);
+    memory_leave(memory_of(source));
 }
 
 static const struct host_source_ops offline_ops = {
@@ -95,7 +110,7 @@ static int power_up(struct offline *off, double scan_s, const struct sh_report *
     off->memory = calloc(1, sizeof *off->memory);
     const struct link_spec spec = {.type = LINK_MEMORY, .memory = off->memory};
     const struct loop_options options = {.extra = &spec, .report = report};
-    const struct host_source source = {.ops = &offline_ops, .fd = -1, .ctx = off->memory, .name = "off line"};
+    const struct host_source source = {.ops = &offline_ops, .fd = -1, .ctx = off, .name = "off line"};
     if (off->memory == NULL || (off->sh = host_open(&source)) == NULL)
         return sh_fail(err, SH_ENOMEM, "no memory for a head off line");
     int rc = device_create(off->site, &device, &off->device, err);
