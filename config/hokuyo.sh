@@ -10,7 +10,7 @@ prefix=$2
 end_s=$(($(date +%s) + 600))
 while [ "$(date +%s)" -lt $end_s ]; do
     rm -f "$prefix"_*.rawlog "$prefix.said"
-    # The loop waits until the grabber has saved scans or failed. Then the pipe's end counts as a key, which ends it.
+    # The loop waits until the grabber has saved scans or failed. The grabber takes the pipe's end for a key, and ends.
     for _ in 1 2 3 4 5 6 7 8 9 10; do
         sleep 1
         ! grep -qs 'Saved\|Error in response' "$prefix.said" || break

@@ -114,7 +114,7 @@ check "EMBREE=3 without it is refused" refuses_embree 3
 rm -r "$work/include/embree4"
 check "without either there is one error that says so" refuses_embree ""
 
-# ---- one test by its name. Unit tests alone need no program; a name that another folder has, too, does.
+# ---- one test by its name: unit tests need no program, but a test of the same name in another folder needs it
 one_makes_the_program() {
     env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -n DEPS=no BUILD="$work/one" T="$1" test 2>&1 |
         grep -c "BUILD=$work/one/test .*all $work/one/test/bench"

@@ -38,7 +38,7 @@ files_agree() {
     done
 }
 
-# A release has all that git tracks at the top, but files with a dot, and nothing else there.
+# A release has at its top all that git tracks there, except names that begin with a dot, and nothing else.
 sources_are_all() {
     listed=$(sed -n 's/^DEB_SOURCES = //p' $packaging/packaging.mk)
     for top in $listed; do [ -e "$top" ] || { echo "no $top"; return 1; }; done

@@ -18,8 +18,8 @@
 # The blocks of a document share a folder that looks like the checkout after `make`; each document has a new one. In
 # that folder the ready configurations have fewer pulses, and turn faster: the same recipe in a fraction of the time.
 # The heads of demo.yaml and glass.yaml have single rays, as the plan would choose (wire/test_plan): the choice takes up
-# to 1 s of processor time a run. Only recipes of core/plan make it. Except in the top README.md Assimp reads the house:
-# others take 3 s of processor time. With THOROUGH=1 configurations stay as they are.
+# to 1 s of processor time a run. Only recipes of core/plan make it. Assimp reads the house, except in the top
+# README.md: the other readers take 3 s of processor time. With THOROUGH=1 configurations stay as they are.
 # First the script is tried on planted documents, whose failures are known.
 set -u
 

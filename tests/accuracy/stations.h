@@ -9,9 +9,9 @@
 
 enum { STATIONS = 200, STATIONS_BATCH = 1250 };
 
-/* Eight places in turn: four in a zone of their own, one that is forced into the neighbouring zone, one in UPS, one at
- * 83.9 N, one at the antimeridian. The forced one lies up to 1.4 degrees beyond the border, as far as that zone reaches
- * on the equator. Heights go from the Dead Sea to a drone over the Himalaya. */
+/* Eight places in turn: four in the zone where they lie, one that is forced into the neighbouring zone, one in UPS, one
+ * at 83.9 N, one at the antimeridian. The forced one lies up to 1.4 degrees beyond the border, as far as that zone
+ * reaches on the equator. Heights go from the Dead Sea to a drone over the Himalaya. */
 struct georef_spec station_spec(int i, enum georef_crs crs);
 
 struct station_points {

@@ -63,7 +63,7 @@ static void test_rings(void **state)
     assert_true(fabs(inside - (1.0 - exp(-0.5)) / (1.0 - exp(-2.0))) < 0.03);
 }
 
-/* The middle of the sub-rays beyond a line is compared with that of the part of the footprint beyond it. The difference
+/* Beyond a line, the middle of the sub-rays is compared with the middle of the footprint's part there. The difference
  * is below beam_end_error for each line that leaves enough for an echo, and above two fifths of it for some line. */
 static void test_end_of_a_plane(void **state)
 {
@@ -187,9 +187,9 @@ static void test_end_of_range(void **state)
 
 /* ---- a door edge */
 
-/* Steps go from less than a millimetre to more than the resolution. For each pulse across the edge there is one echo up
- * to the resolution, at the energy-weighted mean of both surfaces, and beyond there are two. The outlines ignore steps
- * up to half a millimetre, and the mean there is wrong by at most half of the step. */
+/* Steps go from less than a millimetre to more than the resolution. Up to the resolution a pulse across the step has
+ * one echo, at the energy-weighted mean of both surfaces. A larger step gives two. The outlines ignore steps up to half
+ * a millimetre, and the mean there is wrong by at most half of the step. */
 static void test_door_edge(void **state)
 {
     (void)state;

@@ -155,9 +155,9 @@ static void within_floats_of_an_edge(void **state)
 }
 
 /* A plate at 5 m reaches up to an edge, with the sky beyond it. In the sky a wire of 4 mm hangs at 50 m, within 2 cm of
- * where the edge is seen. Footprints whose centre lies on the plate have a part that sees past it. The wire is in that
- * part, whose ray mostly misses it. Such footprints are compared with 1,000 sub-rays where these leave no doubt: each
- * echo has 3 % of the energy, or less than 0.5 %. */
+ * where the edge is seen. Footprints whose centre lies on the plate have a part beyond the edge. The wire is in that
+ * part, but the part's one ray mostly misses it. Such footprints are compared with 1,000 sub-rays where these leave no
+ * doubt: each echo has 3 % of the energy, or less than 0.5 %. */
 static void a_wire_in_the_sky_behind_an_edge(void **state)
 {
     (void)state;

@@ -3,7 +3,7 @@
 #include "tests/accuracy/lit_plates.h"
 
 /* A pane with a free border is on the left, and a wall lies behind all of it. A part of the wall's echo has passed the
- * pane there and back. Without a signal (m >= 2) there are as many echoes. */
+ * pane there and back. The number of echoes is the same without a signal (m >= 2). */
 static void a_footprint_on_the_border_of_glass(void **state)
 {
     (void)state;

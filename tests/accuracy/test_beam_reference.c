@@ -142,8 +142,8 @@ static void count_labels(const struct line_block *b, uint32_t at, uint64_t *seen
         if (b->label[at + k] >= 1 && b->label[at + k] <= WIRES) seen[b->label[at + k] - 1]++;
 }
 
-/* The number of pulses that see each wire is the reference's within 2 %. For two in a hundred, at the wire's edge, its
- * energy is within a quarter of the threshold. There 1,000 sub-rays themselves are wrong by one part in ten. */
+/* The number of pulses that see each wire is the reference's within 2 %. In two pulses of 100, at the wire's edge, the
+ * wire's energy is within a quarter of the threshold. There 1,000 sub-rays themselves are wrong by a tenth. */
 static void test_wires_are_seen(void **state)
 {
     (void)state;

@@ -244,7 +244,7 @@ static void targets_vanish_where_the_data_sheet_says(void **state)
     }
 }
 
-/* The expected share is Phi(k (A - 1)). With one range as data sheet A = (R_k / R)^2. */
+/* The expected share is Phi(k (A - 1)). If the data sheet gives one range R_k, A = (R_k / R)^2. */
 static void the_share_seen_is_the_detection_probability(void **state)
 {
     (void)state;

@@ -157,8 +157,8 @@ static void glass_and_what_is_behind(void **state)
         }
 }
 
-/* Behind a pane, and on a body that moves, only the incidence of a sub-ray is known. A slanted wall there is as
- * wide. */
+/* Behind a pane, and on a body that moves, only the incidence of a sub-ray is known. A slanted wall's echo is
+ * as wide there as in the open. */
 static void slanted_behind_glass_and_in_motion(void **state)
 {
     (void)state;

@@ -56,8 +56,8 @@ static void test_exact_against_definitions(void **state)
 }
 
 /* Orders 1 to 3 are within their bounds, and these are tight: where errors are above rounding, a bound is at most ten
- * times the largest error found. Degrees within ten radii of a pole may be looser: no point has all largest terms
- * there. */
+ * times the largest error found. Bounds of degrees within ten radii of a pole may be looser: no point there has all
+ * largest terms. */
 static void test_bounds(void **state)
 {
     (void)state;

@@ -273,9 +273,9 @@ static double threshold(const struct beam *beam)
 }
 
 /* A step of more than the resolution gives two echoes where both sides have 1 %: a strip of known width, in a view of
- * known width. A single ray is wrong in the whole strip. The plan's figure is the strip's share plus 1.645 standard
- * errors, an upper limit, and the sample scatters by one standard error. With three to either side the figure is -1.4
- * to 4.7 standard errors from the share. The adaptive beam finds the strip. */
+ * known width. A single ray is wrong in the whole strip. The plan's figure is an upper limit, the sample's share plus
+ * 1.645 standard errors. The sample is within three standard errors of the strip's share, so the figure is 1.4 of
+ * them below it to 4.7 above. The adaptive beam finds the strip. */
 static void test_figures(void **state)
 {
     (void)state;

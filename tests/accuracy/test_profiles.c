@@ -58,7 +58,7 @@ struct scan {
 };
 
 /* Casts `lines` of 1666 pulses within half a degree of the wall's normal: cos i is 1 to 4e-5. The sigma is that of
- * ranges less the wall's own. */
+ * the errors of the ranges. */
 static void scan_wall(const char *profile, int prr_hz, double range_m, double reflectance, uint64_t lines,
                       struct scan *scan)
 {
@@ -111,8 +111,8 @@ static void scan_wall(const char *profile, int prr_hz, double range_m, double re
     free(cfg);
 }
 
-/* 2 % before that range more than half of the pulses see the wall, 2 % behind it fewer: 63 and 37 % in clear air.
- * 33,320 pulses have a standard error of 0.3 %. */
+/* 2 % before the profile's range more than half of the pulses see the wall, 2 % behind it fewer: 63 and 37 % in clear
+ * air. 33,320 pulses have a standard error of 0.3 %. */
 static void walls_vanish_where_the_profiles_say(void **state)
 {
     (void)state;

@@ -375,8 +375,8 @@ static void test_house(void **state)
     scene_free(scene);
 }
 
-/* The bound is one ray in a million of normal scans. With none among 3 million (THOROUGH=1) the true share is below
- * that at 95 % (3.0 is -ln 0.05). With none among a sixth of them it is below six in a million. */
+/* At most one ray of normal scans in a million may be undecidable. If none of 3 million is (THOROUGH=1), the true share
+ * is below that at 95 % (3.0 is -ln 0.05). If none of a sixth of them is, it is below six in a million. */
 static void test_share_of_undecidable(void **state)
 {
     (void)state;

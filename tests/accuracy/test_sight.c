@@ -158,8 +158,8 @@ static void test_same_bits(void **state)
             printf("# with %-10s %llu\n", odd_part_name(i), (unsigned long long)tally.differ_by_part[i]);
     assert_true(tally.refused <= tally.scenes / 100);
     assert_true(tally.hits > tally.rays / 4);
-    /* Half of these rays are aimed where only the BVH decides, or at caps, or with too little memory for a map. In all,
-     * 50 % ask the BVH, and 26 % are decided among a few. A sight that always asks is of no use. */
+    /* Many of these rays are aimed where only the BVH decides, or their sight is of a cap or has too little memory. In
+     * all, 50 % ask the BVH, and 26 % are decided among a few. A sight that always asks is of no use. */
     assert_true(tally.asked < tally.rays * 2 / 3 && tally.few > tally.rays / 10);
     assert_true(tally.differ == 0);
 }

@@ -24,8 +24,8 @@ static uint32_t pulses(void)
 /* ---- one echo */
 
 /* The deviation of ranges has bounds. The decomposition is within 10 % of Cramer's and Rao's bound, which no
- * unbiased estimate beats. The edges have the noise over the slope at the crossing, and the effect of the peak's
- * noise on the correction. */
+ * unbiased estimate beats. The deviation at an edge has two parts: the noise over the slope at the crossing, and the
+ * effect of the peak's noise on the correction. */
 static double edge_sigma_m(double peak, double part, double noise, double sigma_s)
 {
     double v = sqrt(-2.0 * log(part)), at_edge = noise / (peak * part * v), by_peak = noise / (peak * v);
@@ -151,7 +151,7 @@ static double extent_m(double incidence_deg)
     return 0.5 * BEAM_RAD * RANGE_M * tan(incidence_deg * M_PI / 180.0);
 }
 
-/* Returns the largest signal of a return, over that of one that is hit head on. */
+/* Returns the peak of a return's signal as a share of the peak of a return that is hit head on. */
 static double peak_of(const struct wave_echoes *w, const struct waveform_return *r)
 {
     const struct waveform_return point = {r->range_m, 1.0, 0.0, WAVEFORM_POINT};
@@ -179,8 +179,8 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
             wave_measure(&w, (enum waveform_detector)d, pulses() / 4, &r, &f[d]);
             /* the tail of a skew echo may reach the level once more, with noise on it */
             assert_true(f[d].single >= pulses() / 4 - pulses() / 4000);
-            /* Ranges across the plane rise as 1 / (1 - x extent / R), so its echo is skew. A symmetric shape through
-             * it lies off the centroid, by less than a third of the rims' shift. */
+            /* Ranges across the plane rise as 1 / (1 - x extent / R), so its echo is skew. A symmetric shape
+             * lies off the centroid by less than a third of extent^2 / R, by which the rims' middle is shifted. */
             const double skew_m = extent * extent / RANGE_M / 3.0;
             wave_between(fabs(f[d].bias_m), 0.0, most_m[d] + skew_m + ERRORS * f[d].sigma_m / sqrt(pulses() / 4.0));
         }
@@ -195,7 +195,7 @@ static void planes(const struct waveform_spec *spec, const char *name, double mo
                1e3 * f[1].bias_m, 1e3 * f[2].bias_m, 1e9 * width_m / C_2, 1e9 * f[1].width_s, 1e9 * f[2].width_s,
                f[2].deviation);
         /* The closed form takes the footprint's spread as Gaussian, with sigma 0.414 w tan i and a width of 0.975 w tan
-         * i (full at half maximum). That of the disc's marginal exp(-2 x^2) erf(sqrt(2 - 2 x^2)) is 1.130 w tan i. */
+         * i (full at half maximum). The disc's marginal, exp(-2 x^2) erf(sqrt(2 - 2 x^2)), has 1.130 w tan i. */
         if (spec->shape == WAVEFORM_GAUSSIAN)
             for (int d = 1; d < WAVE_DETECTORS; d++)
                 wave_between(f[d].width_s * C_2 / width_m, 0.99, 1.130 / 0.975 + 0.01);
@@ -307,7 +307,7 @@ static uint32_t others_echoes(const struct wave_echoes *w, struct other_echo *ec
 }
 
 /* The other decomposition's ranges are samples with the largest count. If the top lies between two samples, noise may
- * make the farther one larger. By the peak's curvature, 8 sigma of noise in a peak of 30 do so up to 0.6 samples away.
+ * make the farther one larger. In a peak of 30 thresholds, 8 sigma of noise do so up to 0.6 samples from the top.
  * Centres and widths of its fits differ from ours by the noise of the offset that it fits too. */
 static void another_decomposition_agrees(void **state)
 {

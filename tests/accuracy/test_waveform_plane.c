@@ -80,8 +80,8 @@ static struct waveform_return closed_form(const struct plane *plane)
 }
 
 /* The error of the closed form is below one count for sub-rays of equal power. The closed form neglects only ranges of
- * second order in b = s tan i. Power by distance and cosine is 3 b at the rim at most, so the samples change by less
- * than 3 b of themselves. */
+ * second order in b = s tan i. Power by distance and cosine changes by at most 3 b at the rim, so the samples change
+ * by less than 3 b of themselves. */
 static void planes_are_the_closed_form(void **state)
 {
     (void)state;
@@ -165,8 +165,8 @@ static double skewness(double h)
 
 /* Both sides of a line as two returns. On a step that is hit head on the two returns are exact: the reference has an
  * error of half a row of its sub-rays, 0.5 / sqrt(100,000). On a wedge a bell stands for half of a disc with the same
- * energy, centre and spread. The bell's third moment is 0, which counts times a sixth of the pulse's third derivative,
- * 1.38 / sigma^3 at most. */
+ * energy, centre and spread. The bell's third moment is 0. The error is that of the half disc times a sixth of the
+ * pulse's third derivative, which is at most 1.38 / sigma^3. */
 static void parts_are_nearly_exact(void **state)
 {
     (void)state;

@@ -6,7 +6,7 @@
 
 enum { PULSES = 16, ACROSS_LINES = 60, ROOM = 16384 };
 
-/* Two plates with waveforms. Signals are about 1,000 thresholds, and a count is a tenth of a threshold. */
+/* Two plates with waveforms. Signals are about 1,000 thresholds, and a count is an eighth of a threshold. */
 struct waves {
     struct lit lit;
     struct cast_waves cast;
@@ -124,8 +124,8 @@ static void spread_samples(const struct line_waves *waves, uint32_t pulse, uint3
 }
 
 /* A plane at 80 deg, 300 m away, is 0.6 m deep within a footprint, as long as the pulse. The closed form agrees with
- * 1,027 sub-rays to a count of 12 bits, RMS: 4 counts here. The closed form neglects that the far side is hit more
- * steeply, by 0.3 % at the rim. */
+ * 1,027 sub-rays to a count of 12 bits, RMS: 4 counts of the 14 bits here. The closed form neglects that the far side
+ * is hit more steeply, by 0.3 % at the rim. */
 static void closed_form_agrees_with_sub_rays(void **state)
 {
     (void)state;

@@ -5,12 +5,12 @@
  *   build/tests/bench/beam [--chart|--speed] [house|wires|foliage|leaves ...]
  *
  * ns is the cost of a pulse for the whole cast, the median of interleaved rounds in processor time of the thread. ratio
- * is that time by the single-ray cast of the same rounds, without sight. seen means with a sight (core/sight.h). count
- * is the share of pulses whose number of echoes differs from the reference: of all pulses, and of those with several
- * echoes or a partial hit. rms, p99.9 and max are the range errors of the pulses whose number agrees. off is how many
- * of their echoes are off by more than the resolution, as on another leaf, and the rms without those: a few decide the
- * rms of a tree. --chart prints rows of the chart's table, without the methods with a sight. --speed
- * measures single and adaptive pulses alone, and only their ns and ratios. */
+ * is that time over the single-ray cast's of the same rounds, without sight. seen means with a sight (core/sight.h).
+ * count is the share of pulses whose number of echoes differs from the reference: of all pulses, and of those with
+ * several echoes or a partial hit. rms, p99.9 and max are the range errors of the pulses whose number agrees. off is
+ * how many of their echoes are off by more than the resolution, as on another leaf. The rms without those follows,
+ * because a few decide the rms of a tree. --chart prints rows of the chart's table, without the methods with a sight.
+ * --speed measures single and adaptive pulses alone, and only their ns and ratios. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -16,7 +16,7 @@ struct bench_mesh {
                           rest outward */
 };
 
-/* which is 0 to 3. mesh->scene belongs to the caller. */
+/* `which` is 0 to 3. mesh->scene belongs to the caller. */
 int bench_mesh_create(int which, struct bench_mesh *mesh, struct sh_err *err);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* This measures a forest of copies: 10,000 of a tree of 100,000 triangles. It shows the memory of it, and the cost of a
- * ray in turns with one tree by itself and with the trees about it as triangles of their own. Figures are processor
- * time of the thread, medians of the rounds.
+/* This measures a forest of copies: 10,000 of a tree of 100,000 triangles. It shows the memory, and the cost of a ray.
+ * In turns with it come one tree by itself, the nearest copies alone, and these trees as triangles of their own.
+ * Figures are processor time of the thread, medians of the rounds.
  *
  *   build/tests/bench/copies */
 #include <math.h>

@@ -3,8 +3,8 @@
  * another file may return anything, so each failure might return SH_OK. In this header it sees that these functions
  * always return the code of a failure.
  *
- * DEFINES_... says that the file that is looked at is the one that defines the function. IN_SCENE says that the file is
- * one of core/scene or core/import. */
+ * DEFINES_... says that the file under analysis defines the function. IN_SCENE says that the file is one of core/scene
+ * or core/import. */
 #ifndef TESTS_CHECK_ANALYZER_H
 #define TESTS_CHECK_ANALYZER_H
 

@@ -82,7 +82,7 @@ class Knobs(clients.Client):
 
 
 def knobs_apart(endpoints, n, stop):
-    """Knobs whose faults strike at their own link alone. A client that waits for each reply would wait for a dropped one for ever."""
+    """Returns Knobs with faults on their own link alone. Other clients would wait for a dropped reply for ever."""
     knobs = Knobs("knobs", endpoints[n], stop, 3)
     knobs.LINES = [line.replace("every: 30", f"every: 30, link: {n + 1}") for line in knobs.LINES]
     return knobs

@@ -59,9 +59,9 @@ int beam_rig_open(struct beam_rig *rig, struct scene *scene, const double statio
                   struct sh_err *err);
 void beam_rig_close(struct beam_rig *rig);
 /* Casts 128 sub-rays for a pulse, in place of 1,000. Where they hit nothing but one smooth surface, with ranges within
- * 5 mm, they are the reference, and this returns 1. 48 of them run around the rim. So several lie in whatever an edge
- * cuts off with 1 % of the energy (beyond 0.87 of the radius at most). The others are 0.2 radii apart. Bodies that fit
- * between those, such as wires, need the 1,000. */
+ * 5 mm, they are the reference, and this returns 1. 48 of them run around the rim. A cap with 1 % of the energy
+ * that an edge cuts off begins at 0.87 of the radius at most, so several lie in it. The others are 0.2 radii apart.
+ * Bodies that fit between those, such as wires, need the 1,000. */
 int beam_ref_plain(const struct beam_rig *rig, const double dir[3], struct beam_ref *out);
 /* The mode SINGLE has no beam. */
 void beam_rig_mode(struct beam_rig *rig, enum beam_mode mode, uint32_t rings);

@@ -88,8 +88,8 @@ struct protocol_rig_run {
 void protocol_rig_points(struct protocol_rig *rig, const struct protocol_rig_run *run);
 void protocol_rig_line_end(struct protocol_rig *rig, const struct line_end *end);
 
-/* Feeds one frame of points of a planar head, whose turns `line` counts from 0: n shots, the first of which is of the
- * step first_step + from. */
+/* Feeds one frame of points of a planar head: n shots of turn `line`, which counts from 0. The first shot is at step
+ * first_step + from. */
 void protocol_rig_part(struct protocol_rig *rig, uint32_t line, uint32_t from, uint32_t n,
                        const struct protocol_rig_shot *shot);
 /* Feeds a turn's line end. Returns the device time of the turn's end. */

@@ -113,8 +113,8 @@ RECORD="record config/glass.yaml --crs local --duration 0.1 --ascii --empty-shot
     --quiet --no-hash"
 
 # compare_record FILE: compares it with the record of this machine. The same arithmetic gives the same ranges. But a ray
-# along an edge may meet the other side of it if packets of rays are narrower. So the comparison allows one shot on each
-# of a dozen edges, twice.
+# along an edge may meet the other side of it if packets of rays are narrower. So the comparison allows 24 other
+# shots, two for each of a dozen edges.
 compare_record() {
     ref=$build/machines/record.ply
     rm -f "$ref"

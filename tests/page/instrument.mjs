@@ -314,8 +314,8 @@ export async function testInstrument(browser) {
 }
 
 // The page's scale for heights and that of files (core/colour.h) have other colours between the ends, and the same hues
-// in the same order: blue, green, yellow, red. The hues are within 60 of the 240 degrees; the other way round they
-// would be 240 apart.
+// in the same order: blue, green, yellow, red. At each height the hues are within 60 degrees of each other. In the
+// reverse order the ends would be 240 degrees apart.
 function sameMeaning() {
   const [low, high] = [-0.5, 3.5], file = `${folder}/heights.ply`;
   run('record', CONFIG, '-o', file, '--quiet', '--set', 'output.colour=height', '--set', `output.colour_limits=[${low}, ${high}]`);

@@ -205,8 +205,8 @@ export async function trialTests(page, other, SIZE) {
     await page.press('#trial-target');
     await page.where('#picture');
     await page.eval('scanhead.view.screenshotReady()');
-    // A point of the first station that the camera sees, since nothing nearer lies there: those on the floor, from
-    // above.
+    // This takes a point of the first station on the floor. The camera looks from above, so nothing lies in front of
+    // it.
     const [x, y, number, at] = await page.eval(`(() => {
       const {left, top, width, height} = document.querySelector('#picture').getBoundingClientRect(), {view, trial} = scanhead;
       const block = view.cloud.blocks.find((b) => b.station === 1), o = view.cloud.origin;

@@ -173,10 +173,10 @@ static void test_large_coordinates(void **state)
 /* ---- ranges: a hull about the station, 1.2 km from the scene's origin */
 
 /* The rough hull's facets stand at up to 80 degrees to the ray. Ours: 16 x 2^-53 x R / cos i is 1e-10 m at 10 km, and
- * vertices about the station round by 2^-53 x 1.2 km before. So the micrometre holds throughout, at 10 km too. Naive:
- * floats at 1.2 km are wrong by 6e-5 m even at short ranges, and by 5e-4 m at 10 km. The BVH's own frame is about the
- * scene's middle. That is the middle of the hull or, with a small sphere beside the hull, more than 1.2 km from
- * there. */
+ * the rounding of vertices about the station adds 2^-53 x 1.2 km. So the micrometre holds throughout, at 10 km too.
+ * Naive: floats at 1.2 km are wrong by 6e-5 m even at short ranges, and by 5e-4 m at 10 km. The BVH's own frame is
+ * about the scene's middle. That is the middle of the hull or, with a small sphere beside the hull, more than 1.2 km
+ * from there. */
 static void range_row(double radius_m, double rough, int beside)
 {
     const double centre[3] = {1000.0, -700.0, 30.0};

@@ -20,7 +20,7 @@ struct row {
     const char *regime, *naive_method;
     struct georef_spec spec;
     double height_m; /* of points, up and down */
-    /* writes the difference from the anchor; a position that goes wrong is given less the anchor */
+    /* writes the difference from the anchor; if the method gives a position, the anchor is subtracted from it */
     void (*naive)(const struct georef_spec *spec, const struct georef *georef, const double d[3], double out[3]);
     int epsg; /* of the system that ours has to use */
 };

@@ -96,8 +96,8 @@ static void add_needles(struct mesh *mesh)
     }
 }
 
-/* Rounding of the corners, 2^-53 x 65 m, over the height of a needle turns its plane by 1e-10 rad about its long side,
- * and about its short side by the same over 100 m. Normals are wrong by 2^-53 x |e1| |e2|.
+/* Corners round by 2^-53 x 65 m. Over the height of a needle this turns its plane by 1e-10 rad about its long side, and
+ * over 100 m by far less about its short side. Normals are wrong by 2^-53 x |e1| |e2|.
  * Over 100 m that displaces the plane by 2^-53 x 100 m x 10^6 = 1e-8 m, so a micrometre holds. */
 static void test_needles(void **state)
 {

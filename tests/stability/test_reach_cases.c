@@ -3,7 +3,7 @@
  * most half as much again as a head that stands nearby. Cost is counted in leaves that a packet is
  * tested against. No clock is read.
  *
- * A cast whose exactness holds about one origin only has a cliff in each of them. In a house within 1.2 km of ground, a
+ * A cast that is exact about one origin only is far too slow in each of these. In a house within 1.2 km of ground, a
  * second station 400 m away took 200,000 times as long for a ray. A ball of 960 triangles that moves took 15,000 times
  * as long. */
 

@@ -104,7 +104,7 @@ static void test_day(void **state)
 
 /* ---- changes in mid-scan */
 
-/* Rates whose periods are n/231 of 10000 ns. The sum of all pulses so far is then a whole number of parts. */
+/* Rates whose periods are multiples of 1/2310 ns (10 x PART), as then is the sum of all periods so far. */
 static const uint64_t PART = 231; /* 3 x 7 x 11 */
 static const int64_t CHANGE_PRR_HZ[] = {2200000, 300000, 700000, 550000, 2100000, 100000};
 enum { CHANGES = 100000, N_RATES = 6 };
@@ -114,10 +114,10 @@ static uint64_t parts_of(int64_t prr_hz)
     return PART * 1000000000 * 10 / (uint64_t)prr_hz; /* period in 1/2310 ns: whole for each of the rates */
 }
 
-/* Ours: a change cuts the rest of a nanosecond to a part in prr_uhz, at least 1e-11 ns with these rates, so 10^5
- * changes make 1e-6 ns. If the true time is a whole number of nanoseconds or just above, the floor of ours is then
- * one less. There is no drift, but a bound of 1 ns. Naive: each segment's length in float seconds, or periods in whole
- * nanoseconds. */
+/* Ours: a change cuts the rest of a nanosecond to a multiple of 1/prr_uhz, which loses at most 1e-11 ns with these
+ * rates, and 1e-6 ns in 10^5 changes. If the true time is a whole number of nanoseconds or just above, the floor of
+ * ours is then one less. There is no drift, but a bound of 1 ns. Naive: each segment's length in float seconds, or
+ * periods in whole nanoseconds. */
 static void test_changes(void **state)
 {
     (void)state;

@@ -82,7 +82,7 @@ static void row(struct mesh *mesh, uint16_t label, const double station_m[3], co
 static const double STATION_M[3] = {0.0, 0.0, 0.0};
 
 /* The bound of all rows is 0 wrong rays. Rays that pass an edge within 16 x 2^-53 of the distance of its farther end do
- * not count. There the reference in long double may see the other side of the edge than any double arithmetic. */
+ * not count. There the reference in long double and double arithmetic may disagree on the side of the edge. */
 static void test_solids(void **state)
 {
     (void)state;

@@ -111,8 +111,8 @@ static double centre_m(const struct waveform *w, double range_m, int as_float)
     return moment / sum;
 }
 
-/* Naive: ranges as floats, which are 7.8 mm apart at 100 km. Ours: doubles, which are 1.5e-11 m apart there. The rest
- * is the error of the pulse's table: 1e-6 of the peak at up to 2 m from the centre, against an area of 2 samples. */
+/* Naive: ranges as floats, which are 7.8 mm apart at 100 km. Ours: doubles, which are 1.5e-11 m apart there. The bound
+ * is for the pulse's table: it errs by 1e-6 of the peak at up to 2 m from the centre, against an area of 2 samples. */
 static void far_ranges_keep_their_millimetres(void **state)
 {
     (void)state;

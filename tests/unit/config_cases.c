@@ -131,7 +131,7 @@ const struct bad bad[] = {
     {LINES, "  range_max_m: 1.5\n", 4, "head.range_max_m", "the head measures from 1.5 to 1.5 m; allowed a "
                                                            "range_min_m below 1.5"},
     {LINES, "  range_max_m: far\n", 4, "head.range_max_m", "\"far\" is not a number; allowed range_min_m to range_max_m of the head profile"},
-    /* 800 m / 2^31 = 3.7e-7 m fits; the row's lower limit is 1e-6 */
+    /* No output.scale_m is too fine for this head: 800 m / 2^31 is 3.7e-7 m, and the key allows 1e-6 m or more. */
     {"output:", "platform:\n  kind: trajectory\noutput:", 17, "platform.kind", "either platform.file or platform.waypoints"},
     {"output:", "platform:\n  kind: trajectory\n  file: a\n  waypoints: b\noutput:", 19, "platform.waypoints", "either"},
     {"output:", "platform:\n  file: a\noutput:", 17, "platform.file", "a static platform has no such key"},
@@ -239,7 +239,7 @@ const struct bad bad[] = {
     {AT_16("waveform: {saturation_db: 91}"), 16, "waveform.saturation_db", "allowed 0 to 90"},
     {AT_16("signal: {model: on}\nwaveform: {send: on, near_m: 1, far_m: 1.1}"), 17, "waveform.far_m",
      "allowed are 0.1499 to 613.825 m"},
-    /* A sample is 0.104927 m here, which 0.1049 m would be too short for. */
+    /* A sample is 0.104927 m here, so 0.1049 m would be too short. */
     {AT_16("signal: {model: on}\nwaveform: {send: on, sample_ns: 0.7, near_m: 1, far_m: 1.05}"), 17, "waveform.far_m",
      "allowed are 0.105 to 429.677 m"},
     {AT_16("waveform: {dead_ns: 5}"), 16, "waveform.dead_ns", "allowed with saturation_db above 0"},

@@ -16,7 +16,7 @@ struct ifc_shape {
     double area_m2, volume_m3, circle_m;
 };
 
-/* Rows of records, and 4 x 2 x 1 m from the origin as item 60. */
+/* These are rows of records: a rectangle, a placement, and as item 60 a box of 4 x 2 x 1 m from the origin. */
 #define IFC_RECT(id, x, y)     #id "=IFCRECTANGLEPROFILEDEF(.AREA.,$,#17," #x "," #y ")\n"
 #define IFC_AT(id, point, xyz) #id "=IFCAXIS2PLACEMENT3D(@" #point ",$,$)\n" #point "=IFCCARTESIANPOINT((" xyz "))\n"
 #define IFC_BOX_ROWS           "60=IFCEXTRUDEDAREASOLID(@61,@62,#10,1.)\n" IFC_RECT(61, 4., 2.) IFC_AT(62, 63, "2.,1.,0.")

@@ -163,7 +163,7 @@ static double range_of(const struct beam *beam, const struct beam_sight *s, cons
     return (d - from) / along * sqrt(length2);
 }
 
-/* Over the part ranges change linearly, but for a share of the slope times the tangent: 1e-4 times up to 3.1. */
+/* Across the part the ranges change linearly, except for a share of 1e-4 (the slope) times the tangent, up to 3.1. */
 static void ranges_within_a_part(void **state)
 {
     (void)state;

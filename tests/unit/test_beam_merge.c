@@ -195,8 +195,8 @@ static double cap(double h)
     return energy;
 }
 
-/* Lines that do not meet in the footprint cut caps off. Caps may be one within the other, beside each other though they
- * look alike, or on opposite sides. The truth is the energy beyond a line. */
+/* Lines that do not meet in the footprint cut caps off. Caps may be one within the other, equal and beside each other,
+ * or on opposite sides. The truth is the energy beyond a line. */
 static void test_two_caps(void **state)
 {
     (void)state;

@@ -32,8 +32,8 @@ static void area_and_volume(void **state)
     assert_true(fabs(sum.area_m2 - (13.0 + sqrt(61.0))) < 1e-12);
 }
 
-/* Along a line, parts add up to the whole: the way there and back in other parts leaves nothing. Rounding: some of
- * 1e-16 of lengths of 10 m. */
+/* Along a line, parts add up to the whole: the way there and back in other parts leaves nothing. Rounding is a few
+ * times 1e-16 of lengths of 10 m. */
 static void edges_cancel_in_any_parts(void **state)
 {
     (void)state;

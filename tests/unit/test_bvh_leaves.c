@@ -172,7 +172,7 @@ static void cast(const struct bvh *bvh, const double d[3][RAYS], double *range_m
 }
 
 /* A large connected surface takes less memory, and has the same hits to the bit. In bytes a triangle: half a leaf, 64;
- * the place of a plane, 4; and Embree's nodes: 20 of four leaves, 52 of one (measured at a million). */
+ * the place of a plane, 4; and Embree's nodes, 20 with four leaves each, or 52 with one (measured at a million). */
 static void test_memory_of_a_large_surface(void **state)
 {
     (void)state;
@@ -200,8 +200,8 @@ static void test_memory_of_a_large_surface(void **state)
 }
 
 /* Two triangles share an edge, along w at u = 0. Rays go along v through points beside that edge, up to a third of a
- * metre away and down to 0.1 um. Rays of a packet begin up to 8 m apart along u, so many of them are judged wrong where
- * a leaf takes them to begin at one point: at 8 m 4 in 10. Axes are turned, since each part of the distance counts. */
+ * metre away and down to 0.1 um. Rays of a packet begin up to 8 m apart along u. A leaf that took them to begin at one
+ * point would judge 4 in 10 wrong at 8 m. Axes are turned, since each part of the distance counts. */
 enum { BESIDE = 1024 };
 #define HALF_TURN 0.7071067811865476
 static const double FRAME[][3][3] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}},

@@ -25,9 +25,9 @@ static void any_direction(uint64_t *seed, double d[3])
     d[2] = z;
 }
 
-/* Rooms of up to 200 m and a head anywhere in them, as near to a wall as 1 % of the room. Rounding: coordinates are
- * within 400 m, so n.p is good to about 4 * 2^-53 * 400 m = 2e-13 m. For these rays the cosine of incidence is at least
- * 1/300, so this grows to 5e-11 m at most. The promise is 1 nm. */
+/* Rooms of up to 200 m and a head anywhere in them, as near to a wall as 1 % of the room. Coordinates are within 400 m,
+ * and for these rays the cosine of incidence is at least 1/300. Rounding may then cost some 2e-10 m, as is worked out
+ * below. The promise is 1 nm. */
 static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
 {
     (void)state;
@@ -68,8 +68,8 @@ static void ranges_in_a_room_are_exact_to_the_planes_tilt(void **state)
     print_message("# rooms: worst range error %.2Lg m\n", worst);
 }
 
-/* A square with any tilt, 50 to 150 m away, whose own vertices give the plane. Corners are up to 4.3 km away: n.p is
- * good to about 4 * 2^-53 * 4300 m = 2e-12 m, seen at an incidence with a cosine of at least 0.05: 4e-11 m. */
+/* A square with any tilt, 50 to 150 m away, whose own vertices give the plane. Corners are up to 4.3 km away,
+ * and the cosine of incidence is at least 0.05. Rounding may then cost some 1.5e-10 m, as is worked out below. */
 static void ranges_to_a_tilted_plane_are_exact_to_the_planes_tilt(void **state)
 {
     (void)state;
