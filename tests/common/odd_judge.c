@@ -24,8 +24,8 @@ static double blur_m(const struct scene *scene, uint32_t triangle, const double 
     return 8.0 * 0x1p-53 * far_m * sliver * vec3_length(n) / fabs(vec3_dot(n, dir));
 }
 
-/* Returns whether the ray is inside the line of each edge of a triangle, or outside of it by no more than rounding. A ray
- * beyond the tip of a needle may be so near to the lines of two edges, and yet far from the edges.
+/* Returns whether the ray is inside the line of each edge of a triangle, or outside of it by no more than rounding. A
+ * ray beyond the tip of a needle may be so near to the lines of two edges, and yet far from the edges.
  * reference_is_undecidable looks at the edges alone. */
 static int is_beside_lines(const struct scene *scene, uint32_t triangle, const double at_m[3], const double dir[3])
 {

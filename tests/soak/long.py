@@ -125,7 +125,7 @@ class Sheet:
 
 
 def flat(sheet, head):
-    """Compares memory and descriptors of the last three quarters: the medians of their first and their last third."""
+    """Compares memory, by medians of the first and last third after settling, and descriptors and threads at rest."""
     kept = head.samples[int(SETTLE * len(head.samples)):]
     third = max(1, len(kept) // 3)
     middle = [[sorted(s[k] for s in part)[len(part) // 2] for part in (kept[:third], kept[-third:])] for k in (1, 2, 3)]

@@ -30,7 +30,7 @@ static void turn_about(struct mesh *mesh, const double station_m[3], double turn
     mesh_free(&point);
 }
 
-/* A room 8 m wide, 1 km from the scene's origin, with the head 1 mm from a wall of 2 m cells: ranges from 1 mm,
+/* A room 8 m wide, 1 km from the scene's origin, with the head 1 mm from a wall of 1.5 m cells: ranges from 1 mm,
  * incidence to 90 degrees. Ours: 16 x 2^-53 x (range + 1 km) / cos i, with range x cos i = 1 mm at least on that wall.
  * A ray that meets it at 8 m stands at cos i = 1.2e-4: below 2e-8 m. Naive: the wall and the head round by 3e-5 m each
  * in the scene's own coordinates, 3 % of the range. The BVH's frame is about the scene's middle: in the room, or 1 km
@@ -150,8 +150,8 @@ static void test_along_face(void **state)
     table_check();
 }
 
-/* ---- kilometres and millimetres: the head of a screw, 2 mm wide and 0.5 mm high, stands out of a slope of 4 km made
- * of two triangles, 5 m from the head. Embree meets the slope with floats of kilometres, which are wrong by tenths of a
+/* ---- kilometres and millimetres: the top of a screw, 2 mm wide and 0.5 mm high, stands out of a slope of 4 km made of
+ * two triangles, 5 m from the scanner. Embree meets the slope with floats of kilometres, which are wrong by tenths of a
  * millimetre. */
 static void test_mixed_sizes(void **state)
 {

@@ -279,8 +279,8 @@ static void move(const double offset[3], double grown_m, double lo[3], double hi
     }
 }
 
-/* The room's coordinates are multiples of a quarter of a metre, and the offset is one of 2^-10 m. Every sum is exact, so
- * nothing at all may change. */
+/* The room's coordinates are multiples of a quarter of a metre, and the offset is one of 2^-10 m. Every sum is exact,
+ * so nothing at all may change. */
 static void a_room_at_utm_coordinates_is_the_room_at_the_origin(void **state)
 {
     (void)state;
