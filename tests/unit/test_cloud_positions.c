@@ -94,7 +94,7 @@ static void test_many_columns(void **state)
         expect(text, (size_t)(p - text), 1, one, 1);
         assert_string_equal(warnings, "");
     }
-    /* Each of the three may be the first, and its # belongs to the line. */
+    /* Any of x, y and z may come first. A # before its name only marks the line. */
     expect("#x y z\n1 2 3\n", 13, 1, one, 1);
     expect("#z y x\n3 2 1\n", 13, 1, one, 1);
     expect("#y z x\n2 3 1\n", 13, 1, one, 1);
@@ -207,7 +207,7 @@ static void test_pcd_runs(void **state)
     memcpy(&last, bytes + 32, 4);
     const double three[3][3] = {{1, 4, 7}, {2, 5, 8}, {3, 6, (double)last}};
     expect(text, len + n, 3, three, 0);
-    /* The x of 80 points as literals; y and z are copies of up to 264 bytes, the longest, from 320 bytes back. */
+    /* The x of 80 points are literals. y and z are copies from 320 bytes back, each of up to 264 bytes, the most. */
     static double same[80][3];
     len = put_header(big, XYZ, 80, "binary_compressed");
     n = len + 8;
@@ -228,7 +228,7 @@ static void test_pcd_runs(void **state)
     expect(big, n, 80, same, 0);
 }
 
-/* An infinite number makes no position, whichever of a point's it is, as text and in binary. */
+/* A point with an infinite x, y or z is no position, as text and in binary. */
 static void test_pcd_that_is_no_position(void **state)
 {
     (void)state;
@@ -288,7 +288,7 @@ static void test_pcd_precision(void **state)
         assert_int_equal(try(text, len, &cloud, &err), SH_OK);
         assert_int_equal(cloud.is_single, row[i].is_single);
         assert_int_equal(strstr(warnings, "stored in single precision, with errors up to 0.0003 m") != NULL, i == 0);
-        /* two units in the last place of a float, of which one is at most 2^-23 of the number */
+        /* two units in the last place of a float; a unit is at most 2^-23 of the number */
         if (row[i].is_single) assert_true(fabs(cloud.count_m - 1.2e-7 * fabs((double)row[i].far)) < 1e-12);
         cloud_free(&cloud);
     }

@@ -63,7 +63,7 @@ static void records_that_say_nothing_are_refused(void **state)
     cola_expect(HEAD "0 0 0 0 1 8 Field002 0", "sFA A");
 }
 
-/* A type has its own part alone. An LMS1xx gives records of type 2 without one for empty fields, so these are taken. */
+/* A record has only the part of its type. An LMS1xx gives empty fields without any part, so these are taken, too. */
 static void a_record_has_the_part_of_its_type(void **state)
 {
     (void)state;

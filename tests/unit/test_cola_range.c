@@ -66,7 +66,7 @@ static void a_range_off_the_grid_goes_to_the_nearest_beams(void **state)
     expect_range(0, "D05", -449997, 2249997, 0, 811);
     expect_range(1, "D05", -450333, 2250333, 0, 811);
     expect_range(2, "D05", 900001, 906666, 405, 3);
-    for (uint32_t i = 0; i < 9; i++) /* a third and 0.27 of a step further in each time */
+    for (uint32_t i = 0; i < 9; i++) /* each time the start is 1/3 step later, and the stop 0.27 earlier */
         expect_range(3 + i, "D05", -450000 + (int32_t)i * 1111, 2250000 - (int32_t)i * 900, (i + 1) / 3,
                      811 - (i + 1) / 3 - (i * 27 + 50) / 100);
 }

@@ -113,7 +113,7 @@ static void rates_agree_as_sick_tim_asks(void **state)
     }
 }
 
-/* A head that turns clockwise seen from above is sent from its last step on, as angles always grow counter-clockwise. A
+/* If a head turns clockwise, seen from above, its last step is sent first, as angles always grow counter-clockwise. A
  * mark is at one step, 30 degrees left of the front. */
 static void a_mark_on_the_left_is_on_the_left(void **state)
 {

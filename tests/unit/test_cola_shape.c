@@ -33,8 +33,8 @@ static int is_on_edge(const struct cola_point *a, const struct cola_point *b, in
     return ax * by == ay * bx && ax * bx + ay * by <= 0;
 }
 
-/* Each edge is seen from the point under an angle. The sum is a whole number of turns; it is rounded from within 1e-10
- * of one, as 128 angles have errors of 1e-19 turns. */
+/* Adds up the angles under which the edges are seen from the point. The sum is a whole number of turns to 1e-10, as
+ * each of 128 angles has an error of 1e-19 turns. */
 static int winds(const struct cola_shape *s, int32_t x, int32_t y)
 {
     long double sum = 0.0L;

@@ -259,8 +259,8 @@ static void a_poll_gets_the_last_scan(void **state)
 static const struct protocol_rig_reply refused[] = {
     {"HEAD:STATE?", "idle", 0}, {"SCAN:START", "ERR", -203}, {NULL, NULL, 0}};
 
-/* Somebody stops the head before the first scan has come: it is started again, since a poll waits. After that scan
- * it is not. Where the start is refused, it is tried once. */
+/* Somebody stops the head before the first scan has come. A waiting poll starts the head again, but not after that
+ * scan. A start that is refused is not repeated. */
 static void a_waiting_poll_starts_the_head_again(void **state)
 {
     (void)state;
@@ -298,8 +298,8 @@ static void a_waiting_poll_starts_the_head_again(void **state)
     assert_int_equal(cola.n_lines, 0);
 }
 
-/* The head fails while a poll waits, or may not be started any more: the poll is refused, once. A request may show
- * this; its own answer comes after the refusal. */
+/* The head fails while a poll waits, or may not be started any more: the poll is refused, once. Where another request
+ * reveals the failure, the refusal comes before that request's answer. */
 static void a_waiting_poll_is_refused(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Heights that colours show of points in a CRS, beside the scene's own. Georeferencing takes points there, and the
- * recorder takes their heights back. */
+/* Colours show heights in the scene, also for points in a CRS. Georeferencing takes points to the CRS, and the recorder
+ * computes their heights in the scene again. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -43,8 +43,8 @@ static double height_seen(enum georef_crs crs, uint32_t native_crs, double lon_d
     return colour_figure(COLOUR_HEIGHT, &t, 0);
 }
 
-/* 2 km away the Earth's surface is 0.31 m below the level of the station. Its radii differ by 0.6 % from the mean one,
- * which is 2 mm. Heights in ECEF need no radius. */
+/* 2 km away the Earth's surface is 0.31 m below the level of the station. Radii of curvature differ by 0.6 % from the
+ * mean one, so heights by 2 mm. Heights in ECEF need no radius. */
 static void test_heights(void **state)
 {
     (void)state;
@@ -63,7 +63,7 @@ static void test_heights(void **state)
     }
 }
 
-/* A scene whose coordinates are those of the grid has the grid's heights. 5 km away, the surface would be 1.96 m lower. */
+/* A scene in coordinates of the grid has the grid's heights. 5 km away, the surface would be 1.96 m lower. */
 static void test_scene_in_the_grid(void **state)
 {
     (void)state;

@@ -225,8 +225,8 @@ static void a_place_is_read_and_said(void **ctx)
     expect(&dev, "SITE:POSE? 1", "1,2,3,0,0,0");
 }
 
-/* The owner of a fault knows its meaning (test_fault_config.c). This test has the lines, as command_device.c answers
- * them. */
+/* test_fault_config.c tests what faults mean. This test has only the commands and their replies; command_device.c
+ * stands for the list of faults. */
 static void faults_are_added_listed_counted_and_cleared(void **ctx)
 {
     (void)ctx;

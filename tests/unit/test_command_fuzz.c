@@ -92,7 +92,7 @@ static void begin(struct command_device *dev, uint64_t seed)
 static void random_lines(void **ctx)
 {
     (void)ctx;
-    /* Half of the lines have any bytes, and half those of commands, which get further. */
+    /* Half of the lines have any bytes. The others have only bytes of commands, and get further. */
     static const char alphabet[] = "*:;?,. +-0123456789eEHADPRLINSTOCMZKGXU\t\"'#[]";
     static struct command_device dev;
     begin(&dev, UINT64_C(0x9e3779b97f4a7c15));

@@ -18,7 +18,7 @@ static void ranges_keep_apart(void **ctx)
     expect(&dev, "HEAD:RANG:MAX? MAX", "800");
     expect_error(&dev, 1, "HEAD:RANG:MIN 100", CMD_E_SETTINGS, "allowed 0.5 to 99.999999999 as HEAD:RANGe:MAX is 100");
     expect_error(&dev, 1, "HEAD:RANG:MIN 0.4", CMD_E_RANGE, "HEAD:RANGe:MIN 0.4 m, allowed 0.5 to 250");
-    expect_error(&dev, 1, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* a pulse rate would have no range */
+    expect_error(&dev, 1, "HEAD:RANG:MAX 1.5", CMD_E_RANGE, "allowed 2 to 800"); /* one rate measures from 2 m on */
     expect_error(&dev, 1, "HEAD:RANG:MAX 900", CMD_E_RANGE, "allowed 2 to 800");
     expect_error(&dev, 1, "HEAD:RANG:MAX 5 DEG", CMD_E_SUFFIX, "takes M, MM or KM");
     expect(&dev, "*RST", "OK");
@@ -41,7 +41,7 @@ static void noise_has_kinds_and_sizes(void **ctx)
     expect_error(&dev, 1, "HEAD:NOIS:ANGL ON", CMD_E_SETTINGS,
                  "needs mirror_sigma_deg or pan_sigma_deg of the head profile");
     expect_error(&dev, 1, "HEAD:NOIS LOUD", CMD_E_DATA_TYPE, "HEAD:NOISe takes OFF, ON, SIGNal, DEF, not 'LOUD'");
-    dev.limits.noise_most = 0; /* of echoes that are found in samples */
+    dev.limits.noise_most = 0; /* echoes are found in samples */
     expect_error(&dev, 1, "HEAD:NOIS SIGN", CMD_E_SETTINGS, "HEAD:NOISe SIGNal needs waveform.echoes: model");
     expect_error(&dev, 1, "HEAD:NOIS ON", CMD_E_SETTINGS, "HEAD:NOISe ON needs waveform.echoes: model");
     dev.limits.noise_most = 2;
@@ -144,8 +144,8 @@ static void steps_stay_within_the_rates(void **ctx)
     expect(&dev, "SCAN:STEP:LINE 0.1", "0.1");
 }
 
-/* 60 deg/s at 100 lines/s are 0.6 deg, and for both steps 0.268328156 is the most. A number sets both steps, but DEF
- * answers with this one. */
+/* 60 deg/s at 100 lines/s are 0.6 deg between lines, which is DEF's answer. Other numbers set both steps, to
+ * 0.268328156 at most. */
 static void what_def_answers_can_be_set(void **ctx)
 {
     (void)ctx;
@@ -204,7 +204,7 @@ static void a_spheres_step_divides_half_a_turn(void **ctx)
     expect_error(&dev, 1, "SCAN:STEP 2", CMD_E_SETTINGS, "allowed 1: the platform moves");
 }
 
-/* A step is the part of a turn to the nearest micro-degree, and gives an even number of steps back. */
+/* A step is its part of a turn, to the nearest micro-degree. It gives their number back if that is even. */
 static void a_step_is_the_nearest_to_its_part_of_a_turn(void **ctx)
 {
     (void)ctx;
@@ -344,8 +344,8 @@ static void limits_are_those_that_hold(void **ctx)
     assert_int_equal(n, settings);
 }
 
-/* Each member of the settings has a row, and HELP:SETtings? lists each row that has one. A step is that of
- * SCAN:STEP. */
+/* Each member of the settings has a row; that of the step is SCAN:STEP. HELP:SETtings? lists each row that has a
+ * setting. */
 static void every_setting_is_listed(void **ctx)
 {
     (void)ctx;

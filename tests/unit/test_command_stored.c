@@ -73,10 +73,10 @@ static void lines_are_carried_out_in_an_order_that_works(void **state)
     (void)state;
     struct command_device dev = command_test_device();
     const struct head_settings before = dev.settings;
-    /* The line's end comes first, and lies below its present start. The pulse rate is set already. */
+    /* SCAN:LINE:STOP comes first, and is below the present start, -30. The pulse rate is set already. */
     assert_int_equal(apply(&dev, "SCAN:LINE:STOP -35\nSCAN:LINE:STARt -38\nHEAD:PRR 300000\nHEAD:LIN 50\n"), 0);
     assert_string_equal(done, "SCAN:LINE:STARt -38\nHEAD:LIN 50\nSCAN:LINE:STOP -35\n");
-    assert_memory_equal(&dev.settings, &before, sizeof before); /* `set` is what carries them out */
+    assert_memory_equal(&dev.settings, &before, sizeof before); /* lines only go to note() here */
     assert_int_equal(dev.queue.count, 0);
     assert_int_equal(apply(&dev, ""), 0);
     assert_string_equal(done, "");

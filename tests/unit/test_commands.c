@@ -239,7 +239,7 @@ static void a_first_configuration(void **state)
     has(on_out, "size      0.01 x 0.004 x 0.01 m\nunit      0.001 m, ");
 }
 
-/* 50 ms of 36,000 pulses/s. The page's observer sees them, too. */
+/* 50 ms of 36,000 pulses/s, all of which count while the page's observer reads, too. */
 static void a_head_with_a_page(void **state)
 {
     (void)state;

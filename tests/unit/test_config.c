@@ -30,7 +30,7 @@ static void malformed_configurations_are_refused(void **state)
             fail_msg("case %zu (%s): \"%s\", expected \"%s...%s\"", i, bad[i].with, err.text, start, bad[i].fragment);
         for (uint32_t k = 0; k < diagnostics.n; k++)
             if (strpbrk(diagnostics.err[k].text, "\n\r") != NULL) fail_msg("case %zu: more than one line", i);
-        /* An edit of base gives no other errors. A whole file has more of them, as much is missing. */
+        /* An edit of base gives one error alone. A whole text gives others, too, as it lacks many keys. */
         if (bad[i].old != NULL && diagnostics.n != 1)
             fail_msg("case %zu (%s): %u faults: %s, %s", i, bad[i].with, diagnostics.n, diagnostics.err[0].text,
                      diagnostics.err[1].text);
@@ -60,7 +60,7 @@ static void files_that_are_none_are_refused(void **state)
     assert_int_equal(config_load(long_path, NULL, 0, cfg, &err), SH_EINPUT);
     assert_says("path too long");
     assert_int_equal(config_load(long_path, NULL, 0, cfg, NULL), SH_EINPUT);
-    long_path[500] = '\0'; /* of 511 bytes that are allowed */
+    long_path[500] = '\0'; /* allowed are 511, with the folder */
     assert_int_equal(load_edited("cube.obj", long_path), SH_EINPUT);
     assert_says("too long with the folder of its file; allowed a path of 1 to 511 bytes");
 }

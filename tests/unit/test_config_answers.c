@@ -251,7 +251,7 @@ static void stops_go_through_the_stations(void **state)
         cfg->platform.kind = PLATFORM_STOPS;
         assert_int_equal(cfg_station_at(cfg, number), (number - 1) % 3);
     }
-    cfg->n_stations = 1; /* a single station has all stops */
+    cfg->n_stations = 1; /* all stops belong to a single station */
     assert_int_equal(cfg_station_at(cfg, 5), 0);
     /* A head that is at none of the stations serves all of them. */
     cfg->n_stations = 2;
@@ -269,7 +269,7 @@ static void stops_go_through_the_stations(void **state)
     assert_true(config_serves(cfg, 1));
 }
 
-/* Some keys count only where they are given, also with the value that they have otherwise. */
+/* Some keys count only where they are given, even if their value is the default. */
 static void what_is_given_is_noted(void **state)
 {
     (void)state;

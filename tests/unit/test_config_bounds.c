@@ -107,8 +107,8 @@ static void noise_signal_and_surfaces(void **state)
     ALL(bounds);
 }
 
-/* There are 4096 samples at most: half of them around an echo, all but one in a gate. Light goes 0.149896229 m back and
- * forth in 1 ns. */
+/* A window has at most 2048 samples around an echo, and 4095 in a gate. Light goes 0.149896229 m back and forth in
+ * 1 ns. */
 static void samples_of_waveforms(void **state)
 {
     (void)state;

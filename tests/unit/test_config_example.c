@@ -23,8 +23,8 @@ static const char *next_line(void)
     return line;
 }
 
-/* Expects a text in lines that begin with blanks and a mark. A line ends where the next word would not fit; the end of
- * the line before it counts as a column. */
+/* Expects a text in lines that begin with blanks and a mark. A line ends where the next word would not fit. The first
+ * line may have WIDTH columns, and later ones have one less. */
 static void expect_wrapped(const char *text, int indent, const char *mark)
 {
     char start[64];

@@ -21,8 +21,8 @@ static void note_grade(const char *path, const char *from)
         if (strncmp(from, grades[g], strlen(grades[g])) == 0) found[key - cfg_profile_table.keys][g] = 1;
 }
 
-/* Notes the grades of a file. A figure of a program has a path of its own. In other lists the grades of all elements
- * are noted for the list. */
+/* Notes the grades of a file. Each figure of `programs` has a path of its own. For any other list, the grades of all
+ * its elements are noted together. */
 static void read_grades(char *text)
 {
     char section[CFG_PATH_MAX] = "", path[CFG_PATH_MAX] = "", word[64];
@@ -42,7 +42,7 @@ static void read_grades(char *text)
     }
 }
 
-/* Takes a line of words, "  quoted     3: firing_ns, beams,", and those that go on below it, as "3: firing_ns, beams". */
+/* Takes a line of words, "  quoted     3: firing_ns, beams,", and its continuation below, as "3: firing_ns, beams". */
 static void take_words(const char **at, char *words, size_t room)
 {
     size_t used = 0;

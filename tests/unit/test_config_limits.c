@@ -42,7 +42,7 @@ static const struct limits {
     {"phase_deg", 0, 359.999999},
     {"step_deg", 0.01, 90},
     {"opening_min_deg", 0, 89},
-    {"fov_min_deg", -180, 360}, /* a line head's angle is 90 up and more than that backward */
+    {"fov_min_deg", -180, 360}, /* for a line head 90 is up, and larger angles are backward */
     {"fov_max_deg", -180, 360},
     {"angles_deg", -360, 720},
     {"turn_deg_s", -36000, 36000}, /* 100 turns a second */
@@ -319,7 +319,7 @@ static void limits_hold_in_files(void **state)
     assert_says("max_echoes: \"16\" is out of range; allowed a whole number, 1 to 15");
 }
 
-/* A word stands for the value that the rest of the program asks for. */
+/* Each word stores the value that the rest of the program compares with. */
 static void words_mean_their_values(void **state)
 {
     (void)state;

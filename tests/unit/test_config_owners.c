@@ -193,7 +193,7 @@ static void anchors(void **state)
     }
 }
 
-/* Points have the number of a frame where the head goes along a file. */
+/* Points have the number of a frame on a trajectory and at stops. */
 static void colours_of_frames(void **state)
 {
     (void)state;

@@ -154,7 +154,7 @@ static void a_name_has_a_longest_length(void **state)
     assert_true(most > 60 && most < CFG_PATH_MAX); /* one that is taken has room, its end included */
 }
 
-/* YAML replaces the file's list or section, and earlier --set within it. Later --set changes it. */
+/* YAML in a --set replaces a list or section, with earlier --set in it. Later --set changes the new one. */
 static void yaml_replaces(void **state)
 {
     (void)state;

@@ -246,8 +246,8 @@ static void expect_beside(const char *name, const char *want)
     free(text);
 }
 
-/* An installed program has its files in ../share/scanhead, one in a build folder in ../config. The working directory's
- * folder config comes last. */
+/* An installed program has its files in ../share/scanhead. A program in a build folder has them in ../config. The
+ * working directory's folder config comes last. */
 static void a_program_finds_what_is_beside_it(void **state)
 {
     (void)state;

@@ -96,7 +96,7 @@ static void the_example_loads(void **state)
     free(text);
 }
 
-/* "# word" is a comment. A key after a # has no blank there, or two and more. */
+/* "# word" is a comment. Between # and a key that is commented out there is no blank, or there are several. */
 static int is_comment(const char *line)
 {
     return line[1] == ' ' && line[2] != ' ';

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A run that takes more than ten times its planned cost gives a warning. The test makes up the figures. A loop then
- * has its own, and a plan of next to no time for a pulse. */
+/* A run that takes more than ten times its planned cost gives a warning. The first tests make up the figures. The last
+ * one measures a loop whose plan gives a pulse next to no time. */
 #include "tests/unit/device_rig.h"
 
 #include <poll.h>

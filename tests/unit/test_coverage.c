@@ -6,9 +6,9 @@
 static const double LO[3] = {-1.9, -1.4, -1.1}, HI[3] = {2.2, 1.7, 1.3}, WITHIN[3] = {0.1, 0.2, 0.05};
 static const double BOX_M2 = 2.0 * (4.1 * 3.1 + 4.1 * 2.4 + 3.1 * 2.4);
 
-/* Lines of points a and b apart, seen at an angle, are images of a square grid. No circle between them has a radius of
- * more than half of the square's diagonal, stretched by range / cosine = range^2 / distance from the plane. 1 % is
- * added: the step isn't infinitely small, and the pan turns by a step during a line. */
+/* The directions are a square grid; on a plane its squares are stretched by up to range / cosine, that is range^2 /
+ * distance from the plane. A circle without points has a radius of at most half of such a diagonal. 1 % is added: the
+ * step isn't infinitely small, and the pan turns by a step during a line. */
 static int is_resolved(const struct cover_cell *cell)
 {
     return cell->least_m > 1.01 * M_SQRT1_2 * cell->spacing_m;

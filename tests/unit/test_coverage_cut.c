@@ -161,7 +161,7 @@ static void test_sums(void **state)
     }
     assert_int_equal(coverage_sum(&c, &sums, &err), SH_OK);
     assert_true(sums.area_m2 == 16.0 && sums.none_m2 == 4.0 && sums.one_m2 == 10.0 && sums.several_m2 == 2.0);
-    /* 12 m2 are seen: 1.25, 40, 20 and 5 pulses a m2 of 8, 1, 2 and 1; floats are good to 1e-7 */
+    /* 12 m2 are seen: 8, 1, 2 and 1 m2 with 1.25, 40, 20 and 5 pulses a m2; floats are good to 1e-7 */
     assert_true(fabs(sums.density_1_m2.mean - 95.0 / 12.0) < 1e-12);
     assert_true(sums.density_1_m2.p05 == 1.25 && sums.density_1_m2.p50 == 1.25 && sums.density_1_m2.p95 == 40.0);
     assert_true(fabs(sums.range_m.mean - 20.0 / 12.0) < 1e-6 && fabs(sums.range_m.p05 - 1.0) < 1e-6);

@@ -29,7 +29,7 @@ static struct coverage_finder finder;
 static struct coverage *const coverage = (struct coverage *)&result;
 static const struct sh_report report;
 
-static double estimate_m2[MOST], front[MOST], gain_m2[MOST]; /* by place; the last one: of a scan */
+static double estimate_m2[MOST], front[MOST], gain_m2[MOST]; /* by place; gain_m2: of a scan */
 static uint32_t looked;                                      /* the place of the scan that waits */
 static int gains_fail, look_fails_at, n_looks;
 static double turned[3]; /* the last direction of the last estimate */

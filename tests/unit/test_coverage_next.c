@@ -297,8 +297,8 @@ static void test_sides_are_cells(void **state)
     cover_close(c);
 }
 
-/* Cells are much smaller than a ray. The gain is the sum of the rays' areas, which is the area of the box. Lines of
- * rays end within a ray's width of its 12 edges; by chance half of that, in either direction. */
+/* Cells are much smaller than a ray. The gain is the sum of the rays' areas, which is the area of the box. At each of
+ * its 12 edges, rays reach too far or not far enough: by half a ray's width on average. */
 static void test_coarse_rays(void **state)
 {
     (void)state;
@@ -345,7 +345,7 @@ static void test_the_other_leg(void **state)
         cover_scan(c, at[i], &sweep, &scan);
         assert_int_equal(coverage_look(c->coverage, &scan, "scan", NULL, &pulses, &err), 0);
         coverage_waiting(c->coverage, &seen_m2, &gain_m2);
-        /* An outline of the gain is at most the shadow's line of either, some 7 m. Each cell there counts or not. */
+        /* Only cells on a shadow's line, at most some 7 m long, may count in one gain and not in the other. */
         print_message("%.2f %.2f: %.3f m2 by rays, %.3f m2 by a scan\n", at[i][0], at[i][1], gain[i].gain_m2, gain_m2);
         assert_true(fabs(gain[i].gain_m2 - gain_m2) <= 7.0 * 0.5);
         assert_true(seen_m2 >= gain_m2);

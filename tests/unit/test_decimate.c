@@ -101,9 +101,9 @@ static void cube_stays(void **state)
 
 /* 64 x 64 quads on 1 m. The first guess for 100 triangles is a cell of sqrt(3 / 100) m, so 6 steps and cells centred on
  * 0, 1/6 ... 1: 7 x 7. Cell j along an axis has the vertices i with floor(6 i / 64 + 1/2) = j: 0..5, 6..15, 16..26,
- * 27..37, 38..47, 48..58 and 59..64. Triangles that cross no border vanish. Triangles at the crossing of two borders
- * give each of the 6 x 6 squares between clusters its two. All quads have their diagonal the same way, so no others
- * come. */
+ * 27..37, 38..47, 48..58 and 59..64. Triangles with two corners in one cluster vanish. Where two borders cross, two
+ * triangles are left: one crossing for each of the 6 x 6 squares between clusters. All quads have their diagonal the
+ * same way, so there are no others. */
 static void plane_has_counts_by_hand(void **state)
 {
     (void)state;

@@ -192,8 +192,8 @@ static void amplitude_follows_the_range_equation(void **state)
     assert_int_equal(told(&signal, (double)NAN, 1.0), LINE_REFL_NONE);
 }
 
-/* Kim's table: fog of 500 m visibility and less does not depend on colours, 3.912 / 500 m. From there to 1 km q = V -
- * 0.5, V in km: 0.25 at 750 m, and no step at either end. Haze of 4 km has q = 0.98, clear air of 23 km q = 1.3. */
+/* Kim's table: in fog, up to a visibility V of 500 m, extinction is 3.912 / V at any wavelength. From 0.5 to 1 km the
+ * exponent is q = V / km - 0.5, without a step at either end. Haze of 4 km has q = 0.98, clear air of 23 km q = 1.3. */
 static void extinction_by_visibility(void **state)
 {
     (void)state;

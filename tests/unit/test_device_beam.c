@@ -43,8 +43,8 @@ static void assert_note(uint32_t i, uint32_t fault, int ended, uint64_t pulse)
     assert_true(notes[i].byte == -1 && notes[i].link == 0 && notes[i].session == 0 && notes[i].number == 0);
 }
 
-/* At the head's highest rate there are 2000 pulses a tick. A tick that an edge of a fault cuts leaves up to as many for
- * later ticks. Each later one has room for an eighth more, so eight ticks after each edge all are caught up. */
+/* At the head's highest rate there are 2000 pulses a tick. If a fault begins or ends in a tick, the tick ends there and
+ * leaves up to 2000 pulses. Each later tick has room for an eighth more, so eight ticks later all are caught up. */
 static void a_tick_ends_where_a_fault_does(void **state)
 {
     (void)state;

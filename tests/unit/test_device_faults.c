@@ -211,8 +211,8 @@ static void loses_power_at_a_pulse(void **state)
     rig_close(rig);
 }
 
-/* The second power cycle begins with the tick in which power would come back. Power then stays away, since a reader
- * counts on its going and coming in turn. */
+/* The second power cycle begins with the tick in which power would come back. Power then stays away: readers expect
+ * that it goes and comes in turn. */
 static void loses_power_as_it_comes(void **state)
 {
     (void)state;

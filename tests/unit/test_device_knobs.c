@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Commands that change what a scan is planned by. The scan is that of a head with the same keys, byte by byte. The
+/* Commands change what a scan is planned by. The scan has the same bytes as if the configuration had these values. The
  * ranges of the scans before and after it stay as they were. */
 #include "tests/unit/device_rig.h"
 
@@ -51,7 +51,7 @@ static void expect_same(const struct scan *a, const struct scan *b)
 
 static const char *const as_it_was[] = {"*RST", NULL};
 
-/* A scan after commands: the first of a rig, or the second, after one without commands. */
+/* Scans after these commands. number 2: another scan, without them, comes first. */
 static struct scan told(int number, const char *const *sets, int n_sets, const char *const *lines)
 {
     struct rig *rig = rig_open(NULL, sets, n_sets);

@@ -139,10 +139,10 @@ static int last_line_end(struct rig *rig, struct line_end *end)
     return found;
 }
 
-/* After such a stop the encoders have the axes' angles, though no pulse fired at the new rate: 1.6 MHz is 100 whole
- * packets a tick, so none was left over. Three facets and a gain of two are 240 degrees a line of 10 ms, from -40 on.
- * The pan turns 180 degrees a second. The encoders may be read at the last pulse or at the next one: 0.015 degrees of
- * the mirror. */
+/* A rate changes, and the scan stops before a pulse fires at the new rate: 1.6 MHz is 100 whole packets a tick, so none
+ * is left over. The encoders have the axes' angles. Three facets and a gain of two are 240 degrees a line of 10 ms,
+ * from -40 on. The pan turns 180 degrees a second. The encoders may be read at the last pulse or at the next one: 0.015
+ * degrees of the mirror. */
 static void a_stop_right_after_a_change_has_its_angles(void **state)
 {
     (void)state;

@@ -6,8 +6,8 @@
 #include "firmware_sim/device/device_state.h"
 #include "tests/unit/device_rig.h"
 
-/* A pose for a time far ahead counts as a bad one, and others still come in. In step pace the peer grants time, so any
- * is allowed. */
+/* A pose for a time far ahead counts as a bad one, and others still come in. In step pace the peer grants time, so a
+ * pose may be for any time. */
 static void a_pose_far_ahead_keeps_no_other_out(void **state)
 {
     (void)state;

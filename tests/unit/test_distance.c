@@ -16,8 +16,8 @@ typedef long double quad; /* on ARM, which lacks __float128, this has 113 bits, 
 #endif
 
 /* Corner differences, relative to the query point, round by 2^-53 of themselves on each axis. Products, the foot and
- * the square root add a few more. 16 half-units in the last place of the largest difference hold all of it, also at
- * large coordinates, since a difference of doubles rounds relative to itself. */
+ * the square root add a few more. All of them are within 16 half-units in the last place of the largest difference. The
+ * size of the coordinates does not matter, since a difference of doubles rounds relative to itself. */
 static const double ROUNDING = 16 * 0x1p-53;
 
 static double uniform(double low, double high)

@@ -51,8 +51,8 @@ static void test_there_and_back(void **state)
     }
 }
 
-/* Bytes 0 to 23 are changed here: they say that it is a blob of this length, and ours. Bits beyond the four are those
- * of another release. */
+/* Bytes 0 to 23, which are changed here, say that the note is a blob of this length, and ours. Flags after the first
+ * four would be of another release. */
 static void test_refused(void **state)
 {
     (void)state;

@@ -283,7 +283,7 @@ static void test_end(void **state)
     killed_rig_write(path, whole, whole_len);
     char *want = xml_of(path);
     const size_t end = packet[n_packets - 1].end / CONTENT * PAGE; /* pages before the XML */
-    for (int header = 0; header < 2; header++) { /* not there yet: all headers; then only the file's own */
+    for (int header = 0; header < 2; header++) { /* all headers are missing; then only the file's own */
         size_t len;
         uint8_t *part = malloc(whole_len);
         memcpy(part, whole, whole_len);

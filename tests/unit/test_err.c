@@ -22,7 +22,7 @@ static void errors_have_a_code_and_a_line(void **state)
     longest[sizeof longest - 1] = '\0';
     sh_fail(&err, SH_EIO, "%s", longest);
     assert_int_equal(strlen(err.text), sizeof err.text - 1);
-    /* Control characters, and those of one byte after 0xc2, may be commands of a terminal. */
+    /* Control characters of ASCII, and of Latin-1 (two bytes in UTF-8), may be commands of a terminal. */
     static const char *const texts[][2] = {{"a\nb\r\x1f\x7f ~", "a?b??? ~"},
                                            {"\xc2\x80\xc2\x9f\xc2\xa0", "????\xc2\xa0"},
                                            {"\xc3\x80\xc2", "\xc3\x80\xc2"},

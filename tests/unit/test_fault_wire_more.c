@@ -305,8 +305,8 @@ static void mixtures_are_what_their_notes_say(void **state)
 
 /* ---- several at one frame */
 
-/* The order of the list counts only among the faults that strike last. A frame that is split already is not split
- * again. */
+/* Only within the last group of kinds (fault/README.md) faults strike in the order of the list. A frame that is split
+ * already is not split again. */
 static void faults_strike_in_their_order(void **state)
 {
     (void)state;

@@ -307,8 +307,8 @@ static void a_cable_is_pulled_once(void **state)
     faulty_end_cable(f);
     assert_int_equal(n_notes, 2);
     assert_int_equal(faulty_fault(f, LINK_FAULT_PLUG, 0, 0, 0.0), SH_OK);
-    expect_fault(2, LINK_FAULT_PLUG, 0, 0, 0.0); /* no reset without that pull */
-    write_it(f, 3, "c\n\n");                     /* due when the cable came in: still that pull */
+    expect_fault(2, LINK_FAULT_PLUG, 0, 0, 0.0); /* no cable was pulled: no reset */
+    write_it(f, 3, "c\n\n");                     /* due as the cable came in: no new pull */
     assert_int_equal(faulty_pass(f, 3, owner.now_ns), 1);
     assert_true(inner.n_faults == 3 && !faulty_is_pulled(f));
     owner.now_ns = 9001;

@@ -190,8 +190,8 @@ static void many_cells_are_all_kept(void **state)
     scene_free(scene);
 }
 
-/* Points without a triangle, and far points, take no part. A cell's range is the mean of its points' ranges. A range
- * that is not known is in no part of the ranges. */
+/* Points without a triangle, and far points, take no part. A cell's range is the mean of its points' ranges. A cell
+ * without a known range counts only in the whole, 0 to infinity. */
 static void ranges_of_cells(void **state)
 {
     (void)state;

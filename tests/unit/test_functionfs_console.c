@@ -221,8 +221,8 @@ static void a_slow_client_keeps_its_session(void **state)
 }
 
 /* A client stops reading while the head goes on writing. Its port counts as closed all the same: only bytes that the
- * client takes keep it open. TURNS: bytes that it has already got may be acknowledged late, at most once for each of
- * its last two packets. */
+ * client takes keep it open. TURNS is in seconds. Two of them may show progress: each of the client's last two packets
+ * may be acknowledged late. */
 static void writing_is_not_taking(void **state)
 {
     enum { FULL = 65536, TURNS = 6 };

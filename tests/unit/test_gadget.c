@@ -306,7 +306,7 @@ static void test_where_a_port_is(void **state)
     functions[0].first = 0;
     expect_failure(make(&model), SH_EINPUT, text);
     functions[1] = (struct usb_function_row){.first = 1, .count = 1, .class = USB_CLASS_COMM, .subclass = 6};
-    assert_int_equal(make(&model), SH_OK); /* another communications function is none: CDC 1.2, table 4 */
+    assert_int_equal(make(&model), SH_OK); /* subclass 6 is no serial port: CDC 1.2, table 4 */
     assert_int_equal(gadget.part.n_interfaces, 1);
     assert_int_equal(gadget.interface[0], 1);
     gadget_remove(&gadget);

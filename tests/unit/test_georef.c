@@ -96,7 +96,7 @@ static double meridian_arc_m(double lat_deg)
 static void test_utm_central_meridian(void **state)
 {
     (void)state;
-    /* the quarter meridian, 10 001 965.7293 m,, is the published figure for WGS 84 */
+    /* the quarter meridian, 10 001 965.7293 m, is the published figure for WGS 84 */
     expect_near(meridian_arc_m(90), 10001965.7293, 5e-5);
     for (int lat_deg = -80; lat_deg < 84; lat_deg += 4) {
         double anchor[3];
@@ -229,7 +229,7 @@ static void test_borders(void **state)
     }
 }
 
-/* A point with a NaN becomes NaN, and in the local frame only its coordinate, also where results replace the input. */
+/* A NaN makes all of its point NaN, in the local frame only itself. Results may also replace the input. */
 static void check_nan(const struct georef *georef, int is_local)
 {
     enum { N = 300 };

@@ -184,7 +184,7 @@ static void test_sides(void **state)
 }
 
 /* A difference in degrees is the short way round, and the axes are east, north, up. The axes are taken from steps over
- * which the map bends by less than 1e-9. The ellipsoid's own 100 m / 6.4e6 m cancels between two opposite steps. */
+ * which the map bends by less than 1e-9. The ellipsoid bends by 100 m / 6.4e6 m, but two opposite steps cancel that. */
 static void test_degrees(void **state)
 {
     (void)state;

@@ -292,8 +292,8 @@ static void odd_heights_are_doubted(void **state)
     scene_free(s);
 }
 
-/* The map's scale of heights is not used where these have no system of their own, as in GDAL. A system of the file's
- * own is reported. */
+/* As in GDAL, the map's scale of heights is not used where the heights have no system. A system that the file defines
+ * itself gives a warning. */
 static void what_is_left_out_is_said(void **state)
 {
     (void)state;

@@ -104,7 +104,7 @@ static void heights_above_an_ellipsoid_are_not_doubted(void **state)
     }
 }
 
-/* The raster's height_m is exact where the mesh has an offset of the same height. Else the frame is tangent. */
+/* With height_m the frame is the grid itself if the mesh has an offset of the same height. Else it is tangent. */
 static void height_m_is_that_of_the_raster_s_zero(void **state)
 {
     (void)state;

@@ -22,7 +22,7 @@ static void check_uv(const struct scene *s)
         }
 }
 
-/* uv: the accessor of texture coordinates, replaced by these. */
+/* Loads the quad with these normalized integers as its texture coordinates. */
 static void check_normalized(const char *type, const void *data, size_t size, int stride)
 {
     char rest[2048], more[64];

@@ -142,7 +142,7 @@ static void webp_is_decoded(void **state)
     assert_memory_equal(image.rgba, rgba, 12);
     assert_int_equal(image.rgba[15], 0);
     texture_image_free(&image);
-    for (size_t k = 0; k < n; k++) { /* cut off anywhere: an error, or a header whose image needs no more */
+    for (size_t k = 0; k < n; k++) { /* cut off anywhere: an error, if any, names the file */
         const struct texture_source cut = {.file = "cut.webp", .bytes = webp, .n_bytes = k};
         if (texture_read(&cut, &image, &err) != SH_OK) assert_int_equal(strncmp(err.text, "cut.webp: ", 10), 0);
         texture_image_free(&image);
@@ -209,8 +209,8 @@ static void meshopt_is_unpacked(void **state)
 
 /* ---- placement of textures */
 
-/* u' = offset + R * S * u, with v down. The transform's own set of coordinates counts, and may stand before the first
- * set. A quarter turn with the scale 1/2 and the offset (0, 1) is the example of the extension's text: the lower left
+/* u' = offset + R * S * u, with v down. The transform's own texCoord counts; its set comes before TEXCOORD_0 in this
+ * file. A quarter turn with the scale 1/2 and the offset (0, 1) is the example of the extension's text: the lower left
  * quarter of the image. */
 static void turned_textures(void **state)
 {
@@ -239,7 +239,7 @@ static void turned_textures(void **state)
 
 /* ---- materials */
 
-/* A second material of a name, and one without a name, get made-up names. Other materials have these already. */
+/* A second material of one name, and one without a name, get other made-up names than materials have already. */
 static void made_names_are_no_others(void **state)
 {
     (void)state;

@@ -52,7 +52,7 @@ static void contradictions_are_named(void **state)
     }
 }
 
-/* A later member of the same name replaces the right one. */
+/* The right buffer view gets a second member of the same name, which replaces its first one. */
 static void views_beyond_their_buffer_are_named(void **state)
 {
     (void)state;

@@ -82,7 +82,7 @@ static void drift(void **state)
             int64_t about_ns = (int64_t)((long double)wanted_ns / (1 + (long double)ppt / 1e12L));
             int64_t t_ns = about_ns - 3;
             for (;;
-                 t_ns++) { /* floor(t d): the product fits 128 bits, its floor by adding whole thousands of seconds */
+                 t_ns++) { /* floor(t d) in 128 bits; 1000 s are added, so that the division rounds down */
                 i128 product = (i128)t_ns * ppt + (i128)1000000000000 * 1000000000000;
                 if (t_ns + (int64_t)(product / 1000000000000 - 1000000000000) >= wanted_ns) break;
             }

@@ -37,7 +37,7 @@ static int came(int fd, const char *expect)
     return strcmp(line, expect) == 0;
 }
 
-/* Neither waits for ever: a client that has given up takes no more. */
+/* came() and give() don't wait for ever: a client that has given up takes no more. */
 static int give(int fd, const void *data, size_t len)
 {
     size_t done = 0;

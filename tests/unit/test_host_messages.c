@@ -59,7 +59,7 @@ static const char *write_file(const char *name, const void *bytes, size_t len)
     return path;
 }
 
-/* Files that are no stream. A capture tells it by its first interface, a .shs by its end. */
+/* Files that are no stream. In a capture its first interface shows that, in a .shs only its end. */
 static void test_files(void **state)
 {
     (void)state;

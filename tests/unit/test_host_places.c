@@ -116,7 +116,7 @@ static void expect_both(struct scanhead *sh, int want)
     assert_int_equal(scanhead_colours(sh, &f, 0, colour, 3), want);
 }
 
-/* The second time the points are lost. The same pulses came before, and the following frames do not belong to those. */
+/* The same points are sent twice, and lost the second time. What follows then does not belong to the first ones. */
 static void test_followers(void **state)
 {
     (void)state;

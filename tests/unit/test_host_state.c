@@ -240,7 +240,7 @@ static void test_gps(void **state)
     const uint64_t s = 1000000000;
     static const struct {
         uint32_t code;
-        uint64_t b, c; /* device time, and GPS time: ns, of a PPS s; of SCAN_START 0: not known */
+        uint64_t b, c; /* b: device time in ns; c: GPS time in ns, for a PPS in s; 0: not known */
         double gps_s;  /* of 3 s after the scan's start; NAN: not known */
     } rows[] = {
         {NATIVE_EV_SCAN_START, 2000000000, 0, NAN},

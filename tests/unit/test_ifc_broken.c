@@ -112,7 +112,7 @@ static void nothing_goes_without_a_word(void **unused)
         print_message("%s\n", why);
         skip();
     }
-    limits.time_s = 120; /* web-ifc never ends on some; once the other has ended it has 10 s, not these */
+    limits.time_s = 120; /* some files hang web-ifc; it is ended 10 s after ifc-lite, long before this */
     ifc_write_text(base, "IFC4", NULL, NULL, ifc_shapes, SHAPES, NULL);
     for (int i = 0; i < n; i++) {
         struct scene *scene = NULL;

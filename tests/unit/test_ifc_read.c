@@ -114,7 +114,7 @@ static void facets_hold_the_tolerance(void **state)
     measure(0, &area, &volume);
     assert_true(fabs(volume / (2 * M_PI) - 1) <= facets_share(1, 70));
     /* With 71 sides chords are 0.089 m long. Edges of a cap that leave out a corner are twice as long. */
-    double least = 1.0; /* least distance of the middle of an edge along the circle from the axis */
+    double least = 1.0; /* the axis's least distance from middles of edges along the circle */
     for (uint32_t i = 0; i < scene->n_triangles; i++)
         for (int c = 0; c < 3; c++) {
             const double *a = scene->vertex_m[scene->triangle[i][c]],

@@ -355,15 +355,15 @@ static void block_is_closed_and_its_parts_are_not(void **state)
         memcpy(rest[gone], side[gone + 1], (11 - gone) * sizeof side[0]);
         f = figures_of(corner, (const uint32_t(*)[3])rest, 11);
         assert_false(ifc_is_closed(&f));
-        /* An estimate: a field may meet little of a face. */
+        /* It is an estimate by vector fields (core/scene/body.c), which may nearly miss a face. */
         assert_true(f.open_m2 > 0.05 * (28 - f.area_m2));
     }
     f = figures_of(corner, side + 2, 8); /* without top and bottom: vector areas cancel */
     assert_false(ifc_is_closed(&f));
 }
 
-/* The middle of an edge is a corner of one side alone, as after a cut. Edges don't pair, and the body is closed.
- * Rounded to single precision it stays so. */
+/* A point within an edge is a corner of one side alone, as after a cut. Edges don't pair, but the body counts as
+ * closed, here with corners in single precision. */
 static void corner_within_an_edge_is_closed(void **state)
 {
     (void)state;

@@ -153,9 +153,9 @@ static void each_format_has_the_same_picture(void **state)
     check_file(write_file("e.tga", bytes, write_tga(bytes, 3, 0)), 0, 0);
     check_file(write_file("f.tga", bytes, write_tga(bytes, 4, 1)), 1, 0);
     check_file(write_file("g.tga", bytes, write_packed_tga(bytes)), 0, 0);
-    /* A flat block has one coefficient a channel: 8 times its mean, rounded to a multiple of 2. Luma and chroma are
-     * whole numbers, so they are off by a half, and an eighth more. That is 0.7 (1 + 1.772) in blue (JFIF), and one by
-     * rounding. */
+    /* A flat block has one coefficient a channel: 8 times its mean, rounded to a multiple of 2. So luma and chroma are
+     * off by an eighth, and by a half as whole numbers: less than 0.7. That is 0.7 (1 + 1.772) in blue (JFIF), and
+     * rounding adds one. */
     check_file(write_file("h.jpg", JPEG, sizeof JPEG), 0, 3);
 }
 

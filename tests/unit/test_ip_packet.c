@@ -165,7 +165,7 @@ static void test_ipv6_lengths(void **state)
         {{{5, 0}}, 58, IP_PACKET_FOUND, 10, 0, 48},
         {{{6, 44}}, 58, IP_PACKET_FRAGMENT, 0, 0, 0},
         {{{6, 58}}, 58, IP_PACKET_OTHER, 0, 0, 0},
-        /* Options before UDP: the next header, and the length in 8 bytes without the first 8. */
+        /* Options before UDP begin with the next header and their length in units of 8 bytes, less one. */
         {{{5, 26}, {6, 60}, {40, 17}, {53, 18}}, 66, IP_PACKET_FOUND, 10, 0, 56},
         {{{5, 26}, {6, 60}, {40, 44}}, 66, IP_PACKET_FRAGMENT, 0, 0, 0},
         {{{5, 26}, {6, 60}, {41, 2}, {40, 58}}, 66, IP_PACKET_OTHER, 0, 0, 0}, /* 24 bytes of 26 */

@@ -11,7 +11,7 @@ enum { N = 40, LINES = 400, N_SAMPLES = 12, POINT = 61, PACKET = 2 * N_SAMPLES, 
 static struct bytes left, left_wdp, whole; /* as a kill leaves them; completed, with its packets inside */
 static char wdp[168], wdp_part[176];
 
-/* With it the points come out. */
+/* At the end of a line its points are written. */
 static void put_line_end(uint32_t line)
 {
     static uint8_t out[256];
@@ -115,7 +115,7 @@ static void check_said(size_t n_points, size_t n_packets)
     if (n_packets >= n_points ? said[0] != '\0' : strstr(said, lost) == NULL) fail_msg("'%s', not '%s'", said, lost);
 }
 
-/* n_points points are whole in the .las. Those after the first n_packets lack packets that are whole in the .wdp. */
+/* n_points points are whole in the .las. Only the first n_packets of them have a whole packet in the .wdp. */
 static void check(size_t n_points, size_t n_packets)
 {
     static const uint8_t none[29];

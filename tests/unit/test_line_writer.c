@@ -188,7 +188,7 @@ static void the_end_does_not_wait_for_ever(void **state)
     assert_true(n > 0);
     text[n] = '\0';
     const struct found found = check_lines(text);
-    assert_true(found.missing < lost);               /* those without a gap came last */
+    assert_true(found.missing < lost);               /* no gap has the last of them */
     assert_int_equal(found.lines + lost, n_put + 1); /* with the end */
     close(fd[0]);
 }

@@ -84,7 +84,7 @@ static void expect_open(const struct link_spec *spec, const char *what, int *bef
         fail_msg("%s, %s: %d descriptors were open, now %d", link_ops_get(spec->type)->name, what, *before, now);
 }
 
-/* The owner is woken once for each time that it was signalled, whatever else happens. */
+/* The owner is woken once, however often it was signalled since the last time. */
 static void wake_up(struct bench *bench)
 {
     uint64_t count = 1;

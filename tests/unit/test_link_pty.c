@@ -251,7 +251,7 @@ static void test_symlink(void **state)
     assert_int_equal(rmdir(dir), 0); /* and nothing lies about */
 }
 
-/* A head was killed, and another program has got its terminal's number. The link is older than that terminal. */
+/* A head was killed, and another program has got its terminal's number. The symlink is older than that terminal. */
 static void test_left_symlink(void **state)
 {
     (void)state;

@@ -189,7 +189,7 @@ static void expect_from(int fd, const char *address, int port, int ttl)
     assert_int_equal(had, ttl);
 }
 
-/* Two heads on one machine send from a port that their receiver has, too. The receiver tells the heads apart by
+/* Three heads on one machine send from a port that their receiver has, too. The receiver tells the heads apart by
  * address, and gets all their datagrams. No datagrams, theirs or others', come back to the heads. */
 static void sources_share_their_port(void **state)
 {
