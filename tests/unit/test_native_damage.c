@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* These tests give the parser every single damage. */
+/* These tests give the parser single damages: at every byte with THOROUGH=1, else some only at every third. */
 #include "tests/common/thorough.h"
 #include "tests/unit/native_stream.h"
 
