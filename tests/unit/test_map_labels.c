@@ -26,7 +26,7 @@ static void add(struct map *map, double x_m, double y_m, double heading_rad, con
     if (map_add_station(map, &s, &err) != SH_OK) fail_msg("%s", err.text);
 }
 
-/* Checks all labels that have places, against each other and the stations at x_m, y_m. Returns how many have one. */
+/* Checks all labels that have places, against each other and the stations at place_px. Returns how many have one. */
 static uint32_t check_labels(const struct map_label *label, uint32_t n, const double (*place_px)[2])
 {
     uint32_t placed = 0;

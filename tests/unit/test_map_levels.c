@@ -108,7 +108,7 @@ static void expect_pixel(const struct map *map, const struct picture *picture, u
 }
 
 /* Heights go from the lowest to the highest of the pixels' lowest points. Half a percent of the pixels are left out at
- * either end, which is none of so few pixels. A ceiling hides nothing. */
+ * either end: with so few pixels that is none. A ceiling hides nothing. */
 static void heights_are_hues(void **state)
 {
     (void)state;

@@ -25,7 +25,7 @@ static double next(void)
     return x / 0x1p32;
 }
 
-/* Places in a cube of 1 m around 0; the last SAME places repeat the first ones. */
+/* Places in a cube of 2 m around 0; the last SAME places repeat the first ones. */
 static void make(void)
 {
     memset(entry, 0, sizeof entry);

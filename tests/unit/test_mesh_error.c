@@ -146,8 +146,8 @@ static void a_coarse_mesh_is_to_be_moved(void **state)
 }
 
 /* Corners at 0 and 1 are made 100 times larger and then 100 times smaller. In units of 6e-8 the corner's error is 1.
- * Times 100 it is 100, and rounding adds 100. Times 0.01 it is 2, and rounding adds 1. So it is 3, though the corner
- * was at 100 on the way. */
+ * Times 100 it is 100, and rounding adds 100. Times 0.01 it is 2, and rounding adds 1. So the error is 3, though the
+ * corner was at 100 on the way. */
 static void an_error_is_scaled_as_the_mesh_is(void **state)
 {
     (void)state;

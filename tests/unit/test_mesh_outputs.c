@@ -60,7 +60,7 @@ static int take_the_name(void *ctx)
     return 0;
 }
 
-/* Where the mesh can't get its name, its materials, which have theirs by then, are removed again. */
+/* Where the mesh can't get its name, its materials are removed again, although they have their names by then. */
 static void no_file_stays_alone(void **state)
 {
     (void)state;

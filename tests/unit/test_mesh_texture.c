@@ -116,7 +116,7 @@ static uint32_t step_of(uint32_t pole, uint32_t i)
     return pole == 0 ? i : STEPS - 1 - i;
 }
 
-/* Faces of both poles, and one of two steps half a turn apart, which crosses nothing. */
+/* Faces at both poles; one of half a turn, which does not cross the seam; and one of a step more, which does. */
 static void a_sphere_is_unwrapped(void **state)
 {
     (void)state;
@@ -151,7 +151,7 @@ static void a_sphere_is_unwrapped(void **state)
     expect_uv(face[n + 1][1], 1.5 / RINGS, (STEPS / 2 + 1.5) / STEPS);
     expect_uv(face[n + 1][2], 2.5 / RINGS, (STEPS / 2 + 1.5) / STEPS);
     assert_int_equal(points.n,
-                     OTHERS + N + 2 * (STEPS - 1) + 2); /* seven more for each pole, one for each ring there */
+                     OTHERS + N + 2 * (STEPS - 1) + 2); /* copies: 7 of each pole, 1 in the ring beside each */
 }
 
 /* A panorama closes after its last line. A point that is beyond the seam is doubled once, for all faces. */

@@ -342,7 +342,7 @@ static void settings_hold_at_the_new_place(void **state)
     free(before.at);
     rig_go_to(there, there->next + 1200);
     struct bytes a = scan(moved), b = scan(there);
-    expect_same(&a, &b); /* each the second of its station */
+    expect_same(&a, &b); /* each is the second scan of its head */
     free(a.at);
     free(b.at);
     rig_close(moved);

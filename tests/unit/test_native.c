@@ -169,7 +169,7 @@ static void test_telemetry(void **state)
     assert_int_equal(native_decode_telemetry(p, 96, &back), 0);
     assert_memory_equal(&t, &back, sizeof t);
     assert_int_equal(native_decode_telemetry(p, 95, &back), SH_EFORMAT);
-    t.lost_lines = 11; /* nothing else makes it longer */
+    t.lost_lines = 11; /* without PTP nothing else makes telemetry longer */
     len = native_encode_telemetry(out, sizeof out, &t, -1, 0);
     check_frame(out, len, 5, 0, 104, -1);
     assert_int_equal(wire(p, 96, 8), 11);
@@ -391,7 +391,7 @@ static void test_emitter(void **state)
     assert_int_equal(native_encode_emitter(out, len - 1, &e, beam, 99, 0), 0);
     assert_int_equal(native_decode_emitter(payload, body - 1, &back), SH_EFORMAT);
     assert_int_equal(native_decode_emitter(payload, 63, &back), SH_EFORMAT);
-    for (size_t at = 0; at < 48; at += 4) { /* kinds up to 4, as many beams as there are, turns by 1, a time */
+    for (size_t at = 0; at < 48; at += 4) { /* refused: kind 5, a third beam, a turn of 2, a denominator of 0 */
         const uint32_t was = le_get32(payload + at);
         le_put32(payload + at, at == 24 ? 2 : at == 40 ? 0 : at == 4 ? 3 : 5);
         const int wrong = at == 0 || at == 4 || at == 24 || at == 40;

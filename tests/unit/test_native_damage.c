@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* These tests give the parser every single damage. */
+/* These tests give the parser single damages: at every byte with THOROUGH=1, else some only at every third. */
 #include "tests/common/thorough.h"
 #include "tests/unit/native_stream.h"
 
@@ -86,7 +86,7 @@ static void test_parser_every_byte_added(void **state)
     for (size_t at = 0; at <= stream_len; at += at < stream_len - 3 ? step() : 1) {
         memcpy(hurt, stream, at);
         hurt[at] = added[at % 3];
-        /* A byte like a neighbour could as well be on that neighbour's other side, outside the frame. */
+        /* An added byte that equals its neighbour could as well lie on its other side, outside the frame. */
         while (at < stream_len && (hurt[at] == stream[at] || (at > 0 && hurt[at] == stream[at - 1])))
             hurt[at]++;
         memcpy(hurt + at + 1, stream + at, stream_len - at);
@@ -128,7 +128,7 @@ static int is_boundary(size_t at)
 
 /* Headers begin alike and payloads end in zeros. So losing a range some bytes later or earlier than [from, to) may
  * leave the same bytes. If a later range begins at a border of pieces, the piece before it is whole after all. If an
- * earlier range ends at a border, the piece after it is. Takes such a range, if possible a later one. */
+ * earlier range ends at a border, the piece after it is whole. Takes such a range, if possible a later one. */
 static void slide_to_piece(size_t *from, size_t *to)
 {
     for (size_t n = 0;; n++) {

@@ -61,7 +61,7 @@ static void make_frames(void)
         le_put32(f + 12, crc32c(0, f + NATIVE_HEADER_LEN, len));
         number[i] = is_local(i) ? 0 : next++;
         native_finish_frame(f, (uint32_t)number[i]);
-        while (f[NATIVE_HEADER_LEN - 1] == NATIVE_SYNC) { /* cut by a byte, the next sync byte completes it */
+        while (f[NATIVE_HEADER_LEN - 1] == NATIVE_SYNC) { /* if it is cut off, the next sync byte replaces it */
             f[1]++;
             native_finish_frame(f, (uint32_t)number[i]);
         }

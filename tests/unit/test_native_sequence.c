@@ -78,7 +78,7 @@ static void test_forgets(void **state)
         for (uint32_t seq = 16; seq < 40; seq++)
             expect(seq, NATIVE_NO_NOTICE, seq, 1);
         assert_int_equal(take(20, 1), NATIVE_RESTARTED);
-        expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* 15 came, 12 was missing: before */
+        expect(again ? 15 : 12, NATIVE_RESTARTED, again ? 15 : 12, 1); /* before the restart 15 came, 12 didn't */
     }
     /* A late frame fills its place. Another one with its number is of another sequence. */
     memset(&sequence, 0, sizeof sequence);
@@ -133,7 +133,7 @@ static void test_long_gaps(void **state)
     expect(1, NATIVE_RESTARTED, 1, 1);
 }
 
-/* A head started again, and its numbers were all missing. The head's frames are dropped only for a while. */
+/* A head started again, with numbers that all count as missing. Its frames are dropped as late only for a while. */
 static void test_late_run(void **state)
 {
     (void)state;

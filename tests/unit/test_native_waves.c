@@ -221,7 +221,7 @@ static void test_cut_with_their_points(void **state)
     const struct seen seen = see_all(native_encode_points(out, room, &block, 0));
     assert_int_equal(seen.windows, waves.n);
     assert_int_equal(seen.points_frames, 3);
-    assert_true(seen.most_waves_frames > 5); /* 3274 windows of 90 bytes of samples and 28 more */
+    assert_true(seen.most_waves_frames > 5); /* 2806 windows: 92 bytes of samples and 28 more */
     assert_int_equal(seen.lost, 5);
 }
 

@@ -28,7 +28,7 @@ static void a_request_has_its_time(void **state)
     assert_memory_equal(packet + 40, "\x83\xaa\x7e\x7f\xc0\0\0\0", 8);
 }
 
-/* Writes an answer: s of T2 and T3 since 1970, which both have a quarter of a second more. */
+/* Writes an answer. T2 and T3 are a quarter of a second after t2_s and t3_s, which count from 1970. */
 static void answer(uint8_t packet[NTP_LEN], int64_t t1_ns, uint32_t t2_s, uint32_t t3_s)
 {
     uint8_t request[NTP_LEN];

@@ -314,7 +314,7 @@ static void colours_of_all_echoes(void **state)
 }
 
 /* A mirror is on a body that moves: it is turned by 45 degrees about z through (0, 2, 0), then 1 m ahead. Beams that
- * meet it go on to the wall at x = 6: the way there plus the rest, at right angles. */
+ * meet it go on to the wall at x = -4: the way there plus the rest, at right angles. */
 static void a_mirror_that_moves(void **state)
 {
     (void)state;

@@ -186,8 +186,8 @@ static int lines_ahead(const struct beam_outlines *o, const struct beam *beam, d
     return (int)n;
 }
 
-/* A sub-ray's place turns on its way, by the angle whose tangent is slope times range over the exit's radius. The edge
- * is as far from the axis as x_m says, as a share of the footprint's radius. Directions are floats: 1e-7. */
+/* A sub-ray's place in the footprint turns with the range, by atan(slope * range / exit radius). The edge is |x_m| from
+ * the axis, which line->h has as a share of the footprint's radius. Directions are floats: 1e-7. */
 static void expect_line(const struct beam *beam, const struct beam_sight *sight, const struct beam_line *line,
                         double x_m, double y_m)
 {
@@ -286,8 +286,8 @@ static void edges_out_of_reach(void **state)
     }
 }
 
-/* An edge goes by from the right, 5 m ahead, to the left, 15 m ahead. It crosses the axis at 10 m, and the footprint of
- * 0.1 m from 9.83 to 10.17 m. Up to 9.6 m nothing crosses the footprint, although the edge is nearer beside it. */
+/* An edge goes by from the right, 5 m ahead, to the left, 15 m ahead. It crosses the axis at 10 m. From 9.83 to
+ * 10.17 m it is in the footprint of 0.1 m. Up to 9.6 m nothing crosses the footprint, though the edge comes nearer. */
 static void an_edge_that_crosses_far_away(void **state)
 {
     (void)state;

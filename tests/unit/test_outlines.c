@@ -81,8 +81,8 @@ static void make_edge(const double around[3], double turn_rad, double corner[3][
 }
 
 /* Directions go to corners, edges and middles of a cube: where its faces meet, and where cells are the most oblique.
- * The beam has a half-width of 10 mrad, many cells. Up to 0.99 of that the footprint surely reaches the edge, as
- * directions are rounded to floats by 1e-7. */
+ * The beam has a half-width of 10 mrad, many cells. Pulses pass the edge at 0.99 of that, so their footprints surely
+ * reach it: rounding to floats changes directions only by 1e-7. */
 static void edges_are_found_in_any_direction(void **state)
 {
     (void)state;
@@ -127,7 +127,7 @@ static void groups_are_looked_up_to_their_ends(void **state)
     struct beam_outlines *outlines = outlines_of((const double(*)[3])corner, &beam);
     for (size_t s = 0; s < sizeof steps_rad / sizeof steps_rad[0]; s++)
         for (uint32_t n = 1; n < 60; n++)
-            for (uint32_t over = 0; over < n; over++) { /* this one meets the edge, and goes on on its other side */
+            for (uint32_t over = 0; over < n; over++) { /* this pulse meets the edge, later ones are beyond it */
                 pulses.n = 0;
                 for (uint32_t i = 0; i < n; i++) {
                     beside(corner[0], corner[1], 0.5, ((double)i - over) * steps_rad[s], d);
@@ -153,7 +153,7 @@ static void a_step_may_lead_to_an_edge(void **state)
     make_edge((const double[3]){0.3, 1.0, 0.2}, 0.3, corner);
     struct beam_outlines *outlines = outlines_of((const double(*)[3])corner, &beam);
     for (uint32_t n = 1; n < 60; n++)
-        for (uint32_t leap = 0; leap < n; leap++) { /* from this pulse on at the edge, before it beside it */
+        for (uint32_t leap = 0; leap < n; leap++) { /* pulses from this one on are at the edge */
             pulses.n = 0;
             for (uint32_t i = 0; i < n; i++) {
                 beside(corner[0], corner[1], 0.4 + 1e-3 * i, i < leap ? 0.03 : 0.0, d);

@@ -154,8 +154,8 @@ static void late_ticks_are_counted(void **state)
     assert_int_equal(lateness_count(&m->pace.late), 8);
 }
 
-/* The machine stands still for 300 ms. A head with one tick ahead gains 9 ms on each of the next 10 ms, as its caster
- * takes 1 ms. The head has caught up after ceil(300 / 9) ticks and the one that was waited for. */
+/* The machine stands still for 300 ms. A caster takes 1 ms for a tick of 10 ms, so a head with one tick ahead gains
+ * 9 ms a tick. It has caught up after ceil(300 / 9) ticks and the tick that was waited for. */
 static void a_stall_is_caught_up(void **state)
 {
     (void)state;

@@ -132,7 +132,7 @@ static void any_piece_can_be_the_first(void **state)
     past_free(past);
 }
 
-/* Whole pieces are dropped, so less than a piece more is kept than asked for. */
+/* Whole pieces are dropped, so up to a piece less is kept than the limit allows. */
 static void the_oldest_go_and_are_counted(void **state)
 {
     (void)state;

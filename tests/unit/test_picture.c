@@ -83,7 +83,7 @@ static void triangles_have_their_area(void **state)
     (void)state;
     static const double corner[3][3][2] = {
         {{1, 1}, {9, 1}, {1, 9}}, {{2.25, 1.5}, {7.75, 3}, {4, 8.5}}, {{-4, 2}, {4, 2}, {-4, 10}}};
-    static const double area[3] = {32, 0, 8}; /* the last one's part within the image; the second one's below */
+    static const double area[3] = {32, 0, 8}; /* the third is cut by the image; the second is computed below */
     for (int k = 0; k < 3; k++)
         for (int turn = 0; turn < 6; turn++) {
             const int o[3] = {turn % 3, (turn + (turn < 3 ? 1 : 2)) % 3, (turn + (turn < 3 ? 2 : 1)) % 3};

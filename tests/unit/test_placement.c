@@ -103,7 +103,7 @@ static void each_form_leads_to_the_same_place(void **state)
     }
 }
 
-/* A scene has one grid, UPS and the hemisphere's false northing included. */
+/* All stations of a scene are in one grid, also on both sides of the equator or of the edge of UPS. */
 static void the_equator_and_the_edge_of_ups_do_not_part_stations(void **state)
 {
     (void)state;
@@ -186,8 +186,8 @@ static void a_mesh_in_utm(void **state)
     assert_corner_agrees(corner);
 }
 
-/* At the equator a place 1 km south of it lies at 9,999 km in the southern grid. In the northern grid of the scene it
- * is at -1 km. 500 m east of the middle that is so to the nanometre. */
+/* A place 1 km south of the equator lies at 9,999 km in the southern grid, and at -1 km in the northern grid of the
+ * scene. 500 m east of the zone's middle meridian both are right to the nanometre. */
 static void a_place_in_the_other_hemisphere_s_grid(void **state)
 {
     (void)state;

@@ -59,7 +59,7 @@ static void test_forced(void **state)
     assert_int_equal(choose(&row, "beam", options, N, 2, "beam.mode"), 2);
     expect(&row, "c", 1, "forced by beam.mode; holds");
     expect_left(&row, 2, "d", "not asked for");
-    assert_int_equal(choose(&row, "beam", options, N, 0, "beam.mode"), 0); /* the first is one, too */
+    assert_int_equal(choose(&row, "beam", options, N, 0, "beam.mode"), 0); /* the first can be forced, too */
     expect(&row, "a", 1, "forced by beam.mode; does not hold");
 }
 
@@ -142,7 +142,7 @@ static void test_sight_pays(void **state)
 }
 
 /* A fifth of the saving must be left after the cost (core/plan/README.md). Where all pulses hit one triangle each, a
- * map saves the difference of two costs (core/plan/cost.h); it may pay where all rays are near borders. */
+ * map saves the difference of two costs (core/plan/cost.h). plan_sight_may_pay assumes all rays near borders. */
 static void test_sight_pays_to_a_pulse(void **state)
 {
     (void)state;

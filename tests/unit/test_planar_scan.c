@@ -284,7 +284,7 @@ static void parts_of_two_turns_make_none(void **state)
     rig.scan_t0_ns += 60000000000; /* a turn of that number in another scan */
     part(1, 8, N - 1);
     protocol_rig_turn_end(&rig, 1, 0);
-    expect(3, 1, 3); /* both, and turn 0 of that scan */
+    expect(3, 1, 3); /* turn 1 of both scans, and turn 0 of the second */
     part(2, 0, 3);
     part(2, 0, 3); /* twice the same */
     part(2, 4, 7);

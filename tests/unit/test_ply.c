@@ -71,7 +71,7 @@ static const char *const properties[] = {"double x",          "double y",      "
                                          "float reflectance", "double time",   "uchar echo", "uchar echo_count",
                                          "ushort label",      "ushort station"};
 
-/* Reads line by line, as strictly as possible: no line beyond 200 bytes, exactly these properties, comments
+/* Reads line by line, as strictly as possible: no line beyond 399 bytes, exactly these properties, comments
  * anywhere. */
 static void read_ply(const char *path, int ascii)
 {

@@ -39,7 +39,7 @@ static void take_poses(struct rig *rig)
 
 static int64_t t0_ns; /* of the scan, device time */
 
-/* The head goes north at 2 m/s, and stands at y = 1 m when the scan is 0.3 s old. */
+/* The head goes north at 2 m/s, and is at y = 1 m when the scan is 0.3 s old. */
 static double way_m(int64_t scan_ns)
 {
     return 1.0 + 2e-9 * (double)(scan_ns - 300 * MS);

@@ -96,7 +96,7 @@ static const struct way ways[] = {
      {0, 1e9, 1, 1000, 0.29},
      1 + 5,
      16e-6 * 50 / 8 / 25},
-    /* The same way in steps of 0.7 s at most is shorter than by length: three parts. */
+    /* Steps of 0.7 s are allowed at any length, so the same way has three parts. */
     {"a time",
      2,
      {0, 2},

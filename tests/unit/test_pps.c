@@ -46,7 +46,7 @@ static void states_follow_the_pulses(void **state)
     expect(&pps, 11 * SECOND + 700 * MS, PROTOCOL_PPS_LOCKED, 22 * SECOND); /* to the nearest full second */
 }
 
-/* A receiver that is there gives no pulse: that is known after a second. Without one the state is absent at once. */
+/* Where a receiver gives no pulse, the state is absent after a second. Without a receiver it is absent at once. */
 static void absent_without_a_first_pulse(void **state)
 {
     (void)state;

@@ -136,8 +136,8 @@ static void ask_dragged(struct room *r, int i, int waits)
 }
 
 /* Pages that drag on and on neither keep the suggestion of another page waiting, nor take its preview out. 64 answers
- * are kept, and that preview is the oldest of 62 when the search is asked for. Only the newest of three places is
- * waited for each time, so that another one always waits. */
+ * are kept, and that preview is the oldest of 62 when the search is asked for. In each round three places are asked
+ * for, and only the last one is waited for. So there is always work that could delay the search. */
 static void test_drag_beside_search(void **state)
 {
     (void)state;

@@ -14,8 +14,8 @@
 
 enum { INPUTS = 3, PIECES = 3000 };
 
-/* In this world a piece comes at each step of a clock, at one of the sockets. When a socket is asked, the clock may go
- * on before. */
+/* In this world a piece comes at each step of a clock, at one of the sockets. The clock may go on just before a socket
+ * is asked. */
 struct world {
     int64_t now;
     uint64_t asked;

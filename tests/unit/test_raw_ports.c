@@ -23,7 +23,7 @@ static struct raw r;
 static int n_open, appears_ms, stop_ms;
 static int64_t utc_ns;
 
-/* Datagrams of each port: their times, ended by 0. The second has 10 bytes, and so on. */
+/* Datagrams of each port: their times, ended by 0. The first has 10 bytes, the second 20, and so on. */
 static int64_t times[2][4];
 static int n_taken[2];
 static uint64_t dropped[2];

@@ -180,8 +180,8 @@ static void frames_that_were_overtaken_are_lost(void **state)
     expect_lost(OLDEST - 4, (OLDEST - 4) * PULSES);
 }
 
-/* Where the head itself lost the oldest ticks, the next one has the number. Where it lost all of them, no number shows
- * anything. */
+/* Where the head itself lost the oldest ticks, the tick after them gives the number. Where it lost all ticks, no number
+ * shows what is missing. */
 static void numbers_come_from_the_first_tick_that_has_some(void **state)
 {
     (void)state;
@@ -234,7 +234,7 @@ static uint32_t fill_buffer(void)
     return first_end;
 }
 
-/* A client that went away has received what was written to it as whole frames. The rest is not lost by it. */
+/* A client that went away has received what was written to it as whole frames. The rest does not count as lost. */
 static void what_was_not_written_is_not_received(void **state)
 {
     (void)state;

@@ -166,7 +166,7 @@ static void sentences_go_wrong(void **state)
     rig_close(rig);
 }
 
-/* As late as settings and faults together can be, at the highest rate: 5 s and 10 s, though the faults have 20 s. All
+/* At the highest rate sentences are as late as can be: 5 s by the setting, and 10 s by faults that add up to 20 s. All
  * sentences under way are still there. */
 static void late_sentences_are_not_lost(void **state)
 {

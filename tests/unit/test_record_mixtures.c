@@ -62,7 +62,7 @@ static void test_several_heads(void **state)
     }
 }
 
-/* Names of a stream can't end their line. As long as more may come, a header with another head still says so. */
+/* Names of a stream can't end their line. While more may come, the header says that the end is missing. */
 static void test_header_of_part(void **state)
 {
     (void)state;

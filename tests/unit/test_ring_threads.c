@@ -14,7 +14,7 @@
 /* Two casters fill slots with contents that depend only on the tick's number. The pacing thread releases them, numbers
  * their frames, and gives up late ones where the test says so. The pacing thread waits for two of the readers, as in
  * the pace `fast`, and not for the slow ones. One of the slow ones reads slots in place. Slots grow all the while. For
- * one tick in seven caster and pacing thread race: 8,600 times, so that an error in one of 2,900 races is seen in 95 of
+ * one tick in seven caster and pacing thread race: 5,700 times, so that an error in one of 1,900 races is seen in 95 of
  * 100 runs.
  *
  * Each wait is a sched_yield(), which takes milliseconds where other processes want both processors. So the run ends

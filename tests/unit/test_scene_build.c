@@ -149,7 +149,7 @@ static void vertices(void **state)
     struct scene_mesh_spec spec = {.file = "f", .scale = 2.0, .offset_m = {10.0, 20.0, 30.0}};
     begin(&spec, 1.0);
     assert_int_equal(build_vertex(&b, v, &err), SH_OK);
-    spec.up = SCENE_UP_Y; /* x stays, z is up after it: y becomes z, and z points backward */
+    spec.up = SCENE_UP_Y; /* y is up in the file: (x, y, z) becomes (x, -z, y) */
     assert_int_equal(build_vertex(&b, v, &err), SH_OK);
     static const double want[2][3] = {{12.0, 24.0, 36.0}, {12.0, 14.0, 34.0}};
     assert_int_equal(b.scene->n_vertices, 2);

@@ -123,8 +123,8 @@ static void a_small_hole_is_open(void **state)
 }
 
 /* A slit over the whole top is an opening from a mean width of 0.5e-5 of the body's diagonal on. The width is the
- * slit's area, as the sums over its edges give it, by the length of edges without a counterpart. These are the slit's
- * sides of 3 m, and at either end an edge of 2 m beside two of 1 m. The volume lacks a pyramid on the slit, 2 m
+ * slit's area, as the sums over its edges give it, divided by the length of edges without a counterpart. These are the
+ * slit's sides of 3 m, and at either end an edge of 2 m beside two of 1 m. The volume lacks a pyramid on the slit, 2 m
  * high. */
 static void a_slit_counts_by_its_width(void **state)
 {

@@ -115,7 +115,7 @@ static void large_and_twice(void **state)
     assert_int_equal(scene_load(spec, 2, 1e-3, NULL, &s, &err), SH_OK);
     unlink(file);
     const uint32_t n = s->n_vertices / 2, half = s->n_triangles / 2;
-    assert_in_range(n, (1 << 17) + 1, t.n_vertices - 1); /* its first room is 2^18, for 360,000; half of that is used */
+    assert_in_range(n, (1 << 17) + 1, t.n_vertices - 1); /* beyond half of its first size, 2^18, the table grows */
     assert_memory_equal(s->vertex_m, s->vertex_m + n, n * sizeof *s->vertex_m);
     for (uint32_t i = 0, at = 0; i < t.n_faces; i++) {
         if (!has_area(t.v[3 * i], t.v[3 * i + 1], t.v[3 * i + 2])) continue;

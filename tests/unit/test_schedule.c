@@ -84,7 +84,7 @@ static void a_day_has_no_drift(void **state)
         assert_true(schedule_time_ns(&seg, days * day) == (int64_t)days * INT64_C(86400000000000));
         assert_true(schedule_pulse_at(&seg, (int64_t)days * INT64_C(86400000000000)) == days * day);
     }
-    start_at(&seg, 333333333333); /* 1e6/3 Hz, as decimals have it: k/3 ns late after 1e12 periods of 3 us */
+    start_at(&seg, 333333333333); /* 333333.333333 Hz: this pulse is 1 us later than at 1e6/3 Hz */
     assert_true(schedule_time_ns(&seg, UINT64_C(333333333333)) == INT64_C(1000000000000000));
 }
 

@@ -148,7 +148,7 @@ static void lines_stay_whole_through_changes(void **state)
     }
 }
 
-/* A change to the present settings, at any moment, doesn't move the frame's end, in a line that begins at phase 0. */
+/* A change to the present settings, at any moment, doesn't move the frame's end. */
 static void a_change_of_nothing_changes_nothing(void **state)
 {
     (void)state;

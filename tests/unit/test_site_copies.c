@@ -301,7 +301,7 @@ static void targets_are_chosen_among_copies(void **state)
     assert_says("copy 2 of a mesh would keep other objects than an earlier copy");
 }
 
-/* A station stands on a copy: 0.3 m from the crown's axis of the second one, whose sides rise 3 m in 0.5 m there. */
+/* A station stands on the second copy, 0.3 m from the axis of its crown. The crown's sides rise 3 m within 0.5 m. */
 static void stations_stand_on_copies(void **state)
 {
     (void)state;

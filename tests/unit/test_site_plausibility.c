@@ -99,7 +99,7 @@ static void under_the_floor(void **state)
     says("no surface below it, but one 2 m above it: it may be under the floor");
 }
 
-/* The head is in a slab of 20 cm. Everything but along it is nearer than the 1.5 m that this head sees. */
+/* The head is in a slab of 20 cm. Except along the slab, all is nearer than the head's least range, 1.5 m. */
 static void within_a_slab(void **state)
 {
     (void)state;

@@ -155,8 +155,8 @@ static void usual_pulses(void **state)
     expect_usual("send: on, near_m: 2, far_m: 31", 193, 28 + 2 * 194);
 }
 
-/* A block has room for four windows of each pulse, if the head reports as many echoes, and for the largest of one
- * pulse. */
+/* A block has room for four usual windows of each pulse, if the head reports as many echoes. There is more room for
+ * the most that one pulse can have. */
 static void room_of_a_block(void **state)
 {
     (void)state;

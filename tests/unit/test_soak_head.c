@@ -273,7 +273,7 @@ static void a_pulse_is_late(void **state)
     expect(FAULT_PPS_JITTER, 1, 0, NULL);
 }
 
-/* UTC falls behind by one second more. */
+/* At a leap second UTC falls one second further behind GPS time. */
 static void a_leap_second(void **state)
 {
     (void)state;

@@ -32,8 +32,8 @@ static int close_stream(void **state)
     return 0;
 }
 
-/* Makes a tick of n_events events, then, unless before < 0, a line end with so many echoes before it, then so many
- * after. */
+/* Makes a tick of n_events events and, unless before < 0, a line end. So many echoes come before the line end, and
+ * `tail` echoes after it. */
 static struct ring_slot *make_tick(uint64_t tick, int n_events, int before, uint32_t tail)
 {
     static const struct native_event event = {.code = NATIVE_EV_PPS, .text = "text"};

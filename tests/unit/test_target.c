@@ -4,7 +4,7 @@
 #include "tests/unit/cast_rig.h"
 #include "tests/unit/config_rig.h"
 
-/* Two triangles of each of three surfaces are side by side along x; they share vertices 4 and 5. */
+/* Three surfaces of two triangles are side by side along x; neighbours share vertices 2 and 3, or 4 and 5. */
 static struct scene *strip(void)
 {
     static const double v[8][3] = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0},

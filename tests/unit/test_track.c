@@ -19,7 +19,7 @@ static void put_poses(int64_t from_ms, int64_t to_ms)
     rig_put(out, native_encode_poses(out, sizeof out, pose, 2, 0, 0));
 }
 
-/* Shot i of line l, at t ms, hit at 5 m + i mm straight ahead. Lines have 10 shots, at 0, 150 and 200 ms. */
+/* Shot i of line l hits at 5 m + i mm straight ahead, at *t_s. Lines have 10 shots, from 0, 150 and 200 ms on. */
 static const int START_MS[LINES] = {0, 150, 200};
 
 static void hit(int line, int i, double p[3], double *t_s)

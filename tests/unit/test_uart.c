@@ -74,7 +74,7 @@ static uint64_t gcd(uint64_t a, uint64_t b)
     return b == 0 ? a : gcd(b, a % b);
 }
 
-/* The level of the line at a tick, of which a sent bit has `bit_ticks`. */
+/* Returns the level of the line at a tick. A sent bit lasts `bit_ticks` ticks. */
 static int level_at_tick(const uint8_t *sent, size_t n, uint64_t tick, uint64_t bit_ticks)
 {
     const uint64_t bit = tick / bit_ticks;

@@ -323,7 +323,7 @@ static int n_open(void)
     return n;
 }
 
-/* The end of the link is the end of each of its connections, whether that has the device or not. */
+/* The end of the link is the end of each of its connections, with the device or without it. */
 static void test_close(void **state)
 {
     (void)state;
