@@ -21,7 +21,7 @@ static void test_shards(void **state)
     batch_expect_same(ply, batch_file(wire, "ref", 3, ".ply"));
 }
 
-/* Meshes that one process shares among combinations, and BVHs among those of the same places, change no byte. There are
+/* One process shares meshes among all jobs, and a BVH among jobs at the same place. That changes no byte. There are
  * two scanners, two places of the second one, and three rates of the first. The jobs run in one process, and then in
  * one process for each job. */
 static void test_shared(void **state)
