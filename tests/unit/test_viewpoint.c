@@ -224,7 +224,7 @@ static void assert_all_in_view(const double lo[3], const double hi[3])
     }
 }
 
-/* From 1 cm to 200 m the picture is the same, as far as the head's shortest range allows. */
+/* Boxes of 1 cm to 200 m are in view whole, from the front or from a corner beside it. */
 static void an_object_is_looked_at_from_the_front(void **state)
 {
     (void)state;

@@ -282,7 +282,7 @@ static void test_slurm(void **state)
     assert_int_equal(access(batch_in(wire, "slurm", "manifest-3-of-3.jsonl"), F_OK), 0);
     batch_expect(wire, "slurm", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "slurm", "ref");
-    /* Some tasks of an array of seven run again. */
+    /* One task of an array of seven runs alone. SHARDS says that there are seven. */
     setenv("SHARDS", "7", 1);
     setenv("SLURM_ARRAY_TASK_ID", "3", 1);
     by_script(wire, "/bin/bash", "config/campaign/slurm.sh", "again");
