@@ -116,7 +116,7 @@ static void a_room_is_entered(void **state)
     assert_near(at.pan_rad, 2 * M_PI, 1e-12);
 }
 
-/* The room is 2 m high. The head stands at three fifths of that, at least 40 cm below the ceiling. */
+/* The room is 2 m high. The head stands at three fifths of that. */
 static void under_a_low_ceiling_the_head_stands_lower(void **state)
 {
     (void)state;
