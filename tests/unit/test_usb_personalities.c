@@ -128,7 +128,7 @@ static void test_descriptors(void **state)
             rig_open(&rig, s->personality, s->serial, high ? USB_RATE_HIGH : USB_RATE_FULL);
             expect_bytes(&rig, 0x0100, s->device, 18);
             expect_bytes(&rig, 0x0200, high ? s->high : s->full, s->config_len);
-            /* There is a BOS only where the native identity has content for it. */
+            /* Only the native identity has content for a BOS (Binary device Object Store), so only it has one. */
             const int bos = control(&rig, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0f00, 0, 255);
             assert_true((bos == USB_STALL) == (s->personality != USB_PERSONALITY_NATIVE));
             usb_device_free(rig.head.device);
@@ -371,18 +371,18 @@ static void test_own_requests(void **state)
     assert_int_equal(rig.head.personality->n_sessions, 2);
     assert_true(rig.head.session[0].open); /* value 3 opened it, and no wrong request has ended it */
     assert_false(rig.head.session[1].open);
-    /* Where the data of a request are still to come, the answer is that of a right one, and nothing is done. */
+    /* A right request whose data are still to come is answered as right, and nothing is done yet. */
     assert_int_equal(usb_device_control(rig.head.device, &coding, NULL, 7), 0);
     assert_int_equal(control(&rig, 0xa1, 0x21, 0, 0, 7), 7);
     assert_int_equal(le_get32(rig.in), 115200);
-    for (int begun = 0; begun < 3; begun++) { /* a stream that is begun again is one that was begun */
+    for (int begun = 0; begun < 3; begun++) { /* a stream stays begun when it is begun again */
         memset(rig.in, 0xee, 2);
         assert_int_equal(control(&rig, 0xc1, 0x22, 0, 2, 1), 1);
         assert_int_equal(rig.in[0], begun > 0);
         assert_int_equal(rig.in[1], 0xee);
         assert_int_equal(control(&rig, 0x41, 0x22, 1, 2, 0), 0);
     }
-    /* If no transfer has told of a reset, the reader's next one does. The transfer of a new reader does not. */
+    /* A transfer that tells of a reset is due. If a new reader begins first, its transfer does not. */
     uint8_t bytes[8];
     struct usb_transfer in = {.endpoint = STREAM_IN, .length = sizeof bytes, .data = bytes};
     usb_device_set_gone_due(rig.head.device, STREAM_IN, 1);

@@ -136,7 +136,7 @@ static void test_out(void **state)
     host_free(host);
 }
 
-/* Transfers are cancelled before, in the middle, and after; first, middle and last of the queue; unknown; twice. */
+/* Transfers are cancelled while they wait (first, middle, last of the queue), half read, too late, and twice. */
 static void test_cancel(void **state)
 {
     (void)state;
@@ -247,8 +247,8 @@ static void test_gone(void **state)
     free(host);
 }
 
-/* Where an interface ends, what was under way ends with it: half-read transfers, short packets and a halt that were
- * asked for, a zero-length packet. The epoch is a new one. When it begins again, all is as at first. */
+/* Where an interface ends, what was under way ends with it: half-read transfers, requested short packets, a notice
+ * of a reset, a zero-length packet. The epoch is a new one. When it begins again, all is as at first. */
 static void test_begun_again(void **state)
 {
     (void)state;

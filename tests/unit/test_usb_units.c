@@ -91,7 +91,7 @@ static void test_usbip_long_reads(void **state)
     }
 }
 
-/* The telegram fills these reads exactly: its end is the next read, whether that waits already or comes later. A
+/* The telegram fills these reads exactly: the next read is its end, and may wait already or come later. A
  * telegram longer than the read goes on in the next one. */
 static void test_usbip_exact_reads(void **state)
 {

@@ -109,7 +109,7 @@ static void test_stream(void **state)
     bench_close(&bench);
 }
 
-/* Bytes that a session left are not for the next one. A link's owner that learns of the end by writing reads no more. */
+/* Bytes that a session left are not for the next one. After a write has reported the end, the owner reads no more. */
 static void test_left_over(void **state)
 {
     (void)state;

@@ -68,7 +68,7 @@ static void test_oldest(void **state)
         client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
     close(client[1].fd); /* its place is free, and goes to one that is younger than its neighbours */
     bench_poll(&bench, 0, DEADLINE_MS);
-    static const int out[] = {-1, 0, 2, 3}; /* the hosts that go as 3, 4, 5 and 6 come */
+    static const int out[] = {-1, 0, 2, 3}; /* the client that has to go when client 3, 4, 5, 6 comes */
     for (int i = 3; i < 7; i++) {
         client[i] = (struct client){.bench = &bench, .fd = connect_silent(&bench)};
         for (int k = 0; k <= i; k++)

@@ -142,7 +142,7 @@ static void test_save(void **state)
     assert_int_equal(http_status(), 409);
 }
 
-/* A client that sends nothing, or half a request, is cut off 30 s after the last whole request, as others wait. */
+/* A client that sends nothing, or half a request, is cut off 30 s after the last whole request: others wait. */
 static void test_idle_clients(void **state)
 {
     (void)state;

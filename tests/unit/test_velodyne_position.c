@@ -163,7 +163,7 @@ static void test_without_fix(void **state)
     assert_int_equal(packet(0)[206], 0);
 }
 
-/* The sentence is the receiver's last before the packet's own time. */
+/* The receiver is asked once for its fix, at the packet's own time. */
 static void test_fix_of_the_packet(void **state)
 {
     (void)state;

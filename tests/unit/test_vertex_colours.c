@@ -90,7 +90,7 @@ static void ply_by_face(void **state)
     scene_free(s);
 }
 
-/* The forms are those of photogrammetry; a weight is no colour. */
+/* Colours from 0 to 1 or from 0 to 255 follow x, y, z. A fourth number alone is a weight, no colour. */
 static void obj_of_two_ranges(void **state)
 {
     (void)state;
@@ -99,7 +99,7 @@ static void obj_of_two_ranges(void **state)
     check(s, 0, 1, 0, 51, 0);
     check(s, 0, 2, 0, 0, 153);
     scene_free(s);
-    s = take("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nf 1 2 3\nv 0 1 0 0 0 153\n", 1); /* 153 says so */
+    s = take("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nf 1 2 3\nv 0 1 0 0 0 153\n", 1); /* 153: so all are 0 to 255 */
     check(s, 0, 0, 1, 0, 0);
     check(s, 0, 2, 0, 0, 153);
     scene_free(s);
@@ -238,7 +238,7 @@ static void expected(double x_m, double z_m, double rgb[3])
     rgb[2] = 255.0 * (w[2] + (v > u ? w[1] : 0.0));
 }
 
-/* Casts one line of 200 pulses through the board, upwards: its points, with colours, and labels with reflectances. */
+/* Casts one line of 200 pulses upwards through the board, and writes its points into the block. */
 static void cast_line(const struct scene *scene, const struct cast_setup *setup, struct line_block *block)
 {
     static const struct schedule_spec spec = {.prr_uhz = 20000000000,
@@ -335,7 +335,7 @@ static void hits_reflect_as_their_colour(void **state)
     surface_table_free(&table);
 }
 
-/* There is one rule: texture, else the colour between the vertices, else the material's, else grey. */
+/* The colour is that between the vertices, else the material's, else grey. (Here no surface has a texture.) */
 static void the_order_of_colours(void **state)
 {
     (void)state;

@@ -128,8 +128,8 @@ static double plane_depth(const double n[3], double x, double y)
     return 10.0 * n[2] / (n[0] * right + n[1] * up + n[2]);
 }
 
-/* Returns a sum over four distances: a weight times the mean by which eight neighbours are nearer, in logarithms.
- * Slanted neighbours are 0.7 of the distance away in both axes. */
+/* Returns a sum over four distances: a weight times the mean over eight neighbours of how much nearer each one is, as
+ * a logarithm from 0 to 0.06. Diagonal neighbours are 0.7 of the distance away in both axes. */
 static double plane_dark(const double n[3], int x, int y)
 {
     static const int reach[4][3] = {{2, 1, 14}, {5, 4, 9}, {12, 8, 5}, {28, 20, 3}};

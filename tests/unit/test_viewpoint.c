@@ -116,7 +116,7 @@ static void a_room_is_entered(void **state)
     assert_near(at.pan_rad, 2 * M_PI, 1e-12);
 }
 
-/* The room is 2 m high. The head stands at three fifths of that, at least 40 cm below the ceiling. */
+/* The room is 2 m high. The head stands at three fifths of that. */
 static void under_a_low_ceiling_the_head_stands_lower(void **state)
 {
     (void)state;
@@ -224,7 +224,7 @@ static void assert_all_in_view(const double lo[3], const double hi[3])
     }
 }
 
-/* From 1 cm to 200 m the picture is the same, as far as the head's shortest range allows. */
+/* Boxes of 1 cm to 200 m are in view whole, from the front or from a corner beside it. */
 static void an_object_is_looked_at_from_the_front(void **state)
 {
     (void)state;

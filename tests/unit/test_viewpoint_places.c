@@ -79,7 +79,7 @@ static void a_floor_is_not_steep(void **state)
         }
 }
 
-/* There are 0.2 m above the head. The floor's other side counts as well. */
+/* At least 0.2 m above the head are free. A floor's lower side counts as a ceiling. */
 static void there_is_room_above(void **state)
 {
     (void)state;

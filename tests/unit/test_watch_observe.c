@@ -201,8 +201,8 @@ static void expect_counts(const char *json, const char *begin, double points, do
 
 /* ---- tests */
 
-/* A thread that nobody waits for is the last to get a processor. Where its share of a processor is limited here, the
- * share lets it look at all points on any machine. */
+/* A thread that nobody waits for gets the lowest priority. The second row limits its share of a processor, but so
+ * little that it looks at all points on any machine. */
 static void a_scan_is_judged_as_by_the_report(void **state)
 {
     (void)state;

@@ -119,8 +119,8 @@ static void same(const char *what, double a, double b, double tolerance)
     if (!(fabs(a - b) <= tolerance)) fail_msg("%s: %.12g is not %.12g", what, a, b);
 }
 
-/* A point at a height z lies z farther from its station along the beam, times the slope of the beam: a beam to a height
- * of 1 - z is 1 / (1 - z) of its length long where it meets the floor. Floats round a deviation of 4 mm by 1e-10 m. */
+/* The station is 1 m above the floor. A beam of length L to a point at height z meets the floor at L / (1 - z), so the
+ * deviation along the beam is L - L / (1 - z), below 0 for z > 0. Floats round a deviation of 4 mm by 1e-10 m. */
 static void points_are_compared_once(void **state)
 {
     (void)state;

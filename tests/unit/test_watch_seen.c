@@ -103,8 +103,8 @@ static void each_station_has_its_cells(void **state)
     close_site();
 }
 
-/* There are about 20,000 cells at most: of 8 m2 that is a side of 0.02 m. Where they take too much memory, they are
- * half as large again, as often as it takes. */
+/* There are about 20,000 cells at most: of 8 m2 that is a side of 0.02 m. Where they take too much memory, their side
+ * is made 1.5 times as long, as often as needed. */
 static void fine_cells_are_made_coarser(void **state)
 {
     (void)state;

@@ -16,8 +16,8 @@ static double sample_m(const struct wave_echoes *w)
     return 0.5 * LIGHT_SPEED_M_S * waveform_spec_of(w->waveform)->sample_s;
 }
 
-/* Without noise the digits alone are in the way: steps of 0.006 thresholds. At 0.35, below the level, a Gaussian of 50
- * has a slope of 0.6 a sample, so half a step is 0.005 samples. */
+/* Without noise the digits alone are in the way: steps of 0.006 thresholds. Where a Gaussian
+ * of 50 is at 0.35, below the level, it rises by 0.6 a sample, so half a step is 0.005 samples. */
 static void a_plain_echo_is_where_it_is(void **state)
 {
     (void)state;
@@ -271,8 +271,8 @@ static void three_surfaces_are_three_echoes(void **state)
     wave_close(&w);
 }
 
-/* Returns about a width apart or more, 0.6 m, without noise. Some of them take a term too many on the way, which has to
- * go again; others end where a fit with one term less is nearly as good. Digits of 14 bits are steps of 0.006
+/* The returns are about a width apart or more, 0.6 m, and have no noise. Some fits take a term too many on the way, and
+ * remove it again. Others end where a fit with one term less is nearly as good. Digits of 14 bits are steps of 0.006
  * thresholds, which is less than 0.1 mm at the slopes of these pulses. What remains is the fit's end, for which 10 mm
  * are allowed. */
 static void overlapping_surfaces_are_all_found(void **state)

@@ -107,7 +107,7 @@ static void figures_of_the_pulse(void **state)
     }
 }
 
-/* A receiver that is limited gives 5 sigma of noise less than that for certain, and is blind for its dead time. */
+/* Samples count as limited from 5 sigma of noise below the saturation on. The receiver is blind for its dead time. */
 static void a_limited_receiver(void **state)
 {
     (void)state;
@@ -122,8 +122,8 @@ static void a_limited_receiver(void **state)
 }
 
 /* A term of sigma 1 is h. The term's middle lies between its half maxima, which are 2.355 sigmas apart. The logarithm
- * of h goes straight over steps of 1/64 width: d^2 / 8 times its second derivative, which is 30 / width^2 where it
- * rises, is 1e-3. */
+ * of h is interpolated by straight lines over steps d of 1/64 width. Where h rises, its second derivative is up to
+ * 30 / width^2, and the error d^2 / 8 times that: 1e-3. */
 static void values_of_a_term(void **state)
 {
     (void)state;

@@ -72,8 +72,8 @@ static void the_top_of_a_gaussian(void **state)
 }
 
 /* Half maxima of a Gaussian are 1.1774 sigmas from its middle. A straight line between two samples has an error of 0.08
- * / sigma; its bend is taken into account. If one side is not seen, the other one is mirrored, and the signal's bend is
- * taken for up to four times its size. If neither is seen, the ends of the peak are taken. */
+ * / sigma; its bend is taken into account. If one side is not seen, the other one is mirrored. The width may then
+ * count half, and the bend up to four times. If neither is seen, the ends of the peak are taken. */
 static void half_maxima(void **state)
 {
     (void)state;

@@ -116,8 +116,8 @@ static uint32_t random_returns(uint64_t *random, int turn, struct waveform_retur
     return n;
 }
 
-/* Checks windows against those that the plain reading keeps. Returns how many of them touch the one before: parts of a
- * window that is too long for one. */
+/* Checks windows against those that the plain reading keeps. Returns how many of them touch the one before, as parts of
+ * a stretch that is too long for one window. */
 static uint32_t check_windows(const struct waveform_record *record, const uint8_t *kept, uint32_t want)
 {
     uint32_t all = 0, runs = 0, parts = 0, run = 0;

@@ -100,7 +100,7 @@ static const struct {
     CASE("GET http://@/scene HTTP/1.1\r\nHost: elsewhere.example\r\n\r\n", 200, NULL),
     CASE("GET http://elsewhere.example/scene HTTP/1.1\r\n" HOST "\r\n", 421, NOT_THIS),
     CASE("GET /scene HTTP/1.0\r\n\r\n", 421, NOT_THIS),
-    CASE("GET /scene HTTP/1.0\r\nOrigin: http://\r\n\r\n", 0, NULL), /* an Origin is never that of no Host: no byte */
+    CASE("GET /scene HTTP/1.0\r\nOrigin: http://\r\n\r\n", 0, NULL), /* no Host, so no Origin is right: no byte comes */
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 8\r\n\r\n",
          426, WEBSOCKETS),
     CASE("GET /ws HTTP/1.1\r\n" HOST "Upgrade: websocket\r\nConnection: upgrade\r\nSec-WebSocket-Version: 13\r\n\r\n",

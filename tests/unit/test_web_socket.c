@@ -135,7 +135,7 @@ static void test_early_frames(void **state)
 }
 
 /* A client sends commands and closes at once. The commands are read before the client's end, also where the owner has
- * not heard of the session by then, or has something to write. Half a message is not. */
+ * not heard of the session by then, or has something to write. Half a message may be read, too. */
 static void test_last_words(void **state)
 {
     (void)state;
@@ -159,7 +159,7 @@ static void test_last_words(void **state)
             assert_int_equal(send(fd, bytes, n, MSG_NOSIGNAL), n);
             assert_int_equal(shutdown(fd, SHUT_WR), 0);
             if (early) bench_expect(&bench, LINK_OPENED, 0);
-            bench_expect(&bench, LINK_READABLE, 1); /* with a writable session poll reports before it works */
+            bench_expect(&bench, LINK_READABLE, 1); /* a writable session is reported first, and then read */
             assert_true(bench.ops->write(bench.link, 0, "\xd5", 1) >= 0);
             ssize_t got = bench.ops->read(bench.link, 0, text, sizeof text);
             assert_in_range(got, 5, 9);

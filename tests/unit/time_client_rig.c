@@ -19,7 +19,7 @@ const int64_t time_client_epoch_ns = 70 * S; /* device time 0 by the machine's c
 int64_t now_ns; /* by the machine's clock, as the client sees it */
 static sem_t waits, goes;
 int waits_ms;       /* for so long the client wants to wait; -1: for ever */
-static int is_free; /* the client waits by itself */
+static int is_free; /* its waits are the system's */
 int is_interrupted; /* its next wait is */
 int has_no_way, has_no_descriptors;
 static _Thread_local int is_client;

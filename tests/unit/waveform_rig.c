@@ -25,7 +25,7 @@ struct waveform *waveform_rig_open(const struct waveform_spec *spec)
     return w;
 }
 
-/* The log-normal with half of its peak at ln(1 + a t) = -ln s, ln s. The log-normal's moments follow from those of
+/* The log-normal has half of its peak at ln(1 + a t) = -ln s and ln s. The log-normal's moments follow from those of
  * exp(n u) under a Gaussian of u = ln(1 + a t) with sigma k = ln s / sqrt(2 ln 2): the area is
  * k sqrt(2 pi) exp(k^2 / 2) / a, and the mean of 1 + a t is exp(3 k^2 / 2). */
 double waveform_rig_pulse(const struct waveform_spec *spec, double t_s)

@@ -67,7 +67,7 @@ void rig_open(const struct fault *fault, uint32_t n, int native);
 void rig_close(void);
 /* Closes the session of a test that failed before it did so. */
 int rig_teardown(void **state);
-/* Runs a session with one fault, so many frames of the stream, and its end: `whole` of them came whole and right. */
+/* rig_run puts so many frames into a session with one fault. rig_end ends it: `whole` of them must have come right. */
 void rig_run(const struct fault *fault, uint32_t n_frames);
 void rig_end(uint32_t whole);
 

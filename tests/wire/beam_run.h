@@ -24,8 +24,8 @@ struct beam_note {
 struct beam_run {
     struct beam_shot shot[BEAM_MAX_PULSES];
     uint64_t pulses; /* one after the last pulse that is there */
-    int64_t
-        start_ns; /* device time of pulse 0. Recordings may differ by ticks: the command to start comes at any tick */
+    /* Device time of pulse 0. */
+    int64_t start_ns;
     struct scanhead_line_end line[BEAM_MAX_LINES];
     uint32_t lines;
     struct scanhead_info info;

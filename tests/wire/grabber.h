@@ -27,8 +27,8 @@ void grabber_start(struct wire *wire, const char *name, const char *sensor, stru
 int grabber_wait(struct grabber *grabber, int n_saved);
 
 /* Lets all threads of a process go before others, where the kernel permits that (root, RLIMIT_RTPRIO). The grabber goes
- * before others, too. It waits 100 ms for the reply to a command and then does without it, so its head has to hurry,
- * too. */
+ * before others, too. It waits only 100 ms for the reply to a command, and then does without one. So its head has to
+ * hurry. */
 void grabber_hurry(pid_t pid);
 
 /* Starts the grabber and waits; where it complains, it is started anew. Beside eight busy processes, and without the

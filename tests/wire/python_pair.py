@@ -186,7 +186,7 @@ def dropped_frames():
 
 
 def alike():
-    """A new sequence begins with a frame equal to the last one, dropped as repeated. The state from it still holds."""
+    """A new sequence begins with the frame that came last. The client drops it as repeated, and keeps its state."""
     head, theirs = pair()
     first, other = (framed(kind, 0, 0, b"", seq) for kind, seq in ((200, 6), (201, 5)))
     theirs.sendall(first + first + other)

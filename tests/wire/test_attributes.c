@@ -86,7 +86,7 @@ static void test_off_and_on(void **state)
     struct scanhead *off = open_stream(wire, "off.shs"), *on = open_stream(wire, "on.shs");
     struct scanhead_frame a, b;
     uint32_t points = 0;
-    int64_t later_ns = 0; /* the second scan may be commanded later, by a tick perhaps */
+    int64_t later_ns = 0; /* all times of the second scan differ by this */
     for (int n = 0; next_hashed(off, &a, 0); n++) {
         assert_true(next_hashed(on, &b, 1));
         assert_true(a.type != SCANHEAD_ATTRIBUTES);

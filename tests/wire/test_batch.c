@@ -21,7 +21,7 @@ static void test_shards(void **state)
     batch_expect_same(ply, batch_file(wire, "ref", 3, ".ply"));
 }
 
-/* Meshes that one process shares among combinations, and BVHs among those of the same places, change no byte. There are
+/* One process shares meshes among all jobs, and a BVH among jobs at the same place. That changes no byte. There are
  * two scanners, two places of the second one, and three rates of the first. The jobs run in one process, and then in
  * one process for each job. */
 static void test_shared(void **state)
@@ -282,7 +282,7 @@ static void test_slurm(void **state)
     assert_int_equal(access(batch_in(wire, "slurm", "manifest-3-of-3.jsonl"), F_OK), 0);
     batch_expect(wire, "slurm", WITH("--merge"), 0, "6 jobs are complete");
     batch_expect_equal(wire, "slurm", "ref");
-    /* Some tasks of an array of seven run again. */
+    /* One task of an array of seven runs alone. SHARDS says that there are seven. */
     setenv("SHARDS", "7", 1);
     setenv("SLURM_ARRAY_TASK_ID", "3", 1);
     by_script(wire, "/bin/bash", "config/campaign/slurm.sh", "again");

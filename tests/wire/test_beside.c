@@ -69,7 +69,7 @@ static pid_t ask_and_drain(struct wire *wire, const char *endpoint, const char *
     _exit(sum < 100000); /* scans came, not only replies */
 }
 
-/* Scans ten seconds of device time as fast as the head computes. The head waits for each client meanwhile. */
+/* Scans so many frames as fast as the head computes. The head waits for each client meanwhile. */
 static void scan(struct wire *wire, const struct personality *p, int with, const char *frames, char hex[65])
 {
     int udp[2];

@@ -84,7 +84,7 @@ static int was_pulled(struct wire *wire)
     return pulled;
 }
 
-/* A queue of a tenth of a second can't hold four of them: the client learns how many frames it lost. */
+/* A queue of 100 ms can't hold the frames of 400 ms: the client learns how many frames it lost. */
 static void loses_what_the_queue_cant_hold(void **state)
 {
     struct wire *wire = *state;
@@ -173,8 +173,8 @@ static int connect_answered(const struct head *head)
     return -1;
 }
 
-/* In lock-step the links are there while power is not, as their clients let time pass. The first connection that a head
- * with power gets is refused, and no other one. */
+/* In lock-step links stay open while power is off, as their clients grant the time. The fault refuses only the first
+ * connection to a head with power. */
 static void no_power_no_count(void **state)
 {
     struct wire *wire = *state;

@@ -103,7 +103,7 @@ static void a_link_has_one_dialect(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* The run ends at its start, before a client could find it silent. */
+/* A wrong line of the file ends the run at its start. */
 static void a_wrong_line_is_found_at_the_start(void **state)
 {
     struct wire *wire = *state;

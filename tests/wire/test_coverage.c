@@ -196,8 +196,8 @@ static void test_next(void **state)
     free(text);
 }
 
-/* Heads whose beams lie in planes or on cones, in the upper leg. All 682 pulses of the planar one are tried, so the
- * estimate is the gain but for two cells of 0.25 m, as a ray lies on the border of one. At 5 turns a second the other
+/* Heads whose beams lie in planes or on cones, in the upper leg. All 682 pulses of the planar one are tried. A ray
+ * lies on the border of a cell, so the estimate may miss the gain by two cells of 0.25 m. At 5 turns a second the other
  * head has 57 869 pulses, and one in 1.4 is tried. Rays of a beam then are at most 7 m * 0.3 deg = 37 mm apart. They
  * miss a cell only where the beam's way through it is shorter: 37 / 250 of the cells.
  */

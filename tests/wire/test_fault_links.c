@@ -107,8 +107,8 @@ static void begin(struct scanhead *hit, struct scanhead *clean)
     client_tell(clean, "SCAN:START");
 }
 
-/* A client is cut off at the frame that the truth names: it has all before and nothing after. The client comes back and
- * gets the rest. The count of one holds for the link, so the second session is not cut. */
+/* A client is cut off at the frame that the truth names, and gets nothing from there on. The client comes back, and its
+ * stream goes on later. The count of one holds for the link, so the second session is not cut. */
 static void cut_and_return(struct wire *wire, const char *link, const char *fault, const char *kind)
 {
     struct head head = start(wire, link, fault, NULL);
@@ -315,7 +315,7 @@ static void test_record(void **state)
     assert_int_equal(truth(wire, 0, "unplug", "frame"), 100);
 }
 
-/* A fault that a link can't have is refused. A fault for all links is for the links that can have it. */
+/* A fault that a link can't have is refused. */
 static void test_wrong_link(void **state)
 {
     struct wire *wire = *state;

@@ -51,7 +51,7 @@ static void test_replies_that_go_wrong(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* A client that goes on asking, whose replies are late, always has one on its way. */
+/* A client that goes on asking always has a late reply on its way. The head ends all the same. */
 static void test_late_replies_do_not_keep_a_head(void **state)
 {
     struct wire *wire = *state;
@@ -131,8 +131,8 @@ static void test_a_stall_makes_a_slow_reader(void **state)
     assert_int_equal(stats_uint(wire, "pulses"), pulses + told);
 }
 
-/* Frames that would come within two seconds are not cut. Later ones are, and count as left out, also where one stall
- * after the other ends in time. */
+/* Frames that would come within two seconds are not cut. Later ones are, and count as left out, also where each of
+ * many stalls is shorter than that. */
 static void test_the_end_waits_for_what_is_on_its_way(void **state)
 {
     static const struct {
@@ -169,7 +169,7 @@ static void test_the_end_waits_for_what_is_on_its_way(void **state)
 }
 
 /* Frames that a fault holds back, to reorder or merge them, go out at a power cycle at the latest. A run that waits for
- * its readers does not wait for them. */
+ * its readers does not wait for such frames. */
 static void test_power_does_not_wait_for_what_is_held(void **state)
 {
     static const char *const held[] = {"{kind: reorder, at: 60, n: 1000}", "{kind: merge, at: 60, n: 64}"};

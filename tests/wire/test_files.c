@@ -79,7 +79,7 @@ static void test_links(void **state)
     expect_unharmed(wire, "stream.shs");
 }
 
-/* Where all standard streams are closed, no file of the run gets the number of one, and so no messages. */
+/* Where all standard streams are closed, no file of the run gets one of their numbers, and with it the messages. */
 static void test_closed_streams(void **state)
 {
     struct wire *wire = *state;

@@ -122,7 +122,7 @@ static void check_ranges(const struct house *house, const struct packets *all, u
         }
 }
 
-/* From the first fix on, turns have the device's date: hour and day of the receiver, the rest of the packet. */
+/* From the first fix on, turns have the device's date: day and hour by the receiver, the rest by the packet. */
 static void check_dates(const struct rawlog *log, const struct packets *all)
 {
     int fixes = 0, dated = 0;

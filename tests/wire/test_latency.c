@@ -129,8 +129,8 @@ static long double time_of(const struct rate *rate, uint64_t pulse)
     return rate->t0_ns + (long double)(pulse - rate->pulse0) * 1e15L / (long double)rate->prr_uhz;
 }
 
-/* A time on the wire is the exact one, rounded down. The head carries fractions of a nanosecond from one rate to the
- * next to 1/prr, hence the 1e-6. */
+/* A time on the wire is the exact one, rounded down. From one rate to the next the head carries the fraction of a
+ * nanosecond, rounded to a multiple of 1/prr: hence the 1e-6. */
 static void check_time(int64_t t_ns, long double exact_ns)
 {
     long double rest = exact_ns - (long double)t_ns;

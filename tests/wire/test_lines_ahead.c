@@ -83,7 +83,7 @@ static void test_scans_follow_each_other(void **state)
                "400 400000000 0 END\n");
 }
 
-/* Rates and the window change within lines that could be cast together. */
+/* The rates of pulses, pan and lines change within lines that could be cast together. */
 static void test_a_scan_changes(void **state)
 {
     check_same(*state, &SHORT,

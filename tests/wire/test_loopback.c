@@ -69,8 +69,8 @@ static void every_service_is_for_this_machine_alone(void **state)
     head_end(&head, SIGTERM);
 }
 
-/* There is a warning for an address that others may reach, once for the link. Loopback and a link that takes no
- * commands have none. */
+/* There is a warning for an address that others may reach, once for the link. Links on
+ * loopback have none. */
 static void what_others_reach_is_said(void **state)
 {
     struct wire *wire = *state;

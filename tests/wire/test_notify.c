@@ -85,7 +85,7 @@ static void test_socket_with_a_path(void **state)
     hears_both(*state, wire_path(*state, "notify"));
 }
 
-/* This also tries the longest name: 107 bytes after the '@'. */
+/* This also tries the longest name: 107 bytes with the '@'. */
 static void test_abstract_socket(void **state)
 {
     char name[sizeof((struct sockaddr_un *)0)->sun_path];

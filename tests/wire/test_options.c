@@ -256,8 +256,8 @@ static void test_no_command(void **state)
     free(err);
 }
 
-/* Cuts a text into words that end at a comma or a blank, and returns whether one of them is a key, or begins with it
- * and a bracket. */
+/* Returns whether a text has the key as a word: after a blank or a line's end, and before a comma, a bracket or a
+ * line's end. */
 static int names_key(const char *words, const char *key)
 {
     const size_t len = strlen(key);

@@ -286,7 +286,7 @@ static uint64_t late_ticks(const struct wire *wire, uint64_t from_ns)
     return n;
 }
 
-/* A stall alone costs nothing with a head's default lateness: pulses that were due are sent when it goes on. */
+/* A stall alone costs nothing where pulses may be late enough: those that were due are sent when the head goes on. */
 static void test_stall_with_patience(void **state)
 {
     struct wire *wire = *state;

@@ -57,8 +57,8 @@ static void check_room_point(struct check *c, const struct scanhead_point *p, ui
         fail_msg("pulse %" PRIu64 ": label %u is %s", k, p->label, WALLS[c->wall_of_label[p->label]]);
 }
 
-/* The ground has an echo where the ray goes down and its range is below 800 m. Within half a mirror count of that angle
- * both results are right. The range there is as steep as 800 m / tan, so it is not compared. */
+/* The ground has an echo where the ray goes down and its range is below 800 m. Near the angle at which it is 800 m,
+ * within two mirror counts, either result is right, and nothing is compared. */
 static void check_ground_point(struct check *c, const struct scanhead_point *p, uint64_t k)
 {
     double below = STATION[2] + 1.7;

@@ -37,8 +37,8 @@ static const struct {
 };
 enum { N_SAID = sizeof SAID / sizeof SAID[0] };
 
-/* The servo has measured the rate to 1 ns over 0.25 s, which is 4e-9: after 3 s that is 12 ns, and there are three
- * floors. */
+/* The servo has measured the rate to 1 ns over 0.25 s, which is 4e-9: after 3 s that is 12 ns. Times are rounded
+ * down three times. */
 static const int64_t WITHIN_NS = 15;
 
 static int64_t gained_ns(int64_t t_ns)

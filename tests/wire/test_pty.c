@@ -184,8 +184,8 @@ static void test_taken_over_at_once(void **state)
 }
 
 /* The kernel throws away the bytes that wait in a terminal when its master is closed. So the head waits for a reader
- * who is slow to take the end. In this test one reads nothing for a third of a second, when the whole scan is with the
- * kernel. */
+ * who is slow to take the end. Here the reader reads nothing for 0.3 s after the end is asked for, when the kernel has
+ * the whole scan. */
 static void test_a_slow_reader_has_the_end(void **state)
 {
     struct wire *wire = *state;

@@ -16,7 +16,7 @@ static uint32_t roll(uint32_t n)
     return (dice >> 8) % n;
 }
 
-/* Writes damaged bytes: some are lost or changed, and some first bytes of a frame, and replies, are put in. */
+/* Copies with damage: some bytes are lost, some changed, and sync bytes and replies are put in between. */
 static size_t damage(uint8_t *to, const uint8_t *from, size_t len)
 {
     size_t n = 0;

@@ -247,7 +247,7 @@ static size_t write_two_lines(const struct wire *wire, const char *name, uint32_
     return len;
 }
 
-/* A kilobyte of stream has lines 0 and 2^32 - 1. The stream gives no 43 GB of empty places between. */
+/* A kilobyte of stream has lines 0 and 2^32 - 1. The .ptx has no 43 GB of empty places between them. */
 static void test_lines_far_apart(void **state)
 {
     struct wire *wire = *state;

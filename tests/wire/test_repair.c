@@ -354,7 +354,7 @@ static int is_written(const char *const *path, int n)
     return 1;
 }
 
-/* Far fewer bytes come than a buffer holds, and then none. Within a second or two they are on the disk all the same. */
+/* Far fewer bytes come than a buffer holds, and then none. They come to the disk all the same. */
 static void test_slow_head(void **state)
 {
     enum { N = 4 };

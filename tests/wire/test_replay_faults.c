@@ -222,7 +222,7 @@ static void test_too_slow(void **state)
     assert_int_equal(stats_uint(wire, "lost_pulses"), 0);
 }
 
-/* The client that commanded leaves in the middle. The others get all of it, and one may ask why nobody commands. */
+/* The client that commanded leaves in the middle. The other one gets all of it, and an error names the session. */
 static void test_a_client_leaves(void **state)
 {
     struct wire *wire = *state;

@@ -163,7 +163,7 @@ static void test_begun_within_a_scan(void **state)
     tape_free(&all);
 }
 
-/* A client reads it twice: there is one restart, and nothing is missing. */
+/* A client reads it three times: there are two restarts, and nothing is missing. */
 static void test_twice(void **state)
 {
     static const char *const more[] = {"--link", "type: tcp, port: 0", "--pace", "fast", "--quiet", NULL};
@@ -186,7 +186,7 @@ static void test_twice(void **state)
 
 /* ---- several in one file */
 
-/* Two scans of a head that was commanded. */
+/* Three scans of a head that was commanded are in one file. */
 static void test_several_scans(void **state)
 {
     struct wire *wire = *state;

@@ -97,7 +97,7 @@ static void test_links_and_paces(void **state)
         hear(wire, file, link, cases[i] + 1, head.n, &first);
         tape_same_bytes(&first.tape, &head);
         assert_string_equal(first.hash, hash);
-        if (i % 4 == 0) { /* that one's replay */
+        if (i % 4 == 0) { /* a replay of this replay */
             snprintf(again, sizeof again, "%s", tape_write(wire, "replay.shs", &first.tape));
             hear(wire, again, link, cases[i] + 1, head.n, &second);
             tape_same_bytes(&second.tape, &head);
@@ -151,7 +151,7 @@ static void test_recorder(void **state)
         record(wire, source, "second.shs", other);
         assert_string_equal(other, hash);
         head_end(&run, SIGTERM);
-        snprintf(file, sizeof file, "%s", wire_path(wire, files[i])); /* the next one is of this */
+        snprintf(file, sizeof file, "%s", wire_path(wire, files[i])); /* from here on this is replayed */
         replay_to_file(wire, file, NULL, "again.shs");
         stats_hash(wire, other);
         assert_string_equal(other, hash);

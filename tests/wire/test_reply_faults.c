@@ -96,8 +96,8 @@ static void check(struct wire *wire, const char *profile, const char *protocol, 
     check_truth(wire);
 }
 
-/* A requested scan comes after its turn, or 0A after 2 s. The scan is a unit of the stream, and dropped here. The head
- * has booted before the late answer comes. Answers keep their order. (299: milliseconds are rounded down twice.) */
+/* GD has its scan after a turn, or the status 0A after 2 s. The scan is a unit of the stream, and dropped here. The
+ * head has booted before the late answer comes. Answers keep their order. (299: 300 ms, rounded down twice.) */
 static void test_scip(void **state)
 {
     static const struct step steps[] = {

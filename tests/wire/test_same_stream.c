@@ -136,7 +136,7 @@ static void test_hash_tells_streams_apart(void **state)
     }
 }
 
-/* A head that idles for longer than its queue still has a hash: that of no bytes (FIPS 180-4's example values). */
+/* A head that idles for longer than its queue still has a hash: that of no bytes, as sha256sum prints it. */
 static void test_hash_of_an_idle_head(void **state)
 {
     struct wire *wire = *state;

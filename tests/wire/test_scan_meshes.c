@@ -102,7 +102,7 @@ static void assert_closed(void)
     assert_int_equal(n_vertices - n_edges + n_faces, 2);
 }
 
-/* Ranges have steps of a millimetre on the wire at most. Each point is within one of a wall, and none is outside. */
+/* Ranges have steps of a millimetre on the wire at most. Each point is within a millimetre of a wall. */
 static void assert_on_walls(void)
 {
     for (int i = 0; i < n_vertices; i++) {

@@ -87,7 +87,7 @@ static int is_on_plane(const double p[3])
     return fabs(p[0] - 2.0) < NEAR_M;
 }
 
-/* There are one cloud of all and one of each, with the same points, each with the number of its scanner's station. The
+/* One file has the points of all stations, and three files those of one each. Each point has its station's number. The
  * points are the scanners' own: the Velodyne's elevations are odd degrees from -15 to 15, by its manual. */
 static void test_together(void **state)
 {
@@ -324,7 +324,7 @@ static unsigned times_said(struct wire *wire, const char *text)
     return n;
 }
 
-/* A warning of several scanners is printed once, with their stations. A warning of all is printed as the first one's. A
+/* A warning of several scanners is printed once, with their stations. A warning that all have is printed once, too. A
  * step of 7 deg divides no turn. */
 static void test_warnings_are_said_once(void **state)
 {

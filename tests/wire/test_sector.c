@@ -9,8 +9,8 @@ enum { MAX_POINTS = 4096 };
 static const char PYTHON[] = "/usr/bin/python3";
 static const double RAD = M_PI / 180;
 
-/* The recorded part. Rings are 180 / gaps degrees apart: those from ring `first` on, or a circle. Steps along a ring
- * are 360 / steps degrees apart: those from step `from` on. */
+/* The recorded part has `rings` rings from ring `first` on, 180 / gaps degrees apart. With gaps 0 it is a circle. A
+ * ring has `count` steps from step `from` on, 360 / steps degrees apart. */
 struct panorama {
     const char *head;
     int gaps, steps;

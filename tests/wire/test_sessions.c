@@ -192,8 +192,8 @@ static void many_come_one_after_the_other(void **state)
 
 /* ---- a client that doesn't read */
 
-/* Streams scans and does not read them until the system holds no more. After that all that comes is whole, and the
- * missing units are the counted ones. */
+/* Streams scans and does not read them until the system holds no more. After that all that comes is whole, and lost
+ * units are counted. */
 static void a_client_that_does_not_read(void **state)
 {
     struct wire *wire = *state;

@@ -12,9 +12,9 @@ struct recipe {
     const char *sets[5]; /* short scans, of which a map shows all */
 };
 
-/* demo and foliage have single rays or beams as a key, which saves seconds of planning. If the pan of a recipe stands
- * still, there is also one that moves. The last three take half of the time, and show only what others show, so they
- * run with THOROUGH=1. */
+/* A recipe is a ready configuration with some keys changed. Those of demo, foliage and glass set beam.mode, which saves
+ * seconds of planning. The last three take half of the time, and show only what others show, so they run with
+ * THOROUGH=1. */
 static const struct recipe RECIPES[] = {
     {"demo", 1, {"head.station=3", "head.pan_stop_deg=30", "beam.mode=single"}},
     {"demo", 1, {"head.pan_stop_deg=1", "beam.mode=single", "output.layout=polar"}},

@@ -35,8 +35,8 @@ static void test_at_once(void **state)
     }
 }
 
-/* The signal comes in mid-scan, at each pace. One reader gets everything up to the end of the scan, and another one
- * does not read. */
+/* The signal comes in mid-scan, in real time and in the pace fast. The reader gets everything up to the end of the
+ * scan. */
 static void in_mid_scan(struct wire *wire, const char *pace, int signal_number)
 {
     struct scanhead_frame frame;
@@ -150,7 +150,7 @@ static uint64_t ply_points(const struct wire *wire, const char *name)
     return n;
 }
 
-/* Starts `record SOURCE -o FILE` and interrupts it once the file grows, which it sees by a watch on the file. */
+/* Starts `record SOURCE -o FILE` and interrupts it once the file has grown. The file is looked at every 5 ms. */
 static void interrupt_record(struct wire *wire, const char *const *args, int signal_number, int expected)
 {
     pid_t pid = wire_spawn(wire, args, "out", "err", -1);

@@ -173,7 +173,7 @@ static void test_a_terminal(void **state)
     }
 }
 
-/* In the pace fast the client holds the head back. The sheet is as complete. JSON has standard output for itself. */
+/* In the pace fast the client holds the head back. Faults strike all the same. JSON has standard output for itself. */
 static void test_the_pace_fast(void **state)
 {
     struct wire *wire = *state;

@@ -209,8 +209,8 @@ static struct replay *replay(const char *path)
     return out;
 }
 
-/* Points after it are placed again from the next repetition on, within a second of 60. None is placed by the anchor
- * before, 2 km away. */
+/* After a lost anchor points are placed again from its next repetition on, so about one of the 60 s is not placed. No
+ * point is placed by the anchor before, 2 km away. */
 static void test_lost_anchor(void **state)
 {
     struct wire *wire = *state;
@@ -238,8 +238,8 @@ static void test_lost_anchor(void **state)
     free(holed);
 }
 
-/* The poses of a recording in ECEF are in the scene frame. By the file's own comments, each comes to where
- * GeographicLib puts it, and the file is a trajectory still. ECEF is rigid: only roundings of 7e6 m remain. */
+/* The poses of a recording in ECEF are in the scene frame. The file's own comments take each to the place
+ * that GeographicLib gives. The file can be read as a trajectory. ECEF is rigid: only roundings of 7e6 m remain. */
 static void test_poses_beside_a_crs(void **state)
 {
     struct wire *wire = *state;

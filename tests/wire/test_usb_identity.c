@@ -47,8 +47,8 @@ static struct head start_file(struct wire *wire, const char *name)
     return head_start(wire, wire_path(wire, name), more);
 }
 
-/* Two heads of different files are ended and started again in the other order. Each has its serial number again, though
- * not its bus id. */
+/* Two heads of different files are ended and started again in the other order. Each has its serial number
+ * again. */
 static void test_started_again(void **state)
 {
     struct wire *wire = *state;

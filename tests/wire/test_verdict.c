@@ -345,8 +345,8 @@ static void test_files_that_do_not_go_together(void **state)
     assert_int_equal(access(wire_path(wire, "configuration.log"), F_OK), -1);
 }
 
-/* The client's file may be {out}, written out. A name that no run writes is free: a sheet may have that of the
- * client's output where the client's file is another. */
+/* --client-file may be the path for which {out} stands. The sheet may have the name of the file for the client's
+ * output, which no run writes while --client-file names another file. */
 static void test_files_that_go_together(void **state)
 {
     struct wire *wire = *state;

@@ -185,7 +185,7 @@ static void a_scan_whose_end_is_lost_is_over(void **state)
     }
 }
 
-/* One sigma of 3 mm, set by a command: the scan is judged by it, and the histogram is highest in the middle. */
+/* One sigma of 3 mm, set by a command: the scan is judged by it. */
 static void noise_is_expected(void **state)
 {
     struct wire *wire = *state;

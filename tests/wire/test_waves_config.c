@@ -66,9 +66,9 @@ static void write_flat_pulse(struct wire *wire)
 }
 
 /* A link that can't carry the samples is refused, with the rate of both. 100 kHz of which 100 of 240 deg are used:
- * 41,667 pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 27 samples: 5 + 10 ns, and 11.8
- * in which a Gaussian of 4 ns is within 26 dB of its peak. A measured pulse has its own length: its 201 ns make 216
- * samples, 28 + 2 x 216. */
+ * 41,667 pulses with 20 + 4 bytes for a point and its attributes, and 28 + 2 x 28 for 27 samples and one to fill
+ * up: 5 + 10 ns, and 11.8 in which a Gaussian of 4 ns is within 26 dB of its peak. A measured pulse has its own length:
+ * its 201 ns make 216 samples, 28 + 2 x 216. */
 static void test_capacity(void **state)
 {
     struct wire *wire = *state;
