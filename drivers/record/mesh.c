@@ -158,6 +158,7 @@ static int end_grid(struct mesh_recorder *m, struct sh_err *err)
         rc = finish_grid(m, &faces, err);
     }
     m->grid.n = 0;
+    m->base.has_failed |= rc != SH_OK; /* the grid's points may have no part */
     scan_faces_free(&faces);
     return rc;
 }
@@ -244,7 +245,9 @@ static int take_point(struct mesh_recorder *m, int i, struct sh_err *err)
     int is_in = mesh_grid_add(&m->grid, t, i, point.xyz_m, err);
     if (is_in < 0) return is_in;
     m->n_lost += is_in == 0;
-    return is_in ? name_path(m, mesh_points_add(&m->points, &point, err), err) : SH_OK;
+    const int rc = is_in ? name_path(m, mesh_points_add(&m->points, &point, err), err) : SH_OK;
+    m->base.has_failed |= rc != SH_OK; /* the grid has a point more than the mesh */
+    return rc;
 }
 
 static int mesh_take_points(void *rec, int n, struct sh_err *err)

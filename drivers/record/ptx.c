@@ -75,7 +75,9 @@ static int end_scan(struct ptx *ptx, struct sh_err *err)
     int rc = ptx_text_put(&text, err);
     /* A repair makes a missing text from the cells. So the text goes to the file before the cells are deleted. */
     if (rc == 0) rc = outfile_flush(&ptx->base.file, err);
-    return rc == 0 ? ptx_grid_clear(g, err) : rc;
+    if (rc == 0) rc = ptx_grid_clear(g, err);
+    ptx->base.has_failed |= rc != 0; /* the text of the grid may be shorter than its header says */
+    return rc;
 }
 
 /* Returns whether the n points of the present batch, which are of one line, belong into the grid as it is. */

@@ -170,7 +170,7 @@ int ptx_grid_drain(struct ptx_grid *grid,
         rc = sh_fail(err, SH_EFORMAT, "%s: line numbers went back within a scan; %llu echoes are left out", grid->path,
                      (unsigned long long)d.left);
     free(column);
-    grid->n_shots = grid->n_cells = 0;
+    if (rc == 0) grid->n_shots = grid->n_cells = 0;
     return rc;
 }
 

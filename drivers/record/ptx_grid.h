@@ -54,7 +54,7 @@ int ptx_grid_cells(struct ptx_grid *grid, struct ptx_cell *cell, int n, struct s
 /* Flushes: the file then has all cells that were given so far. */
 int ptx_grid_save(struct ptx_grid *grid, struct sh_err *err);
 /* Calls fn for each column with its cells from row_min to row_max; a cell without echo has intensity -1. Then
- * the grid is without shots; its file stays until ptx_grid_clear. */
+ * the grid is without shots, unless this failed; its file stays until ptx_grid_clear. */
 int ptx_grid_drain(struct ptx_grid *grid,
                    int (*fn)(void *ctx, const struct ptx_cell *column, uint32_t n_rows, struct sh_err *err), void *ctx,
                    struct sh_err *err);

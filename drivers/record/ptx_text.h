@@ -25,7 +25,7 @@ struct ptx_text {
     uint64_t n_columns, n_rows_unreported; /* so far; since the last report of progress */
 };
 
-/* Puts the grid, whose shots are then gone (ptx_grid_drain). SH_EFORMAT: a coordinate is too long. */
+/* Puts the grid. Its shots are then gone, unless this failed (ptx_grid_drain). SH_EFORMAT: a coordinate is too long. */
 int ptx_text_put(struct ptx_text *text, struct sh_err *err);
 
 #endif

@@ -73,19 +73,20 @@ int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanh
     const int is_first = rec->ops->track.points != NULL && rec->track.n_scans == 0;
     const int rc =
         rec->ops->frame != NULL ? rec->ops->frame(rec, sh, frame, err) : track_frame(&rec->track, sh, frame, err);
-    rec->has_failed |= rc == SH_EIO;
-    rec->is_refused |= is_first && (rc == SH_EFORMAT || rc == SH_EINPUT);
+    const int is_refusal = rc == SH_EFORMAT || rc == SH_EINPUT;
+    rec->has_failed |= rc != SH_OK && !is_refusal;
+    rec->is_refused |= is_first && is_refusal;
     return rc;
 }
 
 int recorder_save(struct recorder *rec, struct sh_err *err)
 {
     const int rc = rec->ops->save != NULL ? rec->ops->save(rec, err) : outfile_save(&rec->file, err);
-    rec->has_failed |= rc == SH_EIO;
+    rec->has_failed |= rc != SH_OK;
     return rc;
 }
 
-/* After a failed write the file is not completed, even if there is room again: points in its middle would be missing.
+/* After a failure the file is not completed, even if there is room again: points in its middle would be missing.
  * A header that marks the file as incomplete stays. */
 static int recorder_finish(struct recorder *rec, struct sh_err *err)
 {

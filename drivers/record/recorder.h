@@ -77,8 +77,11 @@ struct recorder {
     struct recorder_options options;
     struct outfile file;
     struct track track; /* its messages name file.path */
-    int has_failed;     /* a write failed: the file is not completed */
-    int is_refused;     /* the format can't hold the first scan: no file is made */
+    /* Some of what came is missing before the file's end, since a write failed, memory ran out, or work was stopped:
+     * the file is not completed. Where a format refuses points or a scan, those before are whole; a format that leaves
+     * something unfinished then sets it. */
+    int has_failed;
+    int is_refused; /* the format can't hold the first scan: no file is made */
 };
 
 /* A format. All functions but fits and repair get the recorder's own struct as rec. Each function may be NULL. Errors:

@@ -135,6 +135,14 @@ test('where a scan ends, with SCAN_END and without, and what is missing of it', 
     'scan 1 null null null 100 null; scan 2 9 null 0 100 null', 'the next scan');
   equal(lossesOf(start, d(1), points, ['restarted', {}], start, d(1), points, telemetry(5, 1), end),
     `scan 1 null null null 100 null; ${whole}`, 'another sequence, whose scan has the same number');
+  // The final counts that were lost come with the next telemetry of the same scan: 120 - 7 - 100 pulses are missing.
+  for (const [state, scan, missing] of [[2, 1, 13], [5, 1, 13], [3, 1, 13], [4, 1, 0], [2, 2, 0]]) {
+    const late = new Losses(() => {});
+    for (const [name, value] of [start, d(1), points]) late[name]({...value, shots: 0});
+    late.event({...end[1], shots: 100});
+    for (let i = 0; i < 2; i++) late.telemetry({...telemetry(state, scan)[1], shots: 100}, 0);
+    equal(late.missing, missing, `telemetry of state ${state} and scan ${scan} after SCAN_END`);
+  }
   const counted = new Losses(() => {});
   counted.event({...end[1], shots: 0});
   equal(counted.byHead, 7, 'by SCAN_END, of a scan that was not seen');

@@ -24,7 +24,7 @@ struct sh_err err;
 char warned[512], *said;
 const char *stations, *order;
 struct recording_result gets;
-int recording_rc, is_complete, open_rc, appears_ms, stop_ms, is_stopped, is_recording, gave_up;
+int recording_rc, is_complete, open_rc, appears_ms, stop_ms, is_stopped, is_recording, gave_up, gave_up_early;
 
 static struct scanhead *const handle = (struct scanhead *)&job;
 static struct site_station stations_of[3];
@@ -97,6 +97,7 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
                        struct sh_err *e)
 {
     if (sh != handle || frame->seq != 5) say("FRAME ");
+    gave_up_early = job.notes.stop(job.notes.ctx);
     return call(e, "frame_%s", of(files));
 }
 
@@ -344,7 +345,7 @@ int make_job(void **state)
     fails = order = NULL;
     stations = "4";
     is_complete = 1;
-    recording_rc = open_rc = appears_ms = stop_ms = is_stopped = is_recording = gave_up = 0;
+    recording_rc = open_rc = appears_ms = stop_ms = is_stopped = is_recording = gave_up = gave_up_early = 0;
     clock_rig_ns = 0;
     return 0;
 }

@@ -21,6 +21,7 @@ extern int is_recording;        /* the source is a file */
 extern const char *stations;    /* the head's reply; NULL: none comes */
 extern const char *order;       /* what is wrong with the order of the stream; NULL: nothing */
 extern int gave_up;             /* what the files were told as they were closed */
+extern int gave_up_early;       /* what they were told as a frame came */
 
 int make_job(void **state);
 int end_job(void **state);

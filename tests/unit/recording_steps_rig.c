@@ -23,7 +23,7 @@ struct sh_err err;
 char warned[512], progress[512];
 struct scanhead_stats stats;
 struct scanhead_info info;
-int stop_ms, back_ms, rings;
+int stop_ms, back_ms, rings, is_count_due;
 double scan_s;
 
 static struct scanhead *const handle = (struct scanhead *)&options;
@@ -135,9 +135,11 @@ enum recording_news recording_count(struct recording_counts *counts, const struc
         counts->within = 1;
         counts->pulses += frame->n_points;
     }
+    if (frame->type == SCANHEAD_TELEMETRY) counts->due.scan = 0;
     if (frame->type == SCANHEAD_TELEMETRY) return frames_lost ? RECORDING_END_LOST : RECORDING_NOTHING;
     if (frame->type != SCANHEAD_EVENT || frame->event != SCANHEAD_EV_SCAN_END) return RECORDING_NOTHING;
     counts->within = 0;
+    counts->due.scan = is_count_due ? 1 : 0;
     counts->scans++;
     return RECORDING_SCAN_OVER;
 }
@@ -206,7 +208,7 @@ int make_recording(void **state)
     trace[0] = warned[0] = progress[0] = '\0';
     stats = (struct scanhead_stats){0};
     info = (struct scanhead_info){.frames = 1};
-    stop_ms = back_ms = rings = 0;
+    stop_ms = back_ms = rings = is_count_due = 0;
     scan_s = 0;
     clock_rig_ns = BEGAN_MS * MS;
     return 0;

@@ -29,6 +29,7 @@ extern struct scanhead_info info;
 extern int stop_ms, back_ms; /* a signal comes; a head that is gone is back; 0: never */
 extern int rings;            /* of a sphere; 0: it is none */
 extern double scan_s;        /* by the descriptor */
+extern int is_count_due;     /* a scan ends without its final counts, which the next telemetry brings */
 
 int make_recording(void **state);
 /* Runs it, and expects this result. */

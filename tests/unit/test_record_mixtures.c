@@ -345,6 +345,40 @@ static void test_poles(void **state)
     assert_false(mesh_grid_is_pole(&g, 0));
 }
 
+static int asked;
+
+static int stops_once(void *ctx)
+{
+    (void)ctx;
+    return asked++ == 0;
+}
+
+/* The triangles of the first scan fail as the second one begins; the stop stands for memory that runs out. A mesh
+ * without them would pass for a mesh of all that came, so there is none, also for a keeper of all that came. */
+static void test_a_grid_that_fails(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    memcpy(a.anchor, a.station_m, sizeof a.anchor);
+    rig_begin();
+    for (uint32_t scan = 1; scan <= 2; scan++) {
+        struct native_descriptor d = descriptor("Maker,Model,SN1,1", "model", scan);
+        d.pan_udeg_s = 36000000;
+        d.pan_stop_udeg = 360000000;
+        rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+        rig_anchor(&a);
+        for (uint32_t line = 0; line < 300; line++) /* a stop is asked for every 256 lines */
+            rig_points(line, (uint64_t)line * 10, (uint64_t)line * 10, &one, 1);
+    }
+    asked = 0;
+    rig_stop = stops_once;
+    assert_int_equal(rig_record(rig_path("a.obj"), (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err), SH_ESTOPPED);
+    rig_stop = NULL;
+    assert_int_equal(asked, 1);
+    assert_int_equal(access(rig_path("a.obj"), F_OK), -1);
+}
+
 static int tear_down(void **state)
 {
     e57rig_free();
@@ -354,12 +388,19 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_several_heads),  cmocka_unit_test(test_many_heads),
-        cmocka_unit_test(test_header_of_part), cmocka_unit_test(test_other_kinds),
-        cmocka_unit_test(test_same_kinds),     cmocka_unit_test(test_ply_says),
-        cmocka_unit_test(test_floats),         cmocka_unit_test(test_rows_of_beams),
-        cmocka_unit_test(test_lines_of_rings), cmocka_unit_test(test_a_line_beyond),
-        cmocka_unit_test(test_sweeps),         cmocka_unit_test(test_poles),
+        cmocka_unit_test(test_several_heads),
+        cmocka_unit_test(test_many_heads),
+        cmocka_unit_test(test_header_of_part),
+        cmocka_unit_test(test_other_kinds),
+        cmocka_unit_test(test_same_kinds),
+        cmocka_unit_test(test_ply_says),
+        cmocka_unit_test(test_floats),
+        cmocka_unit_test(test_rows_of_beams),
+        cmocka_unit_test(test_lines_of_rings),
+        cmocka_unit_test(test_a_line_beyond),
+        cmocka_unit_test(test_sweeps),
+        cmocka_unit_test(test_poles),
+        cmocka_unit_test(test_a_grid_that_fails),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -339,6 +339,7 @@ static void failures(void **state)
     close_all(1, SH_EIO);
     expect("s0<1 drain0 drop0 keep1 close_spool0 ");
     assert_string_equal(err.text, "drain0 failed");
+    assert_string_equal(warned, "a.ply: its points could not be coloured; it is not written");
     make(NULL);
     add("a.ply");
     add("b.shs");

@@ -69,7 +69,7 @@ static void send_end(void)
 {
     uint8_t frame[256];
     struct native_event end = {.code = NATIVE_EV_SCAN_END, .a = 3, .b = 100, .c = 7};
-    send_telemetry(HEAD_SCANNING);
+    send_telemetry(HEAD_SPIN_DOWN);
     send_frame(frame, native_encode_event(frame, sizeof frame, &end, 0, 0));
 }
 
@@ -226,6 +226,7 @@ static void check_counts(const struct recording_counts *counts, uint64_t pulses)
     assert_int_equal(counts->lost, 7);
     assert_int_equal(counts->pulses, pulses);
     assert_int_equal(counts->missing, 60 - 7 - pulses);
+    assert_int_equal(counts->unknown, 0);
 }
 
 static void test_unplugged_within_a_scan(void **state)

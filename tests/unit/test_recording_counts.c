@@ -8,6 +8,16 @@
 
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/app/studio/record/recording_counts.h"
+#include "firmware_sim/command/head.h"
+
+static int frames_lost; /* some were, by the time of an event or telemetry */
+
+static int set_up(void **state)
+{
+    (void)state;
+    frames_lost = 0;
+    return 0;
+}
 
 static enum recording_news points(struct recording_counts *c, uint32_t n_pulses)
 {
@@ -18,7 +28,7 @@ static enum recording_news points(struct recording_counts *c, uint32_t n_pulses)
 static enum recording_news event(struct recording_counts *c, uint32_t code, uint64_t a, uint64_t b, uint64_t lost)
 {
     const struct scanhead_frame frame = {.type = SCANHEAD_EVENT, .event = code, .event_value = {a, b, lost}};
-    return recording_count(c, &frame, 0);
+    return recording_count(c, &frame, frames_lost);
 }
 
 static enum recording_news descriptor(struct recording_counts *c, uint32_t scan)
@@ -30,6 +40,19 @@ static enum recording_news descriptor(struct recording_counts *c, uint32_t scan)
     const struct scanhead_frame frame = {
         .type = SCANHEAD_DESCRIPTOR, .payload = raw + NATIVE_HEADER_LEN, .payload_len = len - NATIVE_HEADER_LEN};
     return recording_count(c, &frame, 0);
+}
+
+static enum recording_news telemetry(struct recording_counts *c, enum head_state state, uint32_t scan, uint64_t fired,
+                                     uint64_t cast, uint64_t lost)
+{
+    static uint8_t raw[1024];
+    const struct native_telemetry t = {
+        .state = state, .scan = scan, .scan_fired = fired, .scan_cast = cast, .scan_lost = lost};
+    const size_t len = native_encode_telemetry(raw, sizeof raw, &t, 1, 0);
+    assert_true(len > NATIVE_HEADER_LEN);
+    const struct scanhead_frame frame = {
+        .type = SCANHEAD_TELEMETRY, .payload = raw + NATIVE_HEADER_LEN, .payload_len = len - NATIVE_HEADER_LEN};
+    return recording_count(c, &frame, frames_lost);
 }
 
 /* 100 pulses came of the 200 fired ones. The head left out 50 for a slow reader, and lost 10 itself. */
@@ -65,7 +88,7 @@ static void test_end_lost(void **state)
         points(&c, 100);
         assert_int_equal(descriptor(&c, first), RECORDING_NOTHING); /* said again */
         assert_int_equal(descriptor(&c, next[i]), RECORDING_END_LOST);
-        assert_true(c.scans == 1 && c.cast == 100 && c.missing == 0);
+        assert_true(c.scans == 1 && c.cast == 100 && c.missing == 0 && c.unknown == 1);
         points(&c, 10);
         assert_int_equal(event(&c, SCANHEAD_EV_SCAN_END, next[i], 20, 0), RECORDING_SCAN_OVER);
         assert_true(c.scans == 2 && c.pulses == 110 && c.fired == 20);
@@ -88,9 +111,100 @@ static void test_counts_without_an_end(void **state)
     assert_int_equal(c.scans, 1); /* nothing of the second one has come */
 }
 
+/* Of a scan 200 pulses are fired and 160 cast, 10 are lost by the head, and 100 come. So 50 are missing. A telemetry
+ * within the scan says less. */
+static void begin(struct recording_counts *c, uint32_t scan)
+{
+    *c = (struct recording_counts){0};
+    frames_lost = 0;
+    event(c, SCANHEAD_EV_SCAN_START, scan, 0, 0);
+    points(c, 60);
+    frames_lost = 1;
+    telemetry(c, HEAD_SCANNING, scan, 150, 120, 5);
+    points(c, 40);
+}
+
+static void expect_whole(const struct recording_counts *c)
+{
+    assert_true(c->scans == 1 && c->pulses == 100 && c->fired == 200 && c->cast == 160 && c->lost == 10);
+    assert_true(c->missing == 50 && c->unknown == 0);
+}
+
+/* The final counts come before SCAN_END or, where that telemetry was lost, with the next one of the same scan. Until
+ * then the counts of the scan are those that are known at least. */
+static void test_final_counts(void **state)
+{
+    struct recording_counts c;
+    (void)state;
+    begin(&c, 3);
+    telemetry(&c, HEAD_SPIN_DOWN, 3, 200, 160, 10);
+    event(&c, SCANHEAD_EV_SCAN_END, 3, 200, 10);
+    expect_whole(&c);
+
+    static const enum head_state later[] = {HEAD_SPIN_DOWN, HEAD_IDLE, HEAD_SPIN_UP, HEAD_FAULT};
+    for (size_t i = 0; i < sizeof later / sizeof later[0]; i++) {
+        begin(&c, 3);
+        assert_int_equal(event(&c, SCANHEAD_EV_SCAN_END, 3, 200, 10), RECORDING_SCAN_OVER);
+        assert_true(c.scans == 1 && c.fired == 200 && c.cast == 120 && c.missing == 10 && c.unknown == 1);
+        telemetry(&c, HEAD_SCANNING, 4, 9, 9, 9);
+        telemetry(&c, HEAD_IDLE, 4, 9, 9, 9);
+        assert_int_equal(c.unknown, 1); /* these are of another scan */
+        assert_int_equal(telemetry(&c, later[i], 3, 200, 160, 10), RECORDING_NOTHING);
+        expect_whole(&c);
+        telemetry(&c, HEAD_IDLE, 3, 200, 160, 10);
+        expect_whole(&c);
+    }
+}
+
+/* SCAN_END is lost, too. */
+static void test_final_counts_without_an_end(void **state)
+{
+    struct recording_counts c;
+    (void)state;
+    begin(&c, 3);
+    telemetry(&c, HEAD_SPIN_DOWN, 3, 200, 160, 10);
+    assert_int_equal(descriptor(&c, 4), RECORDING_END_LOST);
+    expect_whole(&c);
+    begin(&c, 3);
+    assert_int_equal(telemetry(&c, HEAD_IDLE, 3, 200, 160, 10), RECORDING_END_LOST);
+    expect_whole(&c);
+    begin(&c, 3);
+    recording_count_end(&c);
+    assert_true(c.scans == 1 && c.fired == 150 && c.cast == 120 && c.lost == 0 && c.missing == 20 && c.unknown == 1);
+    telemetry(&c, HEAD_IDLE, 3, 200, 160, 10);
+    expect_whole(&c);
+}
+
+/* The counts of a scan are known without telemetry if all frames came from its start on. */
+static void test_unknown(void **state)
+{
+    struct recording_counts c = {0};
+    (void)state;
+    points(&c, 100); /* the recording begins within the scan */
+    event(&c, SCANHEAD_EV_SCAN_END, 3, 200, 0);
+    assert_true(c.cast == 100 && c.missing == 0 && c.unknown == 1);
+    event(&c, SCANHEAD_EV_SCAN_START, 4, 0, 0);
+    points(&c, 100);
+    event(&c, SCANHEAD_EV_SCAN_END, 4, 200, 0);
+    assert_true(c.scans == 2 && c.cast == 200 && c.unknown == 1);
+    /* Another head, or the same one after a start, has a scan of the same number: its telemetry is of that scan. */
+    for (int is_seen = 0; is_seen < 2; is_seen++) {
+        begin(&c, 3);
+        event(&c, SCANHEAD_EV_SCAN_END, 3, 200, 10);
+        if (is_seen) event(&c, SCANHEAD_EV_SCAN_START, 3, 0, 0);
+        points(&c, 1);
+        telemetry(&c, HEAD_SPIN_DOWN, 3, 1, 1, 0);
+        assert_true(c.cast == 120 && c.unknown == 1);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_left_out), cmocka_unit_test(test_end_lost),
-                                       cmocka_unit_test(test_counts_without_an_end)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test_setup(test_left_out, set_up),
+                                       cmocka_unit_test_setup(test_end_lost, set_up),
+                                       cmocka_unit_test_setup(test_counts_without_an_end, set_up),
+                                       cmocka_unit_test_setup(test_final_counts, set_up),
+                                       cmocka_unit_test_setup(test_final_counts_without_an_end, set_up),
+                                       cmocka_unit_test_setup(test_unknown, set_up)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -67,6 +67,14 @@ static void each_key(void **state)
            "\"reader_lost_frames\":25,\"crowded_echoes\":12,\"faint_hits\":13,\"unfit_echoes\":14,\"lost_samples\":15,"
            "\"replugs\":26,\"bus_resets\":28,\"wall_s\":4,",
            ",\"pulses_per_s\":1500,\"stream_sha256\":\"12ab\"}\n");
+    result.counts.unknown = 1; /* then three counts are not known */
+    expect(&result,
+           "{\"points\":1,\"empty_shots\":2,\"pulses\":6000,\"fired_pulses\":null,\"cast_pulses\":null,"
+           "\"lost_pulses\":9,\"missing_pulses\":null,\"reader_lost_pulses\":10,\"scans\":5,\"frames\":16,"
+           "\"bytes\":17,\"bad_payload\":18,\"bad_bytes\":19,\"seq_lost\":20,\"repeated\":21,\"late\":22,"
+           "\"restarts\":23,\"dropped\":24,\"reader_lost_frames\":25,\"crowded_echoes\":12,\"faint_hits\":13,"
+           "\"unfit_echoes\":14,\"lost_samples\":15,\"replugs\":26,\"bus_resets\":28,\"wall_s\":4,",
+           ",\"pulses_per_s\":1500,\"stream_sha256\":\"12ab\"}\n");
     result = (struct recording_result){.points = 1};
     expect(&result,
            "{\"points\":1,\"empty_shots\":0,\"pulses\":0,\"fired_pulses\":0,\"cast_pulses\":0,\"lost_pulses\":0,"
@@ -82,12 +90,15 @@ static void parts_are_added(void **state)
     struct recording_result sum = a_result(), more = a_result();
     (void)state;
     more.points = 100; /* so that a doubled sum does not pass */
+    sum.counts.unknown = 3;
+    more.counts.unknown = 40;
     strcpy(more.missing, "the scan");
     recording_add(&sum, &more);
     assert_true(sum.points == 101 && sum.empty == 4 && sum.frames == 6 && sum.with_reflectance == 8);
     assert_true(sum.counts.scans == 10 && sum.counts.pulses == 12000 && sum.counts.fired == 14);
     assert_true(sum.counts.cast == 16 && sum.counts.lost == 18 && sum.counts.left_out == 20);
-    assert_true(sum.counts.missing == 22 && sum.crowded == 24 && sum.faint == 26 && sum.unfit == 28);
+    assert_true(sum.counts.unknown == 43 && sum.counts.missing == 22 && sum.crowded == 24 && sum.faint == 26 &&
+                sum.unfit == 28);
     assert_true(sum.lost_samples == 30 && sum.replugs == 52 && sum.broken_scans == 54 && sum.bus_resets == 56);
     assert_true(sum.stream.frames == 16 && sum.wall_s == 4.0); /* as the header says: not those of its stream */
     assert_string_equal(sum.missing, "the scan");
@@ -127,6 +138,12 @@ static void missing_parts_are_named(void **state)
         &r, SH_EIO,
         "the recording is not complete: 321 frames lost to this reader, 0 pulses by the head; of the pulses that "
         "it sent 4 are missing");
+    r.counts.unknown = 1;
+    incomplete(
+        &r, SH_EIO,
+        "the recording is not complete: 321 frames lost to this reader, 0 pulses by the head; of the pulses that "
+        "it sent at least 4 are missing");
+    r.counts.unknown = 0;
     r.stream = (struct scanhead_stats){.pulses_lost = 6};
     r.counts.lost = 5;
     r.counts.missing = 0;

@@ -253,28 +253,6 @@ static void interruptions(void **state)
     assert_string_equal(err.text, "SCAN:STOP: it broke");
 }
 
-/* After 2 s without pulses, it asks for the state where frames were lost: the end may be among them. */
-static void a_lost_end(void **state)
-{
-    static const struct turn script[] = {POINTS(0, 1), NOTHING(1999), NOTHING(1), OVER(0), LAST};
-    (void)state;
-    turns = script;
-    run_it(SH_OK);
-    expect("HEAD:STAT?@0 prepare0@0 SCAN:STAR@0 second@1999 ");
-    make_recording(NULL);
-    turns = script;
-    stats.dropped = 1;
-    run_it(SH_OK);
-    expect("HEAD:STAT?@0 prepare0@0 SCAN:STAR@0 second@1999 HEAD:STAT?@2000 count_end ");
-    assert_string_equal(warned, "the scan's end was lost; the head is idle\n");
-    const struct turn news[] = {POINTS(0, 1), {.frame = {.type = SCANHEAD_TELEMETRY}}, LAST};
-    make_recording(NULL);
-    turns = news;
-    stats.restarts = 1;
-    run_it(SH_OK);
-    assert_string_equal(warned, "the scan's end was lost; the head goes on without it\n");
-}
-
 /* ---- progress */
 
 /* Once a second it reports the share of the whole: by the duration of a scan, or that of the user if it is shorter, and
@@ -438,7 +416,6 @@ int main(void)
         cmocka_unit_test_setup(a_duration, make_recording),
         cmocka_unit_test_setup(an_end_that_does_not_come, make_recording),
         cmocka_unit_test_setup(interruptions, make_recording),
-        cmocka_unit_test_setup(a_lost_end, make_recording),
         cmocka_unit_test_setup(shares, make_recording),
         cmocka_unit_test_setup(a_listener, make_recording),
         cmocka_unit_test_setup(a_head_that_is_gone, make_recording),

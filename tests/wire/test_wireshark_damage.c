@@ -4,6 +4,7 @@
 #include "tests/wire/wireshark_rig.h"
 
 #include "drivers/protocol/native.h"
+#include "firmware_sim/command/head.h"
 
 enum { N_HURT = 1000, N_ROUNDS = 3 };
 
@@ -321,9 +322,41 @@ static void test_restart(void **state)
     assert_non_null(strstr(last, "Points that nobody can place yet"));
 }
 
+/* The telemetry before the end of a scan has its final counts. If that one is missing, an earlier one does not stand
+ * for it: here it is made one from within the scan, before 7 of the pulses. */
+static void test_counts_that_are_not_final(void **state)
+{
+    (void)state;
+    static const char *const fields[] = {S "missing_pulses", "_ws.expert.message", NULL};
+    struct capture c = {0};
+    size_t len, n = 0;
+    uint8_t *bytes = (uint8_t *)wire_read(wire_path(wire, "polar.shs"), &len);
+    capture_begin(&c);
+    const uint32_t interface = capture_interface(&c, CAPTURE_USER0);
+    for (uint8_t *at = bytes; at < bytes + len; at += native_frame_len(at)) {
+        uint8_t *t = at + NATIVE_HEADER_LEN; /* state at 0; scan_fired and scan_cast at 72 and 80 */
+        if (at[1] == NATIVE_TELEMETRY && le_get32(t) == HEAD_SPIN_DOWN) {
+            le_put32(t, HEAD_SCANNING);
+            for (int k = 72; k <= 80; k += 8)
+                le_put32(t + k, le_get32(t + k) - 7);
+            seal_frame(at);
+            n++;
+        }
+        capture_packet(&c, interface, at, native_frame_len(at));
+    }
+    assert_true(n > 0);
+    wire_write(wire, "counts.pcapng", c.bytes, c.len);
+    free(c.bytes);
+    free(bytes);
+    dissect("counts.pcapng", 1, fields);
+    assert_int_equal(dissected_count(S "missing_pulses"), 0);
+    assert_null(strstr(dissected_text(), "telemetry: "));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_hurt), cmocka_unit_test(test_damage),
-                                       cmocka_unit_test(test_restart)};
+                                       cmocka_unit_test(test_restart),
+                                       cmocka_unit_test(test_counts_that_are_not_final)};
     return cmocka_run_group_tests(tests, wireshark_setup, wire_teardown);
 }

@@ -125,7 +125,7 @@ export class Head extends EventTarget {
    * - lost_frames: missing in the sequence
    * - left_out_frames, left_out_pulses: the part of these that the head left out, since this page was too slow
    * - lost_pulses: lost by the head; missing_pulses: those that the head sent and this page did not get, in the scans
-   *   whose end this page has seen
+   *   whose final counts have come
    * - dropped_points, dropped_pulses: decoded, and dropped by the page itself
    * - unplaced_points, unplaced_pulses: came before their anchor or their pose
    * - past_points, past_pulses, past_hash: from before this connection, and in none of the other counts

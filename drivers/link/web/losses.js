@@ -8,7 +8,7 @@ const IN_SCAN = ['scanning', 'spin-down'];
 export class Losses {
   leftOutFrames = 0; // by the head, since this page was too slow (READER_LOST)
   leftOutPulses = 0;
-  missing = 0; // pulses of the scans that ended, which the head delivered and this page did not receive
+  missing = 0; // pulses that the head delivered and this page did not receive, of scans whose final counts came
   #byOverruns = 0; // pulses that the head lost, by OVERRUN events
   #byScanEnds = 0; // the same, by the ends of scans; events of either kind may be missing
   #damaged = 0; // missing frames that no READER_LOST explains, and that were reported
@@ -18,6 +18,7 @@ export class Losses {
   #shots = 0; // pulses received before the scan
   #before = {scan: null, shots: 0}; // the pulses of a scan that past() brought
   #counts = null; // the last telemetry
+  #due = null; // the scan, and pulses received, where SCAN_END came and the telemetry before it was lost
   #say;
 
   /** say(name, detail): 'lost' and 'scan', as Head's events. Events given to this class have `shots`, the pulses
@@ -39,6 +40,7 @@ export class Losses {
   restarted({shots}) {
     this.#begin(null, shots);
     this.#counts = null;
+    this.#due = null;
     this.#before = {scan: null, shots: 0};
   }
 
@@ -51,11 +53,16 @@ export class Losses {
     if (scan !== this.#before.scan) this.#before = {scan, shots: 0};
     this.#before.shots += shots;
     if (scan === this.#scan) this.#shots -= shots;
+    if (scan === this.#due?.scan) this.#due.received += shots;
   }
 
   /** lost_frames: missing in the sequence so far. */
   telemetry(t, lost_frames) {
     this.#counts = t;
+    if (t.scan === this.#due?.scan && STATES[t.state] !== 'scanning') {
+      this.missing += t.scan_cast === null ? 0 : t.scan_cast - t.scan_lost - this.#due.received;
+      this.#due = null;
+    }
     if (t.scan !== this.#scan) this.#end(this.#scan, null, t.shots);
     else if (!IN_SCAN.includes(STATES[t.state])) this.#end(t.scan, t, t.shots);
     // READER_LOST may come after the jump that it explains. Frames that were unexplained at the telemetry before, and
@@ -114,6 +121,7 @@ export class Losses {
     const received = shots - this.#shots, missing = cast === null ? null : cast - lost - received;
     this.#byScanEnds += lost ?? 0;
     this.missing += missing ?? 0;
+    this.#due = counts !== null && cast === null ? {scan, received} : null;
     this.#say('scan', {scan, fired, cast, lost, received, missing});
   }
 }

@@ -639,7 +639,8 @@ local ABSORB = {
     flow.line = {pulses = 0, whole = true}
   end,
   [TELEMETRY] = function(flow, h, bytes, at)
-    if h.length < 96 then flow.final = nil return end
+    local is_final = h.length >= 96 and number_at(bytes, at) ~= 4 -- within a scan (4: scanning) counts are not final
+    if not is_final then flow.final = nil return end
     flow.final = {scan = number_at(bytes, at + 4), fired = number64(bytes, at + 72), cast = number64(bytes, at + 80),
                   lost = number64(bytes, at + 88)}
   end,

@@ -98,9 +98,7 @@ int colour_spool_drain(struct colour_spool *spool,
         done += frame.raw_len;
         if (rc != SH_OK || n % FRAMES_BETWEEN_STOPS != 0) continue;
         sh_progress(report, "colouring the points", (double)done / (double)spool->bytes);
-        if (sh_stopped(report))
-            rc = sh_fail(err, SH_ESTOPPED, "%s: interrupted while it was completed; it is not written",
-                         spool->track.path);
+        if (sh_stopped(report)) rc = sh_fail(err, SH_ESTOPPED, "interrupted while points were coloured");
     }
     /* Compares bytes, not numbers of frames: after a replug a frame may equal an earlier one, and the handle then drops
      * it as a repetition. */

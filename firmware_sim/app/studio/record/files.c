@@ -289,6 +289,9 @@ int record_files_close(struct record_files *files, int keep, struct sh_err *err)
         struct sh_err why = {0};
         if (files->file[i].rec == NULL) continue;
         const int is_whole = is_coloured || !files->file[i].ops->track.wants_colours;
+        if (!is_whole)
+            sh_warn(files->recorder.report, "%s: its points could not be coloured; it is not written",
+                    files->file[i].now);
         int e = recorder_close(files->file[i].rec, keep && is_whole, &why);
         files->file[i].rec = NULL;
         if (e != SH_OK && rc != SH_OK) sh_warn(files->recorder.report, "%s", why.text); /* err has the first */

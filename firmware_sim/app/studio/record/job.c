@@ -20,11 +20,13 @@ static int is_stopped(const struct record_job *r)
     return r->stop != NULL && r->stop(r->stop_ctx);
 }
 
-/* Whether completing files is to be given up: a stop was asked for, or a signal came that did not end the recording. */
+/* Whether files are to be given up: a stop was asked for, or a signal came while they are completed. A signal that
+ * comes earlier ends the recording, also while a recorder writes the grid of a scan, or the files of a scan are
+ * completed: the files then keep what came. */
 static int gives_up(void *ctx)
 {
     const struct record_job *r = ctx;
-    return is_stopped(r) || (app_interrupted() && !r->interrupted);
+    return is_stopped(r) || (r->is_completing && app_interrupted() && !r->interrupted);
 }
 
 static int write_frame(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -110,6 +112,7 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     const int has_points = result->points != 0 && r->files.has_points; /* a format may have refused the first ones */
     const int keep = r->only_whole ? whole : has_points || (rc == SH_OK && result->missing[0] == '\0');
     r->interrupted = app_interrupted();
+    r->is_completing = 1;
     if (r->may_end && rc == SH_ECLOSED && has_points) rc = SH_OK;
     int after = close_files(r, keep && !is_stopped(r), &why);
     rc = app_and_also(rc, after, &why, err);

@@ -37,6 +37,7 @@ struct record_job {
     struct record_files parts;
     struct recorder_scan first; /* the first scan, as the configuration describes it */
     int has_silent;             /* objects that give no echo (scene.target) */
+    int is_completing;          /* all frames have come, and the files are completed */
     int interrupted;            /* a signal came before the files were completed; they are completed all the same */
 };
 

@@ -168,11 +168,15 @@ static int check_options(const struct record_line *r)
     return option == NULL ? APP_OK : app_usage(&app_record, "%s is among the files", option);
 }
 
-/* Where no command is sent to the head, its station and its number of frames can't be chosen. */
+/* Where no command is sent to the head, its station and its number of frames can't be chosen. A duration ends a
+ * recording that listens, but a recorded stream would lose its later scans. */
 static int check_commands(const struct record_line *r)
 {
     const int is_file = app_is_recording(r->in.operand[0]);
-    const char *option = r->job.station != 0 ? "--station" : r->job.recording.frames >= 0 ? "--frames" : NULL;
+    const char *option = r->job.station != 0                            ? "--station"
+                         : r->job.recording.frames >= 0                 ? "--frames"
+                         : is_file && r->job.recording.duration_s > 0.0 ? "--duration"
+                                                                        : NULL;
     if (option == NULL || (!is_file && !r->job.recording.listen)) return APP_OK;
     return app_usage(&app_record, "%s: %s; allowed with a CONFIG, and with a head on a wire without --listen", option,
                      is_file ? "a recorded stream has the scans that it has" : "--listen sends no command");
@@ -310,7 +314,7 @@ static const struct app_option OPTIONS[] = {
      .help = "frames per scan; 0: without end"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(job.recording.duration_s),
      .help = "end each scan after S seconds of device time: with a CONFIG exact to a pulse, with a head on a wire as "
-             "soon as it carries out the command"},
+             "soon as it carries out the command. With --listen the recording ends then"},
     {APP_FLAG, "split", NULL, .at = AT(job.files.split),
      .help = "write each scan to its own files: NAME-1.las, NAME-2.las, ..., in the order of scans"},
     {APP_FLAG, "each", NULL, .at = AT(job.each), .help = "like --split, in addition to the files of all scans"},

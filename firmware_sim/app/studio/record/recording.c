@@ -17,6 +17,7 @@ enum {
     LAST_MS = 60000,
     BOOT_MS = 30000,
     REPLUG_MS = 1000,
+    COUNTS_MS = 2000, /* telemetry comes each second */
     SILENT_MS = 2000
 };
 
@@ -100,7 +101,8 @@ static int has_lost_frames(const struct recording *r)
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
 {
-    const int lost = frame->type == SCANHEAD_TELEMETRY && has_lost_frames(r); /* only telemetry uses it */
+    const int is_asked = frame->type == SCANHEAD_TELEMETRY || frame->type == SCANHEAD_EVENT;
+    const int lost = is_asked && has_lost_frames(r);
     enum recording_news news = recording_count(&r->result->counts, frame, lost);
     if (news == RECORDING_NOTHING) return;
     if (news == RECORDING_END_LOST) sh_warn(r->o->report, "the scan's end was lost; the head goes on without it");
@@ -293,6 +295,19 @@ static int has_waited(const struct recording *r, int64_t asked_ns)
     return now_ns - last_ns > (int64_t)END_MS * 1000000 || now_ns - asked_ns > (int64_t)LAST_MS * 1000000;
 }
 
+/* If the telemetry with the final counts of the scan was lost, the next one has them, too. A stream that ends meanwhile
+ * is no failure here: the scan is over, and the next command finds the end. */
+static int await_counts(struct recording *r, struct sh_err *err)
+{
+    const int64_t end_ns = clock_now_ns() + (int64_t)COUNTS_MS * 1000000;
+    while (r->result->counts.due.scan != 0 && clock_now_ns() < end_ns && !is_interrupted(r)) {
+        const int rc = step(r, NEXT_MS, err);
+        if (rc == SH_ECLOSED || rc == SH_ELOST || rc == SH_ERESET) return SH_OK;
+        if (rc < 0) return rc;
+    }
+    return SH_OK;
+}
+
 static int recording_follow(struct recording *r, struct sh_err *err)
 {
     int64_t asked_ns = 0;
@@ -315,9 +330,9 @@ static int recording_follow(struct recording *r, struct sh_err *err)
         if (rc != SH_OK) return rc;
         r->heard_ns = clock_now_ns();
     }
-    return r->scan_started || r->stopping || r->o->listen
-               ? SH_OK
-               : sh_fail(err, SH_ESTATE, "the head ended the scan before its first pulse");
+    if (r->o->listen) return SH_OK;
+    if (r->scan_started || r->stopping) return await_counts(r, err);
+    return sh_fail(err, SH_ESTATE, "the head ended the scan before its first pulse");
 }
 
 static int start_scan(struct recording *r, uint32_t station, struct sh_err *err)

@@ -6,23 +6,69 @@
 #include "drivers/protocol/native.h"
 #include "firmware_sim/command/head.h"
 
+/* What is known of a scan that ended. */
+struct known {
+    int is_final;
+    uint64_t fired, cast, lost;
+};
+
 /* The scan at hand is over. Where `cast` is less than the pulses received plus those lost, their sum counts instead. */
-static void recording_counts_end(struct recording_counts *c, uint64_t fired, uint64_t cast, uint64_t lost)
+static void recording_counts_end(struct recording_counts *c, const struct known *k)
 {
-    uint64_t least = c->scan.pulses + lost;
+    const uint64_t least = c->scan.pulses + k->lost, cast = k->cast > least ? k->cast : least;
     c->scans++;
-    c->fired += fired;
-    c->cast += cast > least ? cast : least;
-    c->lost += lost;
-    c->missing += cast > least ? cast - least : 0;
+    c->fired += k->fired;
+    c->cast += cast;
+    c->lost += k->lost;
+    c->missing += cast - least;
+    c->unknown += !k->is_final;
+    memset(&c->due, 0, sizeof c->due);
+    if (!k->is_final) {
+        c->due.scan = c->scan.number;
+        c->due.pulses = c->scan.pulses;
+        c->due.fired = k->fired;
+        c->due.cast = cast;
+        c->due.lost = k->lost;
+        c->due.missing = cast - least;
+    }
     c->ended = c->scan.number;
     c->within = 0;
     memset(&c->scan, 0, sizeof c->scan);
 }
 
+/* The final counts of the scan that is due have come: they replace what was counted. */
+static void correct(struct recording_counts *c, const struct native_telemetry *t)
+{
+    const uint64_t least = c->due.pulses + t->scan_lost, cast = t->scan_cast > least ? t->scan_cast : least;
+    c->fired += t->scan_fired - c->due.fired;
+    c->cast += cast - c->due.cast;
+    c->lost += t->scan_lost - c->due.lost;
+    c->missing += cast - least - c->due.missing;
+    c->unknown--;
+    memset(&c->due, 0, sizeof c->due);
+}
+
+static uint64_t more_of(uint64_t a, uint64_t b)
+{
+    return a > b ? a : b;
+}
+
+/* What telemetry and events say of the scan at hand: at least that much. */
+static struct known known_so_far(const struct recording_counts *c)
+{
+    const int is_told = c->told.scan != 0 && c->told.scan == c->scan.number;
+    struct known k = {.cast = c->scan.pulses + c->scan.lost + c->scan.left_out, .lost = c->scan.lost};
+    if (!is_told) return k;
+    if (c->told.is_final) return (struct known){1, c->told.fired, c->told.cast, c->told.lost};
+    k.fired = c->told.fired;
+    k.cast = more_of(k.cast, c->told.cast);
+    return k;
+}
+
 void recording_count_end(struct recording_counts *c)
 {
-    if (c->within) recording_counts_end(c, 0, c->scan.pulses + c->scan.lost + c->scan.left_out, c->scan.lost);
+    const struct known k = known_so_far(c);
+    if (c->within) recording_counts_end(c, &k);
 }
 
 /* Frames of scan `number` come. Where the scan at hand is another one, its end was lost, and its counts with it. */
@@ -37,9 +83,15 @@ static enum recording_news enter(struct recording_counts *c, uint32_t number)
 static enum recording_news recording_counts_begin(struct recording_counts *c, uint32_t number)
 {
     enum recording_news news = enter(c, number);
-    if (!c->within) memset(&c->scan, 0, sizeof c->scan); /* overruns of the scan before may have come after its end */
+    if (!c->within) {
+        memset(&c->scan, 0, sizeof c->scan); /* overruns of the scan before may have come after its end */
+        c->scan.is_seen_begin = 1;
+    }
     c->scan.number = number;
     c->ended = 0;
+    /* An earlier scan of this number was one of another head, or from before this head started again. */
+    if (c->told.scan == number) c->told.scan = 0;
+    if (c->due.scan == number) c->due.scan = 0;
     return news;
 }
 
@@ -48,35 +100,44 @@ static enum recording_news take_telemetry(struct recording_counts *c, const stru
 {
     struct native_telemetry t;
     if (native_decode_telemetry(frame->payload, frame->payload_len, &t) != 0) return RECORDING_NOTHING;
+    const int is_final = t.state != HEAD_SCANNING;
     if (c->scan.number == 0 && c->within) c->scan.number = t.scan;
     c->told.scan = t.scan;
+    c->told.is_final = is_final;
+    c->told.fired = t.scan_fired;
     c->told.cast = t.scan_cast;
+    c->told.lost = t.scan_lost;
+    if (is_final && t.scan != 0 && t.scan == c->due.scan) correct(c, &t);
     if (!c->within || !frames_lost || t.state != HEAD_IDLE) return RECORDING_NOTHING;
-    if (c->scan.number == t.scan)
-        recording_counts_end(c, t.scan_fired, t.scan_cast, t.scan_lost);
-    else
-        recording_count_end(c);
+    recording_count_end(c);
     return RECORDING_END_LOST;
 }
 
-static enum recording_news take_scan_end(struct recording_counts *c, const struct scanhead_frame *frame)
+/* SCAN_END has the final counts but for the pulses cast. If no frame was lost since SCAN_START, all others came. */
+static enum recording_news take_scan_end(struct recording_counts *c, const struct scanhead_frame *frame,
+                                         int frames_lost)
 {
     uint32_t number = (uint32_t)frame->event_value[0];
-    uint64_t lost = frame->event_value[2];
     if (number == c->ended && !c->within) return RECORDING_SCAN_OVER; /* telemetry has said so */
     enter(c, number);
-    recording_counts_end(c, frame->event_value[1],
-                         c->told.scan == number ? c->told.cast : c->scan.pulses + lost + c->scan.left_out, lost);
+    struct known k = known_so_far(c);
+    const uint64_t lost = frame->event_value[2], least = c->scan.pulses + lost + c->scan.left_out;
+    k.fired = frame->event_value[1];
+    k.cast = k.is_final ? k.cast : more_of(k.cast, least);
+    k.lost = lost;
+    k.is_final |= c->scan.is_seen_begin && !frames_lost;
+    recording_counts_end(c, &k);
     return RECORDING_SCAN_OVER;
 }
 
-static enum recording_news recording_counts_take_event(struct recording_counts *c, const struct scanhead_frame *frame)
+static enum recording_news recording_counts_take_event(struct recording_counts *c, const struct scanhead_frame *frame,
+                                                       int frames_lost)
 {
     switch (frame->event) {
     case SCANHEAD_EV_SCAN_START:
         return recording_counts_begin(c, (uint32_t)frame->event_value[0]);
     case SCANHEAD_EV_SCAN_END:
-        return take_scan_end(c, frame);
+        return take_scan_end(c, frame, frames_lost);
     case SCANHEAD_EV_OVERRUN:
         c->scan.lost += frame->event_value[1];
         return RECORDING_NOTHING;
@@ -94,6 +155,7 @@ enum recording_news recording_count(struct recording_counts *c, const struct sca
     struct native_descriptor descriptor;
     switch (frame->type) {
     case SCANHEAD_POINTS:
+        if (!c->within) c->due.scan = 0; /* no points of a scan come after its end: these are of another one */
         c->within = 1;
         c->pulses += frame->n_pulses;
         c->scan.pulses += frame->n_pulses;
@@ -104,7 +166,7 @@ enum recording_news recording_count(struct recording_counts *c, const struct sca
     case SCANHEAD_TELEMETRY:
         return take_telemetry(c, frame, frames_lost);
     case SCANHEAD_EVENT:
-        return recording_counts_take_event(c, frame);
+        return recording_counts_take_event(c, frame, frames_lost);
     default:
         return RECORDING_NOTHING;
     }

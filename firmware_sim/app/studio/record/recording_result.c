@@ -19,6 +19,7 @@ void recording_add(struct recording_result *sum, const struct recording_result *
     sum->counts.lost += more->counts.lost;
     sum->counts.left_out += more->counts.left_out;
     sum->counts.missing += more->counts.missing;
+    sum->counts.unknown += more->counts.unknown;
     sum->crowded += more->crowded;
     sum->lost_samples += more->lost_samples;
     sum->faint += more->faint;
@@ -27,6 +28,15 @@ void recording_add(struct recording_result *sum, const struct recording_result *
     sum->broken_scans += more->broken_scans;
     sum->bus_resets += more->bus_resets;
     memcpy(sum->missing, more->missing, sizeof sum->missing);
+}
+
+/* null where the final counts of a scan did not come. */
+static void put_known(struct json *json, const char *key, const struct recording_counts *counts, uint64_t n)
+{
+    if (counts->unknown == 0)
+        json_uint(json, key, n);
+    else
+        json_string(json, key, NULL);
 }
 
 void recording_put(struct json *json, const void *ctx)
@@ -38,10 +48,10 @@ void recording_put(struct json *json, const void *ctx)
     json_uint(json, "points", result->points);
     json_uint(json, "empty_shots", result->empty);
     json_uint(json, "pulses", counts->pulses);
-    json_uint(json, "fired_pulses", counts->fired);
-    json_uint(json, "cast_pulses", counts->cast);
+    put_known(json, "fired_pulses", counts, counts->fired);
+    put_known(json, "cast_pulses", counts, counts->cast);
     json_uint(json, "lost_pulses", counts->lost);
-    json_uint(json, "missing_pulses", counts->missing);
+    put_known(json, "missing_pulses", counts, counts->missing);
     json_uint(json, "reader_lost_pulses", counts->left_out);
     json_uint(json, "scans", counts->scans);
     json_uint(json, "frames", s->frames);
@@ -101,6 +111,7 @@ int recording_check_complete(const struct recording_result *result, struct sh_er
     return sh_fail(
         err, SH_EIO,
         "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head; of the pulses that "
-        "it sent %llu are missing",
-        lost, (unsigned long long)pulses, (unsigned long long)result->counts.missing);
+        "it sent %s%llu are missing",
+        lost, (unsigned long long)pulses, result->counts.unknown != 0 ? "at least " : "",
+        (unsigned long long)result->counts.missing);
 }

@@ -180,11 +180,12 @@ static void look_for_losses(struct viewed_stream *s, struct scanhead *sh)
     const struct recording_counts *c = &s->counts;
     scanhead_get_stats(sh, &stats);
     v->n_left_out = m->n_unplaced + m->n_without_pose + m->n_nowhere;
-    v->complete = !c->within && c->scans > 0 && c->lost == 0 && c->missing == 0 && !frames_lost(&stats);
+    v->complete =
+        !c->within && c->scans > 0 && c->lost == 0 && c->missing == 0 && c->unknown == 0 && !frames_lost(&stats);
     if (!v->complete)
-        sh_warn(s->report, "%s: not complete: %llu pulses lost by the head, %llu did not arrive, %llu bad bytes%s",
-                v->path, (unsigned long long)c->lost, (unsigned long long)c->missing,
-                (unsigned long long)stats.bad_bytes,
+        sh_warn(s->report, "%s: not complete: %llu pulses lost by the head, %s%llu did not arrive, %llu bad bytes%s",
+                v->path, (unsigned long long)c->lost, c->unknown != 0 ? "at least " : "",
+                (unsigned long long)c->missing, (unsigned long long)stats.bad_bytes,
                 c->within || c->scans == 0 ? "; it ends in the middle of a scan" : "");
 }
 
